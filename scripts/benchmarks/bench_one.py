@@ -60,12 +60,16 @@ def problem_case(dimension: int, n: int, *changes: str) -> Case:
     return bar(n, -0.05, 1e5, "friction.mu=0.5", *changes)
 
 
-def memory() -> float:
-    """Return the peak memory of all ranks (bytes)."""
+def rank_memory() -> float:
+    """Return the peak memory of this rank (bytes)."""
     # Not that of `getrusage`: it is at least that of the process that has started this one.
     status = Path("/proc/self/status").read_text()
-    peak = float(status.split("VmHWM:")[1].split()[0]) * 1024
-    return float(COMM.allreduce(peak, op=MPI.SUM))
+    return float(status.split("VmHWM:")[1].split()[0]) * 1024
+
+
+def memory() -> float:
+    """Return the peak memory of all ranks (bytes)."""
+    return float(COMM.allreduce(rank_memory(), op=MPI.SUM))
 
 
 def unknowns(problem: ContactProblem) -> int:

@@ -1,0 +1,196 @@
+"""Weak scaling: memory and messages of ranks that each have a slice of one body or of two.
+
+``mpirun -n P python3 -m scripts.benchmarks.weak BODIES N [--solve]``: BODIES, 1 or 2, are bars of
+P x 1 x 1 that touch along their length, N the cells of a rank along each edge of its slice: N = 43
+makes 250,000 unknowns a rank of one body, N = 34 of two. Without ``--solve`` a problem is made and
+its residuals are evaluated; with it, it is solved. Each rank counts the bytes of the arrays of
+Python at their peak (`tracemalloc`), those of the coupling, and those that it receives through the
+communicator; counts do not depend on the machine, or on how many cores it has.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+import tracemalloc
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import basix.ufl
+import numpy as np
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact import solve
+from contact._compat import destinations
+from contact.body.description import Body, Fixed
+from contact.interface.friction import Friction
+from contact.mesh.domain import Domain, from_mesh
+from contact.methods.options import NewtonOptions
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
+from contact.problem.residuals import evaluate
+from forms.hencky import Linear
+from scripts.benchmarks.bench_one import rank_memory
+
+#: Gap between the bars, in edges of their section.
+GAP = 1e-3
+
+
+class Counted(MPI.Intracomm):
+    """A communicator that counts the bytes that this rank receives, and the calls."""
+
+    received: ClassVar[Counter[str]] = Counter()
+
+
+def _counting(name: str) -> Any:
+    plain = getattr(MPI.Intracomm, name)
+
+    def counted(self: Counted, *given: Any, **more: Any) -> Any:
+        found = plain(self, *given, **more)
+        here = given[0] if name == "Irecv" else given[1] if name[0].isupper() else found
+        if name != "Irecv" or given[1] != self.rank:
+            self.received["bytes"] += _size(here)
+            self.received["calls"] += 1
+        return found
+
+    return counted
+
+
+for _lower in ("allgather", "gather", "bcast", "alltoall", "allreduce"):
+    for _name in {_lower, _lower.capitalize(), "Irecv"}:
+        setattr(Counted, _name, _counting(_name))
+
+# PETSc knows communicators by their names.
+Counted.__module__, Counted.__name__ = MPI.Intracomm.__module__, MPI.Intracomm.__name__
+
+
+def _size(values: Any) -> int:
+    """Return the bytes of arrays, numbers and lists of them."""
+    if isinstance(values, list | tuple):
+        return sum(map(_size, values))
+    return int(getattr(values, "nbytes", 0 if values is None else 8))
+
+
+def slices(comm: MPI.Intracomm, n: int, bodies: int) -> Domain:
+    """Return bars of hexahedra that are divided in slices, one a rank; no rank has more.
+
+    Parts are ``top`` and ``bottom`` of the whole, and between the bars ``upper`` and ``lower``.
+    """
+    size, rank = comm.size, comm.rank
+    edges = [n, n + n // 7 + 1][:bodies]
+    last = rank == size - 1
+    counts = [m * (m + 1) ** 2 for m in edges]
+    places, cells = [], []
+    for k, m in enumerate(edges):
+        planes = np.arange(m + last)
+        g = np.arange(m + 1) / m
+        x, y, z = (v.ravel() for v in np.meshgrid(rank + planes / m, g, g, indexing="ij"))
+        places.append(np.column_stack([x, y, z + k * (1 + GAP)]))
+        i = np.arange(m + 1)
+        # Planes of the next slice have its numbers.
+        begin = np.full(m + 1, rank * sum(counts) + sum(counts[:k]))
+        begin[:m] += np.arange(m) * (m + 1) ** 2
+        begin[m] += m * (m + 1) ** 2
+        if last:
+            begin += sum((e + 1) ** 2 for e in edges[:k])
+        else:
+            after = sum((e + 1) ** 2 for e in edges[:k]) if rank == size - 2 else 0
+            begin[m] = (rank + 1) * sum(counts) + sum(counts[:k]) + after
+        numbers = begin[:, None, None] + (i[:, None] * (m + 1) + i)[None]
+        ends = [slice(None, -1), slice(1, None)]
+        around = [numbers[a, b, c].ravel() for c in ends for b in ends for a in ends]
+        cells.append(np.column_stack(around))
+    element = basix.ufl.element("Lagrange", "hexahedron", 1, shape=(3,))
+    every = np.concatenate(cells).astype(np.int64)
+
+    def stay(_comm: Any, _parts: int, *_given: Any) -> Any:
+        return destinations(np.full(len(every), rank, dtype=np.int32))
+
+    made = dmesh.create_mesh(comm, every, x=np.concatenate(places), e=element, partitioner=stay)
+    top = bodies + (bodies - 1) * GAP
+
+    def at(height: float) -> Any:
+        return lambda x: np.abs(x[2] - height) < GAP / 4
+
+    parts = {"bottom": at(0.0), "top": at(top)}
+    if bodies == 2:
+        parts |= {"lower": at(1.0), "upper": at(1 + GAP)}
+    return from_mesh(made, parts)
+
+
+def problem_of(comm: MPI.Intracomm, n: int, bodies: int) -> ContactProblem:
+    """Return bars that are pressed and pushed, with friction."""
+    domain, friction = slices(comm, n, bodies), Friction(mu=0.3)
+    fixed = [Fixed("top", [0.002, 0.0, -0.005])]
+    if bodies == 2:
+        fixed.append(Fixed("bottom", [0.0] * 3))
+        contact = Contact("upper", against="lower", friction=friction)
+    else:
+        contact = Contact("bottom", GAP, friction=friction)
+    return ContactProblem(domain, Body(Linear(1.0, 0.3), fixed), contact)
+
+
+def held(problem: ContactProblem) -> int:
+    """Return the bytes of the coupling on this rank."""
+    found = 0
+    for entry in problem.entries:
+        for value in vars(entry.coupling).values() if entry.coupling is not None else ():
+            parts = (value.data, value.indices, value.indptr) if hasattr(value, "indptr") else value
+            found += _size(parts)
+    return found
+
+
+def measure(comm: MPI.Intracomm, n: int, bodies: int, solved: bool = False) -> dict[str, Any]:
+    """Return the counts: the most of any rank, but for bytes received, the sum. Collective."""
+    whole = Domain.comm
+    Domain.comm = property(lambda domain: Counted(whole.fget(domain)))  # type: ignore[assignment]
+    Counted.received.clear()
+    tracemalloc.start()
+    begin = time.perf_counter()
+    try:
+        problem = problem_of(comm, n, bodies)
+        made = time.perf_counter() - begin
+        evaluate(problem, problem.start())
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+        Domain.comm = whole  # type: ignore[method-assign]
+    found: dict[str, Any] = {
+        "ranks": comm.size,
+        "unknowns": problem.equilibrium.layout.unknowns,
+        "contact nodes": problem.nodes.size,
+        "python": comm.allreduce(peak, op=MPI.MAX),
+        "coupling": comm.allreduce(held(problem), op=MPI.MAX),
+        "received": comm.allreduce(Counted.received["bytes"], op=MPI.SUM),
+        "calls": comm.allreduce(Counted.received["calls"], op=MPI.MAX),
+        "seconds": made,
+    }
+    if solved:
+        solution = solve(problem, NewtonOptions(linear="iterative"))
+        found |= {
+            "converged": solution.converged,
+            "forces": [*map(float, np.ravel(solution.contact_force))],
+            "iterations": solution.counters.linear_iterations,
+            "solves": solution.counters.linear_solves,
+        }
+        found["memory"] = comm.allreduce(rank_memory(), op=MPI.MAX)
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the counts."""
+    made = argparse.ArgumentParser(description=__doc__)
+    made.add_argument("bodies", type=int, choices=(1, 2))
+    made.add_argument("n", type=int)
+    made.add_argument("--solve", action="store_true")
+    given = made.parse_args(arguments)
+    found = measure(MPI.COMM_WORLD, given.n, given.bodies, given.solve)
+    if MPI.COMM_WORLD.rank == 0:
+        print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main()

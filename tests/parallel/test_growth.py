@@ -1,0 +1,27 @@
+"""Memory and messages of a rank do not grow with the number of ranks, at fixed work a rank."""
+
+import pytest
+from mpi4py import MPI
+
+from scripts.benchmarks.weak import measure
+
+COMM = MPI.COMM_WORLD
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("bodies", [1, 2])
+def test_no_rank_has_more_where_there_are_more(bodies: int) -> None:
+    """Slices in a row, so that ranks exchange at the cuts: lists of all would be of each rank."""
+    found = {}
+    for size in range(1, COMM.size + 1):
+        some = COMM.Split(0 if COMM.rank < size else MPI.UNDEFINED, COMM.rank)
+        if some != MPI.COMM_NULL:
+            found[size] = measure(some, 8, bodies)
+        COMM.Barrier()
+    found = COMM.bcast(found)  # the first rank is in all of them
+    for size, counts in found.items():
+        assert counts["python"] <= 1.1 * found[1]["python"], size
+        assert counts["coupling"] <= 1.1 * found[1]["coupling"], size
+        if size > 1:
+            cuts = counts["received"] / (size - 1), found[2]["received"]
+            assert cuts[0] <= 1.1 * cuts[1], size
