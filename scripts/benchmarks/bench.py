@@ -243,6 +243,11 @@ def two_bodies(bench: Bench) -> None:
     bench.script("pair_space")
 
 
+def linear_solvers(bench: Bench) -> None:
+    """Part (j): the linear solver beside others on the same matrix."""
+    bench.script("solvers")
+
+
 def load_steps(bench: Bench) -> None:
     """Part (i): load steps beside one static solve."""
     bench.script("steps")
@@ -259,10 +264,11 @@ PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
     "g": (two_bodies, ("pair-space",)),
     "h": (memory, ("bench-memory",)),
     "i": (load_steps, ("bench-steps",)),
+    "j": (linear_solvers, ("solvers",)),
 }
 
 #: In which order the page has them.
-ORDER = "bfichdega"
+ORDER = "bjfichdega"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
