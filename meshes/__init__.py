@@ -21,6 +21,7 @@ from typing import Any
 
 from contact.errors import InputError
 from meshes.bars import bar, bar_on_ends, block, column, piezo_bar
+from meshes.bracket import bracket
 from meshes.hertz import disc, half_disc, quarter_disc, sphere
 from meshes.indentation import half_cylinder, half_space
 from meshes.pairs import (
@@ -48,6 +49,7 @@ GENERATORS: Mapping[str, Callable[..., None]] = {
         bar_on_ends,
         block,
         column,
+        bracket,
         half_space,
         half_cylinder,
         two_blocks,

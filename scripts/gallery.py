@@ -167,6 +167,11 @@ def _balance(run: Run) -> Iterator[Compared]:
     )
 
 
+def _hexahedra(run: Run) -> Iterator[Compared]:
+    yield "largest displacement", run.summary["max_displacement"], 0.93089
+    yield "force on the floor", -run.summary["contact_force"][2], 3067.9
+
+
 #: Name of a page, without `example-` -> its example.
 EXAMPLES = {
     "hertz": Example("hertz-small", _hertz, "Hertz", 0.01),
@@ -187,6 +192,7 @@ EXAMPLES = {
     "column": Example("piezo-column", _column, "closed form", 1e-6, "figure-deformed.png"),
     "layer": Example("layer-column", _layer, "closed form", 1e-6),
     "bimorph": Example("bimorph-stop", _balance, "balance of energy", 0.05, "figure-deformed.png"),
+    "bracket": Example("bracket", _hexahedra, "hexahedra of degree 2", 0.01, "figure-deformed.png"),
 }
 
 

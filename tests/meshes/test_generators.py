@@ -71,6 +71,17 @@ GENERATORS = {
         4.0,
         {"left": 4.0, "right": 4.0, "front": 4.0, "back": 4.0, "bottom": 1.0, "top": 1.0},
     ),
+    "bracket": (
+        # Base, web and fillet, without the holes.
+        40 * (60 * 8 + 52 * 8 + 64 - 16 * np.pi) - 8 * np.pi * (2 * 5.5**2 + 8**2),
+        {
+            "base": 2400 - 2 * np.pi * 5.5**2,
+            "bolts": 2 * np.pi * 11 * 8,
+            "eye": np.pi * 16 * 8,
+            "fillet": np.pi / 2 * 8 * 40,
+            "back": 2400 - np.pi * 8**2,
+        },
+    ),
     "half_space": (
         900.0,
         {"axis": 30.0, "contact": 1.0, "free": 29.0, "side": 30.0, "bottom": 30.0},
@@ -167,7 +178,7 @@ def test_generators_make_their_parts(name):
     assert integral(domain, domain.dx) == pytest.approx(volume, rel=2e-2)
 
 
-ROUND = [name for name in GENERATORS if re.search("disc|sphere|cylinder|ball", name)]
+ROUND = [name for name in GENERATORS if re.search("disc|sphere|cylinder|ball|bracket", name)]
 
 
 @pytest.mark.parallel
@@ -178,7 +189,8 @@ def test_generators_make_other_cells(name, order):
     flat = from_generator(COMM, name).dim == 2
     sizes = {k: 2 * v for k, v in meshes.parameters(name).items() if k.endswith("size")}
     cell = "quadrilateral" if flat else "hexahedron"
-    domain = from_generator(COMM, name, cell, order, **({} if flat else sizes))
+    large = flat or name == "bracket"  # whose holes are round to no less than this
+    domain = from_generator(COMM, name, cell, order, **({} if large else sizes))
     assert shape_of(domain.mesh).name == cell
     # Straight cells of second order are kept as those of first.
     assert domain.order == (order if name in ROUND else 1)
@@ -278,6 +290,8 @@ def test_smaller_sizes_give_more_nodes(name):
         ("bar", {"loaded_from": 4.0}, "loaded_from must be less than the length"),
         ("bar_on_ends", {"end": 6.0}, "end must be less than half the length"),
         ("disc", {"top_angle": 91.0}, "top_angle must be at most 90"),
+        ("bracket", {"eye_diameter": 40.0}, "eye_diameter must be less than 40; given: 40"),
+        ("bracket", {"bolt_diameter": 20.0}, "bolt_diameter must be less than 20; given: 20"),
         ("bar", {"cell": "hexahedron"}, "must be triangle or quadrilateral; given: hexahedron"),
         ("sphere", {"cell": "triangle", "contact_size": 2.0}, "must be tetrahedron or hexahedron"),
         ("bar", {"order": 3}, "order of the mesh generator must be 1 or 2; given: 3"),
