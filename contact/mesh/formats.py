@@ -1,4 +1,4 @@
-"""Mesh files of other programs: by meshio, those of Abaqus and CalculiX by `contact.mesh.abaqus`.
+"""Mesh files of other programs: by meshio, or by readers of their own (`abaqus`, `med`).
 
 Files are read by a process of their own, as by `contact.mesh.extraction`. Groups of elements, tags
 of cells and sets of nodes become regions and parts.
@@ -7,15 +7,19 @@ of cells and sets of nodes become regions and parts.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from contact.mesh import abaqus, exodus
+from contact.mesh import abaqus, exodus, med
 from contact.mesh.cells import INTERVAL, SHAPES, Shape
 from contact.mesh.extraction import BODY, OTHERS, Contents, Ints, Model, run
+from contact.typing import Array
+
+#: Readers that know more of a program's files than meshio.
+OWN = {"Abaqus": abaqus.read, "MED": med.read}
 
 #: Arrays that hold tags of groups, and those of a program's own.
 TAGS = {"gmsh:physical", "cell_tags", "point_tags", "medit:ref"}
@@ -33,12 +37,13 @@ def read(file: Path) -> Model:
     Exception
         Of any kind, if it is damaged.
     """
-    if OTHERS[file.suffix.lower()] == "Abaqus":
-        return model_of(abaqus.read(file))
+    program = OTHERS[file.suffix.lower()]
+    if program in OWN:
+        return model_of(OWN[program](file))
     import meshio
 
     contents = _contents(meshio.read(file))
-    if OTHERS[file.suffix.lower()] == "Exodus":
+    if program == "Exodus":
         exodus.add(file, contents)
     return model_of(contents)
 
@@ -52,49 +57,41 @@ def _contents(mesh: Any) -> Contents:
     for name, parts in mesh.cell_sets.items():
         given = (np.asarray([] if part is None else part, dtype=np.int64) for part in parts)
         made.groups[str(name)] = dict(enumerate(given))
-    names = getattr(mesh, "cell_tags", None) or {}
     for key, arrays in mesh.cell_data.items():
-        for name, members in _by_number(key, arrays, names):
+        for name, members in _by_number(key, arrays):
             group = made.groups.setdefault(name, {})
             for block, rows in members.items():
                 group[block] = np.union1d(group.get(block, rows), rows)
     made.nodes |= {str(k): np.asarray(v, dtype=np.int64) for k, v in mesh.point_sets.items()}
-    families = getattr(mesh, "point_tags", None) or {}
     for key, values in mesh.point_data.items():
         if np.asarray(values).dtype.kind in "iub" and np.ndim(values) == 1:
-            for name, members in _by_number(key, [values], families):
+            for name, members in _by_number(key, [values]):
                 found = made.nodes.get(name, np.zeros(0, dtype=np.int64))
                 made.nodes[name] = np.union1d(found, members[0])
     return made
 
 
-def _by_number(
-    key: str, arrays: Sequence[Any], names: Mapping[int, Sequence[str]]
-) -> Iterator[tuple[str, dict[int, Ints]]]:
+def _by_number(key: str, arrays: Sequence[Any]) -> Iterator[tuple[str, dict[int, Ints]]]:
     """Yield groups that arrays of whole numbers mark, block by block; 0 marks none.
 
     Parameters
     ----------
     key, arrays
-        Name of the arrays, and one a block.
-    names
-        Names of the groups of a number. Without, it is the name of the group, behind that of the
+        Name of the arrays, and one a block. The name of a group is its number, behind that of the
         array unless that is one for tags.
     """
     whole = [np.asarray(array) for array in arrays]
     if key in INNER or any(v.dtype.kind not in "iub" or v.ndim != 1 for v in whole):
         return
-    several = key.split("-")
+    several, names = key.split("-"), {}
     if len(several) > 1 and max(v.max(initial=0) for v in whole) == len(several) - 1:
         # Sets that meshio has written as one array: their names, and -1 for none.
-        names, whole = {k: [name] for k, name in enumerate(several, 1)}, [v + 1 for v in whole]
+        names, whole = dict(enumerate(several, 1)), [v + 1 for v in whole]
     before = "" if key in TAGS else f"{key} "
     for block, values in enumerate(whole):
-        for number in np.unique(values[values != 0]):
-            # Families of MED have negative numbers; without a name these mark none.
-            unnamed = [f"{before}{number}"] if number > 0 else []
-            for name in names.get(int(number), unnamed):
-                yield str(name), {block: np.flatnonzero(values == number)}
+        for number in np.unique(values[values > 0]).tolist():
+            name = names.get(number, f"{before}{number}")
+            yield name, {block: np.flatnonzero(values == number)}
 
 
 def model_of(contents: Contents) -> Model:
@@ -108,15 +105,18 @@ def model_of(contents: Contents) -> Model:
     if shape is None or dim < 2 or len({known[b][0] for b in whole}) > 1:
         none = np.zeros((0, 1), dtype=np.int64)
         return Model(kinds, tags, contents.points, np.zeros((0, max(dim, 1))), none, {}, {})
-    cells = np.concatenate([contents.blocks[b][1] for b in whole])
-    places = _places(shape, cells.shape[1])
+    blocks = [nodes for _, nodes in contents.blocks]
+    places = _places(shape, blocks[whole[0]].shape[1])
+    for b in whole:
+        blocks[b] = _middles_in_order(shape, contents.points, blocks[b])
+    cells = np.concatenate([blocks[b] for b in whole])
     regions, parts = {}, dict(contents.surfaces)
     for name, members in contents.groups.items():
-        inside = [contents.blocks[b][1][members[b]] for b in whole if b in members]
+        inside = [blocks[b][members[b]] for b in whole if b in members]
         if sum(map(len, inside)):
             regions[name] = np.concatenate(inside)
         sides = [
-            contents.blocks[b][1][rows][:, : shape.facet.corners]
+            blocks[b][rows][:, : shape.facet.corners]
             for b, rows in members.items()
             if known[b][1] == shape.facet and len(rows)
         ]
@@ -160,6 +160,25 @@ def _places(shape: Shape, count: int) -> Any:
     """Return the nodes of a cell with so many of them, in VTK's order."""
     degree = 1 if count == shape.corners else 2
     return shape.nodes(degree)[list(shape.vtk(degree)[1])][:count]
+
+
+def _middles_in_order(shape: Shape, points: Array, rows: Ints) -> Ints:
+    """Return cells whose nodes within faces and the cell are in VTK's order.
+
+    Programs number them in ways of their own: Abaqus has that of the cell first, MED the lower face
+    first. They are those next to where the middles of the edges say that they are.
+    """
+    if shape.dim < 3 or rows.shape[1] != len(shape.nodes(2)) or not shape.serendipity:
+        return rows
+    columns = np.argsort(shape.vtk(2)[1])  # of the shape's nodes
+    weights = np.concatenate([weights for _, _, weights in shape.serendipity])
+    inner = columns[np.concatenate([nodes for nodes, _, _ in shape.serendipity])]
+    expected, given = weights @ points[rows[:, columns]], points[rows[:, inner]]
+    nearest = np.linalg.norm(expected[:, :, None] - given[:, None], axis=3).argmin(axis=2)
+    ordered = rows.copy()
+    ordered[:, inner] = np.take_along_axis(rows[:, inner], nearest, axis=1)
+    each_once = np.all(np.sort(nearest, axis=1) == np.arange(len(inner)), axis=1)
+    return np.where(each_once[:, None], ordered, rows)
 
 
 def _corners(shape: Shape) -> list[int]:

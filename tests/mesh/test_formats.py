@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import meshes
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
 from contact.mesh.reader import from_file
@@ -114,6 +115,72 @@ def write_other(path, name: str) -> None:
     meshio.write(path, made, **more)
 
 
+#: Places of nodes of MED's HEXA27 in the unit cube: corners, edges of the lower and the upper face
+#: and between them, the lower face, those around, the upper one, the middle.
+H27 = np.array(
+    [
+        *((0, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 0), (0, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0, 1)),
+        *((0, 0.5, 0), (0.5, 1, 0), (1, 0.5, 0), (0.5, 0, 0)),
+        *((0, 0.5, 1), (0.5, 1, 1), (1, 0.5, 1), (0.5, 0, 1)),
+        *((0, 0, 0.5), (0, 1, 0.5), (1, 1, 0.5), (1, 0, 0.5)),
+        *((0.5, 0.5, 0), (0, 0.5, 0.5), (0.5, 1, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5)),
+        *((0.5, 0.5, 1), (0.5, 0.5, 0.5)),
+    ],
+    dtype=float,
+)
+
+
+def write_salome(path, count: int = 27, bend: float = 0.0) -> None:
+    """Write two cubes along x as Salome does: mirrored cells, families, none for whole kinds.
+
+    Groups have names of 80 letters, several a family; a family of its own is 0, FAMILLE_ZERO, and
+    a kind of cells that is all in it has no array FAM.
+    """
+    h5py = pytest.importorskip("h5py")
+    places, rows = {}, []
+    for k in (0, 1):
+        at = [tuple(x) for x in (H27[:count] + np.array([k, 0.0, 0.0])).tolist()]
+        rows.append([places.setdefault(x, len(places) + 1) for x in at])
+    points = np.array(list(places))
+    points[:, 2] += bend * points[:, 0] * (2 - points[:, 0])
+    faces = {"low": [0, 1, 2, 3], "high": [4, 7, 6, 5]}
+    kind = {27: ("H27", "QU9"), 20: ("H20", "QU8"), 8: ("HE8", "QU4")}[count]
+    quads = [[row[c] for c in around] for around in faces.values() for row in rows]
+
+    def middle(nodes: list[int]) -> int:
+        return places[tuple(np.mean(np.array(list(places))[np.array(nodes) - 1], axis=0).tolist())]
+
+    if count > 8:
+        edges = [[middle([q[k], q[(k + 1) % 4]]) for k in range(4)] for q in quads]
+        inner = [[middle(q)] if count == 27 else [] for q in quads]
+        quads = [a + b + c for a, b, c in zip(quads, edges, inner, strict=True)]
+    with h5py.File(path, "w") as data:
+        mesh = data.create_group("ENS_MAA/piece")
+        mesh.attrs["ESP"], mesh.attrs["DIM"] = 3, 3
+        step = mesh.create_group("-0000000000000000001-0000000000000000001")
+        step["NOE/COO"] = points.T.ravel()
+        step["NOE/COO"].attrs["NBR"] = len(points)
+        families = np.where(points[:, 0] == 0, 3, 0)
+        step["NOE/FAM"] = families
+        for name, of in zip(kind, (rows, quads), strict=True):
+            step[f"MAI/{name}/NOD"] = np.array(of).T.ravel()
+            step[f"MAI/{name}/NOD"].attrs["NBR"] = len(of)
+        step[f"MAI/{kind[1]}/FAM"] = [-6, -6, -7, 0]
+        sets = {
+            "ELEME/FAM_-6_low": (-6, ["low", "Group_of_faces"]),
+            "NOEUD/FAM_3_left": (3, ["left"]),
+        }
+        sets["ELEME/FAM_-7_high"] = (-7, ["high"])
+        for name, (number, groups) in sets.items():
+            family = data.create_group(f"FAS/piece/{name}")
+            family.attrs["NUM"] = number
+            letters = [list(group.encode().ljust(80, b"\0")) for group in groups]
+            family["GRO/NOM"] = np.array(letters, dtype=np.int8)
+            family["GRO"].attrs["NBR"] = len(groups)
+        zero = data.create_group("FAS/piece/FAMILLE_ZERO")
+        zero.attrs["NUM"] = 0
+
+
 FILES = {
     "plate.vtu": ({"ground": 2.0, "top": 2.0}, {"steel": 2.0}),
     "plate.e": ({"ground": 2.0, "top": 2.0}, {"0": 2.0}),
@@ -183,6 +250,49 @@ def test_other_formats(name, shared_tmp_path):
     domain = from_file(COMM, shared_tmp_path / name)
     assert measures(domain) == pytest.approx(parts)
     assert regions(domain) == pytest.approx(cells)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("count", [8, 20, 27])
+def test_groups_of_salome(count, shared_tmp_path):
+    """Families of several groups, arrays that are left out, nodes in MED's own order."""
+    path = shared_tmp_path / "piece.med"
+    if COMM.rank == 0:
+        write_salome(path, count, 0.0 if count == 8 else 0.05)
+    COMM.barrier()
+    domain = from_file(COMM, path)
+    bent = 1.0 if count == 8 else measures(domain)["high"]
+    expected = {"low": 2 * bent, "Group_of_faces": 2 * bent, "high": bent, "left": 1.0}
+    assert measures(domain) == pytest.approx(expected, rel=1e-6)
+    assert integral(domain, domain.dx) == pytest.approx(2.0)
+    assert domain.order == (1 if count == 8 else 2)
+
+
+def test_a_med_file_of_two_meshes_is_refused(tmp_path):
+    write_salome(tmp_path / "piece.med", 8)
+    import h5py
+
+    with h5py.File(tmp_path / "piece.med", "a") as data:
+        data.copy("ENS_MAA/piece", "ENS_MAA/other")
+    with pytest.raises(InputError, match=r"piece\.med: the MED reader says of it: 2 meshes"):
+        from_file(MPI.COMM_SELF, tmp_path / "piece.med")
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
+def test_input_files_that_gmsh_writes(cell, order, shared_tmp_path):
+    """C3D4, C3D10, C3D8 and C3D27 with *ELSET of surfaces; parts are those of Gmsh's own format."""
+    sizes = {"size": 4.0, "contact_size": 4.0, "contact_width": 8.0, "radius": 8.0}
+    if COMM.rank == 0:
+        for ending in ("msh", "inp"):
+            meshes.write("sphere", shared_tmp_path / f"ball.{ending}", cell, order, **sizes)
+    COMM.barrier()
+    own, other = (from_file(COMM, shared_tmp_path / f"ball.{ending}") for ending in ("msh", "inp"))
+    assert own.order == other.order == order
+    found = measures(other)
+    assert {name: found[name] for name in own.parts} == pytest.approx(measures(own))
+    assert regions(other)["body"] == pytest.approx(regions(own)["body"])
 
 
 def test_side_sets_of_exodus(tmp_path):

@@ -1,0 +1,104 @@
+"""MED files of Salome and code_aster: their groups of cells, facets and nodes.
+
+Each cell and node belongs to a family, and a family to groups; those of family 0 to none. Where all
+are in it the array of families may be missing, which other readers take for damage.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact.mesh.extraction import Contents, Ints
+
+#: Kinds of elements: meshio's names, and numbers of nodes.
+KINDS = {
+    "SE2": ("line", 2),
+    "SE3": ("line3", 3),
+    "TR3": ("triangle", 3),
+    "TR6": ("triangle6", 6),
+    "QU4": ("quad", 4),
+    "QU8": ("quad8", 8),
+    "QU9": ("quad9", 9),
+    "TE4": ("tetra", 4),
+    "T10": ("tetra10", 10),
+    "HE8": ("hexahedron", 8),
+    "H20": ("hexahedron20", 20),
+    "H27": ("hexahedron27", 27),
+    "PE6": ("wedge", 6),
+    "P15": ("wedge15", 15),
+    "PY5": ("pyramid", 5),
+    "P13": ("pyramid13", 13),
+}
+
+
+def read(file: Path) -> Contents:
+    """Read a MED file.
+
+    Raises
+    ------
+    ValueError
+        If it has no mesh, or several, or elements that are not known.
+    Exception
+        Of any kind, if it is damaged.
+    """
+    import h5py
+
+    with h5py.File(file, "r") as data:
+        meshes = list(data["ENS_MAA"])
+        if len(meshes) != 1:
+            raise ValueError(f"{len(meshes)} meshes; accepted: one")
+        whole = data["ENS_MAA"][meshes[0]]
+        steps = [whole] if "NOE" in whole else [whole[step] for step in whole]
+        if len(steps) != 1:
+            raise ValueError(f"a mesh at {len(steps)} times; accepted: one")
+        families = data.get(f"FAS/{meshes[0]}", whole.get("FAS", {}))
+        return _contents(steps[0], int(whole.attrs["ESP"]), families)
+
+
+def _contents(mesh: Any, dim: int, families: Any) -> Contents:
+    """Return the contents of a mesh at a time."""
+    coordinates = np.asarray(mesh["NOE/COO"][()], dtype=float).reshape(dim, -1).T
+    points = np.zeros((len(coordinates), 3))
+    points[:, :dim] = coordinates
+    blocks: list[tuple[str, Ints]] = []
+    made = Contents(points, blocks)
+    named = _names(families.get("ELEME", {}))
+    for kind, given in mesh["MAI"].items():
+        if kind == "PO1":
+            continue
+        if kind not in KINDS:
+            raise ValueError(f"elements {kind} that are not known")
+        name, count = KINDS[kind]
+        rows = np.asarray(given["NOD"][()], dtype=np.int64).reshape(count, -1).T - 1
+        if rows.size and not 0 <= rows.min() <= rows.max() < len(points):
+            raise ValueError("it has elements whose nodes it does not have")
+        for group, members in _groups(given, named).items():
+            made.groups.setdefault(group, {})[len(blocks)] = members
+        blocks.append((name, rows))
+    made.nodes |= _groups(mesh["NOE"], _names(families.get("NOEUD", {})))
+    return made
+
+
+def _names(families: Any) -> dict[int, list[str]]:
+    """Return the names of the groups of each family."""
+    found = {}
+    for family in families.values():
+        none = np.zeros((0, 80), dtype=np.uint8)
+        letters = np.asarray(family["GRO/NOM"][()]).view(np.uint8) if "GRO" in family else none
+        texts = [bytes(row).split(b"\0")[0].decode("utf-8", "replace") for row in letters]
+        found[int(family.attrs["NUM"])] = [text.strip() for text in texts]
+    return found
+
+
+def _groups(given: Any, names: dict[int, list[str]]) -> dict[str, Ints]:
+    """Return the members of each group among elements of a kind, or nodes."""
+    found: dict[str, Ints] = {}
+    numbers = np.asarray(given["FAM"][()]) if "FAM" in given else np.zeros(0, dtype=np.int64)
+    for family in np.unique(numbers):
+        members = np.flatnonzero(numbers == family)
+        for name in names.get(int(family), []):
+            found[name] = np.union1d(found.get(name, members), members)
+    return found
