@@ -1,4 +1,6 @@
-"""Orders of convergence on round bodies, on straight cells and on those of second order.
+"""Orders of convergence on straight cells and on those of second order, and times to 1 %.
+
+Round bodies here, known contacts and times in `cell_orders`.
 
 `python3 -m scripts.studies.curved_cells [--out DIR] [--coarse]`
 """
@@ -17,6 +19,7 @@ from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.reporting import Report, append, options
+from scripts.studies import cell_orders
 from scripts.studies.lame_rings import Lame, error, rings
 
 CAPTION = "Displacements of round bodies on straight and on curved cells"
@@ -112,7 +115,10 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, in
                     print(*row, f"{off:.1e}", flush=True)
                     if rate is not None:
                         orders[kind, shape.name, order, degree] = rate
-    Report(chosen.out).table("curved-cells", CAPTION, columns, NOTE)
+    report = Report(chosen.out)
+    report.table("curved-cells", CAPTION, columns, NOTE)
+    cell_orders.orders(report, chosen.coarse)
+    cell_orders.times(report, chosen.coarse)
     return orders
 
 

@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Load
 from contact.interface.obstacle import GapFunction
+from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
@@ -153,7 +154,10 @@ class Singular:
 
     def problem(self, n: int, degree: int = 1) -> ContactProblem:
         """Return the problem on the unit square with n x n cells. Collective."""
-        domain = rectangle(MPI.COMM_WORLD, [0.0, 0.0], [1.0, 1.0], [n, n])
+        return self.on(rectangle(MPI.COMM_WORLD, [0.0, 0.0], [1.0, 1.0], [n, n]), degree)
+
+    def on(self, domain: Domain, degree: int) -> ContactProblem:
+        """Return the problem on another mesh of the square, with the same sides. Collective."""
         given = [_Component(self, i) for i in range(2)]
         fixed = [Fixed(side, given) for side in ("left", "right", "top")]
         flat = GapFunction(lambda points: np.zeros(len(points)))

@@ -13,6 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed
+from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
@@ -70,7 +71,10 @@ class Line:
 
     def problem(self, n: int, degree: int) -> ContactProblem:
         """Return the half [0, 1]^2, symmetric about x = 0, with n x n cells. Collective."""
-        domain = rectangle(MPI.COMM_WORLD, [0.0, 0.0], [1.0, 1.0], [n, n])
+        return self.on(rectangle(MPI.COMM_WORLD, [0.0, 0.0], [1.0, 1.0], [n, n]), degree)
+
+    def on(self, domain: Domain, degree: int) -> ContactProblem:
+        """Return the problem on another mesh of that half, with the same sides. Collective."""
         given = [_component(self.displacement, i) for i in range(2)]
         fixed = [Fixed("left", [0.0, None]), *(Fixed(side, given) for side in ("right", "top"))]
         return ContactProblem(
@@ -130,7 +134,10 @@ class Point:
 
     def problem(self, n: int, degree: int) -> ContactProblem:
         """Return the quarter [0, 1]^3, symmetric about x = 0 and y = 0. Collective."""
-        domain = box(MPI.COMM_WORLD, [0.0] * 3, [1.0] * 3, [n] * 3)
+        return self.on(box(MPI.COMM_WORLD, [0.0] * 3, [1.0] * 3, [n] * 3), degree)
+
+    def on(self, domain: Domain, degree: int) -> ContactProblem:
+        """Return the problem on another mesh of that quarter, with the same sides. Collective."""
         given = [_component(self.displacement, i) for i in range(3)]
         fixed = [Fixed("left", [0.0, None, None]), Fixed("front", [None, 0.0, None])]
         fixed += [Fixed(side, given) for side in ("right", "back", "top")]

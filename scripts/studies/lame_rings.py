@@ -53,6 +53,14 @@ class Lame:
         factor = (1 + self.poisson) / self.young
         return factor * ((1 - 2 * self.poisson) * mean * radius + rest / radius)
 
+    def ufl(self, place: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
+        """Return the displacement as a UFL vector of the coordinates."""
+        radius = ufl.sqrt(place[0] ** 2 + place[1] ** 2)
+        mean, rest = self._constants()
+        factor = (1 + self.poisson) / self.young
+        size = factor * ((1 - 2 * self.poisson) * mean + rest / radius**2)
+        return ufl.as_vector([size * place[0], size * place[1], 0][: len(place)])
+
     def radial(self, radius: Array) -> Array:
         """Return the radial stress."""
         mean, rest = self._constants()
@@ -127,12 +135,7 @@ def error(space: fem.FunctionSpace, x: Array, exact: Lame) -> float:
     """Return the relative error of displacements in L2. Collective."""
     mesh, u = space.mesh, fem.Function(space)
     u.x.array[:] = x[: u.x.array.size]
-    place = ufl.SpatialCoordinate(mesh)
-    radius = ufl.sqrt(place[0] ** 2 + place[1] ** 2)
-    mean, rest = exact._constants()
-    factor = (1 + exact.poisson) / exact.young
-    size = factor * ((1 - 2 * exact.poisson) * mean + rest / radius**2)
-    known = ufl.as_vector([size * place[0], size * place[1], 0][: mesh.geometry.dim])
+    known = exact.ufl(ufl.SpatialCoordinate(mesh))
     dx = ufl.dx(metadata={"quadrature_degree": 10})
     squares = [fem.assemble_scalar(fem.form(ufl.inner(v, v) * dx)) for v in (u - known, known)]
     off, whole = mesh.comm.allreduce(np.array(squares))

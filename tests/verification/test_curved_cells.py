@@ -5,6 +5,8 @@ The exact solutions are Lame's: a ring that is pressed on a shaft, and two rings
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -21,9 +23,10 @@ from contact.output.error_estimate import estimated
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from scripts.force_balance import force_balance
-from scripts.studies import curved_cells
+from scripts.reporting import Report
+from scripts.studies import cell_orders, curved_cells
 from scripts.studies.curved_cells import LAME, LAW, on_a_shaft, solved, supports, two_rings
-from scripts.studies.lame_rings import rings
+from scripts.studies.lame_rings import error, rings
 
 COMM = MPI.COMM_WORLD
 NAMES = [shape.name for shape in SHAPES]
@@ -131,8 +134,56 @@ def test_the_resultants_balance_on_curved_facets() -> None:
     assert force_balance(problem, state).imbalance < 1e-9
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("name", NAMES)
+def test_the_error_in_l2_is_that_of_ufl(name: str, order: int) -> None:
+    domain = rings(MPI.COMM_SELF, name, order, (1.0, 2.0), (2,))
+    problem = on_a_shaft(domain, 2)
+    state, _ = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
+
+    def exact(x: np.ndarray) -> np.ndarray:
+        radius = np.hypot(x[0], x[1])
+        return LAME.displacement(radius) / radius * x * np.array([1, 1, 0])[: len(x), None]
+
+    known = error(problem.equilibrium.space, state.x, LAME)
+    assert cell_orders.l2_error(problem, state.x, exact) == pytest.approx(known, rel=1e-3)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("name", NAMES)
+def test_moved_grids_have_the_sides_of_the_cube(name: str, order: int) -> None:
+    domain = cell_orders.grid(COMM, name, order, 4)
+    assert domain.order == order
+    assert COMM.allreduce(volumes(domain).sum()) == pytest.approx(1.0, rel=1e-12)
+    assert len(domain.parts) == 2 * domain.dim
+    for side in domain.parts:
+        assert domain.volume(domain.ds(side)) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_known_contacts_on_moved_cells(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(cell_orders, "CELLS", {(2, 1): (8, 32), (2, 2): (8, 32)})
+    known = {name: row for name, row in cell_orders.KNOWN.items() if row[1] == 2}
+    monkeypatch.setattr(cell_orders, "KNOWN", known)
+    found = cell_orders.orders(Report(tmp_path), coarse=False)
+    assert len(found) == 12
+    for (_, _, _, degree), (displacement, _) in found.items():
+        assert displacement > (1.6, 2.0)[degree - 1]
+    with (tmp_path / "known-contacts.csv").open() as file:
+        assert all(float(row["p in L2"]) < 0.017 for row in csv.DictReader(file))
+
+
+def test_quadrilaterals_need_fewer_unknowns_than_triangles(tmp_path) -> None:
+    found = cell_orders.times(Report(tmp_path), coarse=True)
+    for name in ("ring on a shaft", "root-like"):
+        one, other = (found[name, cell, 1, 1] for cell in ("triangle", "quadrilateral"))
+        assert other < 0.75 * one
+
+
 def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(curved_cells, "SHAPES", SHAPES[:1])
+    monkeypatch.setattr(cell_orders, "orders", lambda *_: {})
+    monkeypatch.setattr(cell_orders, "times", lambda *_: {})
     orders = curved_cells.main(["--coarse", "--out", str(tmp_path)])
     for kind in ("shaft", "two rings"):
         assert orders[kind, "triangle", 2, 2] > 2.8 > 2.3 > orders[kind, "triangle", 1, 2]

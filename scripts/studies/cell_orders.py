@@ -1,0 +1,269 @@
+"""Orders of convergence to known contacts on cells of all shapes, and their time for one per cent.
+
+Hertz's cylinder and ball and Signorini's problem with r^(3/2), on grids of which no two cells are
+alike. `curved_cells` runs it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact import Domain, Fixed, Sphere
+from contact.body.description import Body
+from contact.mesh.cells import SHAPES, Shape, rule, shape_of
+from contact.mesh.domain import from_mesh
+from contact.mesh.geometry import geometry_nodes, sizes
+from contact.mesh.grid import SIDES, box, rectangle
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+from scripts.reporting import Report, append
+from scripts.studies.error_norms import errors
+from scripts.studies.exact_solutions import Singular
+from scripts.studies.hertz_exact import Line, Point
+from scripts.studies.lame_rings import Lame, rings
+from scripts.studies.pressure_convergence import PLACES
+
+#: Geometry and displacements: their degrees.
+ELEMENTS = ((1, 1), (1, 2), (2, 2))
+
+#: How far nodes are moved, over the side of the body.
+AMOUNT = 0.2
+
+#: Relative error that is asked for.
+ASKED = 0.01
+
+ORDERS = (
+    "Displacements and pressures of known contacts on distorted cells, straight and curved",
+    "Unit square or cube (Hertz: a half or a quarter by symmetry), cut out of the half space with "
+    "the exact displacements prescribed where it is cut; n cells along each edge, whose nodes a "
+    "smooth map has moved that keeps the sides flat. Geometry 2 has curved cells inside. Errors of "
+    "displacements in L2 (of the ball where z > 1/4), of nodal pressures in the lumped L2 of the "
+    "contact part, relative, on the finest mesh; root mean squares over three places in a cell "
+    "where contact ends. Orders are least squares over all meshes (`known-contacts-meshes.csv`). "
+    "The pressure goes to zero like the root of the distance there: approximation alone gives it "
+    "order 1.",
+)
+TIMES = (
+    "Time to an error of 1 % in the energy norm",
+    "Against the exact solution; seconds of the processor for problem and solve on one rank, forms "
+    "compiled, the least of three runs. n grows by a quarter from mesh to mesh; shown is the first "
+    "one below 1 %.",
+)
+
+
+def moved(points: Array, amount: float = AMOUNT) -> Array:
+    """Return points of the unit square or cube moved, those of its sides along these."""
+    x = points.T
+    waves = [np.sin(np.pi * (2 * x[k - 1] + x[k]) + k) for k in range(len(x))]
+    return np.asarray((x + amount / np.pi * np.sin(np.pi * x) * waves).T)
+
+
+def grid(comm: MPI.Intracomm, cell: str, order: int, n: int) -> Domain:
+    """Return the unit square or cube of moved cells, with the sides of a rectangle or box.
+
+    Parameters
+    ----------
+    comm
+        Communicator.
+    cell
+        Shape of the cells.
+    order
+        Degree of their geometry.
+    n
+        Squares or cubes along each edge.
+    """
+    d = Shape(cell).dim
+    make, name = (rectangle, "rectangle") if d == 2 else (box, "box")
+    regular = make(MPI.COMM_SELF, (0.0,) * d, (1.0,) * d, (n,) * d, cell=cell).mesh
+    space = fem.functionspace(regular, ("Lagrange", order))
+    last = None if comm.rank == 0 else 0
+    x = moved(space.tabulate_dof_coordinates()[:last, :d])
+    cells = space.dofmap.list[:last].astype(np.int64)
+    element = basix.ufl.element("Lagrange", cell, order, shape=(d,), dtype=np.float64)
+    mesh = dmesh.create_mesh(comm, cells=cells, x=x, e=ufl.Mesh(element))
+    mesh.topology.create_connectivity(d - 1, d)
+    facets = dmesh.exterior_facet_indices(mesh.topology)
+    middle = dmesh.compute_midpoints(mesh, d - 1, facets)
+    parts = {
+        side: facets[np.abs(middle[:, axis] - end) < 1e-9]
+        for side, (axis, end) in SIDES[name].items()
+    }
+    return from_mesh(mesh, parts, 1.0)
+
+
+def l2_error(
+    problem: ContactProblem, x: Array, exact: Callable[[Array], Array], above: float = 0.0
+) -> float:
+    """Return the relative error of displacements in L2. Collective.
+
+    Parameters
+    ----------
+    problem, x
+        The problem and its unknowns.
+    exact
+        From points (d, k) to displacements (d, k).
+    above
+        Height from which on the body counts.
+    """
+    body = problem.equilibrium
+    domain, space, degree = body.domain, body.space, body.degree
+    shape, of = shape_of(domain.mesh), geometry_nodes(domain)
+    points, weights = rule(shape, 8)
+    measure = sizes(shape, of, points) * weights
+    place = np.einsum("qk,nkd->dnq", shape.lagrange(domain.order, points), of)
+    measure = measure * (place[-1] >= above)
+    nodal = x.reshape(-1, domain.dim)[space.dofmap.list[: len(of)]]
+    found = np.einsum("qk,nkd->dnq", shape.lagrange(degree, points), nodal)
+    known = exact(place.reshape(domain.dim, -1)).reshape(found.shape)
+    squares = [np.sum(measure * part**2) for part in (found - known, known)]
+    off, whole = domain.mesh.comm.allreduce(np.array(squares))
+    return float(np.sqrt(off / whole))
+
+
+def _root_like(place: float) -> tuple[Any, Callable[[Array], Array], Callable[[Array], Array]]:
+    known = Singular(x0=place)
+    return (
+        known,
+        lambda x: np.stack([known.numpy(i, x.T) for i in range(2)]),
+        lambda x: known.pressure(x[:, 0]),
+    )
+
+
+def _hertz(kind: type[Line] | type[Point]) -> Callable[[float], Any]:
+    def at(place: float) -> tuple[Any, Callable[[Array], Array], Callable[[Array], Array]]:
+        known = kind(place)
+        return known, known.displacement, known.pressure
+
+    return at
+
+
+#: Name -> from where contact ends to problem, displacement and pressure; the dimension; the height
+#: from which on displacements are compared, as those of the ball are not known by its rim.
+KNOWN: dict[str, tuple[Callable[[float], Any], int, float]] = {
+    "Hertz, cylinder": (_hertz(Line), 2, 0.0),
+    "Hertz, ball": (_hertz(Point), 3, 0.25),
+    "root-like": (_root_like, 2, 0.0),
+}
+
+#: Cells along an edge, by dimension and degree of the displacements.
+CELLS = {(2, 1): (8, 16, 32, 64), (2, 2): (8, 16, 32, 64), (3, 1): (4, 8, 16), (3, 2): (2, 4, 8)}
+
+
+def solved(problem: ContactProblem) -> State:
+    """Return the solution.
+
+    Raises
+    ------
+    RuntimeError
+        If it does not converge.
+    """
+    state, outcome = Newton(problem, NewtonOptions(tolerance=1e-10)).solve()
+    if not outcome.converged:
+        raise RuntimeError(outcome.reason)
+    return state
+
+
+def places(n: int) -> list[float]:
+    """Return three places where contact may end between two nodes of n."""
+    return [(np.floor(0.53 * n) + part) / n for part in PLACES]
+
+
+def _squares(
+    known: tuple[Any, Any, Any], domain: Domain, degree: int, above: float
+) -> tuple[float, float]:
+    """Return the squares of the errors of displacements and pressures. Collective."""
+    solution, displacement, pressure = known
+    problem = solution.on(domain, degree)
+    state, nodes = solved(problem), problem.nodes
+    exact = pressure(nodes.points)
+    off = nodes.norm(state.forces.pressure - exact) / nodes.norm(exact)
+    return l2_error(problem, state.x, displacement, above) ** 2, off**2
+
+
+def orders(report: Report, coarse: bool) -> dict[tuple[str, str, int, int], Array]:
+    """Make the table of errors; return both orders by problem, cells, and both degrees."""
+    keys = "problem", "cells", "geometry", "degree", "n", "unknowns", "u in L2", "p in L2"
+    columns: dict[str, list[Any]] = {key: [] for key in keys}
+    last: dict[str, list[Any]] = {key: [] for key in (*keys, "order of u", "order of p")}
+    found = {}
+    for name, (kind, dim, above) in KNOWN.items():
+        for shape in (shape for shape in SHAPES if shape.dim == dim):
+            for order, degree in ELEMENTS:
+                counts, rows = CELLS[dim, degree][: 2 if coarse else None], []
+                for n in counts:
+                    domain = grid(MPI.COMM_WORLD, shape.name, order, n)
+                    squares = [_squares(kind(x), domain, degree, above) for x in places(n)]
+                    rows.append(np.sqrt(np.mean(squares, axis=0)))
+                    of = fem.functionspace(domain.mesh, ("Lagrange", degree)).dofmap.index_map
+                    shown = (name, shape.name, order, degree, n, of.size_global * dim)
+                    append(columns, *shown, *rows[-1].tolist())
+                    print(*shown, *rows[-1], flush=True)
+                slopes = np.polyfit(-np.log(counts), np.log(rows), 1)[0]
+                texts = [f"{value:.2e}" for value in rows[-1]]
+                append(last, *shown, *texts, *(f"{slope:.2f}" for slope in slopes))
+                found[name, shape.name, order, degree] = slopes
+    report.table("known-contacts", ORDERS[0], last, ORDERS[1])
+    report.numbers("known-contacts-meshes", columns)
+    return found
+
+
+LAME, SINGULAR = Lame(), Singular()
+
+
+def _ring(cell: str, order: int, degree: int, n: int) -> tuple[ContactProblem, Any]:
+    radius = 1.0 + float(LAME.displacement(np.array(1.0)))
+    fixed = [Fixed("left", [0.0, None]), Fixed("bottom", [None, 0.0])]
+    body = Body(SINGULAR.law, fixed)
+    contact = Contact("inner0", Sphere((0.0, 0.0), radius), press=True)
+    domain = rings(MPI.COMM_WORLD, cell, order, (1.0, 2.0), (n,))
+    return ContactProblem(domain, body, contact, degree=degree), LAME.ufl
+
+
+def _root(cell: str, order: int, degree: int, n: int) -> tuple[ContactProblem, Any]:
+    return SINGULAR.on(grid(MPI.COMM_WORLD, cell, order, n), degree), SINGULAR.ufl
+
+
+def _measured(make: Callable[[int], tuple[ContactProblem, Any]], n: int) -> tuple[float, ...]:
+    """Return the error in the energy norm, relative, the seconds, and the unknowns. Collective."""
+    begin = time.process_time()
+    problem, exact = make(n)
+    state = solved(problem)
+    seconds = time.process_time() - begin
+    norms = [errors(problem.equilibrium, state.x, other).energy for other in (exact, None)]
+    return norms[0] / norms[1], seconds, problem.equilibrium.layout.unknowns
+
+
+def times(report: Report, coarse: bool) -> dict[tuple[str, str, int, int], float]:
+    """Make the table of times to 1 %; return the unknowns by problem, cells and degrees."""
+    keys = ("problem", "cells", "geometry", "degree", "n", "unknowns", "error", "seconds")
+    columns: dict[str, list[Any]] = {key: [] for key in keys}
+    found = {}
+    makes = (("ring on a shaft", _ring), ("root-like", _root))
+    asked = 5 * ASKED if coarse else ASKED
+    for name, make in makes:
+        for shape in (shape for shape in SHAPES if shape.dim == 2):
+            for order, degree in ELEMENTS:
+                of, n = partial(make, shape.name, order, degree), 2
+                while (measured := _measured(of, n))[0] > asked:
+                    n = max(n + 1, n * 5 // 4)
+                least = min(measured[1], *(_measured(of, n)[1] for _ in range(2)))
+                shown = (name, shape.name, order, degree, n, measured[2])
+                append(columns, *shown, f"{measured[0]:.2e}", f"{least:.3f}")
+                print(*shown, measured[0], least, flush=True)
+                found[name, shape.name, order, degree] = measured[2]
+    report.table("time-to-one-per-cent", TIMES[0], columns, TIMES[1])
+    return found
