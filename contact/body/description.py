@@ -24,7 +24,7 @@ from contact.body.fields import (
     own_amplitude,
     vector,
 )
-from contact.body.rigid import Electrode, Rigid
+from contact.body.rigid import Bolt, Electrode, Rigid
 from contact.errors import InputError
 from contact.mesh.together import part
 from contact.typing import Array
@@ -328,6 +328,8 @@ class Body:
         Rigid parts, foundations included, and parts of one unknown potential.
     elastic
         Elastic supports.
+    bolts
+        Cuts whose sides are drawn together.
     """
 
     law: Given
@@ -338,6 +340,7 @@ class Body:
     rigid: tuple[Rigid, ...] = ()
     electrodes: tuple[Electrode, ...] = ()
     elastic: Sequence[Elastic] = default(default_factory=tuple)
+    bolts: tuple[Bolt, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse other arguments; accept one support or one load without a list."""
@@ -356,6 +359,7 @@ class Body:
             ("rigid", Rigid),
             ("electrodes", Electrode),
             ("elastic", Elastic),
+            ("bolts", Bolt),
         ):
             words = f"{kind.__name__}(...), or a list of them"
             object.__setattr__(self, name, several(name, getattr(self, name), kind, words))
@@ -364,6 +368,9 @@ class Body:
             accepted = "all materials as the law, Body([Material(...), Material(...)], ...)"
             fits = self.law is law and self.piezo is piezo
             expect("regions beside a law", self.regions, accepted, fits)
+        history = any(isinstance(m.law, HistoryLaw) for m in self.materials)
+        accepted = "materials without internal variables where a bolt is"
+        expect("bolts", self.bolts, accepted, not (self.bolts and history))
         fits = not self.electrodes or self.piezo is not None
         expect("electrodes", self.electrodes, "electrodes of a piezoelectric material", fits)
 

@@ -25,6 +25,7 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.component_norms import component_norms_of
+from contact.body.cuts import Cuts
 from contact.body.description import Body
 from contact.body.elements import STANDARD, check_element
 from contact.body.global_unknowns import make_global_unknowns
@@ -106,9 +107,11 @@ class BodyEquilibrium:
             inclined,
         )
         self._check_rollers()
+        #: The jumps across cuts of bolts; None without any.
+        self.cuts = Cuts.of(domain, self.space, self.global_unknowns)
         #: Where the forms are evaluated is written anew by each query.
         self.forms = WeakForms(
-            domain, body, self.space, self.cells, degree, element, self.pointwise
+            domain, body, self.space, self.cells, degree, element, self.pointwise, self.cuts
         )
         self._at = self.forms.at
         #: The laws with internal variables: the body's part of a history.
@@ -306,7 +309,9 @@ class BodyEquilibrium:
     def forces_without_history(self, state: Evaluated) -> Array:
         """Return the owned nodal forces of all materials without internal variables. Collective."""
         self.laws.silence()
-        return self._assembled_at(self.nodal(state.x).ravel())
+        forces = self._assembled_at(self.forms.put(self.nodal(state.x), self.motion(state.x)))
+        forces[self.owned :] += self.forms.on_global(self.global_unknowns.size)
+        return forces
 
     def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
         """Return the owned nodal forces of the stresses at a state. Collective.
@@ -319,16 +324,15 @@ class BodyEquilibrium:
             Unknowns at which the secant modulus is taken; those of the state by default: the
             material law itself.
         """
-        forms = self.forms
-        forms.at.x.array[:] = self.nodal(state.x).ravel()
-        if secant_at is None or self.linear:
-            self.laws.set(state, forms.at.x.array)
-            forces = sum(assembled(form, self.owned) for form in forms.law_forces)
-        else:
-            forms.secant_at.x.array[:] = self.nodal(secant_at).ravel()
-            self.laws.set(state, forms.secant_at.x.array, "secant")
-            forces = sum(assembled(form, self.owned) for form in forms.secant_forces)
-        return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
+        forms, secant = self.forms, secant_at is not None and not self.linear
+        at = forms.put(self.nodal(state.x), self.motion(state.x))
+        if secant:
+            assert secant_at is not None
+            at = forms.put(self.nodal(secant_at), self.motion(secant_at), secant=True)
+        self.laws.set(state, at, "secant" if secant else "")
+        chosen = forms.secant_forces if secant else forms.law_forces
+        forces = sum(assembled(form, self.owned) for form in chosen)
+        return np.concatenate([forces, forms.on_global(self.global_unknowns.size, secant)])
 
     def elastic_forces(self, x: Array) -> list[Array]:
         """Return the owned nodal forces of each elastic support at local unknowns. Collective."""
@@ -398,8 +402,9 @@ class BodyEquilibrium:
             Whether rows and columns of unknowns that supports hold are those of the identity.
         """
         forms, conditions = self.forms, [s.condition for s in self.supports] if held else []
-        forms.at.x.array[:] = forms.secant_at.x.array[:] = self.nodal(state.x).ravel()
-        self.laws.set(state, forms.at.x.array, kind)
+        for secant in (False, True):
+            at = forms.put(self.nodal(state.x), self.motion(state.x), secant)
+        self.laws.set(state, at, kind)
         matrix.zeroEntries()
         for form in forms.secant if kind == "secant" else forms.tangent:
             assemble_matrix(matrix, form, bcs=conditions)
@@ -411,6 +416,10 @@ class BodyEquilibrium:
             product.copy(matrix)
             product.destroy()
             inclined.add(matrix, 1.0)
+
+    def border(self, kind: str) -> tuple[Array, Array] | None:
+        """Return derivatives by the global unknowns where `assemble` was last. Collective."""
+        return self.forms.border(kind, self.owned, self.global_unknowns.size)
 
     def operator(
         self,

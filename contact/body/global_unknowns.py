@@ -1,4 +1,4 @@
-"""Global unknowns beside those of the nodes: rigid motions and potentials of electrodes.
+"""Global unknowns beside those of the nodes: rigid motions, electrodes, cuts of bolts.
 
 A rigid body moves by u = R q, R = [I, -(x - x_c) x]; an electrode has one potential. Each
 component of q is given, or free under a force, moment or charge that is given. Nodes of a rigid
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.body.description import Body
-from contact.body.rigid import Electrode, Rigid, rigid_motions
+from contact.body.rigid import Bolt, Electrode, Rigid, rigid_motions
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.tolerances import NEGLIGIBLE
@@ -42,7 +42,7 @@ class Member:
         How much a rotation of 1 counts (length), or the unit of the potential.
     """
 
-    description: Rigid | Electrode
+    description: Rigid | Electrode | Bolt
     begin: int
     scale: float
 
@@ -52,6 +52,11 @@ class Member:
         return isinstance(self.description, Rigid) and self.description.foundation
 
     @property
+    def followed(self) -> bool:
+        """Whether nodes follow it: those of a rigid part, or an electrode."""
+        return not (self.foundation or isinstance(self.description, Bolt))
+
+    @property
     def columns(self) -> slice:
         """Where its unknowns are."""
         return slice(self.begin, self.begin + len(self.description.values))
@@ -59,7 +64,7 @@ class Member:
     @property
     def units(self) -> Array:
         """How much an unknown of 1 is of a translation, a rotation or a potential."""
-        if isinstance(self.description, Electrode):
+        if not isinstance(self.description, Rigid):
             return np.full(1, self.scale)
         motion = self.description.motion
         turns = np.full(len(motion.rotation), 1 / self.scale)
@@ -85,7 +90,7 @@ class Member:
         columns = np.zeros((n, block_size, self.units.size))
         if isinstance(self.description, Electrode):
             columns[:, -1, 0] = 1.0
-        else:
+        elif isinstance(self.description, Rigid):
             offset = points - np.asarray(self.description.motion.centre)
             columns[:, :d] = rigid_motions(offset) * self.units
         return columns
@@ -123,13 +128,14 @@ class GlobalUnknowns:
     @property
     def mechanical(self) -> NDArray[np.bool_]:
         """Which of them are motions, shape (m,)."""
-        flags = [np.full(m.free.size, isinstance(m.description, Rigid)) for m in self.members]
+        moves = [not isinstance(m.description, Electrode) for m in self.members]
+        flags = [np.full(m.free.size, own) for m, own in zip(self.members, moves, strict=True)]
         return np.concatenate([np.zeros(0, dtype=bool), *flags])
 
     @property
     def tying(self) -> bool:
         """Whether any node follows."""
-        return any(not member.foundation for member in self.members)
+        return any(member.followed for member in self.members)
 
     def member(self, part: str) -> Member | None:
         """Return the moving foundation in front of a part; None where it is fixed."""
@@ -194,19 +200,20 @@ def make_global_unknowns(
         part that is free to move.
     """
     members: list[Member] = []
-    described: list[Rigid | Electrode] = [*body.rigid, *body.electrodes]
+    described: list[Rigid | Electrode | Bolt] = [*body.rigid, *body.electrodes, *body.bolts]
     for given in described:
         if domain.revolved and isinstance(given, Rigid):
             _check_revolved(given)
         begin = members[-1].columns.stop if members else 0
         scale = body.phi_scale if isinstance(given, Electrode) else domain.size
+        scale = 1.0 if isinstance(given, Bolt) else scale
         members.append(Member(given, begin, scale))
     size = members[-1].columns.stop if members else 0
     unknown = np.concatenate([np.zeros(0, dtype=bool), *(member.free for member in members)])
     tied = np.zeros(free.shape, dtype=bool)
     ties = sparse.csr_array((free.size, size))
     for member in members:
-        if not member.foundation:
+        if member.followed:
             ties = ties + _tie(domain, space, member, free, tied, size)
     return GlobalUnknowns(domain.comm, tuple(members), unknown, ties, tied)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contact.arguments import OfTime, expect
 from contact.body.fields import Amplitude, amplitude_of, own_amplitude
+from contact.errors import InputError
 from contact.mesh.together import part
 from contact.typing import Array
 
@@ -116,6 +117,59 @@ class Electrode:
     def forces(self) -> tuple[Timed | None, ...]:
         """The charge."""
         return (self.charge,)
+
+    def at(self, values: Sequence[Timed | None], time: float) -> Array:
+        """Return some of these at a time."""
+        return _at(values, self.amplitude, time)
+
+
+@dataclass(frozen=True)
+class Bolt:
+    """A cut through a body whose sides are drawn together: a bolt, or an anchor, that is tightened.
+
+    Parameters
+    ----------
+    on
+        Name of a part inside of the body, all facets of a plane section.
+    force
+        The section force (tension > 0), a number or a function of time; of a body of revolution
+        that of the full turn, of a plane one by unit thickness.
+    shortening
+        Instead of it the length by which the sides are drawn together, likewise.
+    amplitude
+        Function of time that multiplies it; by default it grows from 0 to all at time 1.
+
+    Raises
+    ------
+    InputError
+        If both or neither are given.
+    """
+
+    on: Any
+    force: Timed | None = None
+    shortening: Timed | None = None
+    amplitude: Amplitude | None = None
+
+    def __post_init__(self) -> None:
+        """Let functions of time be named where they fail."""
+        object.__setattr__(self, "on", part(self.on))
+        for name in ("force", "shortening"):
+            object.__setattr__(self, name, _timed(f"Bolt: {name}", getattr(self, name)))
+        object.__setattr__(self, "amplitude", own_amplitude("Bolt", self.amplitude))
+        if (self.force is None) == (self.shortening is None):
+            raise InputError(f"Bolt on {self.on!r}: accepted: one of force and shortening")
+
+    name = "bolt"
+
+    @property
+    def values(self) -> tuple[Timed | None, ...]:
+        """The shortening."""
+        return (self.shortening,)
+
+    @property
+    def forces(self) -> tuple[Timed | None, ...]:
+        """The section force."""
+        return (self.force,)
 
     def at(self, values: Sequence[Timed | None], time: float) -> Array:
         """Return some of these at a time."""

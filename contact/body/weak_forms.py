@@ -6,21 +6,25 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from ufl.core.expr import Expr
 
+from contact.body.cuts import Cuts
 from contact.body.description import Body
 from contact.body.elements import MEAN_DILATATION, kinematics_of
 from contact.body.fields import Number
 from contact.body.internal_variables import QuadratureLaws
-from contact.body.loads import expression
+from contact.body.loads import assembled, expression
 from contact.body.materials import material_measures
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Measure
 from contact.mesh.entities import Indices
+from contact.typing import Array
 from forms.hencky import is_linear, secant_form
 from forms.history import HistoryLaw, QuadratureLaw
 from forms.kinematics import CellMean, Isochoric
@@ -74,9 +78,11 @@ class WeakForms:
         degree: int,
         element: str,
         pointwise: Pointwise,
+        cuts: Cuts | None = None,
     ) -> None:
-        self._body, self._dim = body, domain.dim
+        self._body, self._dim, self._cuts = body, domain.dim, cuts
         self.at, self.secant_at = fem.Function(space), fem.Function(space)
+        self._mesh = domain.mesh
         self._trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
         self._test = self.split(test)
         # Stresses at points are no function that more of them would integrate more exactly.
@@ -141,9 +147,24 @@ class WeakForms:
         They are the forms of all quadrature rules, which add up: in one form FFCx would take values
         of a rule of one point for those of the others.
         """
-        (u, phi), (v, xi) = self.split(self.at), test or self._test
+        (u, _), (v, _) = self.split(self.at), test or self._test
         supports = [functions * form for form in self._supported(u, v)]
-        frozen = {False: self.split(secant_at)[0], True: self.split(history_at)[0]}
+        forms = self._stresses(secant_at, history_at, test or self._test, functions)
+        return forms + ([sum(supports)] if supports else [])
+
+    def _displacement(self, at: fem.Function) -> Expr:
+        """Return the displacement of unknowns `at` or `secant_at`, with the jumps across cuts."""
+        u = self.split(at)[0]
+        if self._cuts is None:
+            return u
+        return u + (self._cuts.jump if at is self.at else self._cuts.secant_jump)
+
+    def _stresses(
+        self, secant_at: Any, history_at: Any, test: Any, functions: Any = 1
+    ) -> list[ufl.Form]:
+        """Return the forces of the stresses; see `_internal`."""
+        u, phi, (v, xi) = self._displacement(self.at), self.split(self.at)[1], test
+        frozen = {False: self._displacement(secant_at), True: self._displacement(history_at)}
         return [
             sum(
                 (sign * functions) * secant_form(law, u_0, u, v, kinematics) * dx
@@ -156,7 +177,96 @@ class WeakForms:
             )
             for integrals in self._rules
             if integrals
-        ] + ([sum(supports)] if supports else [])
+        ]
+
+    # Of cuts: the section forces, and the derivatives of all forces by shortenings.
+
+    def _across(self, k: int) -> tuple[Expr, Expr | None]:
+        """Return the test function of a shortening."""
+        assert self._cuts is not None
+        none = None if self._body.piezo is None else fem.Constant(self._mesh, 0.0)
+        return self._cuts.directions[k], none
+
+    def put(self, nodal: Array, q: Array, secant: bool = False) -> Array:
+        """Put unknowns of the nodes, and the global ones, into `at` or `secant_at`; return it."""
+        into = self.secant_at if secant else self.at
+        into.x.array[:] = nodal.ravel()
+        if self._cuts is not None:
+            self._cuts.set(self._cuts.secant_jump if secant else self._cuts.jump, q)
+        return np.asarray(into.x.array)
+
+    def on_global(self, size: int, secant: bool = False) -> Array:
+        """Return the forces of the stresses on the global unknowns, shape (m,). Collective."""
+        found = np.zeros(size)
+        if self._cuts is not None:
+            forms = self._secant_section_forces if secant else self._section_forces
+            found[self._cuts.places] = [self._sum(own) for own in forms]
+        return found
+
+    def border(self, kind: str, owned: int, size: int) -> tuple[Array, Array] | None:
+        """Return the derivatives by global unknowns; None without cuts. Collective.
+
+        Parameters
+        ----------
+        kind
+            "secant", or of the law itself.
+        owned, size
+            Numbers of owned unknowns of the nodes, and of global ones.
+
+        Returns
+        -------
+        Those of the forces on the nodes, shape (owned, m), and on the global unknowns, (m, m).
+        """
+        if self._cuts is None:
+            return None
+        frozen = kind == "secant" or self._body.linear
+        own, across = self._secant_border if frozen else self._border
+        columns, corner = np.zeros((owned, size)), np.zeros((size, size))
+        for k, place in enumerate(self._cuts.places):
+            columns[:, place] = sum(assembled(form, owned) for form in own[k])
+            corner[self._cuts.places, place] = [self._sum(row[k]) for row in across]
+        return columns, corner
+
+    def _sum(self, forms: list[fem.Form]) -> float:
+        """Return the sum of functionals over all ranks. Collective."""
+        own = sum(fem.assemble_scalar(form) for form in forms)
+        return float(self._mesh.comm.allreduce(own, op=MPI.SUM))
+
+    @cached_property
+    def _section_forces(self) -> list[list[fem.Form]]:
+        return self._forces_across(self.at)
+
+    @cached_property
+    def _secant_section_forces(self) -> list[list[fem.Form]]:
+        return self._forces_across(self.secant_at)
+
+    def _forces_across(self, at: fem.Function) -> list[list[fem.Form]]:
+        assert self._cuts is not None
+        count = range(len(self._cuts.places))
+        return [fem.form(self._stresses(at, at, self._across(k))) for k in count]
+
+    @cached_property
+    def _secant_border(self) -> Any:
+        return self._derivatives_by_jumps(self.secant_at)
+
+    @cached_property
+    def _border(self) -> Any:
+        return self._derivatives_by_jumps(self.at)
+
+    def _derivatives_by_jumps(self, secant_at: fem.Function) -> Any:
+        cuts = self._cuts
+        assert cuts is not None
+
+        def along(forms: list[ufl.Form], k: int) -> list[fem.Form]:
+            made = [ufl.derivative(form, cuts.jump, cuts.directions[k]) for form in forms]
+            return fem.form(made)  # type: ignore[no-any-return]
+
+        count = range(len(cuts.places))
+        own = self._stresses(secant_at, secant_at, self._test)
+        return [along(own, k) for k in count], [
+            [along(self._stresses(secant_at, secant_at, self._across(j)), k) for k in count]
+            for j in count
+        ]
 
     def _supported(self, u: Expr, v: Expr) -> list[Any]:
         """Return the work of each elastic support, against the displacement u, along v."""

@@ -355,6 +355,34 @@ class Electrode(Section):
         return rigid.Electrode(self.on, as_number(self.charge), case.amplitude(self.amplitude))
 
 
+class Bolt(Section):
+    """`[[bolt]]`: a cut through a body whose sides are drawn together: a bolt that is tightened."""
+
+    on: Part
+    """A part inside of the body, all facets of a plane section: a group of a mesh file, or one of
+    `[mesh.inside]`."""
+    force: TimeFormula | None = None
+    """Section force, tension > 0; in 2-D of a unit of depth, of a body of revolution that of the
+    full turn. This or `shortening`."""
+    shortening: TimeFormula | None = None
+    """Length by which the sides are drawn together: with a load that follows, a bolt stays so."""
+    amplitude: AmplitudeName | None = None
+    """Factor of it as a function of time, see `[evolution]`."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.force is None) == (self.shortening is None):
+            given = "neither" if self.force is None else "both"
+            raise fault("force", Words(given), "one of force and shortening")
+        return self
+
+    def build(self, case: Case) -> rigid.Bolt:
+        """Return the bolt itself."""
+        force = None if self.force is None else as_number(self.force)
+        shortening = None if self.shortening is None else as_number(self.shortening)
+        return rigid.Bolt(self.on, force, shortening, case.amplitude(self.amplitude))
+
+
 def _check_free(
     key: str, forces: Sequence[Expression], moves: Sequence[Expression | str], name: str
 ) -> None:

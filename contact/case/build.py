@@ -75,6 +75,7 @@ def build_problem(
             elastic=[e.build(f"elastic.{i}", domain.comm) for i, e in enumerate(case.elastic)],
             rigid=_rigid(case, domain.dim),
             electrodes=tuple(electrode.build(case) for electrode in case.electrode),
+            bolts=tuple(bolt.build(case) for bolt in case.bolt),
         )
         own = {"coefficient": coefficient, "law": friction}
         contacts = _contacts(case, domain, foundation, layer, own)

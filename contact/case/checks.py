@@ -26,7 +26,7 @@ from contact.tolerances import HUGE
 Case: TypeAlias = Any
 
 #: Beginnings of the keys that may depend on the time.
-TIMED = ("fixed.", "load.", "rigid.", "electrode.")
+TIMED = ("fixed.", "load.", "rigid.", "electrode.", "bolt.")
 
 
 def check_sections(case: Case) -> None:
@@ -108,7 +108,7 @@ def growing(case: Case) -> list[str]:
         return []
     sections = [
         (f"{k}.{i}", s)
-        for k in ("fixed", "load", "electrode")
+        for k in ("fixed", "load", "electrode", "bolt")
         for i, s in enumerate(getattr(case, k))
     ]
     found = []
@@ -211,7 +211,7 @@ def _check_rigid(case: Case) -> None:
     for path, motion in case.moving:
         if case.space.kinematics == "axisymmetric":
             motion.check_along_axis(path)
-    for key in ("rigid", "electrode"):
+    for key in ("rigid", "electrode", "bolt"):
         parts = [section.on for section in getattr(case, key)]
         for i, on in enumerate(parts):
             if any(meet(on, other) for other in parts[:i]):

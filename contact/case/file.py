@@ -25,7 +25,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from contact.body.fields import CONSTANT, Amplitude, Ramp, steady
-from contact.case.body import Elastic, Electrode, Fixed, Load, Moving, RigidPart, Space
+from contact.case.body import Bolt, Elastic, Electrode, Fixed, Load, Moving, RigidPart, Space
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
 from contact.case.interface import Contact, Electric, Friction
@@ -136,6 +136,8 @@ class Case(Section):
     """Parts that move as rigid bodies: any number of `[[rigid]]`."""
     electrode: Annotated[tuple[Electrode, ...], as_tuple, Accepted("tables [[electrode]]")] = ()
     """Electrodes of unknown potential: any number of `[[electrode]]`."""
+    bolt: Annotated[tuple[Bolt, ...], as_tuple, Accepted("tables [[bolt]]")] = ()
+    """Bolts that are tightened: any number of `[[bolt]]`."""
     contact: Contacts
     """The foundation: `[contact]`; several: `[[contact]]`, each with its part."""
     friction: Friction | None = None

@@ -243,8 +243,18 @@ class ConstrainedBulk:
         for k, column in enumerate(self.constraint.motions.T.toarray()):
             self.columns[:, k] = times(matrix, column)
         self.corner = self.constraint.gathered(self.columns)
+        border = self._bulk.border(kind)
+        if border is not None:
+            own = [times(self.constraint.matrix, c, transposed=True) for c in border[0].T]
+            added = np.stack([self.layout.mask(column) for column in own], axis=1)
+            across = self.constraint.gathered(added)
+            self.columns += added
+            self.corner = self.corner + across + across.T + border[1]
         self.columns = np.stack([self.layout.mask(column) for column in self.columns.T], axis=1)
         self._without_followers(matrix)
+
+    def border(self, kind: str) -> None:
+        """Return None: the border is that of `columns` and `corner`."""
 
     def _without_followers(self, matrix: PETSc.Mat) -> None:
         """Take the rows and columns of unknowns that are not free out of a matrix. Collective."""
@@ -408,6 +418,13 @@ class ConstrainedOperator:
         other[self._dofs] = 0.0
         tied = self._constraint.motions[:, free].multiply(other[:, None]).toarray()
         parts = bulk.layout.comm.allreduce(tied.T @ tied, op=MPI.SUM)
-        gram = sum(part / max(np.abs(part).max(initial=0.0), 1e-300) for part in (gram, parts))
+        # One that no node follows, and that something resists, is a jump within the body.
+        motions = bulk.layout.comm.allreduce(
+            abs(self._constraint.motions[:, free]).sum(axis=0), op=MPI.SUM
+        )
+        own = np.diag(bulk.corner)[free] > 0
+        jumps = np.diag((own & (np.asarray(motions).ravel() == 0)).astype(float))
+        every = (gram, parts, jumps)
+        gram = sum(part / max(np.abs(part).max(initial=0.0), 1e-300) for part in every)
         resistance, directions = np.linalg.eigh(gram)
         return np.asarray(directions[:, resistance > ROUNDING * resistance.max(initial=0.0)])

@@ -49,6 +49,12 @@ class Bulk(Protocol):
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
         """Assemble the body's "secant", "tangent" or its "symmetric" part. Collective."""
 
+    def border(self, kind: str) -> tuple[Array, Array] | None:
+        """Return derivatives of the forces on x and on q by q where it assembled last. Collective.
+
+        Those that motions do not make, of which there may be none.
+        """
+
 
 @dataclass
 class Counters:

@@ -117,6 +117,7 @@ class Point:
     def __init__(self, body: BodyEquilibrium, material: Material, at: fem.Function) -> None:
         mesh = body.domain.mesh
         u, self._phi = body.split(at)
+        u = u if body.cuts is None else u + body.cuts.jump
         # The nodes may lie on the axis.
         kinematics = kinematics_of(body.domain, body.element, on_axis=True)
         self._dim, plane = body.dim, strain(u, kinematics)
@@ -240,6 +241,8 @@ class DerivedFields:
         expression = partial(self._expression, body.body.materials[material])
         name = "fields", material, self.points.tobytes()
         body.laws.fit(self._state, self._x)
+        if body.cuts is not None:
+            body.cuts.set(body.cuts.jump, self._q)
         yield from body.pointwise.values(name, expression, self.points, self._x, cells)
 
     def chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
@@ -249,6 +252,7 @@ class DerivedFields:
     def move_to(self, state: Evaluated) -> None:
         """Look at the fields of another state of the same body from now on."""
         self._state, self._x = state, self.body.nodal(state.x).flatten()
+        self._q = self.body.motion(state.x)
 
     def strains(self) -> list[Array]:
         """Return |dev eps| in the owned cells of each material, shape (cells, points)."""
@@ -392,9 +396,12 @@ def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
     """Return how large the deformation is at local unknowns of a body. Collective."""
     mesh, kinematics = body.domain.mesh, body.domain.kinematics
     nodal, middle = body.nodal(x).ravel(), shape_of(mesh).middle
+    if body.cuts is not None:
+        body.cuts.set(body.cuts.jump, body.motion(x))
 
     def measures(at: fem.Function) -> Expr:
         u, _ = body.split(at)
+        u = u if body.cuts is None else u + body.cuts.jump
         eps, stretch = strain(u, kinematics), ufl.Identity(3) + kinematics.gradient(u)
         return ufl.as_vector([ufl.sqrt(ufl.inner(eps, eps)), ufl.det(stretch)])
 

@@ -246,6 +246,10 @@ _RUN = (
         lambda r: r.movements.get("electrodes"),
     ),
     Quantity(
+        "bolts", "", "`shortening` and section `force` of each `[[bolt]]`, by part.",
+        lambda r: r.movements.get("bolts"),
+    ),
+    Quantity(
         "rigid_AXIS", "length",
         "Displacement of a foundation that moves, `rigid_x`...; `rigid_rotation` in degrees. Of a "
         "part that does, where there is no such foundation or with the part: `rigid_x_top`.",
@@ -258,6 +262,10 @@ _RUN = (
     ),
     Quantity(
         "potential_PART", "potential", "Of electrodes.", lambda r: r.rigid["potentials"], ROWS
+    ),
+    Quantity(
+        "bolt_KEY_PART", "length, force",
+        "Of bolts: `bolt_shortening_shank`, `bolt_force_shank`.", lambda r: r.rigid["bolts"], ROWS
     ),
     Quantity(
         "charge_PART", "charge", "Likewise; `charge_foundation` through the contact part.",

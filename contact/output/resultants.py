@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from contact.body.fields import constant, knows_time, steady
 from contact.body.loads import expression
-from contact.body.rigid import Electrode
+from contact.body.rigid import Bolt, Electrode
 from contact.body.rollers import directions_of
 from contact.errors import InputError
 from contact.mesh.together import members
@@ -288,10 +288,12 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
 
     ``rigid`` is the foundation that moves; of several it has one entry each, by part.
     ``rigid_parts`` are the parts that move as rigid bodies, ``electrodes`` those of unknown
-    potential; a key is absent where there are none. Rotations are in degrees. Forces, moments and
-    charges act from outside: those given, or the reactions of components that are given.
+    potential, ``bolts`` cuts; a key is absent where there are none. Rotations are in degrees.
+    Forces, moments and charges act from outside: those given, or the reactions of components that
+    are given. The force of a bolt is that in its section, tension positive.
     """
     foundations, parts, electrodes = dict[str, Any](), dict[str, Any](), dict[str, Any]()
+    bolts: dict[str, Any] = {}
     body = problem.equilibrium
     global_unknowns, q = body.global_unknowns, body.motion(state.x)
     if global_unknowns.size == 0:
@@ -306,6 +308,9 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
             charge = float((own / member.units)[0])
             electrodes[part] = {"potential": float(values[0]), "charge": charge}
             continue
+        if isinstance(member.description, Bolt):
+            bolts[part] = {"shortening": float(values[0]), "force": float(own[0])}
+            continue
         if problem.domain.revolved:
             # Over the full turn forces across the axis, and moments about it, cancel.
             own = np.where(np.arange(own.size) == 1, own, 0.0)
@@ -317,7 +322,7 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
             "moment": _one_or_more(own[d:]),
         }
     rigid = next(iter(foundations.values())) if len(foundations) == 1 else foundations
-    found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes}
+    found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes, "bolts": bolts}
     return {key: value for key, value in found.items() if value}
 
 
@@ -328,14 +333,18 @@ def _one_or_more(values: Array) -> Any:
 def rigid_columns(moving: Mapping[str, Any]) -> dict[str, dict[str, float]]:
     """Return the columns of rigid bodies and of electrodes, from their `movements`.
 
-    They are `moved` (displacements and rotations), `acting` (forces and moments) and
-    `potentials`. Of several foundations the names have that of the part behind them, and so have
+    They are `moved` (displacements and rotations), `acting` (forces and moments), `potentials`, and
+    `bolts`. Of several foundations the names have that of the part behind them, and so have
     those of rigid parts, but where there is one and no foundation moves.
     """
     foundations, electrodes = moving.get("rigid", {}), moving.get("electrodes", {})
+    bolts = moving.get("bolts", {})
     parts = moving.get("rigid_parts", {})
     found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}}
     found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
+    found["bolts"] = {
+        f"bolt_{key}_{part}": bolt[key] for part, bolt in bolts.items() for key in bolt
+    }
     if isinstance(foundations.get("displacement"), list):  # a single one
         foundations = {"": foundations}
     for body, end in zip(

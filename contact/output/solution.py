@@ -298,7 +298,7 @@ class Solution(Solved):
     def movements(self) -> Mapping[str, Any]:
         """Rigid bodies, and electrodes of unknown potential, as in summary.json. Collective.
 
-        Its keys are `rigid`, `rigid_parts` and `electrodes`, as far as there are any.
+        Its keys are `rigid`, `rigid_parts`, `electrodes` and `bolts`, as far as there are any.
         """
         return movements(self.problem, self.state)
 

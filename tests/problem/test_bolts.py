@@ -1,0 +1,255 @@
+"""Bolt preload: closed forms of a bar, and of a bolt through two flanges in series."""
+
+import basix.ufl
+import numpy as np
+import pytest
+import ufl
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact import (
+    Body,
+    Contact,
+    Fixed,
+    Linear,
+    Material,
+    Problem,
+    parse_case,
+    sensitivity,
+    solve,
+)
+from contact.body.rigid import Bolt, Motion, Rigid
+from contact.case.build import build_problem
+from contact.errors import InputError
+from contact.mesh.domain import from_mesh
+from contact.methods.options import NewtonOptions
+from contact.output.fields import DerivedFields
+
+COMM = MPI.COMM_WORLD
+LENGTH, YOUNG = 2.0, 10.0
+
+
+def bar(bolt, dim=2, degree=1, rotation=0.0, **more):
+    """Return a bar that is held at its ends, or at one, with a cut across it in the middle."""
+    size, cells = [0.5, 0.4, LENGTH][3 - dim :], [2, 2, 5][3 - dim :]
+    up = "xyz"[dim - 1]
+    still = [0.0] * dim
+    data = {
+        "mesh": {
+            "generator": "rectangle" if dim == 2 else "box",
+            "size": size,
+            "cells": cells,
+            "rotation": rotation,
+            "inside": {"cut": f"abs({up} - {0.4 * LENGTH}) < 1e-6"},
+        },
+        "space": {"degree": degree},
+        "material": {"young": YOUNG, "poisson": 0.0},
+        "fixed": [{"on": side, "displacement": still} for side in ("bottom", "top")],
+        "bolt": [{"on": "cut"} | bolt],
+        "contact": {"on": "right", "gap": 10.0},
+        "solver": {"tolerance": 1e-12},
+    }
+    return parse_case(data | more)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+@pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
+@pytest.mark.parametrize("given", ["force", "shortening"])
+def test_a_bar_between_walls(given, dim, degree, linear):
+    """N = E A s/L, whichever is given."""
+    area = 0.4 if dim == 2 else 0.2
+    s = 0.003
+    force = YOUNG * area * s / LENGTH
+    bolt = {given: {"force": force, "shortening": s}[given]}
+    solver = {"tolerance": 1e-12, "linear": linear}
+    solution = solve(bar(bolt, dim, degree, solver=solver), comm=COMM)
+    assert solution.converged
+    found = solution.movements["bolts"]["cut"]
+    assert found == {"shortening": pytest.approx(s), "force": pytest.approx(force)}
+    assert solution.reaction("bottom")[dim - 1] == pytest.approx(-force, rel=1e-8)
+    assert np.allclose(stresses(solution)[:, dim - 1, dim - 1], force / area, rtol=1e-7, atol=0)
+    energy = solution.energies
+    assert energy is None or energy.energy == pytest.approx(force * s / 2, rel=1e-8)
+
+
+def stresses(solution):
+    """Return the stresses at points of the owned cells, shape (n, 3, 3)."""
+    fields = DerivedFields(solution.problem.equilibrium, solution.state)
+    rows = [values.reshape(-1, values.shape[-1]) for _, values in fields.chunks()]
+    every = np.concatenate(rows) if rows else np.zeros((0, 40))
+    return every[:, fields.columns["stress"]].reshape(-1, 3, 3)
+
+
+#: Widths of the bolt and of the flanges, heights of these, Young's moduli of all.
+WIDTHS, HEIGHTS, MODULI = (0.5, 1.0), (0.8, 1.2), (20.0, 10.0, 5.0)
+
+
+def joint(comm):
+    """Return the mesh of a bolt beside two flanges, of which one lies on the other."""
+    (b, f), (low, high) = WIDTHS, HEIGHTS
+    boxes = [
+        ((0.0, 0.0), (b, low + high), (2, 5)),
+        ((1.0, 0.0), (1.0 + f, low), (2, 2)),
+        ((1.0, low), (1.0 + f, low + high), (3, 3)),
+    ]
+    points, cells = [np.zeros((0, 2))], [np.zeros((0, 4), dtype=np.int64)]
+    for start, end, (n, m) in boxes:
+        x, y = np.meshgrid(
+            np.linspace(start[0], end[0], n + 1), np.linspace(start[1], end[1], m + 1)
+        )
+        number = sum(map(len, points)) + np.arange(x.size).reshape(x.shape)
+        points.append(np.stack([x.ravel(), y.ravel()], axis=1))
+        quads = [number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]]
+        cells.append(np.stack(quads, axis=2).reshape(-1, 4))
+    x, quads = np.concatenate(points), np.concatenate(cells)
+    if comm.rank > 0:
+        x, quads = x[:0], quads[:0]
+    element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,), dtype=np.float64)
+    mesh = dmesh.create_mesh(comm, cells=quads, x=x, e=ufl.Mesh(element))
+    top = low + high
+    parts = {
+        "foot": lambda x: np.isclose(x[1], 0.0),
+        "head": lambda x: np.isclose(x[1], top),
+        "sides": lambda x: np.isclose(x[0], 0.0) | np.isclose(x[0], 1.0),
+    }
+    mesh.topology.create_entities(1)
+    edges = dmesh.locate_entities_boundary(mesh, 1, lambda x: np.isclose(x[1], low) & (x[0] > 0.9))
+    mesh.topology.create_connectivity(1, 2)
+    behind = mesh.topology.connectivity(1, 2)
+    middles = dmesh.compute_midpoints(
+        mesh, 2, np.arange(mesh.topology.index_map(2).size_local, dtype=np.int32)
+    )
+    lower = np.array([middles[behind.links(e)[0], 1] < low for e in edges], dtype=bool)
+    return from_mesh(
+        mesh,
+        parts | {"joint_low": edges[lower], "joint_high": edges[~lower]},
+        regions={
+            "bolt": lambda x: x[0] < b + 1e-9,
+            "low": lambda x: (x[0] > 0.9) & (x[1] < low + 1e-9),
+            "high": lambda x: (x[0] > 0.9) & (x[1] > low - 1e-9),
+        },
+        inside={"shank": lambda x: np.isclose(x[1], 0.4 * top) & (x[0] < b + 1e-9)},
+    )
+
+
+def tightened(bolt, pull=0.0, amplitude=None, linear="auto"):
+    """Return a joint with a rigid head that is pulled at."""
+    domain = joint(COMM)
+    names = ("bolt", "low", "high")
+    materials = [Material(Linear(e, 0.0), on=name) for e, name in zip(MODULI, names, strict=True)]
+    motion = Motion([0.0, None], [0.0], [0.0, pull], [0.0], (0.0, 0.0), amplitude)
+    supports = [Fixed("foot", [None, 0.0]), Fixed("sides", [0.0, None])]
+    body = Body(materials, supports, rigid=Rigid("head", motion), bolts=bolt)
+    return Problem(domain, body, Contact("joint_high", against="joint_low"))
+
+
+def stiffnesses():
+    """Return the stiffness of the bolt, and that of the flanges, one behind the other."""
+    bolt = MODULI[0] * WIDTHS[0] / sum(HEIGHTS)
+    flanges = [e * WIDTHS[1] / h for e, h in zip(MODULI[1:], HEIGHTS, strict=True)]
+    return bolt, 1 / sum(1 / k for k in flanges)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+def test_a_bolt_and_two_flanges_in_series(linear):
+    """N = s k_b k_f/(k_b + k_f); a given force asks for s = N (1/k_b + 1/k_f)."""
+    bolt, flanges = stiffnesses()
+    s = 0.004
+    force = s / (1 / bolt + 1 / flanges)
+    options = NewtonOptions(tolerance=1e-12, linear=linear)
+    for given in ({"shortening": s}, {"force": force}):
+        solution = solve(tightened(Bolt("shank", **given)), options)
+        assert solution.converged
+        found = solution.movements["bolts"]["shank"]
+        assert found["shortening"] == pytest.approx(s, rel=1e-9)
+        assert found["force"] == pytest.approx(force, rel=1e-9)
+        head = solution.movements["rigid_parts"]["head"]["displacement"][1]
+        assert head == pytest.approx(-force / flanges, rel=1e-9)
+        pressures = np.concatenate(COMM.allgather(solution.pressure))
+        assert pressures == pytest.approx(force / WIDTHS[1], rel=1e-8)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("share", [0.5, 0.99, 1.5])
+def test_a_tightened_joint_shares_a_load_until_it_opens(share):
+    """The bolt takes k_b/(k_b + k_f) of it; once the flanges part, all."""
+    bolt, flanges = stiffnesses()
+    s = 0.004
+    force = s / (1 / bolt + 1 / flanges)
+    opens = force * (1 + bolt / flanges)
+    pull = share * opens
+    options = NewtonOptions(tolerance=1e-12)
+    solution = solve(tightened(Bolt("shank", shortening=s), pull), options)
+    found = solution.movements["bolts"]["shank"]["force"]
+    shared = force + pull * bolt / (bolt + flanges)
+    assert found == pytest.approx(shared if share < 1 else pull, rel=1e-8)
+    assert (np.linalg.norm(solution.contact_force) > 1e-9) == (share < 1)
+
+
+@pytest.mark.parallel
+def test_an_inclined_bar_of_another_law_is_the_straight_one():
+    """With a shift along the cut: the jump is along its normal alone."""
+    material = {"law": "log", "young": YOUNG, "poisson": 0.3, "yield_strain": 0.001}
+    found = [
+        solve(bar({"force": 0.02}, material=material, rotation=angle), comm=COMM)
+        for angle in (0.0, 40.0)
+    ]
+    assert all(solution.converged for solution in found)
+    one, other = (solution.movements["bolts"]["cut"]["shortening"] for solution in found)
+    assert other == pytest.approx(one, rel=1e-8)
+    assert one > 1.05 * 0.02 * LENGTH / YOUNG / 0.4
+
+
+@pytest.mark.parallel
+def test_tightened_in_steps_its_work_is_stored():
+    steps = {"evolution": {"times": [0.0, 1.0, 2.0], "steps": [2, 1]}}
+    steps["evolution"]["amplitudes"] = {"turn": {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.5]}}
+    solution = solve(bar({"shortening": 0.004, "amplitude": "turn"}, **steps), comm=COMM)
+    rows = [step.row for step in solution.steps]
+    stiffness = YOUNG * 0.4 / LENGTH
+    assert [row["bolt_shortening_cut"] for row in rows] == pytest.approx([0.002, 0.004, 0.002])
+    forces = [row["bolt_force_cut"] for row in rows]
+    assert forces == pytest.approx([stiffness * s for s in (0.002, 0.004, 0.002)])
+    energies = [row["energy"] for row in rows]
+    assert energies == pytest.approx([stiffness / 2 * s**2 for s in (0.002, 0.004, 0.002)])
+    assert sum(row["work"] for row in rows) == pytest.approx(energies[-1])
+
+
+def test_results_have_derivatives_by_a_shortening():
+    solution = solve(bar({"shortening": 0.004}))
+    found = sensitivity(solution, ["reaction_y_top"], ["bolt.0.shortening"])
+    assert found["reaction_y_top"]["bolt.0.shortening"] == pytest.approx(2.0, rel=1e-6)
+
+
+WRONG = {
+    "both": ({"force": 1.0, "shortening": 1.0}, {}, r"bolt\.0\.force: both"),
+    "neither": ({}, {}, r"bolt\.0\.force: neither"),
+    "a side": ({"on": "top", "force": 1.0}, {}, "'top': it is on the boundary"),
+    "half a section": (
+        {"force": 1.0},
+        {"mesh": {"inside": {"cut": "(abs(y - 0.8) < 1e-6)*(x < 0.3)"}}},
+        "'cut': the cut ends within the body",
+    ),
+    "two planes": (
+        {"force": 1.0},
+        {"mesh": {"inside": {"cut": "(abs(y - 0.8) < 1e-6) + (abs(y - 1.2) < 1e-6)"}}},
+        "'cut': the cut is not plane",
+    ),
+    "plastic": (
+        {"force": 1.0},
+        {"material": {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 1.0}},
+        "without internal variables",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_refused(name):
+    bolt, more, words = WRONG[name]
+    base = {"generator": "rectangle", "size": [0.4, LENGTH], "cells": [4, 5]}
+    more = more | ({"mesh": base | more["mesh"]} if "mesh" in more else {})
+    with pytest.raises(InputError, match=words) as caught:
+        build_problem(bar(bolt, **more))
+    assert "\n" not in str(caught.value)
