@@ -130,6 +130,15 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
             yield _role(domain, fixed.on, ELECTRODE, words)
     for support in case.elastic:
         yield _role(domain, support.on, HELD, f"elastic support: {support.on}")
+    for bolt in case.bolt:
+        key = "shortening" if bolt.force is None else "force"
+        words = f"bolt, {key} {_said(getattr(bolt, key))}: {bolt.on}"
+        yield _role(domain, bolt.on, LOADED, words)
+    for electrode in case.electrode:
+        words = f"electrode of charge {_said(electrode.charge)}: {electrode.on}"
+        yield _role(domain, electrode.on, ELECTRODE, words)
+    for part in case.rigid:
+        yield _role(domain, part.on, HELD, f"rigid part: {part.on}")
     for given, load in zip(case.load, problem.body.loads, strict=True):
         said = []
         if given.traction is not None:

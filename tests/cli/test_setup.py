@@ -8,7 +8,7 @@ import pytest
 from matplotlib.collections import LineCollection
 from matplotlib.quiver import Quiver
 
-from contact import build_problem, load_case
+from contact import build_problem, load_case, parse_case
 from contact.cli.main import main
 from contact.cli.setup import draw_setup
 from scripts.cases import CASES
@@ -73,3 +73,25 @@ def test_check_writes_it(tmp_path, monkeypatch, capsys):
     assert {path.name for path in tmp_path.iterdir()} == {"bar-setup.png", "bar-setup.pdf"}
     assert "# set-up: bar-setup.png" in capsys.readouterr().out
     assert matplotlib.rcParams["font.size"] == before["font.size"]
+
+
+def test_parts_inside_of_a_body_are_drawn():
+    """An electrode between two layers, and the cut of a bolt, stand in the legend."""
+    mesh = {"generator": "rectangle", "size": [4.0, 1.0], "cells": [8, 4]}
+    mesh |= {"inside": {"middle": "abs(y - 0.5) < 1e-6", "cut": "abs(x - 2) < 1e-6"}}
+    case = parse_case(
+        {
+            "mesh": mesh,
+            "material": {"name": "PZT-4"},
+            "fixed": [
+                {"on": "left", "displacement": [0.0, 0.0]},
+                {"on": "bottom", "potential": 0.0},
+            ],
+            "electrode": [{"on": "middle", "charge": 1.0}],
+            "bolt": [{"on": "cut", "force": 2.0}],
+            "contact": {"on": "top", "gap": 1.0},
+        }
+    )
+    (legend,) = draw_setup(case, build_problem(case)).legends
+    words = {text.get_text() for text in legend.get_texts()}
+    assert {"electrode of charge 1: middle", "bolt, force 2: cut"} <= words

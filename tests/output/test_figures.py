@@ -144,3 +144,10 @@ def test_a_small_contact_zone_is_drawn_with_its_vicinity() -> None:
     assert np.ptp(near.box, axis=0)[0] == pytest.approx(7 * width)
     ax = draw_plane(near, Look()).axes[0]
     assert ax.get_xlim() == pytest.approx((1 - 3.5 * width, 1 + 3.5 * width))
+
+
+def test_a_foundation_far_away_does_not_shrink_the_body() -> None:
+    """The gap is scaled as the displacements are: the body would be a dot beside it."""
+    run = run_of(solve(block(2, contact={"on": "bottom", "gap": 5.0})))
+    low, high = draw_plane(picture(run, "von_mises", 10.0), Look()).axes[0].get_ylim()
+    assert high - low < 2 * run.diameter

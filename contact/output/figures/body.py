@@ -193,7 +193,8 @@ def draw_plane(picture: Picture, look: Look) -> Figure:
         ax.add_collection(LineCollection(list(outline * [side, 1]), colors="black", lw=0.5))
         for part in run.contacts:
             if np.all(part["rigid"]):
-                _foundation(ax, part, picture.scale, ends(part, run.held), side)
+                edge = ends(part, run.held)
+                _foundation(ax, part, picture.scale, edge, side, run.diameter)
     _bar(figure, picture)
     ax.set_aspect("equal")
     ax.use_sticky_edges = False
@@ -225,10 +226,13 @@ def _colour(ax: Axes, picture: Picture, side: int) -> None:
         ax.tripcolor(mesh, skin["values"], shading="gouraud", **shown)
 
 
-def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -> None:
+def _foundation(
+    ax: Axes, table: Table, scale: float, edges: Array, side: int, diameter: float
+) -> None:
     """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled.
 
-    Not where it is far: gaps to a curved shape, scaled like the displacements, are no shape.
+    Not where it is far: gaps to a curved shape, scaled like the displacements, are no shape; and
+    beside one that is farther than the body is large the body would be a dot.
     """
     points = np.column_stack([table["x"], table["y"]])
     normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"] + table["moved"]
@@ -237,7 +241,8 @@ def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -
     gap = np.concatenate([gap[:1], gap, gap[-1:]])
     surface = points + scale * gap[:, None] * normal
     extent = np.ptp(points, axis=0).max()
-    near = np.flatnonzero((scale == 1) | (scale * gap <= max(FAR * extent, 2 * scale * gap.min())))
+    far = max(FAR * extent, min(2 * scale * gap.min(), diameter))
+    near = np.flatnonzero((scale == 1) | (scale * gap <= far))
     for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1):
         ax.plot(*surface[run].T, color="black", lw=0.5)
         band = np.concatenate([surface[run], (surface + 0.03 * extent * normal)[run[::-1]]])
