@@ -85,6 +85,13 @@ class Cells:
         return replace(self, points=self.points[:0], regions=regions, parts=parts)
 
 
+#: Note on curved hexahedra of 20 nodes.
+SERENDIPITY = (
+    "the middles of curved faces are interpolated from their edges: pressures may scatter where "
+    "faces are distorted, and do not with 27 nodes a cell (in Gmsh Mesh.SecondOrderIncomplete = 0)"
+)
+
+
 def check_model(model: Model) -> Cells:
     """Check a mesh and bring it into the form in which it is distributed.
 
@@ -117,6 +124,8 @@ def check_model(model: Model) -> Cells:
         points, rows = _filled(points, regions.rows, shape, kept)
         regions = replace(regions, rows=rows)
     notes = [*model.notes]
+    if dim == 3 and np.any(kept < 0):
+        notes.append(SERENDIPITY)
     if left := len(_first_of_each(every[:, first])) - len(regions.rows):
         notes.append(f"{left} cell(s) in no physical group are no part of the body")
     # The nodes of the body alone; others may be centres of circles.

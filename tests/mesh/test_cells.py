@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import ast
+from pathlib import Path
+
 import numpy as np
 import pytest
 from dolfinx import fem
 from mpi4py import MPI
 from vtkmodules import vtkCommonDataModel
 
+import contact
 from contact.errors import InputError
 from contact.mesh.cells import SHAPES, Shape, rule, shape_of
 from contact.mesh.domain import revolved
@@ -20,6 +24,27 @@ from tests.problems.sizes import measures as part_sizes
 
 COMM = MPI.COMM_WORLD
 NAMES = [shape.name for shape in SHAPES]
+
+
+#: Where names of shapes stand: with their definition, in formats of files and input, and for the
+#: pieces into which facets are cut.
+FORMATS = ("cells", "grid", "shared", "abaqus", "exodus", "med", "formats")
+NAMING = [*(f"mesh/{name}" for name in FORMATS), "case/mesh", "interface/mortar/segments"]
+
+
+def test_nothing_else_asks_for_a_shape_by_its_name() -> None:
+    """Neither by a text nor by a constant; properties such as `Shape.simplex` tell what differs."""
+    root = Path(contact.__file__).parent
+    asked = set()
+    for path in root.rglob("*.py"):
+        if str(path.relative_to(root).with_suffix("")) in NAMING:
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            text = isinstance(node, ast.Constant) and node.value in ("interval", *NAMES)
+            constant = isinstance(node, ast.Name) and node.id in [name.upper() for name in NAMES]
+            if text or constant:
+                asked.add(str(path.relative_to(root)))
+    assert asked == set()
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=NAMES)

@@ -10,6 +10,7 @@ import meshes
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
 from contact.mesh.reader import from_file
+from contact.mesh.validity import SERENDIPITY
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD
@@ -220,6 +221,7 @@ def test_faces_of_twenty_node_bricks(shared_tmp_path):
     domain = from_file(COMM, path)
     expected = {"low": 2.0, "high": 2.0, "front": 1.0, "end": 1.0, "back": 1.0, "start": 1.0}
     assert measures(domain) == pytest.approx({**expected, "skin": 10.0})
+    assert domain.notes == ()
     x = domain.mesh.geometry.x
     for part, axis, value in (("low", 2, 0), ("high", 2, 1), ("front", 1, 0), ("end", 0, 2)):
         from dolfinx.mesh import entities_to_geometry
@@ -235,6 +237,7 @@ def test_bent_edges_are_kept(tmp_path):
     domain = from_file(MPI.COMM_SELF, tmp_path / "bent.inp")
     assert domain.order == 2 and domain.mesh.geometry.dofmap.shape == (2, 27)
     assert domain.mesh.geometry.index_map().size_global == 45
+    assert domain.notes == (SERENDIPITY,)
     (tmp_path / "folded.inp").write_text(bricks(1.5))
     with pytest.raises(InputError, match=r"folded\.inp: .* folded by their curved edges"):
         from_file(MPI.COMM_SELF, tmp_path / "folded.inp")
