@@ -20,6 +20,7 @@ from contact.output.quantities import ADAPT, values_of
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 logger = logging.getLogger("contact.adapt")
@@ -141,7 +142,16 @@ def marked(comm: MPI.Intracomm, squares: Array, fraction: float) -> Indices:
     fraction
         The share of the sum over all ranks.
     """
-    every = np.sort(np.concatenate(comm.allgather(squares)))[::-1]
-    sums = np.cumsum(every)
-    last = every[min(np.searchsorted(sums, fraction * sums[-1]), every.size - 1)]
+    share = (1 - ROUNDING) * fraction * comm.allreduce(float(squares.sum()), op=MPI.SUM)
+    most = comm.allreduce(float(squares.max(initial=0.0)), op=MPI.MAX)
+    # Bisection for the least of them: numbers >= 0 are in the order of their bits.
+    low, high = 0, int(np.float64(most).view(np.int64))
+    while low < high:
+        middle = (low + high + 1) // 2
+        above = float(squares[squares >= np.int64(middle).view(np.float64)].sum())
+        if comm.allreduce(above, op=MPI.SUM) >= share:
+            low = middle
+        else:
+            high = middle - 1
+    last = np.int64(low).view(np.float64)
     return np.flatnonzero(squares >= (1 - TIE) * last).astype(np.int32)

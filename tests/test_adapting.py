@@ -84,6 +84,21 @@ def test_marks_have_the_share_of_the_sum_with_ties():
 
 
 @pytest.mark.parallel
+@pytest.mark.parametrize("fraction", [0.1, 0.5, 0.97, 1.0])
+def test_marks_are_the_fewest_with_the_share(fraction):
+    """As one finds them who has sorted those of all ranks; the last of them has none."""
+    comm = MPI.COMM_WORLD
+    every = 10 ** np.random.default_rng(0).uniform(-4, 4, 100) * (np.arange(100) % 7 > 0)
+    shares = max(comm.size - 1, 1)
+    bounds = [100 * min(k, shares) // shares for k in (comm.rank, comm.rank + 1)]
+    order = np.argsort(-every)
+    count = 1 + np.searchsorted(np.cumsum(every[order]), (1 - 1e-12) * fraction * every.sum())
+    expected = np.sort(order[:count])
+    found = bounds[0] + marked(comm, every[slice(*bounds)], fraction)
+    np.testing.assert_array_equal(np.concatenate(comm.allgather(found)), expected)
+
+
+@pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_names_are_inherited_where_some_cells_are_refined(dim):
     comm = MPI.COMM_WORLD
