@@ -17,7 +17,7 @@ and a problem that is put together in Python by
   dolfinx's mesh and tags.
 - Body: `Body`, `Fixed`, `Elastic`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`; `J2` with `Voce` or
   `Tabulated` hardening, and a stress update of your own, which returns a `Response`; several by
-  `Material`, and crystals by `make_material`; `Rigid` with its `Motion`, and `Electrode`.
+  `Material`, and crystals by `make_material`; `Rigid` with its `Motion`, `Electrode`, `Bolt`.
 - Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
   `Level`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
   `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.

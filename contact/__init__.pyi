@@ -5,6 +5,7 @@ from contact.body.description import Elastic as Elastic
 from contact.body.description import Fixed as Fixed
 from contact.body.description import Load as Load
 from contact.body.description import Material as Material
+from contact.body.rigid import Bolt as Bolt
 from contact.body.rigid import Electrode as Electrode
 from contact.body.rigid import Motion as Motion
 from contact.body.rigid import Rigid as Rigid

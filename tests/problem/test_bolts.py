@@ -9,16 +9,18 @@ from mpi4py import MPI
 
 from contact import (
     Body,
+    Bolt,
     Contact,
     Fixed,
     Linear,
     Material,
+    Motion,
     Problem,
+    Rigid,
     parse_case,
     sensitivity,
     solve,
 )
-from contact.body.rigid import Bolt, Motion, Rigid
 from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh
