@@ -11,10 +11,13 @@ from dolfinx import fem
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
+from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import material_measures
 from contact.typing import Array
-from forms.hencky import secant_form
+from forms.hencky import secant_stress
+from forms.kinematics import strain
+from forms.piezo import Piezo
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,8 @@ class Errors:
         Norm in L2(Omega), and |grad(.)| in L2(Omega).
     energy
         sqrt(B(u; e, e)) with the secant form of the finer solution u: the norm in which Cea's
-        lemma holds for a linear material.
+        lemma holds for a linear material. In a piezoelectric body with E . beta E besides. Strains
+        of u are those of its element: of the mean dilatation the error is that of the pressure.
     """
 
     l2: float
@@ -51,27 +55,43 @@ def errors(
     body, x
         The body on the finer mesh, and its unknowns: the solution.
     other
-        A function in `body.space`, or the displacement as a UFL vector of the coordinates; None
-        for the norms of the solution itself.
+        A function in `body.space`, or the displacement, with the potential of a piezoelectric body,
+        as a UFL vector of the coordinates; None for the norms of the solution itself.
     """
     solution = body.function(x)
-    u, _ = body.split(solution)
+    u, phi = body.split(solution)
+    kinematics, own = body.domain.kinematics, kinematics_of(body.domain, body.element)
+    frozen = eps = strain(u, own)
+    e, electric = u, phi
     if isinstance(other, fem.Function):
-        e = body.split(solution - other)[0]
-    elif other is None:
-        e = u
-    else:
-        e = u - other(ufl.SpatialCoordinate(body.domain.mesh))
+        e, electric = body.split(solution - other)
+        eps = strain(e, own)
+    elif other is not None:
+        every = other(ufl.SpatialCoordinate(body.domain.mesh))
+        given = ufl.as_vector([every[i] for i in range(body.dim)])
+        e, eps = u - given, eps - strain(given, kinematics)
+        electric = None if phi is None else phi - every[body.dim]
     materials = list(
         material_measures(body.domain, body.body.materials, body.cells, 2 * body.degree + 4)
     )
-    kinematics = body.domain.kinematics
     gradient = kinematics.gradient(e)
     squares = (
         sum(ufl.inner(e, e) * dx for _, _, dx in materials),
         sum(ufl.inner(gradient, gradient) * dx for _, _, dx in materials),
-        sum(secant_form(law, u, e, e, kinematics) * dx for law, _, dx in materials),
+        sum(
+            (ufl.inner(secant_stress(law, frozen, eps), eps) + _electric(piezo, electric, body.dim))
+            * dx
+            for law, piezo, dx in materials
+        ),
     )
     integrals = [fem.assemble_scalar(fem.form(square)) for square in squares]
     totals = body.comm.allreduce(np.array(integrals), op=MPI.SUM)
     return Errors(*(float(np.sqrt(max(total, 0.0))) for total in totals))
+
+
+def _electric(piezo: Piezo | None, potential: Expr | None, dim: int) -> Expr:
+    """Return E . beta E, zero in a material without a field."""
+    if piezo is None or potential is None:
+        return ufl.as_ufl(0)
+    field = ufl.grad(potential)
+    return sum(piezo.beta[i, j] * field[i] * field[j] for i in range(dim) for j in range(dim))

@@ -1,8 +1,8 @@
-"""Problems whose exact solution is known: a manufactured one, and Signorini's with r^(3/2)."""
+"""Problems whose exact solution is known: manufactured ones, and Signorini's with r^(3/2)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,6 +23,7 @@ from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log, stress
 from forms.kinematics import strain
 from forms.ops import cos, sin
+from forms.piezo import Piezo, coupling_stress, electric_displacement
 from scripts.studies.error_norms import Errors, errors
 
 
@@ -57,10 +58,31 @@ def smooth(dim: int) -> list[Callable[[Any], Any]]:
     return parts
 
 
+def nearly_isochoric(law: Linear) -> list[Callable[[Any], Any]]:
+    """Return the components of a displacement in 2-D whose pressure is smooth and of order one."""
+    low = 0.05 / float(law.bulk)
+    return [
+        lambda x: 0.1 * sin(x[0]) * cos(x[1]) + low * sin(2 * x[0] + x[1]),
+        lambda x: -0.1 * cos(x[0]) * sin(x[1]) + low * cos(x[0] - 2 * x[1]),
+    ]
+
+
+def electric(x: Any) -> Any:
+    """Return a smooth potential."""
+    return 0.3 * sin(1.2 * x[0] + 0.5) * cos(0.9 * x[1]) + 0.1 * x[0] * x[1]
+
+
 def manufactured(
-    dim: int, degree: int, n: int, law: Hencky = HENCKY, cell: str | None = None
+    dim: int,
+    degree: int,
+    n: int,
+    law: Hencky = HENCKY,
+    cell: str | None = None,
+    piezo: Piezo | None = None,
+    element: str = "standard",
+    parts: Sequence[Callable[[Any], Any]] | None = None,
 ) -> ContactProblem:
-    """Return a Hencky body with the displacement `smooth`, loaded at the bottom. Collective.
+    """Return a Hencky body with a given displacement, loaded at the bottom. Collective.
 
     Parameters
     ----------
@@ -72,34 +94,52 @@ def manufactured(
         The material.
     cell
         Shape of the cells; by default triangles or tetrahedra.
+    piezo
+        Of a piezoelectric body, whose potential is `electric`.
+    element
+        "standard" or "mean_dilatation".
+    parts
+        Components of the displacement; by default those of `smooth`.
     """
     make, usual = (rectangle, "triangle") if dim == 2 else (box, "tetrahedron")
     domain = make(MPI.COMM_WORLD, [0.0] * dim, [1.0] * dim, [n] * dim, cell=cell or usual)
-    sigma = stress(law, strain(exact(dim)(ufl.SpatialCoordinate(domain.mesh))))
-    element = basix.ufl.element("Lagrange", domain.mesh.topology.cell_name(), degree + 2)
-    space = fem.functionspace(domain.mesh, element)
+    x = ufl.SpatialCoordinate(domain.mesh)
+    parts = parts or smooth(dim)
+    eps = strain(ufl.as_vector([f(x) for f in parts]))
+    sigma = stress(law, eps)
+    if piezo is not None:
+        sigma += coupling_stress(piezo, electric(x))
+    finer = basix.ufl.element("Lagrange", domain.mesh.topology.cell_name(), degree + 2)
+    space = fem.functionspace(domain.mesh, finer)
 
     def load(expression: ufl.core.expr.Expr) -> Given:
         # Interpolated: UFL would ask for a quadrature of a very high degree.
         function = fem.Function(space)
-        function.interpolate(fem.Expression(expression, element.basix_element.points))
+        function.interpolate(fem.Expression(expression, finer.basix_element.points))
         return Given(lambda _: function)
 
+    # The outward normal of the bottom is minus the last axis.
     axes, up = range(dim), dim - 1
     loads = [
         Load(None, [load(-sum(sigma[i, j].dx(j) for j in axes)) for i in axes]),
         Load("bottom", [load(-sigma[i, up]) for i in axes]),
     ]
-    given = [Given(f) for f in smooth(dim)]
+    if piezo is not None:
+        d = electric_displacement(piezo, eps, electric(x))
+        loads.append(Load(None, charge=load(sum(d[j].dx(j) for j in axes))))
+        loads.append(Load("bottom", charge=load(-d[up])))
+    given = [Given(f) for f in parts]
     sides = ["left", "right", "top"] + ["front", "back"] * (dim == 3)
-    fixed = [Fixed(side, given) for side in sides]
+    fixed = [Fixed(side, given, None if piezo is None else Given(electric)) for side in sides]
     far = GapFunction(lambda points: np.full(len(points), 10.0))
-    return ContactProblem(domain, Body(law, fixed, loads), Contact("bottom", far), degree=degree)
+    body = Body(law, fixed, loads, piezo)
+    contact = Contact("bottom", far)
+    return ContactProblem(domain, body, contact, degree=degree, element=element)
 
 
-def exact(dim: int) -> Callable[[Any], ufl.core.expr.Expr]:
-    """Return `smooth` as a UFL vector."""
-    return lambda x: ufl.as_vector([f(x) for f in smooth(dim)])
+def exact(dim: int, charged: bool = False) -> Callable[[Any], ufl.core.expr.Expr]:
+    """Return `smooth` as a UFL vector, with `electric` of a piezoelectric body."""
+    return lambda x: ufl.as_vector([f(x) for f in [*smooth(dim), *[electric] * charged]])
 
 
 @dataclass(frozen=True)
