@@ -18,8 +18,8 @@ from tests.problems.bar import changed
 LINEAR = {"material__law": "linear", "material__yield_strain": None, "friction__mu": 0.6}
 
 
-def bar(comm=MPI.COMM_SELF, cells=(8, 2), **adapt):
-    data = changed(mesh__cells=list(cells), **LINEAR)
+def bar(comm=MPI.COMM_SELF, cells=(8, 2), degree=1, **adapt):
+    data = changed(mesh__cells=list(cells), space__degree=degree, **LINEAR)
     data["mesh"]["adapt"] = adapt
     solution = solve(parse_case(data), comm=comm)
     assert solution.converged, solution.outcome.reason
@@ -50,9 +50,10 @@ def test_meshes_grow_so_that_the_last_one_costs_the_most(degree, asked):
 
 
 @pytest.mark.parallel
-def test_ranks_mark_the_same_cells():
+@pytest.mark.parametrize(("degree", "error"), [(1, 0.012), (2, 0.004)])
+def test_ranks_mark_the_same_cells(degree, error):
     comm = MPI.COMM_WORLD
-    alone, together = (bar(part, error=0.012) for part in (MPI.COMM_SELF, comm))
+    alone, together = (bar(part, degree=degree, error=error) for part in (MPI.COMM_SELF, comm))
     assert len(alone.adaptation) == len(together.adaptation) > 3
     for one, other in zip(alone.adaptation, together.adaptation, strict=True):
         assert one["unknowns"] == other["unknowns"]

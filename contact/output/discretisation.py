@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from contact.body.elements import unlocked
+from contact.body.elements import MEAN_DILATATION, unlocked
 from contact.mesh.cells import shape_of
 from contact.output.solution import Remark, Solution
 
@@ -38,9 +38,12 @@ def remarks(solution: Solution) -> Iterator[Remark]:
             f"{_remedy(solution)}"
         )
     elif error.relative > COARSE:
+        # The mean dilatation is no bound from below: it may be too soft as well.
+        mean = solution.problem.equilibrium.element == MEAN_DILATATION
         yield (
             f"the mesh is too coarse: the estimated discretisation error is "
-            f"{error.relative:.1%} (energy norm), and the body is too stiff by about "
+            f"{error.relative:.1%} (energy norm), and "
+            f"{'displacements are off' if mean else 'the body is too stiff'} by about "
             f"{error.relative**2:.1%}, more where slender parts bend; a finer mesh, or "
             "space.degree = 2, has less of it"
         )

@@ -1,19 +1,19 @@
 """Local Neumann problems for the error of quadratic elements, cell by cell.
 
 Bank and Weiser, Math. Comp. 44, 1985. In each cell the error is sought among the cubics that vanish
-at the nodes: M strain(e) : strain(v) = work of the loads - flux : strain(v) + work of the mean flux
-through the facets, at a contact of the multipliers (Weiss and Wohlmuth, Math. Comp. 78, 2009). The
-flux is sigma, with D where there is coupling, and the strain eps, with E = -grad phi. Recovery of
-the stress, which serves degree 1, follows that of degree 2 into its singularities, and sees half of
-the error there.
+at the nodes: M strain(e) : strain(v) = work of the loads - flux : strain(v) + work of the flux
+through the facets, the mean of both sides, at a contact of the multipliers (Weiss and Wohlmuth,
+Math. Comp. 78, 2009), brought into balance with the cells (`balance`). The flux is sigma, with D
+where there is coupling, and the strain eps, with E = -grad phi. Recovery of the stress, which
+serves degree 1, follows that of degree 2 into its singularities, and sees half of the error there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Callable, Iterator
 from itertools import combinations
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 from dolfinx import la
@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.cells import INTERVAL, Shape, barycentric, rule, shape_of
 from contact.mesh.domain import Indices
-from contact.mesh.entities import cell_facets
 from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures
+from contact.output.balance import Sides, balancing
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.tolerances import ROUNDING
@@ -32,16 +32,6 @@ from forms.crystal import VOIGT
 
 #: Cells that are solved at once.
 CHUNK = 10_000
-
-
-@cache
-def surplus(shape: Shape, degree: int) -> tuple[Array, Array]:
-    """Return the cubics without values at nodes at the points of a rule, and their derivatives.
-
-    Shapes (q, n), (q, n, dim).
-    """
-    at, _ = rule(shape, degree)
-    return cubics(shape, at), _derivatives(shape, at)
 
 
 def cubics(shape: Shape, at: Array) -> Array:
@@ -102,6 +92,25 @@ def _product(factors: list[list[Array]], axis: int, along: int = -1) -> Array:
     return found
 
 
+class Basis(NamedTuple):
+    """Functions on the reference cell, (q, n), and their derivatives, (q, n, dim)."""
+
+    values: Callable[[Shape, Array], Array]
+    derivatives: Callable[[Shape, Array], Array]
+
+
+class Work(NamedTuple):
+    """Points of a rule, strains of functions there, (cells, q, k, n b), and these by weights."""
+
+    at: Array
+    strains: Array
+    weighted: Array
+
+
+CUBICS = Basis(cubics, _derivatives)
+HATS = Basis(lambda shape, at: shape.lagrange(1, at), lambda shape, at: shape.gradients(1, at))
+
+
 class LocalProblems:
     """The local problems of a body at a state. Collective to make.
 
@@ -120,8 +129,22 @@ class LocalProblems:
         shape = self._shape = shape_of(body.domain.mesh)
         #: The nodes of each facet, as nodes of its cell.
         self._closures = shape.facet_nodes(2)
-        self._loads = _loads(body, state.time)
-        self._through, self._held = self._facets(problem, state)
+        self._loads, self._load_points = _loads(body, state.time)
+        self._through, self._held, unknown = self._facets(problem, state)
+        self._through += balancing(body, self._out_of_balance(), unknown)
+
+    def _out_of_balance(self) -> Array:
+        """Return the residuals of the linear functions of the owned cells, (cells, corners, b)."""
+        found = np.zeros((len(self._flux), self._shape.corners, self._body.block_size))
+        for cells in self._pieces(np.arange(len(found), dtype=np.int32)):
+            found[cells] = self._residual(cells, HATS, self._work(cells, HATS))[0]
+        return found
+
+    def _pieces(self, cells: Indices) -> Iterator[Indices]:
+        """Yield some of the cells after the other: none where there are none."""
+        size = CHUNK if self._shape.simplex else CHUNK // 10
+        for first in range(0, len(cells), size):
+            yield cells[first : first + size]
 
     def _normal_flux(self) -> Array:
         """Return the flux out of each cell at the nodes of its facets, (cells, facets, m, b).
@@ -145,32 +168,19 @@ class LocalProblems:
             found[..., d] = -np.sum(flux[..., 6 : 6 + d] * normal, axis=-1)
         return found
 
-    def _facets(self, problem: ContactProblem, state: State) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the flux into each cell through its facets, and which of its components are held.
+    def _facets(
+        self, problem: ContactProblem, state: State
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the flux into each cell through its facets, and two flags of its components.
 
         Inside it is the mean of both sides. On the boundary it is among the loads, where these are
         known; at a contact that touches, that of the multipliers, and the flux itself where there
-        are none: of charge, on the other side. Held components have no error.
+        are none: of charge, on the other side. Which components are held, without any error, and
+        of which the flux is unknown.
         """
         body, d = self._body, self._body.dim
-        mesh, space = body.domain.mesh, body.space
-        nodes = space.dofmap.list[: len(self._flux), self._closures]
-        numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
-        order = np.argsort(numbers.reshape(nodes.shape), axis=2)
-        out = self._normal_flux()
-        topology = mesh.topology
-        topology.create_connectivity(d, d - 1)
-        facets = cell_facets(mesh)[: len(self._flux)]
-        ordered = np.take_along_axis(out, order[..., None], axis=2)
-        ordered = ordered.reshape(*facets.shape, int(np.prod(out.shape[2:])))
-        total = la.vector(topology.index_map(d - 1), ordered.shape[2] + 1)
-        sums = total.array.reshape(-1, ordered.shape[2] + 1)
-        np.add.at(sums, facets, np.concatenate([ordered, np.ones((*facets.shape, 1))], axis=2))
-        total.scatter_reverse(la.InsertMode.add)
-        total.scatter_forward()
-        inside = sums[facets, -1] > 1.5
-        back = np.argsort(order, axis=2)[..., None]
-        jump = np.take_along_axis(sums[facets, :-1].reshape(out.shape), back, axis=2)
+        sides, out = Sides(body, self._closures), self._normal_flux()
+        facets, nodes, inside = sides.facets, sides.nodes, sides.inside
         forces = np.zeros(body.owned + body.global_unknowns.size)
         problem.interface.add_forces(forces, state.x, state.forces)
         touch = np.any(body.nodal(body.local(forces)) != 0, axis=1)[nodes].any(axis=2)
@@ -189,22 +199,26 @@ class LocalProblems:
         own = np.zeros(body.owned + body.global_unknowns.size)
         own[: body.owned] = body.free.ravel()
         free = body.nodal(body.local(own))[nodes].any(axis=2)
-        sides = [body.domain.facets(load.on) for load in body.body.loads if load.on]
-        loaded = np.isin(facets, np.concatenate([[], *sides]))
-        known = ~(inside | touch)[..., None, None]
-        through = np.where(known, 0.0, out - np.where(inside[..., None, None], jump / 2, 0.0))
-        traction = _contact_traction(problem, state)[nodes]
-        pressed = (touch & slave)[..., None, None] & np.isfinite(traction)
-        through[..., :d] = np.where(pressed, traction, through[..., :d])
+        loads = [body.domain.facets(load.on) for load in body.body.loads if load.on]
+        loaded = np.isin(facets, np.concatenate([[], *loads]))
         # Facets inside that are fixed, or an electrode, have a jump, of charges for instance.
         names = [
             *(fixed.on for fixed in body.body.fixed),
             *(member.description.on for member in body.global_unknowns.members),
         ]
         parts = [body.domain.facets_anywhere(name) for name in names]
-        inside &= ~np.isin(facets, np.concatenate([[], *parts]))
-        held = ~inside[..., None] & ((free == 0) | (touch & loaded)[..., None])
-        return through, held
+        boundary = ~inside[..., None]
+        split = boundary | np.isin(facets, np.concatenate([[], *parts]))[..., None]
+        held = split & (free == 0)
+        unknown = held | (boundary & touch[..., None])
+        one_sided = (unknown | boundary)[:, :, None]
+        mean = np.where(one_sided, out, out - sides.sums(out) / 2)
+        through = np.where((unknown | ~boundary)[:, :, None], mean, 0.0)
+        traction = _contact_traction(problem, state)[nodes]
+        pressed = (touch & slave)[..., None, None] & np.isfinite(traction)
+        through[..., :d] = np.where(pressed, traction, through[..., :d])
+        held = held | (boundary & (touch & loaded & ~slave)[..., None])
+        return through, held, unknown
 
     def squares(self, cells: Indices, moduli: Array) -> Array:
         """Return the square of the energy norm of the errors in some of the owned cells.
@@ -219,22 +233,43 @@ class LocalProblems:
         # Of a material without a field those of a field are zero.
         whole = np.zeros((len(cells), *2 * (9 if self._body.piezoelectric else 6,)))
         whole[:, : moduli.shape[1], : moduli.shape[2]] = moduli
-        found = np.zeros(len(cells))
-        chunk = CHUNK if self._shape.simplex else CHUNK // 10
-        for first in range(0, len(cells), chunk):  # a rank may have none
-            piece = slice(first, first + chunk)
-            found[piece] = self._solved(cells[piece], whole[piece])
-        return found
+        pieces = self._pieces(np.arange(len(cells), dtype=np.int32))
+        found = [self._solved(cells[piece], whole[piece]) for piece in pieces]
+        return np.concatenate([np.zeros(0), *found])
 
     def _solved(self, cells: Indices, moduli: Array) -> Array:
-        body, d, shape, of = self._body, self._body.dim, self._shape, self._nodes[cells]
-        # Strains of the test functions have these components alone.
+        body, count = self._body, len(cells)
+        work = self._work(cells, CUBICS)
+        moduli = moduli[..., self._kept, :][..., self._kept]
+        fluxes = (moduli[:, None] @ work.strains).reshape(work.weighted.shape)
+        matrix = work.weighted.swapaxes(1, 2) @ fluxes
+        right, held = self._residual(cells, CUBICS, work)
+        if body.piezoelectric:
+            held[..., body.dim] |= (moduli[:, -1, -1] == 0)[:, None]
+        held, right = held.reshape(count, -1), right.reshape(count, -1)
+        right[held] = 0.0
+        matrix[held[:, :, None] | held[:, None, :]] = 0.0
+        places = np.arange(held.shape[1])
+        matrix[:, places, places] += held
+        errors = np.linalg.solve(matrix, right[..., None])[..., 0]
+        return np.asarray(np.sum(errors * right, axis=1))
+
+    @property
+    def _kept(self) -> list[int]:
+        """The components that strains of the test functions have."""
+        d = self._body.dim
         kept = [0, 1, 2, 5] if d == 2 else list(range(6))
-        kept += [6, 7, 8][:d] * body.piezoelectric
-        moduli = moduli[:, kept][:, :, kept]
+        return kept + [6, 7, 8][:d] * self._body.piezoelectric
+
+    def _work(self, cells: Indices, basis: Basis) -> Work:
+        """Return the strains of functions in cells."""
+        body, d, shape, of, kept = (
+            self._body, self._body.dim, self._shape, self._nodes[cells], self._kept
+        )  # fmt: skip
         order = body.domain.order
         degree = (4 if shape.simplex else 6) + 2 * (order - 1) + body.domain.revolved
-        (at, weights), (values, derivatives) = rule(shape, degree), surplus(shape, degree)
+        at, weights = rule(shape, degree)
+        values, derivatives = basis.values(shape, at), basis.derivatives(shape, at)
         volumes = measures(body.domain.revolved, shape, of, at, weights)
         back = np.broadcast_to(inverse(jacobians(shape, of, at)), (len(of), len(at), d, d))
         gradients = derivatives @ back
@@ -254,30 +289,28 @@ class LocalProblems:
         count = len(cells)
         strains = strains.reshape(count, len(weights), -1, len(kept)).swapaxes(2, 3)
         weighted = (volumes[:, :, None, None] * strains).reshape(count, -1, strains.shape[3])
-        fluxes = moduli[:, None] @ strains
-        matrix = weighted.swapaxes(1, 2) @ fluxes.reshape(weighted.shape)
-        known = (shape.lagrange(2, at) @ self._flux[cells])[..., kept].reshape(count, -1, 1)
-        right = self._loads[cells] - (weighted.swapaxes(1, 2) @ known)[..., 0].reshape(
-            count, -1, body.block_size
-        )
+        return Work(at, strains, weighted)
+
+    def _residual(
+        self, cells: Indices, basis: Basis, work: Work
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the residuals of functions in cells, (cells, n, b), and which are held."""
+        body, shape, of, count = self._body, self._shape, self._nodes[cells], len(cells)
+        flux = shape.lagrange(2, work.at) @ self._flux[cells]
+        known = flux[..., self._kept].reshape(count, -1, 1)
+        inner = (work.weighted.swapaxes(1, 2) @ known)[..., 0]
+        right = basis.values(shape, self._load_points).T @ self._loads[cells]
+        right = right - inner.reshape(right.shape)
         held = np.zeros(right.shape, dtype=bool)
         at, weights = rule(shape.facet, 5)
-        for facet, ends in enumerate(shape.facet_nodes(order)):
-            values = cubics(shape, shape.on_facet(facet, at))
+        for facet, ends in enumerate(shape.facet_nodes(body.domain.order)):
+            values = basis.values(shape, shape.on_facet(facet, at))
             areas = measures(body.domain.revolved, shape.facet, of[:, ends], at, weights)
             flux = shape.facet.lagrange(2, at) @ self._through[cells, facet]
             right += values.T @ (areas[..., None] * flux)
             acts = np.abs(values).max(axis=0) > ROUNDING
             held |= acts[None, :, None] & self._held[cells, facet][:, None]
-        if body.piezoelectric:
-            held[..., d] |= (moduli[:, -1, -1] == 0)[:, None]
-        held, right = held.reshape(count, -1), right.reshape(count, -1)
-        right[held] = 0.0
-        matrix[held[:, :, None] | held[:, None, :]] = 0.0
-        places = np.arange(held.shape[1])
-        matrix[:, places, places] += held
-        errors = np.linalg.solve(matrix, right[..., None])[..., 0]
-        return np.asarray(np.sum(errors * right, axis=1))
+        return right, held
 
 
 def _contact_traction(problem: ContactProblem, state: State) -> Array:
@@ -297,14 +330,14 @@ def _contact_traction(problem: ContactProblem, state: State) -> Array:
     return at_nodes
 
 
-def _loads(body: BodyEquilibrium, time: float) -> Array:
-    """Return the loads on the cubics of the owned cells, shape (cells, n, b)."""
+def _loads(body: BodyEquilibrium, time: float) -> tuple[Array, Array]:
+    """Return the loads on the cubics of Lagrange in the owned cells, (cells, n, b); their nodes."""
     space, loads = body.loads_by_cell
     values = loads.at(time).reshape(-1, body.block_size)
     points = space.sub(0).element.basix_element.points
     nodes = space.dofmap.list[: body.domain.mesh.topology.index_map(body.dim).size_local]
-    found = cubics(shape_of(space.mesh), points).T @ values[nodes]
+    found = values[nodes]
     if body.piezoelectric:
         # The potential is scaled there, and its test function negated.
         found[..., body.dim] /= -body.phi_scale
-    return np.asarray(found)
+    return np.asarray(found), np.asarray(points)

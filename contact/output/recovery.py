@@ -22,18 +22,21 @@ def nodal_means(domain: Domain, cells: Indices, values: Array) -> Array:
     cells
         Owned cells; those around them that are not among them do not count.
     values
-        Constant in each of the cells, shape (cells, components).
+        At the corners of each of the cells, shape (cells, corners, components); or constant there,
+        shape (cells, components).
     """
     corners = shape_of(domain.mesh).corners
     vertices = _compat.geometry_dofmap(domain.mesh)[cells, :corners]
     index_map = domain.mesh.geometry.index_map()
     count = index_map.size_local + index_map.num_ghosts
-    with_ones = np.column_stack([values, np.ones(len(values))])
-    rows = vertices.ravel(), np.repeat(np.arange(len(values)), vertices.shape[1])
-    around = sparse.csr_array((np.ones(vertices.size), rows), shape=(count, len(values)))
-    sums = around @ with_ones
+    at_corners = values if values.ndim == 3 else values[:, None]
+    at_corners = np.broadcast_to(at_corners, (*vertices.shape, values.shape[-1]))
+    with_ones = np.concatenate([at_corners, np.ones((*vertices.shape, 1))], axis=2)
+    rows = np.ones(vertices.size), (vertices.ravel(), np.arange(vertices.size))
+    around = sparse.csr_array(rows, shape=(count, vertices.size))
+    sums = around @ with_ones.reshape(vertices.size, values.shape[-1] + 1)
     if domain.comm.size > 1:
-        total = la.vector(index_map, with_ones.shape[1])
+        total = la.vector(index_map, sums.shape[1])
         total.array[:] = sums.ravel()
         total.scatter_reverse(la.InsertMode.add)
         total.scatter_forward()

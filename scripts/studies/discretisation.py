@@ -1,4 +1,4 @@
-"""Discretisation error: effectivity of the estimate, locking, adaptive meshes.
+"""Discretisation error: locking, intervals of quantities, adaptive meshes.
 
 `python3 -m scripts.studies.discretisation [--out DIR] [--coarse]`; the page is docs/error.md.
 """
@@ -6,35 +6,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from contact import load_case, parse_case, solve
-from contact.body.description import Body, Fixed, Load
 from contact.case.build import build_problem
 from contact.case.file import Case
-from contact.mesh.grid import box
-from contact.mesh.transfer import carry
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.discretisation import LOCKED
 from contact.output.error_estimate import estimated
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from forms.hencky import Linear
 from scripts.reporting import Report, append, options, subplots
-from scripts.studies.error_norms import errors
-from scripts.studies.exact_solutions import Singular, exact, manufactured
 from tests.problems.bar import changed
-from tests.problems.mechanics import flat
 from tests.problems.membrane import cook
-from tests.problems.revolution import Drum, Layers, Tube, pressed_cylinder
 
 LINEAR = {"material__law": "linear", "material__yield_strain": None}
 #: The bar of Example 7.2 where it locks.
@@ -53,122 +42,6 @@ ELEMENTS = {"P1": (1, "standard"), "P2": (2, "standard"), "P2, mean": (2, "mean_
 def state_of(problem: ContactProblem) -> State:
     """Return the solution. Collective."""
     return Newton(problem, NewtonOptions(tolerance=1e-9)).solve(problem.start())[0]
-
-
-#: Effectivities that are asked for, and why some are not.
-WITHIN = 0.7, 1.5
-WHY = {
-    ("Hencky, 3-D", "P2"): "facets are not in balance; smooth",
-    ("tube, nu = 0.4999", "P1"): "locked",
-    ("bar, nu = 0.4999", "P1"): "locked",
-    ("bar, nu = 0.4999", "P2"): "nearly incompressible corners",
-    ("pressed cylinder, revolved", "P2"): "nearly incompressible corner",
-}
-
-
-def effectivity(report: Report, coarse: bool) -> None:
-    """Make the table of estimates beside known errors. Collective."""
-    columns: dict[str, list[Any]] = {
-        name: []
-        for name in ("problem", "element", "cells", "error", "estimate", "effectivity", "why not")
-    }
-    tube, drum, singular, layers = Tube(), Drum(), Singular(), Layers()
-    soft = Tube(law=Linear(1.0, 0.4999))
-    known: list[tuple[str, Any, Any, tuple[int, int]]] = [
-        ("Hencky, 2-D", lambda n, p: manufactured(2, p, n), exact(2), (32, 16)),
-        ("Hencky, 3-D", lambda n, p: manufactured(3, p, n), exact(3), (8, 4)),
-        ("quadrilaterals", partial(_cells, 2, "quadrilateral"), exact(2), (32, 16)),
-        ("hexahedra", partial(_cells, 3, "hexahedron"), exact(3), (8, 4)),
-        ("two materials", lambda n, p: layers.problem(n, p, 1), layers.displacement, (24, 12)),
-        ("two bodies", lambda n, p: layers.problem(n, p, 2), layers.displacement, (24, 12)),
-        ("Lamé's tube", lambda n, p: tube.problem(n, p), tube.displacement, (32, 16)),
-        ("tube, nu = 0.4999", lambda n, p: soft.problem(n, p), soft.displacement, (32, 16)),
-        ("Hencky, revolved", lambda n, p: drum.problem(n, p), drum.displacement, (32, 16)),
-        ("Signorini", lambda n, p: singular.problem(n, p), singular, (32, 16)),
-    ]
-    for name, make, displacement, cells in known:
-        for degree in (1, 2):
-            n = cells[degree - 1] // (2 if coarse else 1)
-            problem = make(n, degree)
-            state = state_of(problem)
-            if displacement is singular:
-                error = singular.errors(problem, state)[0]
-            else:
-                error = errors(problem.equilibrium, state.x, displacement)
-            _append(columns, name, f"P{degree}", n, problem, state, error.energy)
-    for name, (make, cells, most) in beside().items():
-        fine = make(most // (2 if coarse else 1), 2)
-        best = state_of(fine)
-        for degree, n in cells:
-            problem = make(n, degree)
-            state = state_of(problem)
-            other = carry(problem.equilibrium.function(state.x), fine.equilibrium.space)
-            error = errors(fine.equilibrium, best.x, other)
-            _append(columns, name, f"P{degree}", n, problem, state, error.energy)
-    report.table(
-        "effectivity",
-        "Estimated error over the error, in the energy norm, relative",
-        columns,
-        "Exact: manufactured solutions (Hencky, also on quadrilaterals and hexahedra), Lamé's "
-        "tube under a pressed-on casing (also nearly incompressible), a tube in another one (of"
-        " one body with two materials, or two bodies whose meshes do not match), contact "
-        "without friction of a half plane that ends at a point. Bars, cylinder (Hencky's law "
-        "and friction, revolved) and block (3-D, clamped at an end) are set beside P2 on 64, 48"
-        " and 8 cells a unit. Not within 0.7 to 1.5: where P1 locks the estimate is a lower "
-        "bound, as the run says. Of degree 2 the local problems are cubic: mean fluxes are not "
-        "in balance with the loads of a cell, which shows in 3-D; and at corners with infinite "
-        "stresses they see half of the error where the material is nearly incompressible, at "
-        "the rim of the cylinder far in the plastic range.",
-    )
-
-
-def _cells(dim: int, cell: str, n: int, degree: int) -> ContactProblem:
-    return manufactured(dim, degree, n, cell=cell)
-
-
-def beside() -> dict[str, tuple[Callable[[int, int], ContactProblem], list[Any], int]]:
-    """Return problems of n cells a unit and a degree, those looked at, and n of the finest."""
-    few = [(1, 8), (1, 16), (2, 8)]
-    bars = {
-        "bar with friction": {**LINEAR, "friction__mu": 0.6},
-        "bar without friction": {**LINEAR, "friction__mu": 0.0},
-        "yielding bar": {"friction__mu": 0.6, "material__yield_strain": 0.005},
-        "bar, nu = 0.4999": LOCKING["nu = 0.4999, mu = 0"],
-    }
-    return {
-        **{name: (partial(bar, **more), few, 64) for name, more in bars.items()},
-        "pressed cylinder, revolved": (
-            lambda n, p: pressed_cylinder(MPI.COMM_WORLD, n, p),
-            [(1, 8), (1, 16), (2, 8)],
-            48,
-        ),
-        "block": (block, [(1, 4), (2, 2), (2, 3)], 8),
-    }
-
-
-def block(n: int, degree: int) -> ContactProblem:
-    """Return a block 2 x 1 x 1 that is clamped at one end and sheared at the other. Collective."""
-    domain = box(MPI.COMM_WORLD, [0.0] * 3, [2.0, 1.0, 1.0], [2 * n, n, n])
-    held, load = Fixed("left", [0.0] * 3), Load("right", [0.0, 0.0, -1e-3])
-    body = Body(Linear(1.0, 0.3), [held], [load])
-    return ContactProblem(domain, body, Contact("bottom", flat(10.0)), degree=degree)
-
-
-def _append(
-    columns: dict[str, list[Any]],
-    name: str,
-    element: str,
-    n: int,
-    problem: ContactProblem,
-    state: State,
-    error: float,
-) -> None:
-    found = estimated(problem, state)
-    norm = errors(problem.equilibrium, state.x, None).energy
-    estimate = float(np.sqrt(found.total))
-    ratio = estimate / error
-    why = "" if WITHIN[0] <= ratio <= WITHIN[1] else WHY.get((name, element), "?")
-    append(columns, name, element, n, error / norm, estimate / norm, ratio, why)
 
 
 def bar(n: int, degree: int, element: str = "standard", **changes: Any) -> ContactProblem:
@@ -439,7 +312,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make all of them. Collective."""
     chosen = options(__doc__ or "", "discretisation", arguments)
     report = Report(chosen.out)
-    effectivity(report, chosen.coarse)
     locking(report, chosen.coarse)
     limits(report, chosen.coarse)
     quantities(report, chosen.coarse)
