@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 import platform
+import re
 import shlex
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
@@ -171,6 +173,11 @@ def _told(record: logging.LogRecord) -> str:
 def _log(name: str) -> logging.Handler:
     """Open a log, and write the command line and its process there."""
     try:
+        if (path := Path(name)).is_file():
+            with path.open("rb") as file:
+                begin = file.read(5)
+            if begin and not re.fullmatch(rb"\d{4}-", begin):
+                raise InputError(f"--log {name}: given no log; accepted: a new file, or a log")
         handler = logging.FileHandler(name, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise InputError(

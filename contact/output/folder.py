@@ -371,9 +371,13 @@ def _is_stage(path: Path) -> bool:
 def listed(manifest: Path, pattern: re.Pattern[str] = _MEMBER) -> dict[str, str]:
     """Return the files that a manifest names, with their checksums, if it has any.
 
-    It may be of anybody: names that do not match the pattern are left out.
+    It may be of anybody: names that do not match the pattern are left out, and so are all of a
+    summary that does not say by which versions it was made, as each of ours does.
     """
-    known = read_json(manifest).get(MANIFEST)
+    content = read_json(manifest)
+    if manifest.name == SUMMARY and not isinstance(content.get("versions"), dict):
+        return {}
+    known = content.get(MANIFEST)
     sums = known if isinstance(known, dict) else {}
     names = known if isinstance(known, list | dict) else ()
     return {n: str(sums.get(n)) for n in names if isinstance(n, str) and pattern.fullmatch(n)}

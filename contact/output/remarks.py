@@ -208,6 +208,15 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
             "foundation: the gap there is taken as 0; make the mesh finer from the beginning"
         )
     closed = solution.status != "open"
+    if nodes.maximum(closed.astype(float)) == 0:
+        least = -nodes.maximum(-nodes.gap, -np.inf)
+        if nodes.deviation > DEVIATION * least:
+            yield (
+                f"nothing touches, but straight facets deviate by up to {nodes.deviation:.3g} from "
+                f"a curved contact surface, and the least gap is {least:.3g}; make the mesh finer "
+                "from the beginning, or take space.degree = 2"
+            )
+        return
     size = nodes.maximum(np.where(closed, np.abs(nodes.gap), 0.0))
     if size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size:
         yield (

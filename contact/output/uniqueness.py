@@ -60,7 +60,8 @@ def critical_factor(
         return np.inf
     nodal = jump.apply(state.x)
     pressure = interface.pressure(nodal, state.forces)
-    closed = touching(pressure, interface.opening(nodal), interface.stiffness)
+    rounding = 1e-9 * jump.maximum(pressure)  # as of `Solution.status`
+    closed = touching(pressure, interface.opening(nodal), interface.stiffness, rounding)
     if jump.maximum(closed.astype(float)) == 0:
         closed = jump.gap <= EPS * interface.size
     mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(nodal))

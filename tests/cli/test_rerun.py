@@ -114,3 +114,12 @@ def test_a_log_that_cannot_be_written(case: Path, capsys: pytest.CaptureFixture)
     assert run(case, "--log", str(case.parent / "no" / "run.log")) == BAD_INPUT
     if MPI.COMM_WORLD.rank == 0:
         assert "run.log: No such file or directory; accepted: a file" in capsys.readouterr().err
+
+
+def test_a_log_goes_to_no_file_that_is_none(case: Path, capsys: pytest.CaptureFixture) -> None:
+    """Not behind the case file, which could not be read any more."""
+    before = case.read_bytes()
+    assert run(case, "--log", str(case)) == BAD_INPUT
+    if MPI.COMM_WORLD.rank == 0:
+        assert "given no log; accepted: a new file, or a log" in capsys.readouterr().err
+        assert case.read_bytes() == before

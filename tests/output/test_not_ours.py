@@ -218,3 +218,16 @@ def test_damaged_checkpoints_are_gone_on_from_before(
             assert message.startswith("contact: ")
             if name == "nodes.npz":  # a missing one was called a place to write to
                 assert "nodes.npz: no checkpoint, or a damaged one" in message
+
+
+def test_a_summary_of_a_users_own_names_no_files_of_ours(tmp_path, cases):
+    """Its word "files" is not ours: it has no versions of the libraries."""
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "summary.json").write_text('{"files": ["data.csv", "mine.json", "summary.json"]}')
+    kept = mine(out, "data.csv", "mine.json")
+    assert on_the_line("solve", cases["static"], "--out", out, "--overwrite") == 0
+    after = contents(out)
+    assert all(after[name] == kept[name] for name in ("data.csv", "mine.json"))
+    (out / "summary.json").write_text("[1]")
+    assert on_the_line("plot", out) == 2

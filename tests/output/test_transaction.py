@@ -39,7 +39,7 @@ def write(folder: Path, run: str, names: tuple[str, ...]) -> None:
             (new / name / "data.0").write_text(run)
         else:
             (new / name).write_text(run)
-    complete(folder, {"run": run})
+    complete(folder, {"run": run, "versions": {}})
 
 
 def held(folder: Path) -> dict[str, str]:
@@ -237,7 +237,7 @@ def test_a_summary_from_elsewhere_removes_nothing(names: object, tmp_path: Path)
     (tmp_path / "target").write_text("mine")
     for name in ("notes.txt", ".bashrc"):
         (folder / name).write_text("mine")
-    (folder / "summary.json").write_text(json.dumps({"files": names}))
+    (folder / "summary.json").write_text(json.dumps({"versions": {}, "files": names}))
     write(folder, "later", LATER)
     swap(folder)
     assert (tmp_path / "target").read_text() == "mine"

@@ -78,6 +78,13 @@ def test_two_rings_with_a_small_interference(degree):
         assert "at most 0.000774" in found[0]
 
 
+def test_chords_that_hide_a_contact_are_named():
+    """The facets deviate by eight times the interference: nothing touches."""
+    solution, _ = study.two_rings(0.1, 1, 1e-4)
+    assert np.all(solution.pressure == 0)
+    assert "nothing touches, but straight facets deviate by up to" in warnings(solution)[0]
+
+
 @pytest.mark.parametrize("levels", [0, 1])
 def test_refined_chords_are_warned_of(levels):
     domain = study.mesh(study.RING, 0.1, 2)

@@ -111,7 +111,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
     InputError
         If the folder has not all that is needed.
     """
-    about = summary or read(folder, "summary.json", lambda path: json.loads(path.read_bytes()))
+    about = summary or read(folder, "summary.json", _table_of)
     surface, body = (read(folder, name, read_grid) for name in ("contact.vtu", "fields.vtu"))
     columns = read(folder, "contact.csv", _nodes)
     files = about.get("files", [path.name for path in folder.iterdir()])
@@ -170,6 +170,13 @@ def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
         raise InputError(f"{path}: not as a run has left it (no {error})") from None
     except (ValueError, IndexError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not as a run has left it ({error})") from None
+
+
+def _table_of(path: Path) -> dict[str, Any]:
+    found = json.loads(path.read_bytes())
+    if not isinstance(found, dict):
+        raise ValueError("no table of results")
+    return found
 
 
 def read_grid(path: Path) -> Any:
