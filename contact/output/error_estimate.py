@@ -31,6 +31,7 @@ from contact.output.local_problems import LocalProblems
 from contact.output.recovery import nodal_means
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 from forms.crystal import VOIGT
 from forms.elasticity import Anisotropic, mandel
@@ -128,8 +129,18 @@ def estimated(
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
     energy_sum, locked, shearing, total, contact = sums
+    if energy_sum <= _rounding(problem, state, float(volumes.sum())):
+        return Estimate(np.zeros_like(squares), 0.0, 0.0, 0.0, None)
     ratio = float(locked / shearing) if shearing > 0 else None
     return Estimate(squares, float(contact), float(energy_sum), float(total), ratio)
+
+
+def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
+    """Return the energy of strains that a rigid motion leaves by rounding. Collective."""
+    body, comm = problem.equilibrium, problem.comm
+    moved = float(np.abs(body.nodal(state.x)[:, : body.dim]).max(initial=0.0))
+    strain = ROUNDING * comm.allreduce(moved, op=MPI.MAX) / body.domain.size
+    return body.layout.stiffness * strain**2 * comm.allreduce(volume, op=MPI.SUM)
 
 
 def _sampled(fields: DerivedFields) -> tuple[Array, Array]:

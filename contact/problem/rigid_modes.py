@@ -211,7 +211,7 @@ def _group(
     moved = np.stack(columns, axis=1)
     # Relative to its restraints: supports, and rigid parts where nodes follow them.
     apart = moved[: body.owned] - global_unknowns.ties @ moved[body.owned :]
-    nodal = apart.reshape(len(body.free), body.block_size, -1)[:, :d]
+    nodal = apart.reshape(*body.free.shape, moved.shape[1])[:, :d]
     every = np.arange(len(body.free), dtype=np.int32)
     held = nodal - np.einsum("nij,njk->nik", body.movable(every), nodal)
     return Group(

@@ -142,3 +142,24 @@ def test_a_formula_is_the_shape_that_it_describes():
         distance, found = ellipsoid.distance(on + h * normal)
         assert np.abs(distance - h).max() < 5 * h**2
         assert np.abs(found - normal).max() < 5 * h
+
+
+def test_a_ray_passes_by_no_side_of_a_body_that_is_not_convex():
+    """A ring: Newton's method on the distance alone would miss every ninth ray that meets it."""
+
+    def distance(x):
+        return np.hypot(np.hypot(x[:, 0], x[:, 1]) - 1.0, x[:, 2]) - 0.3
+
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(300, 3))
+    points *= 3 / np.linalg.norm(points, axis=1)[:, None]
+    rays = rng.uniform(-1.2, 1.2, size=points.shape) - points
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    ways = np.linspace(0, 6, 3001)
+    on_way = points[:, None] + ways[:, None] * rays[:, None]
+    inside = distance(on_way.reshape(-1, 3)).reshape(300, -1) <= 0
+    met, first = inside.any(axis=1), ways[inside.argmax(axis=1)]
+    assert 100 < met.sum() < 200
+    found = Level(distance).ray(points, rays)
+    assert np.array_equal(np.isfinite(found), met)
+    assert np.all((found[met] <= first[met]) & (found[met] > first[met] - 0.0021))

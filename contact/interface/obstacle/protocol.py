@@ -21,7 +21,7 @@ from contact.typing import Array
 GRAZING = 1e-6
 
 #: Most steps along a ray.
-STEPS = 100
+STEPS = 200
 
 
 class Obstacle(Protocol):
@@ -116,25 +116,28 @@ class Shape(ABC):
         """
 
     def ray(self, points: Array, rays: Array) -> Array:
-        """Return how far the surface is along unit vectors, (n,), by Newton's method.
+        """Return how far the surface is along unit vectors, (n,). Infinite where it is never met.
 
-        Along a ray the distance to a convex body is convex: Newton's method goes up to the surface
-        from outside and never beyond. At other bodies the steps are those of the distance where
-        Newton's would lead away. Infinite where the surface is never met.
+        From outside a step by the distance leads through no surface (sphere tracing, Hart, The
+        Visual Computer 12 (1996) 527), however the body is shaped; near it, and for rays that graze
+        it, Newton's method takes over, which from afar would pass by a side of a body that is not
+        convex.
         """
         found = np.full(len(points), np.inf)
         left = np.arange(len(points))
         at = np.zeros(len(points))
-        reach = np.zeros(len(points))
+        reach, near = np.zeros(len(points)), np.zeros(len(points))
         for step in range(STEPS):
             value, normal = self.distance(points[left] + at[left, None] * rays[left])
             slope = -np.einsum("ni,ni->n", normal, rays[left])
             if step == 0:
+                near = np.abs(value) / STEPS
                 reach = 1e4 * (np.abs(value) + np.linalg.norm(points, axis=1))
             towards = slope > GRAZING
-            move = np.where(towards, value / np.where(towards, slope, 1.0), np.abs(value))
+            close = towards & ((value <= near[left]) | (2 * step >= STEPS))
+            move = np.where(close, value / np.where(close, slope, 1.0), np.abs(value))
             size = np.maximum(np.abs(points[left]).max(axis=1, initial=0.0), np.abs(at[left]))
-            done = towards & (np.abs(move) <= 1e-13 * np.maximum(size, np.abs(value)))
+            done = close & (np.abs(move) <= 1e-13 * np.maximum(size, np.abs(value)))
             at[left] += move
             found[left[done]] = at[left[done]]
             # A ray that is outside and moves away for good is lost.
