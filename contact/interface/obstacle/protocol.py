@@ -126,12 +126,12 @@ class Shape(ABC):
         found = np.full(len(points), np.inf)
         left = np.arange(len(points))
         at = np.zeros(len(points))
-        reach, near = np.zeros(len(points)), np.zeros(len(points))
+        reach = np.zeros(len(points))
+        near = np.asarray(np.abs(self.distance(points)[0]) / STEPS)
         for step in range(STEPS):
             value, normal = self.distance(points[left] + at[left, None] * rays[left])
             slope = -np.einsum("ni,ni->n", normal, rays[left])
             if step == 0:
-                near = np.abs(value) / STEPS
                 reach = 1e4 * (np.abs(value) + np.linalg.norm(points, axis=1))
             towards = slope > GRAZING
             close = towards & ((value <= near[left]) | (2 * step >= STEPS))
