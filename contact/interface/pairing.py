@@ -81,7 +81,7 @@ def find_pair(
     admissible = np.einsum("nij,nj->ni", movable, normal)
     length = np.linalg.norm(admissible, axis=1)
     direction = admissible / length[:, None]
-    sides = (side.largest_deviation for side in (slave, master) if not side.follows)
+    sides = (side.unknown_deviation for side in (slave, master))
     unknown = max(sides, default=0.0)
     nodes = ContactNodes(
         body.comm,

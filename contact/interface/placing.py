@@ -40,6 +40,8 @@ class Candidates:
         middle of straight edges are on chords, and gaps to a shape are measured from the surface.
     deviation
         Largest deviation of the curved surface from the facets (length).
+    unknown
+        The part of it that gaps do not have; none at degree 1, whose nodes are on the surface.
     owners
         The owners of the nodes.
     mixing
@@ -52,6 +54,7 @@ class Candidates:
     normal: Array
     surface: Array
     deviation: float
+    unknown: float
     owners: Owners
     mixing: Mixing | None
 
@@ -89,6 +92,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     normal = lumped.normal
     points = space.tabulate_dof_coordinates()[nodes, : domain.dim]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+    exact = facets.degree == 1 and not facets.refined
     return Candidates(
         nodes,
         points,
@@ -96,6 +100,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
         normal,
         points + lumped.deviation,
         comm.allreduce(facets.largest_deviation, op=MPI.MAX),
+        comm.allreduce(0.0 if exact else facets.unknown_deviation, op=MPI.MAX),
         facets.owners,
         lumped.mixing,
     )
@@ -277,7 +282,7 @@ def find_nodes(
         gap,
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
-        found.deviation if obstacle.is_shape and domain.levels > 0 else 0.0,
+        found.unknown if obstacle.is_shape else 0.0,
         domain.revolved,
         _motion(body, part, points, direction, (movable, held)),
         held=held,

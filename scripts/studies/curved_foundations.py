@@ -374,8 +374,10 @@ def rings(name: str, h: float, degree: int, order: int = 1) -> Array:
     return ratios(solve(problem, NewtonOptions(tolerance=1e-10)), exact)
 
 
-def ring(name: str, h: float, degree: int, order: int = 1) -> tuple[Problem, float]:
-    """Return a ring, 1 <= r <= 2, on a shaft of the radius 1.001 or in its bore, and the pressure.
+def ring(
+    name: str, h: float, degree: int, order: int = 1, interference: float = 0.001
+) -> tuple[Problem, float]:
+    """Return a ring, 1 <= r <= 2, on a larger shaft or in its bore, and the exact pressure.
 
     In a bore of its own radius a pressure of 1 acts from within. Lame's solutions, plane strain.
     """
@@ -384,8 +386,8 @@ def ring(name: str, h: float, degree: int, order: int = 1) -> tuple[Problem, flo
     factor = np.array([1 / (1 - 2 * POISSON), -1.0]) * YOUNG / (1 + POISSON)
     inside, outside = factor, factor * [1.0, 1 / outer**2]
     if shaft:
-        a, b = np.linalg.solve([[1.0, 1.0], outside], [0.001, 0.0])
-        exact, shape = -inside @ [a, b], Sphere(centre=(0.0, 0.0), radius=1.001)
+        a, b = np.linalg.solve([[1.0, 1.0], outside], [interference, 0.0])
+        exact, shape = -inside @ [a, b], Sphere(centre=(0.0, 0.0), radius=1 + interference)
         on, loads = "contact", []
     else:
         a, b = np.linalg.solve([[outer, 1 / outer], inside], [0.0, -1.0])

@@ -210,7 +210,8 @@ def test_bulges() -> None:
     ball = np.column_stack([0.25 * flat, np.sqrt(1 - np.sum((0.25 * flat) ** 2, axis=1))])
     corners, normal, edges = oriented(ball, triangles, np.array([0.0, 0.0, 1.0]))
     found = deviations(triangles, corners, normal)
-    np.testing.assert_allclose(found, np.sum(edges**2, axis=2) / 2, rtol=1e-9)
+    halves = np.sum(edges**2, axis=2) / 4
+    np.testing.assert_allclose(found / 4, 1 - np.sqrt(1 - halves), rtol=1e-9)
     x, y = (v.ravel() for v in np.meshgrid(np.linspace(0, 2, 9), np.linspace(0, 1, 5)))
     triangles = Delaunay(np.column_stack([x, y])).simplices.astype(np.int64)
     folded = np.column_stack([np.minimum(x, 1), y, -np.maximum(x - 1, 0)])

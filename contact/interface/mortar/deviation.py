@@ -1,9 +1,10 @@
 """Deviation of a curved surface from the straight facets that approximate it.
 
 At each vertex a quadratic surface is fitted to the vertices around it. An edge e is the chord of
-a curve that is, to second order, lambda_i lambda_j c_ij above it, c = -e.K e/2 with the curvature K
-of the fits at its ends; so is a triangle with the sum over its edges, in barycentric coordinates.
-Circles and spheres are reproduced, and a flat side has no deviation.
+an arc that is, to second order, lambda_i lambda_j c_ij above it, c = -e.K e/2 with the curvature K
+of the fits at its ends, and c/4 in its middle; so is a triangle with the sum over its edges, in
+barycentric coordinates. Circles are reproduced, spheres to third order, and a flat side has no
+deviation.
 
 References
 ----------
@@ -135,7 +136,10 @@ def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels:
         edge = points[around[:, 1]] - points[around[:, 0]]
         value = np.where(known[around], _sagitta(edge[:, None], curvature[around]), 0.0)
         if levels == 0:
-            found[:, k] = _between(points, curvature, pairs, around, known, edge, value)
+            flat = _between(points, curvature, pairs, around, known, edge, value)
+            # Of an arc of this curvature, for its parabola is off by the square of a quarter turn.
+            turn = np.minimum(np.abs(flat) / np.linalg.norm(edge, axis=1), 1.0)
+            found[:, k] = 2 * flat / (1 + np.sqrt(1 - turn**2))
         else:
             # All of the turn of the first edges is at their ends.
             larger = np.argmax(np.abs(value), axis=1)[:, None]

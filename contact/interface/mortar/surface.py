@@ -138,6 +138,19 @@ class Surface:
         return float(np.abs(self.deviation).max(initial=0.0)) / 4
 
     @property
+    def unknown_deviation(self) -> float:
+        """The largest part of the deviations that gaps do not have (length), on this rank.
+
+        Where gaps are those of the facets it is all; else as much as vertices leave open, of third
+        order in the size of facets: the deviation times the turn along half of the edge.
+        """
+        if not self.follows:
+            return self.largest_deviation
+        first, second = np.array(self.shape.edges).T
+        edges = np.linalg.norm(self.corners[:, second] - self.corners[:, first], axis=2)
+        return float((self.deviation**2 / (4 * edges)).max(initial=0.0))
+
+    @property
     def follows(self) -> bool:
         """Whether gaps are those of the curved surface that straight facets approximate.
 
