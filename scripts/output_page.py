@@ -55,7 +55,8 @@ of the full turn, in which those along r cancel: resultants have 0 there.
 friction stresses act from the body *on the foundation*, reactions from the supports *on the
 body*. Stresses in the body are positive in tension. In the plane tangential numbers
 count along ν turned counter-clockwise by 90 degrees: at the bottom of a body, where ν points down,
-along x.
+along x. Charges of surfaces are D·ν, the opposite of the free charge of an electrode there: a
+positive `charge` lowers the potential, where a positive `body_charge` raises it.
 
 ## Opening them
 

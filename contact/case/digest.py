@@ -68,7 +68,7 @@ def check_restart(folder: Path, case: Case) -> None:
     """Refuse, by an InputError, to continue checkpoints of a folder that other input made."""
     path, files = stored_input(folder)
     where, now = f"--restart {folder}", to_toml(case, anchored=True)
-    accepted = "the same case, solved and shown as you like"
+    accepted = "the same case; [solver] and [output] alone may differ"
     check_same(where, "checkpoints", to_toml(load_case(path)), now, accepted)
     check_files(where, "the checkpoints were written", files, digest(case))
 

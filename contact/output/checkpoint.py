@@ -351,8 +351,7 @@ def _intact(folder: Path) -> list[Path]:
                 raise
             logger.warning("%s; going on from step %d, the last one intact", error, count)
             return files[:count]
-    place = files[0].parent
-    later = {path.name for path in place.glob("0*.npz")} | set(_manifest(place)) - {_NODES}
+    later = [*files[0].parent.glob("0*.npz")]
     if len(later) > len(files):
         missing = files[0].parent / _name(len(files) + 1)
         logger.warning("%s is missing; going on from step %d", missing, len(files))

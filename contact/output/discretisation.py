@@ -1,8 +1,10 @@
-"""Remarks on the discretisation error: elements that lock, meshes that are too coarse."""
+"""Remarks on the discretisation error: elements that lock, meshes that are too coarse, chords."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+
+import numpy as np
 
 from contact.body.elements import MEAN_DILATATION, unlocked
 from contact.mesh.cells import shape_of
@@ -13,6 +15,9 @@ LOCKED = 20.0
 
 #: Largest estimated error without a warning: its square is that of displacements under loads.
 COARSE = 0.15
+
+#: Largest deviation of facets from a curved surface, as a share of the gaps that are closed.
+DEVIATION = 0.1
 
 
 def locks(solution: Solution) -> bool:
@@ -46,4 +51,38 @@ def remarks(solution: Solution) -> Iterator[Remark]:
             f"{'displacements are off' if mean else 'the body is too stiff'} by about "
             f"{error.relative**2:.1%}, more where slender parts bend; a finer mesh, or "
             "space.degree = 2, has less of it"
+        )
+
+
+def coarse_curves(solution: Solution) -> Iterator[Remark]:
+    """Say where straight facets of a curved surface lie in the foundation, or decide the gap."""
+    problem, nodes = solution.problem, solution.problem.nodes
+    if nodes.cut > 0:
+        yield (
+            f"straight facets of the curved contact part reach {nodes.cut:.3g} into the "
+            "foundation: the gap there is taken as 0; make the mesh finer from the beginning"
+        )
+    closed = solution.status != "open"
+    if nodes.maximum(closed.astype(float)) == 0:
+        least = -nodes.maximum(-nodes.gap, -np.inf)
+        if nodes.deviation > DEVIATION * least:
+            yield (
+                f"nothing touches, but straight facets deviate by up to {nodes.deviation:.3g} from "
+                f"a curved contact surface, and the least gap is {least:.3g}; make the mesh finer "
+                "from the beginning, or take space.degree = 2"
+            )
+        return
+    size = nodes.maximum(np.where(closed, np.abs(nodes.gap), 0.0))
+    if size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size:
+        if problem.equilibrium.degree == 2 and problem.domain.levels == 0:
+            yield (
+                f"straight edges tell a curved contact surface to about {nodes.deviation:.2g}, and "
+                f"contact closes gaps of at most {size:.3g}: pressures scatter by about that "
+                "share; take curved cells (mesh.order = 2), or a finer mesh"
+            )
+            return
+        yield (
+            f"straight facets deviate by up to {nodes.deviation:.3g} from a curved contact "
+            f"surface, and contact closes gaps of at most {size:.3g}: pressures are off by about "
+            "that share; make the mesh finer from the beginning, or take space.degree = 2"
         )

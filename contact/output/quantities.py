@@ -293,7 +293,7 @@ _RUN = (
         lambda r: r.charges and r.charges.total,
     ),
     Quantity(
-        "charges", "charge", "Free charges D·ν integrated, ν out of the body: `electrodes` and "
+        "charges", "charge", "Charges D·ν integrated, ν out of the body: `electrodes` and "
         "`given` part by part, `foundation` (through the contact part), `body` (in the volume), "
         "`magnitude` (of all nodal ones, without sign).", lambda r: r.charges and vars(r.charges),
     ),

@@ -287,16 +287,3 @@ def test_read_steps_gives_the_states(tmp_path):
     solution = solve(steps_case(), comm=SELF, folder=tmp_path)
     for one, two in zip(solution.steps, read_steps(tmp_path, solution.problem), strict=True):
         assert one.state.near(two.state)
-
-
-def test_a_checkpoint_that_is_gone_is_named(tmp_path, ended, capfd):
-    case, out = tmp_path / "case.toml", tmp_path / "out"
-    case.write_text(to_toml(steps_case()))
-    heal = ended(3)
-    with pytest.raises(Killed):
-        on_the_line("solve", case, "--out", out)
-    heal()
-    last = max((out / "checkpoints").glob("0*.npz"))
-    last.unlink()
-    assert on_the_line("solve", "--restart", out) == 0
-    assert f"{last} is missing; going on from step {int(last.stem) - 1}" in capfd.readouterr().err
