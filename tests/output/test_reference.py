@@ -40,6 +40,12 @@ def two_contacts():
     )
 
 
+def bolted():
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4]}
+    mesh["inside"] = {"cut": "abs(y - 0.5) < 1e-6"}
+    return block(2, mesh=mesh, bolt=[{"on": "cut", "shortening": 0.001}])
+
+
 def rigid():
     return indented(n=4), plate(), column()
 
@@ -50,7 +56,16 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folders = []
     metal = {"law": "j2", "young": 10.0, "poisson": 0.3, "yield_stress": 0.05}
     plastic = block(2, 2, material=metal)
-    for case in (block(2), block(3), plastic, electric(2), electric(3), two_contacts(), *rigid()):
+    for case in (
+        block(2),
+        block(3),
+        plastic,
+        electric(2),
+        electric(3),
+        two_contacts(),
+        bolted(),
+        *rigid(),
+    ):
         folders.append(tmp_path_factory.mktemp("out"))
         write_outputs(solve(case), folders[-1])
     return folders
