@@ -222,7 +222,8 @@ class Newton:
         assert self.modes is not None
         iterate, outcome = self._iterate(iterate)
         if not outcome.converged:
-            iterate, outcome = self._fall_back(iterate, outcome)
+            found = self._without_forces(iterate)
+            iterate, outcome = found or self._fall_back(iterate, outcome)
         elif not self._pays and self.modes.pushed_aside(self.problem, iterate.state):
             found = self._fall_back(iterate, outcome)
             iterate, outcome = found if found[1].converged else (iterate, outcome)
@@ -233,6 +234,22 @@ class Newton:
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
         iteration.at = iterate
         return iterate, outcome
+
+    def _without_forces(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
+        """Return the unknowns without contact forces, where these solve it. Collective.
+
+        Active sets may cycle on forces that are all rounding of others. Not of bodies that contact
+        alone restrains: moved aside they may be in balance, but others hold them.
+        """
+        assert self.modes is not None
+        if not self.modes.constrained_by_supports:
+            return None
+        zero = Multipliers.zero(self.problem.interface.jump)
+        iterate = replace(iterate, state=replace(iterate.state, forces=zero))
+        residuals = evaluate(self.problem, iterate.state)
+        if residuals.excess(self.options.allowed):
+            return None
+        return iterate, Outcome(residuals, self.options.allowed, "")
 
     def _minimal_motion(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
         """Take a rigid motion off a solution that costs nothing. Collective."""
