@@ -113,6 +113,8 @@ def field_gradient(
     >>> gradient = field_gradient(solution, "max_pressure")  # doctest: +SKIP
     >>> gradient.x.array  # doctest: +SKIP
     """
+    whole = not solution.problem.body.bolts
+    expect("field_gradient: problem", "bolts", "a body without bolts", whole)
     expect("field_gradient: degree", degree, "0 (cells) or 1 (vertices)", degree in (0, 1))
     key = parameter if isinstance(parameter, str) else "parameter"
     inside = not isinstance(parameter, str) or key.split(".")[0] == MATERIAL

@@ -245,8 +245,9 @@ class ConstrainedBulk:
         self.corner = self.constraint.gathered(self.columns)
         border = self._bulk.border(kind)
         if border is not None:
+            # Rows of nodes that follow a rigid part count by R alone.
             own = [times(self.constraint.matrix, c, transposed=True) for c in border[0].T]
-            added = np.stack([self.layout.mask(column) for column in own], axis=1)
+            added = np.stack(own, axis=1)
             across = self.constraint.gathered(added)
             self.columns += added
             self.corner = self.corner + across + across.T + border[1]

@@ -65,7 +65,7 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     closed = solution.status != "open"
     if nodes.maximum(closed.astype(float)) == 0:
         least = -nodes.maximum(-nodes.gap, -np.inf)
-        if nodes.deviation > DEVIATION * least:
+        if nodes.deviation > DEVIATION * max(least, 0.0):
             yield (
                 f"nothing touches, but straight facets deviate by up to {nodes.deviation:.3g} from "
                 f"a curved contact surface, and the least gap is {least:.3g}; make the mesh finer "

@@ -72,9 +72,24 @@ def check_problem(problem: ContactProblem) -> None:
         If a load acts on a contact part or is no finite number, two supports contradict each
         other, or `check_rigid_modes` finds that the body can move.
     """
+    _check_plane_stress(problem)
     _check_loads(problem)
     check_supports(problem)
     check_rigid_modes(problem)
+
+
+def _check_plane_stress(problem: ContactProblem) -> None:
+    """Refuse materials in plane stress elsewhere than in a plane body that is wholly so."""
+    body = problem.equilibrium
+    thin = [material.in_plane_stress for material in problem.body.materials]
+    if not any(thin):
+        return
+    plane = problem.dim == 2 and not problem.domain.revolved
+    if not (plane and all(thin) and body.element == "standard"):
+        raise InputError(
+            "material: plane stress; accepted: all materials of a body in the plane, with the "
+            "standard element"
+        )
 
 
 def _shared(problem: ContactProblem, one: str, other: str) -> tuple[NDArray[np.int32], bool]:

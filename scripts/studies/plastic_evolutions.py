@@ -90,11 +90,11 @@ def main(first: int = 0, last: int = 60) -> None:
     print("|---|---|---|---|---|---|---|---|")
     failed = 0
     for number in range(first, last):
-        case, linearised_at = evolution(number)
+        case, described = evolution(number)
         solution = solve(case)
         failed += not solution.converged
         steps, iterations = len(solution.steps), len(solution.history.records)
-        words = " | ".join(map(str, linearised_at.values()))
+        words = " | ".join(map(str, described.values()))
         more = f" ({steps - STAGES * STEPS} more)" if steps > STAGES * STEPS else ""
         end = f"{balance(solution):.1e}" if solution.converged else solution.outcome.reason
         row = f"| {number} | {words} | {steps}{more} | {iterations / steps:.1f} | {end} |"

@@ -7,8 +7,10 @@ import pytest
 from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, Linear, Load, Log, Material, Problem, parse_case, solve
+from contact.body.elements import MEAN_DILATATION as MEAN
 from contact.case.build import build_problem
 from contact.errors import InputError
+from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
 from contact.output.fields import DerivedFields
 from forms.history import differential
@@ -213,3 +215,15 @@ def test_the_tangent_is_the_derivative_of_the_stress(law):
 def test_what_is_refused(data, words):
     with pytest.raises(InputError, match=words):
         build_problem(strip({"law": "linear"}, **data))
+
+
+def test_python_takes_plane_stress_for_whole_plane_bodies_alone():
+    """Its stiffness knows nothing of a strain across that the kinematics give."""
+    thin = Material(Linear(YOUNG, POISSON)).plane_stress()
+    square = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [2, 2])
+    fixed = [Fixed("left", [0.0, 0.0])]
+    for domain, more in ((revolved(square), {}), (square, {"degree": 2, "element": MEAN})):
+        fixed = [Fixed("bottom", [None, 0.0])] if domain.revolved else fixed
+        problem = Problem(domain, Body(thin, fixed), Contact("top", 1.0), **more)
+        with pytest.raises(InputError, match="plane stress; accepted: all materials of a body"):
+            solve(problem)
