@@ -173,6 +173,8 @@ DEVICES = (
     Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
     Device("zero displacement where nothing acts", (progress.undeformed_equilibrium,), "-",
            ((newton.NewtonLoop, "_loss_of_contact", _nothing),)),
+    Device("no contact forces where supports hold a body", (Newton._without_forces,), "-",
+           ((Newton, "_without_forces", _nothing),)),
     Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
            ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _lifted),
