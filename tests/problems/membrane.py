@@ -15,9 +15,9 @@ from contact.mesh.grid import rectangle
 from forms.hencky import Linear
 
 
-def cook(cells, degree, element="standard", poisson=0.4999):
+def cook(cells, degree, element="standard", cell="triangle", poisson=0.4999):
     """Return the rise of the upper corner of Cook's membrane, E = 1, traction 1/16 up."""
-    plane = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (1.0, 1.0), (cells, cells))
+    plane = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (1.0, 1.0), (cells, cells), cell=cell)
     x = plane.mesh.geometry.x
     x[:, 1] = 44 * x[:, 0] + x[:, 1] * (44 - 28 * x[:, 0])
     x[:, 0] *= 48
