@@ -68,9 +68,10 @@ def test_the_pressure_converges_in_the_dual_norm(tmp_path):
     found = pressure_convergence.main(["--coarse", "--out", str(tmp_path)])
     assert len(found) == 10
     for key, errors in found.items():
-        if key[0] == "conforming":  # unlike meshes, to which degree 2 owes a lucky coarse one
+        if key[0] == "conforming":  # straight edges, whose polygons pressures feel to first order
             assert errors[1, 1] < 0.6 * errors[0, 1], key
-            assert errors[:, 0].max() < 0.02, key
+            assert errors[:, 0].max() < 0.04, key
+            assert errors[1, 0] < 0.02, key
             continue
         assert errors[1, 1] < 0.55 * errors[0, 1], key
         assert errors[1, 0] < 0.7 * errors[0, 0], key
