@@ -163,7 +163,7 @@ KNOWN: dict[str, tuple[Callable[[float], Any], int, float]] = {
 CELLS = {(2, 1): (8, 16, 32, 64), (2, 2): (8, 16, 32, 64), (3, 1): (4, 8, 16), (3, 2): (2, 4, 8)}
 
 
-def solved(problem: ContactProblem) -> State:
+def solved(problem: ContactProblem, tolerance: float = 1e-10) -> State:
     """Return the solution.
 
     Raises
@@ -171,7 +171,7 @@ def solved(problem: ContactProblem) -> State:
     RuntimeError
         If it does not converge.
     """
-    state, outcome = Newton(problem, NewtonOptions(tolerance=1e-10)).solve()
+    state, outcome = Newton(problem, NewtonOptions(tolerance=tolerance)).solve()
     if not outcome.converged:
         raise RuntimeError(outcome.reason)
     return state
