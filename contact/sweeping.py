@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import difflib
+import hashlib
 import itertools
 import logging
 import os
@@ -47,8 +48,8 @@ logger = logging.getLogger("contact.sweep")
 #: Names of the table and of the case that was swept.
 TABLE, CASE = "sweep.csv", "sweep.toml"
 
-#: Column with the digests of the files that the case of a row reads.
-INPUT = "input"
+#: Column with the digests of the files that the case of a row reads, and the row's own by `SEAL`.
+INPUT, SEAL = "input", "row"
 
 #: Most values of a range, and names of the components of a vector.
 MOST, AXES = 10_000, "xyz"
@@ -230,7 +231,7 @@ def sweep(
                 measure(solution, whole=len(columns) > 0)
                 more = summary_columns(solution, columns)
                 row = {**point, **values_of(SWEEP, solution), **more, "seconds": seconds}
-                row[INPUT] = given
+                row[INPUT] = f"{given} {SEAL}={_seal(row)}".strip()
                 said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
                 tell(logger, (len(rows) + 1) / len(cases), said)
             rows.append(row)
@@ -246,6 +247,13 @@ def _set(point: Mapping[str, str]) -> list[str]:
 def _input(case: Case) -> str:
     """Return short digests of the files that a case reads. On one rank."""
     return " ".join(f"{key}={value[:12]}" for key, value in digest(case).items())
+
+
+def _seal(row: Mapping[str, Any]) -> str:
+    """Return a short digest of the texts of a row."""
+    row = {key: value for key, value in row.items() if key != INPUT}
+    texts = [f"{key}={'' if value is None else value}" for key, value in row.items()]
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:12]
 
 
 def _kept_rows(
@@ -291,6 +299,11 @@ def _kept_rows(
             for text in (row[INPUT], _input(load(point)))
         )
         made = f"the row {', '.join(_set(point))} was computed"
+        if then.pop(SEAL, "") != _seal(row):
+            raise InputError(
+                f"{table}: the row {', '.join(_set(point))} has been changed since it was "
+                "computed; accepted: the table as a sweep has left it, or another folder"
+            )
         check_files(f"--out {folder}", made, then, now)
     if not before.exists():
         before.write_text(text, encoding="utf-8")
@@ -306,7 +319,7 @@ def _read(table: Path) -> list[dict[str, str]]:
         found = [dict(zip(header, row, strict=True)) for row in rows]
         whole = {*COLUMNS} <= {*header} and len({*header}) == len(header)
         for row in found:
-            whole = whole and row["converged"] in ("True", "False")
+            whole = whole and row["converged"] in ("True", "False") and f"{SEAL}=" in row[INPUT]
             [float(row[column]) for column in computed if column not in ("converged", INPUT)]
     except (ValueError, csv.Error):
         whole = False

@@ -310,7 +310,7 @@ _RUN = (
     Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: versions()),
     Quantity("files", "", "Files of this run: a later run replaces them.", _elsewhere),
     Quantity("seconds", "s", "Time for this row.", _elsewhere, (SWEEP,)),
-    Quantity("input", "", "Digests of the files of the case.", _elsewhere, (SWEEP,)),
+    Quantity("input", "", "Digests of the case's files, and of the row.", _elsewhere, (SWEEP,)),
 )  # fmt: skip
 
 #: Of the contact nodes; fields of the contact part are NaN, or -1, at nodes that are held.
