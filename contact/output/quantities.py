@@ -279,7 +279,7 @@ _RUN = (
         "driven_force", "force", "The force that drives it: with `driven_x` it makes the loop.",
         lambda r: _item(r.driven, 1), (STEPS,), _VECTOR,
     ),
-    Quantity("notes", "", "Assumptions that were checked and found to hold, in words."),
+    Quantity("notes", "", "Assumptions that hold, or that were not checked, in words."),
     Quantity("warnings", "", "Reasons for care, in words."),
     Quantity(
         "phi_min", "potential", "Least potential at a node.", lambda r: _item(r.potential_range, 0),

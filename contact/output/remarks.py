@@ -13,6 +13,7 @@ from contact.output import bodies, discretisation
 from contact.output.error_estimate import estimated
 from contact.output.fields import DerivedFields, deformation, unloaded
 from contact.output.solution import Note, Remark, Solution
+from contact.output.uniqueness import MOST
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import left_as_pressures, residual_forces
 from contact.tolerances import LARGEST_VIOLATION
@@ -381,6 +382,8 @@ def sliding(solution: Solution) -> Iterator[Remark]:
 def strong_friction(solution: Solution) -> Iterator[Remark]:
     """Say where friction suffices for several solutions, see `contact.output.uniqueness`."""
     factor = solution.critical_factor
+    if np.isnan(factor):
+        yield Note(f"with more than {MOST} contact nodes, a critical friction is not looked for")
     if factor <= 1:
         law, nodes = solution.problem.interface.friction.law, solution.problem.nodes
         own = law.maximum if law is not None and nodes.nodes.size else 0.0

@@ -112,7 +112,7 @@ class Solution(Solved):
         The initial guess, in words.
     critical_factor
         The factor of mu from which on there may be several solutions, as far as that is known;
-        infinity for none (`contact.output.uniqueness`).
+        infinity for none, NaN where it is not looked for (`contact.output.uniqueness`).
     case
         The case as `contact check` prints it, empty where there is none.
     source

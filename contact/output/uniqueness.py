@@ -40,8 +40,9 @@ def critical_factor(
     Below 1 the friction that is there is enough for several solutions. The touching nodes slide in
     the directions of their friction stresses, or all in one direction, or in the opposite ones; of
     a body that touches nothing those that touch in the reference configuration. Infinity without
-    such a factor, and where nothing is known: with a layer, a potential, a smoothed pressure, more
-    than `MOST` contact nodes, or where sliding bodies meet no resistance but friction. Collective.
+    such a factor, and where nothing is known: with a layer, a potential, a smoothed pressure, or
+    where sliding bodies meet no resistance but friction. NaN with more than `MOST` contact nodes,
+    where it is not looked for. Collective.
 
     Parameters
     ----------
@@ -54,8 +55,10 @@ def critical_factor(
     jump, friction = interface.jump, interface.friction
     known = friction.acts and friction.local and not interface.law.active
     known = known and not problem.piezoelectric and interface.coupled.size == jump.nodes.size
-    if not known or not 0 < jump.size <= MOST:
+    if not known or jump.size == 0:
         return np.inf
+    if jump.size > MOST:
+        return np.nan
     if condensation is None and not (condensable(problem, "auto") and pays(problem, "auto")):
         return np.inf
     nodal = jump.apply(state.x)
