@@ -1,8 +1,8 @@
 """Rigid-body modes of a problem's bodies: constrained by supports, by contact or by friction alone.
 
 Where friction alone constrains a mode, a method cannot begin without friction, nor with the bound
-of pressures that are not known yet: the linear system would be singular. All nodes in contact are
-first taken for sticking.
+of pressures that are not known yet: the linear system would be singular. The nodes that touch first
+are taken for sticking.
 
 Where nothing constrains a mode at a solution, a rigid motion costs nothing: of all solutions the
 one is taken whose displacements at the contact nodes are the least.
@@ -108,7 +108,22 @@ class UnconstrainedModes:
         loads = _loads(problem)
         borne, total = float(loads[_without_supports(problem)].sum()), float(loads.sum())
         # Loads on another body need not be borne, but where a body is squeezed by it alone.
-        return np.full_like(weight, STUCK * (borne if borne > EPS * total else total)) / weight
+        bound = STUCK * (borne if borne > EPS * total else total)
+        return np.where(self._nearest(), bound / weight, 0.0)
+
+    def _nearest(self) -> NDArray[np.bool_]:
+        """Tell which nodes of each unsupported body touch first, shape (n,). Collective.
+
+        By friction at others, whose tangents are inclined, a body could hang without pressure.
+        """
+        interface, rest = self.problem.interface, self.problem.start()
+        opening = interface.opening(interface.jump.apply(rest.x))
+        found = np.zeros(opening.size, dtype=bool)
+        for group in self._unsupported:
+            moved = np.abs(group.normal).sum(axis=1) + np.abs(group.tangential).sum(axis=(1, 2))
+            own = np.where(moved > 0, opening, np.inf)
+            found |= own <= NEGLIGIBLE * interface.size - interface.jump.maximum(-own)
+        return found
 
     @cached_property
     def _unsupported(self) -> list[Group]:

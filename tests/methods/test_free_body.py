@@ -43,6 +43,18 @@ def test_the_least_of_all_places():
         np.testing.assert_allclose(nodes.apply(back), nodes.apply(state.x), rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 6, 8])
+def test_a_loaded_ring_that_lies_on_a_plate(seed):
+    """By friction at all nodes that may touch, it would hang between the plates at first."""
+    case = squeezed("newton", way=0.3, traction=(0.0, -1e-3))
+    solution = solve(case, domain=between_plates(COMM, seed))
+    assert solution.converged
+    assert solution.counters.linear_solves <= 100  # not converged after 309 and 357, 277 before
+    nodes = solution.problem.nodes
+    pressed = nodes.sum(solution.forces.pressure * nodes.normal[:, 1])
+    assert abs(pressed) == pytest.approx(1e-3 * np.pi, rel=0.02)  # a polygon in a circle
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_least_distance_by_another_method(seed):
     rng = np.random.default_rng(seed)

@@ -91,6 +91,7 @@ def squeezed(
     way: float = -0.01,
     file: str | None = None,
     guided: bool = False,
+    traction: tuple[float, float] | None = None,
     **solver: object,
 ) -> Case:
     """Return the case: the lid goes down a little, both flat sides `against` the ring.
@@ -109,6 +110,8 @@ def squeezed(
         The mesh; None if it is given otherwise.
     guided
         Whether supports keep the ring from moving sideways and rolling.
+    traction
+        On the inside of the ring.
     """
     tables: dict[str, Any] = {
         "material": [
@@ -124,6 +127,7 @@ def squeezed(
             for on in ("plate_top", "lid_bottom")
         ],
         "solver": {"method": method, **solver},
+        "load": [] if traction is None else [{"on": "ring_inside", "traction": list(traction)}],
     }
     if file is None:
         return parse_case(tables, without=("mesh",))
