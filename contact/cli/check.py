@@ -106,7 +106,14 @@ def _times(case: Case) -> list[float]:
 
 def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> list[str]:
     """Return lines on the mesh, and on loads and prescribed values at some times. Collective."""
-    warnings = [f"# warning: {text}" for text in (*fitting(problem), *passing(problem))]
+    warnings = [
+        f"# warning: {text} [{identifier}]"
+        for identifier, remarks in {
+            "own-shape": fitting(problem),
+            "passing-bodies": passing(problem),
+        }.items()
+        for text in remarks
+    ]
     return [*_quality(problem), *_given(problem, times), *_locking(problem), *warnings]
 
 
@@ -119,7 +126,7 @@ def _locking(problem: ContactProblem) -> list[str]:
     ratios = [float(m.law.poisson) for m in problem.body.materials]
     return [
         f"# warning: Poisson's ratio {ratio:g}, and from {INCOMPRESSIBLE:g} on elements of degree "
-        f"1 are much too stiff, they lock: {remedy}"
+        f"1 are much too stiff, they lock: {remedy} [locking]"
         for ratio in dict.fromkeys(ratios)
         if ratio >= INCOMPRESSIBLE
     ]

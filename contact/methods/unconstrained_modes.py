@@ -232,7 +232,10 @@ class UnconstrainedModes:
 
 
 def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -> Array:
-    """Return the q nearest to a wanted one in the norm of `products` with cone q >= least."""
+    """Return the q nearest to a wanted one in the norm of `products` with cone q >= least.
+
+    NaN where there is none.
+    """
     values, vectors = np.linalg.eigh(products)
     used = values > EPS * values.max()
     back = vectors[:, used] / np.sqrt(values[used])
@@ -241,6 +244,8 @@ def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -
     unit = np.append(np.zeros(back.shape[1]), 1.0)
     system = np.vstack([rows.T, below / size])
     residual = system @ nnls(system, unit)[0] - unit
+    if residual[-1] == 0:
+        return np.full_like(wanted, np.nan)
     return np.asarray(wanted - size * back @ residual[:-1] / residual[-1])
 
 

@@ -31,18 +31,22 @@ def _remedy(solution: Solution) -> str | None:
     return unlocked(body.element, body.degree, shape_of(body.domain.mesh))
 
 
-def remarks(solution: Solution) -> Iterator[Remark]:
-    """Say where the mesh locks, or the estimated error is large, as where slender parts bend."""
+def locking(solution: Solution) -> Iterator[Remark]:
+    """Say where the mesh locks."""
     error = solution.error
-    assert error is not None
-    if locks(solution):
+    if error is not None and locks(solution):
         yield (
             f"the mesh locks: the bulk modulus is {error.stiffness_ratio:.3g} times the shear "
             f"modulus where the energy is, and from {LOCKED:g} on elements of degree 1 are too "
             "stiff: displacements are too small, and the estimated error is a lower bound; "
             f"{_remedy(solution)}"
         )
-    elif error.relative > COARSE:
+
+
+def large_error(solution: Solution) -> Iterator[Remark]:
+    """Say where the estimated error is large, as where slender parts bend."""
+    error = solution.error
+    if error is not None and error.relative > COARSE and not locks(solution):
         # The mean dilatation is no bound from below: it may be too soft as well.
         mean = solution.problem.equilibrium.element == MEAN_DILATATION
         yield (

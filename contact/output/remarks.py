@@ -87,32 +87,34 @@ def measure(solution: Solution, whole: bool = True) -> list[float]:
 def review(solution: Solution) -> None:
     """Add all remarks to the notes and warnings of a solution. Collective."""
     strains = measure(solution)
-    for remarks in (
-        halved(solution),
-        unloading(solution),
-        monotonicity(solution, strains),
-        small_strain(solution),
-        discretisation.coarse_curves(solution),
-        held_aslant(solution),
-        fitting(solution.problem),
-        layers(solution),
-        discretisation.remarks(solution),
-        untouched(solution),
-        resolution(solution),
-        rounding(solution),
-        sliding(solution),
-        strong_friction(solution),
-        conductivity(solution),
-        ramp(solution),
-        bodies.choices(solution),
-        bodies.passing(solution.problem),
-        bodies.regions(solution),
-        bodies.unresisted_motions(solution),
-        bodies.adrift(solution),
-        giving_way(solution),
-    ):
+    for identifier, remarks in {
+        "halved-steps": halved(solution),
+        "unloading": unloading(solution),
+        "material": monotonicity(solution, strains),
+        "small-strain": small_strain(solution),
+        "curved-surface": discretisation.coarse_curves(solution),
+        "held-aslant": held_aslant(solution),
+        "own-shape": fitting(solution.problem),
+        "layer": layers(solution),
+        "locking": discretisation.locking(solution),
+        "discretisation-error": discretisation.large_error(solution),
+        "no-contact": untouched(solution),
+        "pressure-resolution": resolution(solution),
+        "rounding": rounding(solution),
+        "sliding": sliding(solution),
+        "strong-friction": strong_friction(solution),
+        "conductivity": conductivity(solution),
+        "conductivity-ramp": ramp(solution),
+        "two-bodies": bodies.choices(solution),
+        "passing-bodies": bodies.passing(solution.problem),
+        "one-material": bodies.regions(solution),
+        "unresisted-motion": bodies.unresisted_motions(solution),
+        "free-motion": bodies.adrift(solution),
+        "penalty": giving_way(solution),
+    }.items():
         for text in remarks:
-            (solution.notes if isinstance(text, Note) else solution.warnings).append(text)
+            listed = solution.notes if isinstance(text, Note) else solution.warnings
+            listed.append(f"{text} [{identifier}]")
 
 
 def halved(solution: Solution) -> Iterator[Remark]:

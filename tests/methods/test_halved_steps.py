@@ -38,7 +38,8 @@ def test_a_solution_says_that_steps_were_halved(largest, monkeypatch):
     solution = solve(problem, TIGHT["newton"], times=[1.0, 2.0])
     said = [text for text in solution.notes if "halved" in text]
     assert said == ([] if largest == 1 else [
-        "4 steps, 2 more than asked for: some that did not converge were halved"
+        "4 steps, 2 more than asked for: some that did not converge were halved "
+        "[halved-steps]"
     ])  # fmt: skip
 
 
