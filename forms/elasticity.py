@@ -143,9 +143,14 @@ def mandel(stiffness: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(stiffness, dtype=float) * np.outer(factor, factor)
 
 
+def moduli(young: float, poisson: float) -> tuple[float, float]:
+    """Return the bulk modulus k0 and the shear modulus mu1 of an isotropic material, (7.9)."""
+    return young / (3 - 6 * poisson), young / (2 + 2 * poisson)
+
+
 def isotropic(young: float, poisson: float) -> NDArray[np.float64]:
     """Return the stiffness matrix of an isotropic material, shape (6, 6)."""
-    shear = young / (2 + 2 * poisson)
+    _, shear = moduli(young, poisson)
     c = np.diag([2 * shear] * 3 + [shear] * 3)
     c[:3, :3] += young * poisson / ((1 + poisson) * (1 - 2 * poisson))
     return c

@@ -17,7 +17,7 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from forms.elasticity import Anisotropic
+from forms.elasticity import Anisotropic, moduli
 from forms.history import HistoryLaw, QuadratureLaw
 from forms.kinematics import CARTESIAN, Strained, deviator_squared, embed, strain
 from forms.ops import Value, is_symbolic, log, maximum, sqrt
@@ -67,12 +67,12 @@ class Isotropic:
     @property
     def bulk(self) -> float:
         """Bulk modulus k0 = E / (3 - 6 nu), equation (7.9)."""
-        return self.young / (3 - 6 * self.poisson)
+        return moduli(self.young, self.poisson)[0]
 
     @property
     def shear(self) -> float:
         """Initial shear modulus mu1 = E / (2 + 2 nu), equation (7.9)."""
-        return self.young / (2 + 2 * self.poisson)
+        return moduli(self.young, self.poisson)[1]
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ufl.core.expr import Expr
 
 from forms.crystal import VOIGT
+from forms.elasticity import moduli
 from forms.kinematics import embed
 
 #: Number of components -> the pairs of tensor indices that they stand for.
@@ -159,9 +160,7 @@ def with_stiffness(
     n, size = strain.shape
     stiffness = np.empty((n, size, size))
     if kind == "secant":
-        young, poisson = float(law.young), float(law.poisson)
-        moduli = young / (3 - 6 * poisson), young / (2 + 2 * poisson)
-        stiffness[:] = isotropic_stiffness(*moduli, size)
+        stiffness[:] = isotropic_stiffness(*moduli(float(law.young), float(law.poisson)), size)
     else:
         still = {name: np.zeros_like(value) for name, value in variables.items()}
         for k, unit in enumerate(np.eye(size)):

@@ -2,8 +2,9 @@
 
 Of a linear material the strain across is eliminated from the constants, which are those of the
 Schur complement on the stress sigma_zz: no element and no form notices. Of other laws it is found
-at each point, by Newton's method on sigma_zz = 0 within a bracket (de Souza Neto, Peric and Owen,
-Computational Methods for Plasticity, 2008, section 9.2), and is one of their internal variables.
+at each point, by Newton's method on sigma_zz = 0 (de Souza Neto, Peric and Owen, Computational
+Methods for Plasticity, 2008, section 9.2) and by bisection where that does not end, and is one of
+their internal variables.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ufl.core.expr import Expr
 
 from forms.crystal import stiffness_tensor
-from forms.elasticity import Anisotropic, isotropic
+from forms.elasticity import Anisotropic, isotropic, moduli
 from forms.hencky import Hencky, Law, Linear
 from forms.history import HistoryLaw, Response, isotropic_stiffness, with_stiffness
 from forms.piezo import Piezo
@@ -26,8 +27,11 @@ Array = NDArray[np.float64]
 #: Name of the strain across among the internal variables.
 ACROSS = "strain_across"
 
-#: Steps of Newton's method, or bisections, in which the stress across vanishes.
-MOST = 100
+#: Steps of Newton's method; then bisections, as many as take a bracket to the rounding of its ends.
+NEWTON, BISECTIONS = 20, 2 * np.finfo(float).nmant
+
+#: Stress across, as a part of the others, that is rounding.
+ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +61,56 @@ class PlaneStressElastic(Anisotropic):
         return found + f[0] * gradient[0] + f[1] * gradient[1]
 
 
+def without_stress_across(stiffness: Array) -> Array:
+    """Return stiffnesses from strains in the plane to stresses where none acts across.
+
+    The Schur complement on sigma_zz, whose own entry stays, so that there is an inverse.
+
+    Parameters
+    ----------
+    stiffness
+        With zz as the third component, shape (..., s, s) (stress).
+    """
+    c = stiffness
+    least = c - c[..., :, 2:3] * c[..., 2:3, :] / c[..., 2:3, 2:3]
+    least[..., 2, 2] = c[..., 2, 2]
+    return np.asarray(least)
+
+
 @dataclass(frozen=True)
-class PlaneStressHistory:
+class _Around:
+    """A law made of another one, whose elastic constants it has."""
+
+    base: Hencky | HistoryLaw
+
+    @property
+    def young(self) -> float:
+        """Young's modulus of small strains."""
+        return float(self.base.young)
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio of these."""
+        return float(self.base.poisson)
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus of these."""
+        return moduli(self.young, self.poisson)[0]
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus of these."""
+        return moduli(self.young, self.poisson)[1]
+
+    @property
+    def first_yield(self) -> float:
+        """The strain |dev eps| at first yield."""
+        return float(getattr(self.base, "first_yield", np.inf))
+
+
+@dataclass(frozen=True)
+class PlaneStressHistory(_Around):
     """A law at points whose stress across vanishes; a `forms.history.HistoryLaw`.
 
     Parameters
@@ -68,31 +120,6 @@ class PlaneStressHistory:
     """
 
     base: HistoryLaw
-
-    @property
-    def young(self) -> float:
-        """Young's modulus of small strains."""
-        return self.base.young
-
-    @property
-    def poisson(self) -> float:
-        """Poisson's ratio of these."""
-        return self.base.poisson
-
-    @property
-    def bulk(self) -> float:
-        """Bulk modulus of these."""
-        return self.young / (3 - 6 * self.poisson)
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus of these."""
-        return self.young / (2 + 2 * self.poisson)
-
-    @property
-    def first_yield(self) -> float:
-        """The strain |dev eps| at first yield."""
-        return float(getattr(self.base, "first_yield", np.inf))
 
     @property
     def symmetric(self) -> bool:
@@ -106,76 +133,74 @@ class PlaneStressHistory:
     def respond(self, strain: Array, variables: Mapping[str, Array], kind: str = "") -> Response:
         """Return the response at n points; see `forms.history.HistoryLaw`."""
         own = {name: value for name, value in variables.items() if name != ACROSS}
-        eps, found = self._without_stress(strain, own, variables[ACROSS])
+        eps, found, solved = self._without_stress(strain, own, variables[ACROSS])
         new = {**found.variables, ACROSS: eps[:, 2].copy()}
-        stress = found.stress.copy()
-        stress[:, 2] = 0.0
+        assert found.stiffness is not None
+        # To first order, without the rounding of a large bulk modulus.
+        across = found.stiffness[:, :, 2] / found.stiffness[:, 2:3, 2]
+        stress = found.stress - across * found.stress[:, 2:3]
+        # Where no such strain is found the stress is no number, and the state no solution.
+        stress[~solved] = np.nan
         stiffness = None
         if kind:
             if kind == "secant":
                 asked = self.base.respond(eps, own, "secant")
                 found = with_stiffness(self.base, eps, own, "secant", asked)
             assert found.stiffness is not None
-            c = found.stiffness
-            stiffness = c - c[:, :, 2:3] * c[:, 2:3] / c[:, 2:3, 2:3]
-            stiffness[:, 2, 2] = c[:, 2, 2]
+            stiffness = without_stress_across(found.stiffness)
         return replace(found, stress=stress, variables=new, stiffness=stiffness)
 
     def _without_stress(
         self, strain: Array, variables: Mapping[str, Array], start: Array
-    ) -> tuple[Array, Response]:
-        """Return strains with those across at which no stress acts, and the response with tangent.
+    ) -> tuple[Array, Response, NDArray[np.bool_]]:
+        """Return strains with those across at which no stress acts, the response, and where so.
 
-        The stress across grows with the strain across: where Newton's step leaves the bracket of
-        the signs that were seen, its middle is taken.
+        Newton's steps are taken inside of the bracket of the signs that were seen, its middle in
+        place of those that leave it, and after the last one (Press et al. 2007, section 9.4); while
+        all signs are the same, strains at least double. So it ends for every continuous stress that
+        is pressure for some strain across and tension for another.
         """
         eps = strain.copy()
         eps[:, 2] = start
+        elastic = self.young * np.abs(eps).max(axis=1)
         low: Array = np.full(len(eps), -np.inf)
         high: Array = np.full(len(eps), np.inf)
-        for _ in range(MOST):
+        for step in range(NEWTON + BISECTIONS):
             found = self.base.respond(eps, variables, "tangent")
             found = with_stiffness(self.base, eps, variables, "tangent", found)
             assert found.stiffness is not None
-            stress, slope = found.stress[:, 2], found.stiffness[:, 2, 2]
+            stress, slope, at = found.stress[:, 2], found.stiffness[:, 2, 2], eps[:, 2].copy()
+            strained = np.abs(eps).max(axis=1)
             size = np.abs(found.stress).max(axis=1, initial=0.0)
-            open_ = np.abs(stress) > 1e-14 * np.maximum(size, self.young * np.abs(eps).max(axis=1))
-            if not open_.any():
+            # Of nearly incompressible materials the rounding of strains is that of the slope.
+            known = np.maximum.reduce([size, elastic, slope * strained])
+            open_ = ~(np.abs(stress) <= ROUNDING * known)
+            moving = open_ & np.isfinite(stress)
+            if not moving.any():
                 break
-            low = np.where(stress < 0, np.maximum(low, eps[:, 2]), low)
-            high = np.where(stress > 0, np.minimum(high, eps[:, 2]), high)
-            to = eps[:, 2] - stress / slope
-            outside = ~((to > low) & (to < high)) & np.isfinite(low) & np.isfinite(high)
-            eps[:, 2] = np.where(open_, np.where(outside, (low + high) / 2, to), eps[:, 2])
-        return eps, found
+            low = np.where(stress < 0, np.maximum(low, at), low)
+            high = np.where(stress > 0, np.minimum(high, at), high)
+            to = at - stress / np.where(slope > 0, slope, np.nan)
+            reach = 2 * np.maximum(strained, size / self.young)
+            inside = (to > low) & (to < high) & (np.abs(to - at) <= reach) & (step < NEWTON)
+            beyond = at - np.sign(stress) * reach
+            closed = np.isfinite(low) & np.isfinite(high)
+            middle = np.add(low, high, out=2 * beyond, where=closed) / 2
+            eps[:, 2] = np.where(moving, np.where(inside, to, middle), at)
+        return eps, found, ~open_
 
 
 @dataclass(frozen=True)
-class HenckyAtPoints:
+class HenckyAtPoints(_Around):
     """Hencky's law as a stress update without internal variables.
 
     Parameters
     ----------
-    law
+    base
         The law.
     """
 
-    law: Hencky
-
-    @property
-    def young(self) -> float:
-        """Young's modulus."""
-        return float(self.law.young)
-
-    @property
-    def poisson(self) -> float:
-        """Poisson's ratio."""
-        return float(self.law.poisson)
-
-    @property
-    def first_yield(self) -> float:
-        """The strain |dev eps| at first yield."""
-        return float(getattr(self.law, "first_yield", np.inf))
+    base: Hencky
 
     def variables(self, size: int) -> Mapping[str, ArrayLike]:
         """Return none."""
@@ -183,23 +208,23 @@ class HenckyAtPoints:
 
     def respond(self, strain: Array, variables: Mapping[str, Array], kind: str = "") -> Response:
         """Return the response at n points; see `forms.history.HistoryLaw`."""
-        size, law = strain.shape[1], self.law
+        size, law, bulk = strain.shape[1], self.base, self.bulk
         trace, deviator = strain[:, :3].sum(axis=1), strain.copy()
         deviator[:, :3] -= trace[:, None] / 3
         q = np.einsum("ni,ni->n", deviator, deviator)
         g = np.asarray(law.secant_modulus(q), dtype=float)
         stress = 2 * g[:, None] * deviator
-        stress[:, :3] += float(law.bulk) * trace[:, None]
+        stress[:, :3] += bulk * trace[:, None]
         stiffness = None
         if kind:
-            stiffness = isotropic_stiffness(np.full(len(q), float(law.bulk)), g, size)
+            stiffness = isotropic_stiffness(np.full(len(q), bulk), g, size)
         if kind == "tangent":
             h = 1e-6 * q + 1e-24
             slope = (law.secant_modulus(q + h) - law.secant_modulus(np.maximum(q - h, 0.0))) / (
                 h + np.minimum(q, h)
             )
             stiffness = stiffness + 4 * np.einsum("n,ni,nj->nij", slope, deviator, deviator)
-        energy = float(law.bulk) / 2 * trace**2 + np.asarray(law.shear_energy(q), dtype=float)
+        energy = bulk / 2 * trace**2 + np.asarray(law.shear_energy(q), dtype=float)
         return Response(stress, {}, stiffness, None, energy)
 
 
@@ -234,8 +259,7 @@ def in_plane_stress(law: Law, piezo: Piezo | None = None) -> tuple[Law, Piezo | 
         c = isotropic(float(law.young), float(law.poisson))
     else:
         c = np.array(law.stiffness, dtype=float)
-    least = c - np.outer(c[:, 2], c[2]) / c[2, 2]
-    least[2, 2] = c[2, 2]
+    least = without_stress_across(c)
     across = -c[2, [0, 1, 5]] / c[2, 2]
     if piezo is None:
         return PlaneStressElastic(least, True, across), None

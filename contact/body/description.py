@@ -296,7 +296,14 @@ class Material:
         """Return the material of a plane body without stress across it, of unit thickness.
 
         Crystals are in the axes of the body.
+
+        Raises
+        ------
+        InputError
+            If a nonlinear law is piezoelectric: the strain across would have to follow the field.
         """
+        fits = self.piezo is None or self.in_plane_stress or is_linear(self.law)
+        expect("piezo", self.piezo, "None in plane stress, unless the law is linear", fits)
         law, piezo = in_plane_stress(self.law, self.piezo)
         return replace(self, law=law, piezo=piezo)
 

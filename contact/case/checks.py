@@ -52,12 +52,22 @@ def check_sections(case: Case) -> None:
         accepted = needed(case.space.element, case.space.degree, case.mesh.shape)
         if accepted is not None:
             raise fault("space.element", case.space.element, accepted)
-    if case.space.kinematics == "plane_stress" and case.space.element != "standard":
-        accepted = '"standard" in plane stress, where nothing locks'
-        raise fault("space.element", case.space.element, accepted)
+    if case.space.kinematics == "plane_stress":
+        _check_plane_stress(case)
     if case.mesh.dimension is not None:
         parts = [*case.mesh.sides, *case.mesh.parts, *case.mesh.inside]
         check_mesh(case, case.mesh.dimension, parts)
+
+
+def _check_plane_stress(case: Case) -> None:
+    """Raise a fault if no stress acts across the body, and an element or a law does not fit."""
+    if case.space.element != "standard":
+        accepted = '"standard" in plane stress, where nothing locks'
+        raise fault("space.element", case.space.element, accepted)
+    for key, material in case.materials:
+        if material.piezoelectric and material.law in ("log", "j2"):
+            accepted = '"linear" or "anisotropic" in plane stress with piezoelectric constants'
+            raise fault(f"{key}.law", material.law, accepted)
 
 
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:

@@ -31,7 +31,7 @@ from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
 from contact.typing import Array
 from forms import j2
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis
-from forms.elasticity import Anisotropic, hexagonal
+from forms.elasticity import Anisotropic, hexagonal, moduli
 from forms.hencky import Law, Linear, Log
 from forms.piezo import Piezo as PiezoTensors
 from forms.piezo import from_voigt, hexagonal_voigt
@@ -317,7 +317,7 @@ class Material(Section):
         if self.yield_strain is None:
             raise fault("yield_strain", Words("missing"), 'a number > 0 with law = "log"')
         assert self.young is not None and self.poisson is not None  # required
-        mu1 = self.young / (2 + 2 * self.poisson)
+        _, mu1 = moduli(self.young, self.poisson)
         if self.g_min > mu1:
             raise fault("g_min", self.g_min, f"at most the shear modulus {mu1:g}")
 

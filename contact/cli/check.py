@@ -123,7 +123,8 @@ def _locking(problem: ContactProblem) -> list[str]:
     remedy = unlocked(body.element, body.degree, shape_of(body.domain.mesh))
     if remedy is None:
         return []
-    ratios = [float(m.law.poisson) for m in problem.body.materials]
+    # In plane stress volumes are free to change.
+    ratios = [float(m.law.poisson) for m in problem.body.materials if not m.in_plane_stress]
     return [
         f"# warning: Poisson's ratio {ratio:g}, and from {INCOMPRESSIBLE:g} on elements of degree "
         f"1 are much too stiff, they lock: {remedy} [locking]"

@@ -34,10 +34,11 @@ from contact.problem.state import State
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 from forms.crystal import VOIGT
-from forms.elasticity import Anisotropic, mandel
-from forms.hencky import Hencky, is_linear
-from forms.history import HistoryLaw
+from forms.elasticity import Anisotropic, mandel, moduli
+from forms.hencky import is_linear
+from forms.history import HistoryLaw, isotropic_stiffness
 from forms.piezo import Piezo
+from forms.plane_stress import without_stress_across
 
 #: Factors of the components of a tensor in the basis of Mandel.
 MANDEL = np.array([1.0] * 3 + [np.sqrt(2.0)] * 3)
@@ -58,7 +59,8 @@ class Estimate:
     total
         The sum of eta_K^2 over all ranks.
     stiffness_ratio
-        Mean of bulk over secant shear modulus, weighted by the energy; None for a crystal.
+        Mean of bulk over secant shear modulus, weighted by the energy; None for a crystal, and in
+        plane stress, where volumes are free to change.
     """
 
     squares: Array
@@ -115,7 +117,7 @@ def estimated(
         factor = factor_of(body.domain, material, cells)
         energy = _density(material, shear, factor)
         if local is not None:
-            squares[cells] = local.squares(cells, _moduli(material, shear, factor))
+            squares[cells] = local.squares(cells, _stiffness(material, shear, factor))
         else:
             # Of degree 1 stresses are most exact in the middle of a cell.
             values = own.mean(axis=1) if body.degree == 1 else own[:, : shape.corners]
@@ -123,8 +125,8 @@ def estimated(
             squares[cells] = np.sum(volumes[cells] * energy(linear @ smooth - shapes @ own), axis=1)
         known = np.sum(volumes[cells] * energy(shapes @ own), axis=1)
         sums[0] += known.sum()
-        if not isinstance(law, Anisotropic):
-            sums[1:] += known @ (_bulk(law) / shear), known.sum()
+        if not (isinstance(law, Anisotropic) or material.in_plane_stress):
+            sums[1:] += known @ (_bulk(material) / shear), known.sum()
     at_contact = _at_contact(problem, state)
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
@@ -163,15 +165,15 @@ def _sampled(fields: DerivedFields) -> tuple[Array, Array]:
     return flux, strain
 
 
-def _bulk(law: Hencky | HistoryLaw) -> float:
+def _bulk(material: Material) -> float:
     """Return the bulk modulus."""
-    return float(law.young) / (3 - 6 * float(law.poisson))
+    return moduli(float(material.law.young), float(material.law.poisson))[0]
 
 
 def _density(material: Material, shear: Array, factor: Array) -> Callable[[Array], Array]:
     """Return the energy density of fluxes of shape (cells, q, components) in a material."""
     if material.piezo is None and not isinstance(material.law, Anisotropic):
-        bulk = _bulk(material.law)
+        bulk = _bulk(material)
 
         def isotropic(flux: Array) -> Array:
             trace = flux[..., :3].sum(axis=-1)
@@ -180,28 +182,29 @@ def _density(material: Material, shear: Array, factor: Array) -> Callable[[Array
             return density / factor[:, None]
 
         return isotropic
-    compliance = np.linalg.inv(_moduli(material, shear, factor))
+    compliance = np.linalg.inv(_stiffness(material, shear, factor))
     # Without coupling a neighbour's D is zero here.
     size = compliance.shape[1]
     return lambda flux: np.sum((flux[..., :size] @ compliance) * flux[..., :size], axis=-1)
 
 
-def _moduli(material: Material, shear: Array, factor: Array) -> Array:
-    """Return the moduli of each cell, shape (cells, 6, 6), with coupling (cells, 9, 9); or of all.
+def _stiffness(material: Material, shear: Array, factor: Array) -> Array:
+    """Return the stiffness of each cell, or one, shape (cells, 6, 6), with coupling (cells, 9, 9).
 
-    They map strains to stresses in the basis of Mandel, and (eps, E) to (sigma, D).
+    It maps strains to stresses in the basis of Mandel, and (eps, E) to (sigma, D); in plane stress
+    those in the plane, the strains across being those at which no stress acts.
     """
     law = material.law
     if isinstance(law, Anisotropic):
-        moduli = mandel(law.stiffness)[None]
+        stiffness = mandel(law.stiffness)[None]
     else:
-        volumetric = np.zeros((6, 6))
-        volumetric[:3, :3] = 1 / 3
         own = shear[:1] if is_linear(law) else shear
-        moduli = 3 * _bulk(law) * volumetric + 2 * own[:, None, None] * (np.eye(6) - volumetric)
+        stiffness = isotropic_stiffness(_bulk(material), own, 6)
+        if material.in_plane_stress:
+            stiffness = without_stress_across(stiffness)
     if material.factor is not None:
-        moduli = factor[:, None, None] * moduli
-    return moduli if material.piezo is None else _coupled(moduli, material.piezo)
+        stiffness = factor[:, None, None] * stiffness
+    return stiffness if material.piezo is None else _coupled(stiffness, material.piezo)
 
 
 def _coupled(stiffness: Array, piezo: Piezo) -> Array:

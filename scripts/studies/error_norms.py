@@ -14,10 +14,12 @@ from ufl.core.expr import Expr
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import material_measures
+from contact.history import BodyState
 from contact.typing import Array
-from forms.hencky import secant_stress
-from forms.kinematics import strain
+from forms.hencky import FormLaw, secant_stress
+from forms.kinematics import deviator_squared, strain
 from forms.piezo import Piezo
+from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,8 @@ class Errors:
     energy
         sqrt(B(u; e, e)) with the secant form of the finer solution u: the norm in which Cea's
         lemma holds for a linear material. In a piezoelectric body with E . beta E besides. Strains
-        of u are those of its element: of the mean dilatation the error is that of the pressure.
+        of u are those of its element: of the mean dilatation the error is that of the pressure. In
+        plane stress strains across are those at which e has no stress there.
     """
 
     l2: float
@@ -74,19 +77,30 @@ def errors(
     materials = list(
         material_measures(body.domain, body.body.materials, body.cells, 2 * body.degree + 4)
     )
+    body.laws.fit(BodyState(x), body.nodal(x).ravel())
     gradient = kinematics.gradient(e)
     squares = (
         sum(ufl.inner(e, e) * dx for _, _, dx in materials),
         sum(ufl.inner(gradient, gradient) * dx for _, _, dx in materials),
         sum(
-            (ufl.inner(secant_stress(law, frozen, eps), eps) + _electric(piezo, electric, body.dim))
-            * dx
+            (_elastic(body, law, frozen, eps) + _electric(piezo, electric, body.dim)) * dx
             for law, piezo, dx in materials
         ),
     )
     integrals = [fem.assemble_scalar(fem.form(square)) for square in squares]
     totals = body.comm.allreduce(np.array(integrals), op=MPI.SUM)
     return Errors(*(float(np.sqrt(max(total, 0.0))) for total in totals))
+
+
+def _elastic(body: BodyEquilibrium, law: FormLaw, frozen: Expr, eps: Expr) -> Expr:
+    """Return eps : C eps with the secant stiffness C at a frozen strain."""
+    if isinstance(law, PlaneStressHistory):
+        assert isinstance(law.base, HenckyAtPoints)
+        across = ufl.as_tensor([[0, 0, 0], [0, 0, 0], [0, 0, 1]])
+        law, frozen = law.base.base, frozen + body.laws.fits[ACROSS] * across
+        g = law.secant_modulus(deviator_squared(frozen))
+        eps -= (law.bulk - 2 * g / 3) / (law.bulk + 4 * g / 3) * ufl.tr(eps) * across
+    return ufl.inner(secant_stress(law, frozen, eps), eps)
 
 
 def _electric(piezo: Piezo | None, potential: Expr | None, dim: int) -> Expr:

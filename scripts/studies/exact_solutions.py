@@ -12,7 +12,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body, Fixed, Load, Material
 from contact.interface.obstacle import GapFunction
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
@@ -21,9 +21,11 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log, stress
+from forms.history import to_tensor, to_vector
 from forms.kinematics import strain
 from forms.ops import cos, sin
 from forms.piezo import Piezo, coupling_stress, electric_displacement
+from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory
 from scripts.studies.error_norms import Errors, errors
 
 
@@ -81,6 +83,7 @@ def manufactured(
     piezo: Piezo | None = None,
     element: str = "standard",
     parts: Sequence[Callable[[Any], Any]] | None = None,
+    plane_stress: bool = False,
 ) -> ContactProblem:
     """Return a Hencky body with a given displacement, loaded at the bottom. Collective.
 
@@ -100,17 +103,19 @@ def manufactured(
         "standard" or "mean_dilatation".
     parts
         Components of the displacement; by default those of `smooth`.
+    plane_stress
+        Whether no stress acts across a plane body.
     """
     make, usual = (rectangle, "triangle") if dim == 2 else (box, "tetrahedron")
     domain = make(MPI.COMM_WORLD, [0.0] * dim, [1.0] * dim, [n] * dim, cell=cell or usual)
     x = ufl.SpatialCoordinate(domain.mesh)
     parts = parts or smooth(dim)
     eps = strain(ufl.as_vector([f(x) for f in parts]))
-    sigma = stress(law, eps)
-    if piezo is not None:
-        sigma += coupling_stress(piezo, electric(x))
     finer = basix.ufl.element("Lagrange", domain.mesh.topology.cell_name(), degree + 2)
     space = fem.functionspace(domain.mesh, finer)
+    sigma = _without_stress_across(law, eps, space) if plane_stress else stress(law, eps)
+    if piezo is not None:
+        sigma += coupling_stress(piezo, electric(x))
 
     def load(expression: ufl.core.expr.Expr) -> Given:
         # Interpolated: UFL would ask for a quadrature of a very high degree.
@@ -132,9 +137,27 @@ def manufactured(
     sides = ["left", "right", "top"] + ["front", "back"] * (dim == 3)
     fixed = [Fixed(side, given, None if piezo is None else Given(electric)) for side in sides]
     far = GapFunction(lambda points: np.full(len(points), 10.0))
-    body = Body(law, fixed, loads, piezo)
+    material = Material(law, piezo)
+    body = Body(material.plane_stress() if plane_stress else material, fixed, loads)
     contact = Contact("bottom", far)
     return ContactProblem(domain, body, contact, degree=degree, element=element)
+
+
+def _without_stress_across(
+    law: Hencky, eps: ufl.core.expr.Expr, space: fem.FunctionSpace
+) -> ufl.core.expr.Expr:
+    """Return the plane stress of a strain, interpolated."""
+    element = basix.ufl.element(
+        "Lagrange", space.mesh.topology.cell_name(), space.ufl_element().degree, shape=(4,)
+    )
+    found = fem.Function(fem.functionspace(space.mesh, element))
+    points = space.ufl_element().basix_element.points
+    found.interpolate(fem.Expression(to_vector(eps, 4), points))
+    strains = found.x.array.reshape(-1, 4)
+    across = {ACROSS: np.zeros(len(strains))}
+    response = PlaneStressHistory(HenckyAtPoints(law)).respond(strains, across)
+    found.x.array[:] = response.stress.ravel()
+    return to_tensor(found)
 
 
 def exact(dim: int, charged: bool = False) -> Callable[[Any], ufl.core.expr.Expr]:

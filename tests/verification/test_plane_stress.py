@@ -1,10 +1,12 @@
 """Plane stress: a strip, a plate with a hole's ring, Cook's membrane, plasticity, a ceramic."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.optimize import brentq
 
 from contact import Body, Contact, Fixed, Linear, Load, Log, Material, Problem, parse_case, solve
 from contact.body.elements import MEAN_DILATATION as MEAN
@@ -13,11 +15,13 @@ from contact.errors import InputError
 from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
 from contact.output.fields import DerivedFields
-from forms.history import differential
+from forms.hencky import Isotropic
+from forms.history import Response, differential, isotropic_stiffness
 from forms.j2 import J2, Voce
-from forms.plane_stress import ACROSS, HenckyAtPoints, in_plane_stress
+from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory, in_plane_stress
 from tests.body.test_rollers import sector
 from tests.problem.test_electrodes_inside import BETA33, C11, C13, C33, CERAMIC, E31, E33
+from tests.problems.piezo import pzt
 
 COMM = MPI.COMM_WORLD
 YOUNG, POISSON = 200.0, 0.3
@@ -195,12 +199,92 @@ def test_the_tangent_is_the_derivative_of_the_stress(law):
     assert np.allclose(whole[:, [0, 1, 3]], found.stress[:, [0, 1, 3]])
 
 
+class Counted(HenckyAtPoints):
+    """The same, and how often it was asked."""
+
+    asked: ClassVar[int] = 0
+
+    def respond(self, strain, variables, kind=""):
+        Counted.asked += 1
+        return super().respond(strain, variables, kind)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 1.0])
+@pytest.mark.parametrize("argument", ["norm", "square"])
+@pytest.mark.parametrize("poisson", [-0.95, 0.3, 0.4999])
+def test_the_strain_across_is_that_of_a_bracket(poisson, argument, size):
+    """Also beyond e xi_0, where the deviator softens; it ended after 100 steps for nu = .4999.
+
+    Both parts of the stress across are pulls at |eps_xx + eps_yy|, and pressures at minus that.
+    """
+    base = Counted(Log(YOUNG, poisson, yield_strain=0.003, argument=argument))
+    strain = size * np.random.default_rng(3).standard_normal((20, 4)) * [1, 1, 0, 1]
+    Counted.asked = 0
+    found = PlaneStressHistory(base).respond(strain, {ACROSS: np.zeros(20)}).variables[ACROSS]
+    assert Counted.asked <= 15
+
+    def stress(across, row):
+        return base.respond(np.array([[*row[:2], across, row[3]]]), {}).stress[0, 2]
+
+    for row, value in zip(strain, found, strict=True):
+        end = abs(row[0] + row[1])
+        known = brentq(stress, -end, end, (row,), xtol=1e-15 * size, rtol=1e-14)
+        assert value == pytest.approx(known, rel=1e-9, abs=1e-12 * size)
+
+
+@dataclass(frozen=True)
+class Steep(Isotropic):
+    """A stress across like arctan, from which Newton's method runs away; or none but tension."""
+
+    swollen: float = 0.0
+
+    def variables(self, size):
+        return {}
+
+    def respond(self, strain, variables, kind=""):
+        stiffness = isotropic_stiffness(self.bulk, self.shear, strain.shape[1])
+        stiffness[2] = stiffness[:, 2] = 0.0
+        stress = strain @ stiffness
+        shifted = 1e3 * (strain[:, 2] - 0.3)
+        stress[:, 2] = self.young * (np.arctan(shifted) + self.swollen)
+        found = np.tile(stiffness, (len(strain), 1, 1))
+        found[:, 2, 2] = self.young * (1.0 if kind == "secant" else 1e3 / (1 + shifted**2))
+        return Response(stress, {}, found)
+
+
+def test_the_strain_across_is_found_by_bisection():
+    strain = np.array([[0.1, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [1e-9, 0.0, 0.0, 0.0]])
+    for start in (0.0, 0.301, -50.0):
+        found = PlaneStressHistory(Steep(YOUNG, POISSON)).respond(
+            strain, {ACROSS: np.full(3, start)}, "tangent"
+        )
+        assert found.variables[ACROSS] == pytest.approx(0.3, abs=1e-14)
+        assert np.all(found.stress[:, 2] == 0)
+
+
+def test_no_strain_without_stress_across_is_no_solution():
+    """The stress is then no number, and the law has no value there."""
+    law = PlaneStressHistory(Steep(YOUNG, POISSON, swollen=10.0))
+    found = law.respond(np.full((2, 4), 1e-3), {ACROSS: np.zeros(2)}, "tangent")
+    assert np.isnan(found.stress).all()
+    problem = build_problem(strip({}), law=Steep(YOUNG, POISSON, swollen=10.0))
+    with pytest.raises(InputError, match="law that is given has no value at these strains"):
+        solve(problem)
+
+
 @pytest.mark.parametrize(
     ("data", "words"),
     [
         (
             {"space": {"kinematics": "plane_stress", "element": "mean_dilatation", "degree": 2}},
             "locks",
+        ),
+        (
+            {
+                "material": LAWS["log"] | {"piezo": CERAMIC["piezo"]},
+                "fixed": [{"on": "left", "displacement": [0, 0], "potential": 0.0}],
+            },
+            'given "log".*in plane stress with',
         ),
         (
             {
@@ -214,12 +298,14 @@ def test_the_tangent_is_the_derivative_of_the_stress(law):
 )
 def test_what_is_refused(data, words):
     with pytest.raises(InputError, match=words):
-        build_problem(strip({"law": "linear"}, **data))
+        build_problem(strip(**{"material": {"law": "linear"}} | data))
 
 
 def test_python_takes_plane_stress_for_whole_plane_bodies_alone():
     """Its stiffness knows nothing of a strain across that the kinematics give."""
     thin = Material(Linear(YOUNG, POISSON)).plane_stress()
+    with pytest.raises(InputError, match="None in plane stress"):
+        Material(Log(YOUNG, POISSON, yield_strain=0.003), pzt(2)).plane_stress()
     square = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [2, 2])
     fixed = [Fixed("left", [0.0, 0.0])]
     for domain, more in ((revolved(square), {}), (square, {"degree": 2, "element": MEAN})):
