@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from contact.mesh.cells import together
 from contact.mesh.extraction import Contents, Ints
 
 #: meshio's names of elements by their dimension and number of nodes.
@@ -36,6 +37,7 @@ KINDS = {
     (3, 8): "hexahedron",
     (3, 20): "hexahedron20",
     (3, 27): "hexahedron27",
+    (3, 5): "pyramid",
     (3, 6): "wedge",
     (3, 15): "wedge15",
 }
@@ -52,6 +54,8 @@ FACES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     "hexahedron": (
         (0, 1, 2, 3),
         (4, 7, 6, 5),
@@ -277,9 +281,9 @@ def _faces(
     elements: Ints,
     blocks: Sequence[tuple[str, Ints]],
 ) -> Ints:
-    """Return the faces of a surface by their corners; all with one number of them."""
+    """Return the faces of a surface by their corners."""
     faces: list[Ints] = []
-    every: list[Ints] = []
+    every: dict[int, list[Ints]] = {}
     for given, label in ((row[0], row[1].upper() if len(row) > 1 else "") for row in rows):
         for block, members in _by_block(_named(found, found.sets, [given]), elements).items():
             name, nodes = blocks[block]
@@ -291,14 +295,14 @@ def _faces(
                 if name.startswith(("triangle", "quad")):
                     faces.append(nodes[members][:, : len(corners)])
                 else:
-                    every += [nodes[members][:, list(face)] for face in corners]
+                    for face in corners:
+                        every.setdefault(len(face), []).append(nodes[members][:, list(face)])
             else:
                 raise ValueError(f"*SURFACE: elements {given} have no face {label!r}")
-    if every:
-        faces.append(once(np.concatenate(every)))
+    faces += [once(np.concatenate(alike)) for alike in every.values()]
     least = min((face.shape[1] for face in faces), default=1)
-    kept = [face for face in faces if face.shape[1] == least]
-    return np.concatenate(kept) if kept else np.zeros((0, 1), dtype=np.int64)
+    # Edges of shells are no faces of solids.
+    return together([face for face in faces if least > 2 or face.shape[1] == least])
 
 
 def once(faces: Ints) -> Ints:

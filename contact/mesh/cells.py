@@ -2,10 +2,16 @@
 
 Points are those of the reference cell of basix, shape (q, dim); nodes are numbered as dolfinx does,
 corners first. dolfinx is not imported: it starts MPI, and files are read by processes of their own.
+
+References
+----------
+Dompierre, Labbé, Vallet and Camarero, How to subdivide pyramids, prisms and hexahedra into
+tetrahedra, 8th International Meshing Roundtable (1999).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -244,3 +250,92 @@ def shape_of(mesh: Any) -> Shape:
 def barycentric(points: Array) -> Array:
     """Return the barycentric coordinates of points of a simplex, shape (n, dim + 1)."""
     return np.column_stack([1 - points.sum(axis=1), points])
+
+
+#: Corners of cells and facets that can be cut into simplices, by the first word of Gmsh's names.
+CUT = {
+    "Line": 2,
+    "Triangle": 3,
+    "Quadrilateral": 4,
+    "Tetrahedron": 4,
+    "Pyramid": 5,
+    "Prism": 6,
+    "Hexahedron": 8,
+}
+
+#: Corners, in VTK's order, of the faces of a cell in 3-D, around them, by its number of corners.
+FACES: dict[int, tuple[tuple[int, ...], ...]] = {
+    5: ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    6: ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    8: (
+        *((0, 1, 2, 3), (4, 5, 6, 7)),
+        *((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    ),
+}
+
+
+def simplices(rows: Nodes, dim: int) -> Nodes:
+    """Return cells or facets cut into simplices, shape (cells, simplices, dim + 1).
+
+    A cell is the cone of its smallest corner over the faces without it, and so is each of these:
+    the diagonal of a face begins at its smallest corner on either side (Dompierre et al.).
+
+    Parameters
+    ----------
+    rows
+        Cells by the numbers of their corners in VTK's order, shape (cells, corners).
+    dim
+        Their dimension.
+    """
+    count = rows.shape[1]
+    if count == dim + 1:
+        return rows[:, None]
+    smallest = rows.argmin(axis=1)
+    if dim == 2:
+        around = np.take_along_axis(rows, (np.arange(4) + smallest[:, None]) % 4, axis=1)
+        return around[:, [[0, 1, 2], [0, 2, 3]]]
+    made = np.empty((len(rows), {5: 2, 6: 3, 8: 6}[count], 4), dtype=rows.dtype)
+    for tip in range(count):
+        mine = smallest == tip
+        faces = [rows[mine][:, list(face)] for face in FACES[count] if tip not in face]
+        made[mine, :, :3] = np.concatenate([simplices(face, 2) for face in faces], axis=1)
+        made[mine, :, 3] = rows[mine, tip, None]
+    return made
+
+
+def together(faces: Sequence[Nodes]) -> Nodes:
+    """Return facets of one dimension as one array, cut into triangles where they are unlike."""
+    if len({face.shape[1] for face in faces}) > 1:
+        faces = [simplices(face, 2).reshape(-1, 3) for face in faces]
+    return np.concatenate(faces) if faces else np.zeros((0, 1), dtype=np.int64)
+
+
+#: Name, dimension and order of a type of elements, as Gmsh has them.
+Kind = tuple[str, int, int]
+
+
+def as_simplices(kinds: Sequence[Kind]) -> tuple[Shape, list[Kind], str] | None:
+    """Return how cells that are not all of one shape of ours are taken; None if they are.
+
+    Parameters
+    ----------
+    kinds
+        The types of elements of a mesh.
+
+    Returns
+    -------
+    The shape that cells become, the types of elements then, and a note.
+    """
+    dim = max((of for _, of, _ in kinds), default=0)
+    cells = [(name, order) for name, of, order in kinds if of == dim]
+    words = {name.split()[0] for name, _ in cells}
+    if dim < 2 or not words <= {*CUT} or max(order for _, order in cells) > 2:
+        return None
+    if len(cells) == 1 and words <= {shape.name.capitalize() for shape in SHAPES}:
+        return None
+    shape = {2: TRIANGLE, 3: TETRAHEDRON}[dim]
+    found = " beside ".join(repr(name) for name, _ in cells)
+    straight = " with straight edges" if any(order > 1 for _, order in cells) else ""
+    note = f"its cells, {found}, become {shape.plural}{straight}: a mesh has cells of one kind"
+    others = [kind for kind in kinds if kind[1] < dim]
+    return shape, [*others, (f"{shape.name.capitalize()} {shape.corners}", dim, 1)], note

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from contact.mesh.cells import together
 from contact.mesh.extraction import Contents, Ints
 
 #: Corners of the sides of elements, by meshio's names without a number.
@@ -20,6 +21,8 @@ SIDES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetra": ((0, 1, 3), (1, 2, 3), (0, 3, 2), (0, 2, 1)),
+    "pyramid": ((0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 4, 3), (0, 3, 2, 1)),
+    "wedge": ((0, 1, 4, 3), (1, 2, 5, 4), (0, 3, 5, 2), (0, 2, 1), (3, 4, 5)),
     "hexahedron": (
         (0, 1, 5, 4),
         (1, 2, 6, 5),
@@ -68,8 +71,8 @@ def _facets(contents: Contents, elements: Ints, sides: Ints) -> Ints:
         here = (elements >= first) & (elements < first + len(nodes))
         table = SIDES.get(name.rstrip("0123456789"))
         if here.any() and table is not None:
-            corners = np.array(table, dtype=np.int64)[sides[here]]
             rows = nodes[elements[here] - first]
-            found.append(np.take_along_axis(rows, corners, axis=1))
+            for side in np.unique(sides[here]):
+                found.append(rows[sides[here] == side][:, list(table[side])])
         first += len(nodes)
-    return np.concatenate(found) if found else np.zeros((0, 1), dtype=np.int64)
+    return together(found)

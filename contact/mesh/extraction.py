@@ -18,18 +18,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from contact.mesh.cells import CUT, SHAPES, as_simplices, simplices
+
 Ints = npt.NDArray[np.int64]
-
-#: Cells by the first word of Gmsh's names: their corners, and those of their facets.
-CORNERS = {
-    "Triangle": (3, 2),
-    "Quadrilateral": (4, 2),
-    "Tetrahedron": (4, 3),
-    "Hexahedron": (8, 4),
-}
-
-#: The first words of Gmsh's names of facets, by their corners.
-FACETS = {2: "Line", 3: "Triangle", 4: "Quadrilateral"}
 
 #: Endings of the names of files that are not Gmsh's, and their formats.
 OTHERS = {
@@ -156,33 +147,41 @@ def extract(model: Any, entities_are_groups: bool) -> Model:
     nodes = tags.astype(np.int64), xyz.reshape(-1, 3)
     dim = max((kind[1] for kind in kinds), default=-1)
     dim = max(dim, 1)
-    types = {t: model.mesh.getElementProperties(t) for t in model.mesh.getElementTypes(dim)}
-    first = next(iter(types.values()), None)
-    if dim < 2 or first is None or first[0].split()[0] not in CORNERS:
+    properties = model.mesh.getElementProperties
+    cells, facets = (
+        {t: CUT.get(properties(t)[0].split()[0], 0) for t in model.mesh.getElementTypes(of)}
+        for of in (dim, dim - 1)
+    )
+    first = properties(next(iter(cells))) if cells else None
+    shape = next((s for s in SHAPES if first and s.name == first[0].split()[0].lower()), None)
+    notes: tuple[str, ...] = ()
+    cut = as_simplices(kinds)
+    if cut is not None:
+        shape, kinds, note = cut
+        places, notes = shape.nodes(1), (note,)
+    elif first is None or shape is None:
         return Model(kinds, *nodes, np.empty((0, dim)), np.empty((0, 1), dtype=np.int64), {}, {})
-    local = np.array(first[4], dtype=np.float64).reshape(-1, dim)
-    # Gmsh's quadrilaterals and hexahedra go from -1 to 1.
-    low = local.min(axis=0)
-    places = (local - low) / (local.max(axis=0) - low)
-    corners = CORNERS[first[0].split()[0]][1]
-    facets = {
-        t: corners
-        for t in model.mesh.getElementTypes(dim - 1)
-        if model.mesh.getElementProperties(t)[0].split()[0] == FACETS[corners]
-    }
-    cells = {next(iter(types)): len(places)}
+    else:
+        local = np.array(first[4], dtype=np.float64).reshape(-1, dim)
+        # Gmsh's quadrilaterals and hexahedra go from -1 to 1.
+        low = local.min(axis=0)
+        places = (local - low) / (local.max(axis=0) - low)
+        cells = {next(iter(cells)): len(places)}
+        facets = {t: count for t, count in facets.items() if count == shape.facet.corners}
+    whole, sides = ((of, kept, cut is not None) for of, kept in ((dim, cells), (dim - 1, facets)))
     return Model(
         kinds,
         *nodes,
         places,
-        _elements(model, cells, [-1]),
-        _groups(model, dim, cells, entities_are_groups),
-        _groups(model, dim - 1, facets, entities_are_groups),
+        _elements(model, *whole, [-1]),
+        _groups(model, *whole, entities_are_groups),
+        _groups(model, *sides, entities_are_groups),
+        notes,
     )
 
 
 def _groups(
-    model: Any, dim: int, types: Mapping[int, int], entities_are_groups: bool
+    model: Any, dim: int, types: Mapping[int, int], cut: bool, entities_are_groups: bool
 ) -> dict[str, Ints]:
     """Elements of each physical group of a dimension; one without a name goes by its number."""
     if entities_are_groups:
@@ -195,19 +194,23 @@ def _groups(
     entities: dict[str, list[int]] = {}
     for tag, members in found:
         entities.setdefault(model.getPhysicalName(dim, tag) or str(tag), []).extend(members)
-    return {name: _elements(model, types, members) for name, members in entities.items()}
+    return {name: _elements(model, dim, types, cut, tags) for name, tags in entities.items()}
 
 
-def _elements(model: Any, types: Mapping[int, int], entities: list[int]) -> Ints:
+def _elements(
+    model: Any, dim: int, types: Mapping[int, int], cut: bool, entities: list[int]
+) -> Ints:
     """Tags of the first nodes of elements of some types, as many as each has, in some entities.
 
-    Of the entity -1 they are all.
+    Of the entity -1 they are all. They are cut into simplices, or have the same number of nodes.
     """
-    found = [np.empty((0, *{*types.values()}), dtype=np.int64)] if types else []
+    columns = {dim + 1} if cut else {*types.values()}
+    found = [np.empty((0, *columns), dtype=np.int64)] if types else []
     for kind, count in types.items():
         every = model.mesh.getElementProperties(kind)[3]
         nodes = [model.mesh.getElementsByType(kind, entity)[1] for entity in entities]
-        found.append(np.concatenate(nodes).astype(np.int64).reshape(-1, every)[:, :count])
+        rows = np.concatenate(nodes).astype(np.int64).reshape(-1, every)[:, :count]
+        found.append(simplices(rows, dim).reshape(-1, dim + 1) if cut else rows)
     return np.concatenate(found) if found else np.empty((0, 1), dtype=np.int64)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from contact.mesh import abaqus, exodus, med
-from contact.mesh.cells import INTERVAL, SHAPES, Shape
+from contact.mesh.cells import CUT, INTERVAL, SHAPES, Kind, Shape, as_simplices, simplices
 from contact.mesh.extraction import BODY, OTHERS, Contents, Ints, Model, run
 from contact.typing import Array
 
@@ -26,7 +26,7 @@ TAGS = {"gmsh:physical", "cell_tags", "point_tags", "medit:ref"}
 INNER = {"gmsh:geometrical", "gmsh:bounding_entities", "GlobalElementId", "GlobalNodeId"}
 
 #: Names of shapes of cells in other programs.
-NAMES = {"line": "interval", "quad": "quadrilateral", "tetra": "tetrahedron"}
+NAMES = {"line": "interval", "quad": "quadrilateral", "tetra": "tetrahedron", "wedge": "prism"}
 
 
 def read(file: Path) -> Model:
@@ -98,6 +98,9 @@ def model_of(contents: Contents) -> Model:
     """Return the contents of a file as they are checked."""
     known = [_kind(name, nodes.shape[1]) for name, nodes in contents.blocks]
     kinds = list(dict.fromkeys(kind for kind, _ in known if kind[1] > 0))
+    cut = as_simplices(kinds)
+    if cut is not None:
+        return model_of(_cut(contents, [kind for kind, _ in known], cut[2]))
     tags = np.arange(1, len(contents.points) + 1)
     dim = max((kind[1] for kind in kinds), default=-1)
     whole = [b for b, (kind, _) in enumerate(known) if kind[1] == dim]
@@ -146,14 +149,46 @@ def model_of(contents: Contents) -> Model:
     )
 
 
-def _kind(name: str, nodes: int) -> tuple[tuple[str, int, int], Shape | None]:
+def _cut(contents: Contents, kinds: Sequence[Kind], note: str) -> Contents:
+    """Return the contents of a file with its cells and their facets cut into simplices.
+
+    Parameters
+    ----------
+    contents, kinds
+        The contents, and the kind of each block.
+    note
+        The sentence on it.
+    """
+    dim = max(of for _, of, _ in kinds)
+    blocks, each = list(contents.blocks), np.ones(len(kinds), dtype=np.int64)
+    for b, ((kind, of, _), (_, nodes)) in enumerate(zip(kinds, contents.blocks, strict=True)):
+        if of >= dim - 1:
+            made = simplices(nodes[:, : CUT[kind.split()[0]]], of)
+            each[b] = made.shape[1]
+            blocks[b] = {1: "line", 2: "triangle", 3: "tetra"}[of], made.reshape(-1, of + 1)
+    groups = {
+        name: {
+            b: (rows[:, None] * each[b] + np.arange(each[b])).ravel() for b, rows in members.items()
+        }
+        for name, members in contents.groups.items()
+    }
+    surfaces = {
+        name: simplices(faces, dim - 1).reshape(-1, dim) if len(faces) else faces
+        for name, faces in contents.surfaces.items()
+    }
+    notes = [*contents.notes, note]
+    return Contents(contents.points, blocks, groups, contents.nodes, surfaces, notes)
+
+
+def _kind(name: str, nodes: int) -> tuple[Kind, Shape | None]:
     """Return name, dimension and order as Gmsh has them, and the shape if it is one of ours."""
     stem = name.rstrip("0123456789")
-    shape = next((s for s in (INTERVAL, *SHAPES) if s.name == NAMES.get(stem, stem)), None)
-    if shape is None:
+    word = NAMES.get(stem, stem)
+    shape = next((s for s in (INTERVAL, *SHAPES) if s.name == word), None)
+    label = "Line" if shape == INTERVAL else word.capitalize()
+    if label not in CUT:
         return (name, 0 if stem == "vertex" else 3, 1), None
-    word = "Line" if shape == INTERVAL else shape.name.capitalize()
-    return (f"{word} {nodes}", shape.dim, 1 if nodes == shape.corners else 2), shape
+    return (f"{label} {nodes}", shape.dim if shape else 3, 1 if nodes == CUT[label] else 2), shape
 
 
 def _places(shape: Shape, count: int) -> Any:

@@ -164,14 +164,8 @@ def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
             why = "another shape" if order < 3 else f"order {order}"
             raise InputError(
                 f"its cells include {label!r}, of {why}; accepted are triangles or quadrilaterals "
-                "in 2-D, tetrahedra or hexahedra in 3-D, of order 1 or 2"
+                "in 2-D, tetrahedra, hexahedra, prisms or pyramids in 3-D, of order 1 or 2"
             )
-    if len(labels) > 1:
-        found = " beside ".join(repr(label) for label, _ in labels)
-        raise InputError(
-            f"its cells include {found}; accepted are cells of one kind (in Gmsh quadrilaterals "
-            "alone by Mesh.RecombineAll and Mesh.SubdivisionAlgorithm = 1, hexahedra by 2)"
-        )
     return Shape(labels[0][0].split()[0].lower())
 
 

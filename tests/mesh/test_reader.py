@@ -48,7 +48,6 @@ BAD = {
     "no-boundary.msh": "no physical groups of curves",
     "degenerate.msh": r"1 cell\(s\) of zero volume, the first near \(0.5, 0\)",
     "folded.msh": "cells overlap",
-    "two-kinds.msh": "'Triangle 3' beside 'Quadrilateral 4'; accepted are cells of one kind",
     "arrow.msh": r"1 cell\(s\) with a corner of 180 degrees or more",
     "curled.msh": r"1 cell\(s\) that are folded by their curved edges, the first near \(0\.333",
     "surface.msh": "surface in 3-D",

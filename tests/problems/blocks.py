@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import basix.ufl
 import numpy as np
@@ -160,6 +161,35 @@ class Blocks:
                 vertices.append(corner[tuple(at)])
             cells.append(np.stack(vertices, 1))
         return x, np.concatenate(cells)
+
+
+#: Elements of Abaqus by the number of their corners, in 2-D and in 3-D.
+ELEMENTS = {2: {3: "CPE3", 4: "CPE4"}, 3: {4: "C3D4", 8: "C3D8"}}
+
+
+def write_unlike(path: Path, upper: Blocks, lower: Blocks) -> None:
+    """Write the upper block of one pair on the lower one of another, of other cells, for Abaqus."""
+    d = upper.dim
+    lines, sets, first, points = ["*NODE"], [], 1, 1
+    elements: list[str] = []
+    for name, given, n, low in (("lower", lower, lower.lower, 0), ("upper", upper, upper.upper, 1)):
+        x, cells = given._block(n, np.random.default_rng(n))
+        x[:, -1] += low
+        order = np.argsort(given.shape.vtk(1)[1])
+        rows = cells[:, order] + points
+        lines += [f"{points + k}, " + ", ".join(map(repr, p)) for k, p in enumerate(x.tolist())]
+        elements.append(f"*ELEMENT, TYPE={ELEMENTS[d][rows.shape[1]]}, ELSET={name}")
+        elements += [", ".join(map(str, [first + k, *row])) for k, row in enumerate(rows)]
+        ends = {"lower": ("bottom", "over"), "upper": ("under", "top")}[name]
+        for part, axis, value in (
+            *((end, d - 1, low + k) for k, end in enumerate(ends)),
+            (f"{name}_left", 0, 0),
+            *([(f"{name}_front", 1, 0)] if d == 3 else []),
+        ):
+            sets.append(f"*NSET, NSET={part}")
+            sets += map(str, np.flatnonzero(np.abs(x[:, axis] - value) < 1e-12) + points)
+        first, points = first + len(rows), points + len(x)
+    path.write_text("\n".join([*lines, *elements, *sets]) + "\n")
 
 
 def squares(comm: MPI.Intracomm, corners, cells) -> Domain:

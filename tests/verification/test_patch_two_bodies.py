@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from scipy.spatial import cKDTree
 from contact.body.description import Body, Fixed, Load, Material
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
-from contact.mesh.domain import revolved
+from contact.mesh.domain import Domain, revolved
+from contact.mesh.reader import from_file
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.fields import DerivedFields
@@ -22,7 +24,7 @@ from contact.typing import Array
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from scripts.force_balance import force_balance
-from tests.problems.blocks import Blocks, squares
+from tests.problems.blocks import Blocks, squares, write_unlike
 from tests.problems.mechanics import constant
 
 COMM = MPI.COMM_WORLD
@@ -78,6 +80,32 @@ def contact(on: str, against: str, mu: float = 0.0) -> Contact:
 PAIRS = [("under", "over"), ("over", "under")]
 
 
+def check_constant_pressure(
+    domain: Domain,
+    rollers: Sequence[tuple[str, int]],
+    degree: int,
+    pair: Sequence[str],
+    dense: bool,
+) -> None:
+    """Check that the pressure is that on top; the lower block is a hundred times stiffer."""
+    dim = domain.dim
+    zero = constant(0.0, dim)
+    fixed = [
+        Fixed(part, [zero if i == axis else None for i in range(dim)]) for part, axis in rollers
+    ]
+    laws = {"upper": Linear(1.0, 0.3), "lower": Linear(100.0, 0.2)}
+    materials = [Material(law, on=(name,)) for name, law in laws.items()]
+    load = Load("top", pressure=constant(0.01, dim))
+    body = Body(materials, fixed, [load])
+    problem = ContactProblem(domain, body, contact(*pair), degree=degree)
+    state = solve(problem, condense=dense)
+    np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
+    stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
+    k = 4 * (dim - 1)
+    np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
+    assert force_balance(problem, state).imbalance < 1e-12
+
+
 @pytest.mark.parallel
 @pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
 @pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
@@ -85,24 +113,32 @@ PAIRS = [("under", "over"), ("over", "under")]
 def test_constant_pressure(
     dim: int, degree: int, cell: str, pair: Sequence[str], condense: bool
 ) -> None:
-    """A hundred times stiffer below, either side the slave: the pressure is that on top."""
     domain = blocks(dim, grading=1.4, cell=cell).domain(COMM)
-    zero = constant(0.0, dim)
-    fixed = [
-        Fixed(part, [zero if i == axis else None for i in range(dim)])
-        for part, axis in (("bottom", dim - 1), ("left", 0), ("front", 1))[:dim]
-    ]
-    laws = {"upper": Linear(1.0, 0.3), "lower": Linear(100.0, 0.2)}
-    materials = [Material(law, on=(name,)) for name, law in laws.items()]
-    load = Load("top", pressure=constant(0.01, dim))
-    body = Body(materials, fixed, [load])
-    problem = ContactProblem(domain, body, contact(*pair), degree=degree)
-    state = solve(problem, condense=condense)
-    np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
-    stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
-    k = 4 * (dim - 1)
-    np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
-    assert force_balance(problem, state).imbalance < 1e-12
+    rollers = (("bottom", dim - 1), ("left", 0), ("front", 1))[:dim]
+    check_constant_pressure(domain, rollers, degree, pair, condense)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_constant_pressure_of_unlike_cells(
+    dim: int, degree: int, pair: Sequence[str], shared_tmp_path: Path
+) -> None:
+    """Simplices above, quadrilaterals or hexahedra below, as one file of Abaqus has them."""
+    upper, lower = (
+        blocks(dim, cell=cell, grading=1.4)
+        for cell in {2: ("triangle", "quadrilateral"), 3: ("tetrahedron", "hexahedron")}[dim]
+    )
+    path = shared_tmp_path / "pair.inp"
+    if COMM.rank == 0:
+        write_unlike(path, upper, lower)
+    COMM.barrier()
+    domain = from_file(COMM, path)
+    assert "become" in domain.notes[0]
+    sides = (("left", 0), ("front", 1))[: dim - 1]
+    rollers = [(f"{body}_{side}", k) for body in ("upper", "lower") for side, k in sides]
+    check_constant_pressure(domain, [("bottom", dim - 1), *rollers], degree, pair, dense=False)
 
 
 @pytest.mark.parallel

@@ -1,0 +1,212 @@
+"""Cells of several shapes in a file become simplices, with their sets, and meet at their faces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import meshes
+from contact.mesh.cells import FACES, simplices
+from contact.mesh.extraction import Contents
+from contact.mesh.formats import model_of
+from contact.mesh.reader import from_file
+from contact.mesh.validity import check_model
+from tests.problems.sizes import integral, measures
+
+COMM = MPI.COMM_WORLD
+FIXTURES = Path(meshes.__file__).parent / "fixtures"
+
+#: Elements of Abaqus.
+TYPES = {"hexahedron": "C3D8", "wedge": "C3D6", "pyramid": "C3D5", "tetra": "C3D4"}
+
+
+def stack() -> Contents:
+    """Three cubes along x: a hexahedron, two prisms, six pyramids; a tetrahedron below a prism."""
+    square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+    points = [(float(x), y, z) for x in range(4) for y, z in square]
+    points += [(2.5, 0.5, 0.5), (4 / 3, 1 / 3, -1.0)]
+    at = np.arange(16).reshape(4, 4)
+
+    def cube(k: int) -> np.ndarray:
+        """In VTK's order, from x = k to x = k + 1."""
+        return np.concatenate([at[k], at[k + 1]])
+
+    a, b, c = cube(0), cube(1), cube(2)
+    prisms = [b[[0, 1, 4, 3, 2, 7]], b[[1, 5, 4, 2, 6, 7]]]
+    pyramids = [[*c[list(face)], 16] for face in FACES[8]]
+    low = [b[0], b[1], b[4]]
+    blocks = {"hexahedron": [a], "wedge": prisms, "pyramid": pyramids, "tetra": [[*low, 17]]}
+    made = Contents(np.array(points), [(name, np.array(rows)) for name, rows in blocks.items()])
+    made.groups |= {name: {k: np.arange(len(rows))} for k, (name, rows) in enumerate(made.blocks)}
+    made.surfaces |= {"start": at[0][None], "end": at[3][None]}
+    made.nodes["side"] = np.flatnonzero(made.points[:, 1] == 1.0)
+    return made
+
+
+#: Volumes of the regions and areas of the parts.
+VOLUMES = {"hexahedron": 1.0, "wedge": 1.0, "pyramid": 1.0, "tetra": 1 / 6}
+AREAS = {"start": 1.0, "end": 1.0, "side": 3.0}
+
+#: The skin of the cubes but for half a square, and the tetrahedron's three other faces.
+SKIN = 13.5 + 2 * np.sqrt(1 + 1 / 9) / 2 + np.sqrt(2 * (1 + 1 / 18)) / 2
+
+
+def numbered(contents: Contents, order: np.ndarray) -> Contents:
+    """Return the same with other numbers of the nodes."""
+    new = np.argsort(order)
+    return Contents(
+        contents.points[order],
+        [(name, new[rows]) for name, rows in contents.blocks],
+        contents.groups,
+        {name: new[rows] for name, rows in contents.nodes.items()},
+        {name: new[rows] for name, rows in contents.surfaces.items()},
+    )
+
+
+def sizes(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return the volumes of tetrahedra or the areas of triangles."""
+    edges = points[rows[:, 1:]] - points[rows[:, :1]]
+    count = edges.shape[1]
+    return np.sqrt(np.linalg.det(edges @ edges.transpose(0, 2, 1))) / (count * (count - 1))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_neighbours_cut_their_faces_alike_whatever_the_numbers(seed):
+    contents = stack()
+    order = np.random.default_rng(seed).permutation(len(contents.points))
+    model = model_of(numbered(contents, order))
+    cells = check_model(model)  # which finds faces of two cells that do not meet
+    assert cells.notes[-1] == (
+        "its cells, 'Hexahedron 8' beside 'Prism 6' beside 'Pyramid 5' beside 'Tetrahedron 4', "
+        "become tetrahedra: a mesh has cells of one kind"
+    )
+    rows = cells.regions.rows
+    assert len(rows) == 6 + 2 * 3 + 6 * 2 + 1
+    found = {name: sizes(model.points, nodes - 1).sum() for name, nodes in model.regions.items()}
+    assert found == pytest.approx(VOLUMES)
+    found = {name: sizes(model.points, nodes - 1).sum() for name, nodes in model.parts.items()}
+    assert found == pytest.approx(AREAS)
+    facets = np.sort(rows[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
+    once, count = np.unique(facets, axis=0, return_counts=True)
+    assert sizes(cells.points, once[count == 1]).sum() == pytest.approx(SKIN)
+
+
+@pytest.mark.parametrize("count", [5, 6, 8])
+def test_each_corner_may_be_the_smallest(count):
+    """Of one cell, with its corners in every cyclic order, the pieces fill it."""
+    block = {len(rows[0]): rows[0] for _, rows in stack().blocks}[count]
+    points = stack().points
+    whole = {5: 1 / 6, 6: 1 / 2, 8: 1.0}[count]
+    for turn in range(count):
+        number = np.empty(len(points), dtype=int)
+        number[block] = (np.arange(count) + turn) % count
+        made = simplices(number[block][None], 3)
+        place = points[block[np.argsort(number[block])]]
+        assert sizes(place, made[0]) == pytest.approx(whole / made.shape[1])
+
+
+def write(path, contents: Contents) -> None:
+    """Write the stack in a program's format."""
+    if path.suffix == ".inp":
+        lines = ["*NODE"]
+        lines += [f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(contents.points, 1)]
+        first = 1
+        for name, rows in contents.blocks:
+            lines.append(f"*ELEMENT, TYPE={TYPES[name]}, ELSET={name}")
+            lines += [", ".join(map(str, [first + k, *(row + 1)])) for k, row in enumerate(rows)]
+            first += len(rows)
+        lines += ["*ELSET, ELSET=all", "hexahedron, wedge, pyramid, tetra"]
+        lines += ["*SURFACE, NAME=start", "hexahedron, S1", "*SURFACE, NAME=end", "5, S1"]
+        lines += ["*SURFACE, NAME=below", "hexahedron, S3", "3, S1"]
+        lines += ["*SURFACE, NAME=skin", "all,", "*NSET, NSET=side"]
+        lines += [", ".join(map(str, contents.nodes["side"] + 1))]
+        path.write_text("\n".join(lines) + "\n")
+        return
+    meshio = pytest.importorskip("meshio")
+    quads = ("quad", np.concatenate([contents.surfaces["start"], contents.surfaces["end"]]))
+    tags = [np.full(len(rows), k + 1) for k, (_, rows) in enumerate(contents.blocks)]
+    tags.append(np.array([11, 12]))
+    if path.suffix == ".msh":
+        data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+        made = meshio.Mesh(contents.points, [*contents.blocks, quads], cell_data=data)
+        made.field_data = {
+            name: np.array([k + 1, 3]) for k, (name, _) in enumerate(contents.blocks)
+        }
+        made.field_data |= {"start": np.array([11, 2]), "end": np.array([12, 2])}
+        meshio.write(path, made, file_format="gmsh22", binary=False)
+    else:
+        sets = {
+            name: [np.arange(len(rows) * (k == b)) for b in range(5)]
+            for k, (name, rows) in enumerate(contents.blocks)
+        }
+        none = [np.zeros(0, dtype=int)] * 4
+        sets |= {"start": [*none, np.array([0])], "end": [*none, np.array([1])]}
+        meshio.write(path, meshio.Mesh(contents.points, [*contents.blocks, quads], cell_sets=sets))
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", ["stack.inp", "stack.msh", "stack.vtu"])
+def test_files_of_unlike_cells_keep_their_sets(name, shared_tmp_path):
+    path = shared_tmp_path / name
+    if COMM.rank == 0:
+        write(path, stack())
+    COMM.barrier()
+    domain = from_file(COMM, path)
+    found = {region: integral(domain, domain.dx_in(region)) for region in VOLUMES}
+    assert found == pytest.approx(VOLUMES)
+    areas = measures(domain)
+    expected = {"start": 1.0, "end": 1.0}
+    if name == "stack.inp":
+        # A surface of a square and a triangle, and all that bounds one cell alone.
+        expected |= {"side": 3.0, "below": 1.5, "skin": SKIN}
+        assert integral(domain, domain.dx_in("all")) == pytest.approx(sum(VOLUMES.values()))
+    assert {part: areas[part] for part in expected} == pytest.approx(expected)
+    assert any("become tetrahedra: a mesh has cells of one kind" in note for note in domain.notes)
+
+
+@pytest.mark.parallel
+def test_quadrilaterals_beside_triangles():
+    """From Gmsh: a square and a triangle under one name."""
+    domain = from_file(COMM, FIXTURES / "two-kinds.msh")
+    assert measures(domain) == pytest.approx({"bottom": 1.0, "top": 1.0})
+    assert integral(domain, domain.dx_in("body")) == pytest.approx(1.5)
+    note = "its cells, 'Triangle 3' beside 'Quadrilateral 4', become triangles: a mesh has cells "
+    assert domain.notes == (note + "of one kind",)
+
+
+def test_cells_of_second_order_become_straight(tmp_path):
+    """Six nodes a triangle, four a quadrilateral: middles are left out, and it is said."""
+    nodes = ["0, 0", "1, 0", "1, 1", "0, 1", "2, 0", "1.5, -.1", "1.5, .5", "1, .5"]
+    lines = ["*NODE", *(f"{k}, {x}" for k, x in enumerate(nodes, 1))]
+    lines += ["*ELEMENT, TYPE=CPE4, ELSET=square", "1, 1, 2, 3, 4"]
+    lines += ["*ELEMENT, TYPE=CPE6, ELSET=corner", "2, 2, 5, 3, 6, 7, 8"]
+    lines += ["*SURFACE, NAME=ground", "square, S1", "corner, S1"]
+    (tmp_path / "plate.inp").write_text("\n".join(lines) + "\n")
+    domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
+    assert domain.order == 1 and measures(domain) == pytest.approx({"ground": 2.0})
+    assert integral(domain, domain.dx_in("corner")) == pytest.approx(0.5)
+    assert domain.notes == (
+        "its cells, 'Quadrilateral 4' beside 'Triangle 6', become triangles with straight edges: a "
+        "mesh has cells of one kind",
+    )
+
+
+def test_prisms_alone_and_side_sets_of_exodus(tmp_path):
+    """Extruded meshes: sides of three and of four corners."""
+    netcdf, meshio = pytest.importorskip("netCDF4"), pytest.importorskip("meshio")
+    points = np.array([(x, y, z) for z in (0, 1) for x, y in [(0, 0), (1, 0), (0, 1)]], float)
+    path = tmp_path / "prism.exo"
+    meshio.write(path, meshio.Mesh(points, [("wedge", np.arange(6)[None])]))
+    with netcdf.Dataset(str(path), "a") as data:
+        data.createDimension("num_side_sets", 1)
+        data.createDimension("num_side_ss1", 5)
+        for kind, values in (("elem", [1] * 5), ("side", [1, 2, 3, 4, 5])):
+            data.createVariable(f"{kind}_ss1", "i4", ("num_side_ss1",))[:] = values
+    domain = from_file(MPI.COMM_SELF, path)
+    assert measures(domain) == pytest.approx({"1": 3 + 2**0.5})
+    assert domain.notes == (
+        "its cells, 'Prism 6', become tetrahedra: a mesh has cells of one kind",
+    )
