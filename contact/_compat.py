@@ -6,9 +6,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem, graph
+from dolfinx.common import IndexMap
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from petsc4py import PETSc
+
+#: Of the messages by which an index map finds out whom it is asked by; dolfinx's own in 0.9.
+TAG = 1202
 
 
 def geometry_degree(mesh: Mesh) -> int:
@@ -57,6 +61,18 @@ def destinations(ranks: npt.NDArray[np.int32]) -> Any:
     return getattr(made, "_cpp_object", made)
 
 
+def ghosted_map(
+    comm: MPI.Intracomm,
+    count: int,
+    ghosts: npt.NDArray[np.int64],
+    owners: npt.NDArray[np.int32],
+) -> IndexMap:
+    """Return the map of `count` own indices and of ghosts with their owners. Collective."""
+    # The tag of its messages is an argument without a default in 0.11.
+    tag = (TAG,) if "tag: int" in (IndexMap.__init__.__doc__ or "") else ()
+    return IndexMap(comm, count, ghosts, owners, *tag)
+
+
 def collapse(
     subspace: fem.FunctionSpace,
 ) -> tuple[fem.FunctionSpace, npt.NDArray[np.int32]]:
@@ -79,9 +95,9 @@ def keeps_inverted_blocks() -> bool:
 def lasting(comm: MPI.Intracomm) -> MPI.Intracomm:
     """Return a communicator of the same ranks that lives as long as the program, if there is one.
 
-    mpi4py 4.0 keeps a lock with each communicator that it has sent Python objects by. Where a
-    mesh's own is freed while an exception is on its way, the lock remains taken, and the program
-    does not end.
+    mpi4py from 4.0 on keeps a lock with each communicator that it has sent Python objects by. Where
+    a mesh's own is freed the lock may remain taken, and the program does not end: Python objects
+    are sent by this one.
     """
     same = MPI.IDENT, MPI.CONGRUENT
     whole = (MPI.COMM_WORLD, MPI.COMM_SELF)

@@ -1,6 +1,7 @@
 """Who imports whom: the packages of the solver know those above them in the list alone."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 
@@ -109,6 +110,12 @@ def test_no_module_imports_itself_through_others():
         return seen
 
     agrees({name for name in edges if name in reached(name)}, CYCLIC)
+
+
+def test_no_python_objects_are_sent_by_the_communicator_of_a_mesh():
+    """With mpi4py from 4.0 on a program may not end then, see `contact._compat.lasting`."""
+    sent = re.compile(r"mesh\.comm\.(all)?(reduce|gather|bcast|scatter|toall|send|recv)\b")
+    assert [name for name, path in CONTACT.items() if sent.search(path.read_text())] == []
 
 
 def test_files_are_short():

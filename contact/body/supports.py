@@ -11,7 +11,7 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact._compat import collapse
+from contact._compat import collapse, lasting
 from contact.body.description import Body, Field
 from contact.body.fields import Amplitude, Moving, steady, values_at
 from contact.errors import InputError
@@ -124,7 +124,7 @@ def _nothing(
 ) -> Support:
     """Return the condition that a component is 0 at some of its dofs."""
     condition = fem.dirichletbc(zero, dofs, subspace)
-    none, comm = np.zeros((dofs[1].size, 0)), subspace.mesh.comm
+    none, comm = np.zeros((dofs[1].size, 0)), lasting(subspace.mesh.comm)
     return Support(condition, steady, None, zero, dofs[1], none, 1.0, "", comm)
 
 

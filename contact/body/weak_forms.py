@@ -12,6 +12,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
+from contact._compat import lasting
 from contact.body.cuts import Cuts
 from contact.body.description import Body
 from contact.body.elements import MEAN_DILATATION, kinematics_of
@@ -230,7 +231,7 @@ class WeakForms:
     def _sum(self, forms: list[fem.Form]) -> float:
         """Return the sum of functionals over all ranks. Collective."""
         own = sum(fem.assemble_scalar(form) for form in forms)
-        return float(self._mesh.comm.allreduce(own, op=MPI.SUM))
+        return float(lasting(self._mesh.comm).allreduce(own, op=MPI.SUM))
 
     @cached_property
     def _section_forces(self) -> list[list[fem.Form]]:

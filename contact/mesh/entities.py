@@ -81,7 +81,7 @@ def elongation(mesh: dmesh.Mesh, facets: Indices) -> float:
         corners = mesh.geometry.x[places[:, shape_of(mesh).facet.around]]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         found = float(np.max(mesh.h(dim, behind) / (2 * edges.min(axis=1)), initial=1.0))
-    return mesh.comm.allreduce(found, op=MPI.MAX)
+    return lasting(mesh.comm).allreduce(found, op=MPI.MAX)
 
 
 def extent(mesh: dmesh.Mesh) -> float:

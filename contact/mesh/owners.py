@@ -13,6 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
+from contact._compat import ghosted_map
 from contact.ranks import exchanged
 from contact.typing import Array
 
@@ -135,7 +136,7 @@ class Halo:
         ranks = owners.ranks(numbers)
         self._ghosts, first = np.unique(numbers[ranks != owners.comm.rank], return_index=True)
         of = ranks[ranks != owners.comm.rank][first].astype(np.int32)
-        self._map = IndexMap(owners.comm, count, self._ghosts, of)
+        self._map = ghosted_map(owners.comm, count, self._ghosts, of)
         self._vectors: dict[int, la.Vector] = {}
 
     @property
