@@ -69,7 +69,7 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
         room = asked.max_unknowns / unknowns
         domain = grown(domain, squares, asked.fraction, goal, room, problem.equilibrium.degree)
     solution.adaptation = rows
-    if asked.fraction == 1:
+    if asked.fraction == 1 and solution.converged:
         solution.intervals = intervals(rows)
     return solution
 
@@ -99,10 +99,12 @@ def grown(
     first, asked = (comm.allreduce(value, op=MPI.SUM) for value in (squares.size, squares.sum()))
     enough: Domain | None = None
     while True:
-        finer, parents = with_parents(domain, marked(comm, squares, fraction))
+        every = np.arange(squares.size, dtype=np.int32)
+        cells = every if fraction == 1 else marked(comm, squares, fraction)
+        finer, parents = with_parents(domain, cells)
         count = comm.allreduce(parents.size, op=MPI.SUM)
-        cells = comm.allreduce(squares.size, op=MPI.SUM)
-        if cells > first and count > room * first:
+        before = comm.allreduce(squares.size, op=MPI.SUM)
+        if before > first and (count > room * first or count > 2 * GROWTH * first):
             return enough or domain
         pieces = np.bincount(parents, minlength=squares.size)
         # Of 2^d pieces each edge is half as long.

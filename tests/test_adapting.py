@@ -9,7 +9,7 @@ from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
 
 from contact import InputError, load_case, parse_case, solve, write_outputs
-from contact.adapting import GROWTH, marked
+from contact.adapting import GROWTH, grown, marked
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import box, rectangle
 from contact.mesh.transfer import refined
@@ -144,6 +144,15 @@ def test_intervals_hold_the_values_of_a_much_finer_mesh():
         assert low <= value <= high and high - low < 0.2 * abs(value)
     assert solution.intervals["max_pressure"] is None
     assert bar(max_unknowns=600).intervals is None
+
+
+def test_uniform_meshes_cut_each_edge_in_two():
+    """Also where a cell has no error, and where twice as fine a mesh again would reach the goal."""
+    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [1.0, 1.0], [4, 4])
+    squares = np.ones(32)
+    squares[:7] = 0.0
+    finer = grown(domain, squares, 1.0, goal=0.1, room=100.0, degree=1)
+    assert finer.mesh.topology.index_map(2).size_global == 128
 
 
 def test_the_steps_of_an_evolution_have_one_mesh():

@@ -99,7 +99,7 @@ def estimated(
         # Stresses vary in the cell, and are most exact in its middle.
         fields = DerivedFields(body, state, shape.nodes(1))
     fields = fields or DerivedFields(body, state)
-    flux, strain = _sampled(fields)
+    flux, strain = sampled(fields)
     secant = body.laws.secant_shear(state, body.nodal(state.x).ravel())
     local = None
     if body.degree == 2 and body.element != MEAN_DILATATION:
@@ -145,7 +145,7 @@ def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
     return body.layout.stiffness * strain**2 * comm.allreduce(volume, op=MPI.SUM)
 
 
-def _sampled(fields: DerivedFields) -> tuple[Array, Array]:
+def sampled(fields: DerivedFields) -> tuple[Array, Array]:
     """Return the fluxes and |dev eps| at the points of the owned cells.
 
     Fluxes are the stress in the basis of Mandel, and D where there is coupling.

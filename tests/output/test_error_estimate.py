@@ -12,15 +12,19 @@ from contact import parse_case, solve, write_outputs
 from contact.body.description import Body, Fixed, Material
 from contact.case.build import build_problem
 from contact.cli.check import expectations
+from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import from_mesh
+from contact.mesh.geometry import geometry_nodes, measures
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.error_estimate import estimated
-from contact.output.fields import Point
+from contact.output.error_estimate import estimated, sampled
+from contact.output.fields import DerivedFields, Point
+from contact.output.local_problems import LocalProblems
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from forms.elasticity import isotropic, mandel
 from forms.hencky import Linear, Log
 from scripts.studies.effectivity import known
 from scripts.studies.error_norms import errors
@@ -28,6 +32,7 @@ from scripts.studies.exact_solutions import Singular, manufactured
 from tests.problems.bar import changed
 from tests.problems.mechanics import flat
 from tests.problems.piezo import pzt
+from tests.problems.revolution import Tube
 
 #: Cells of P1 and P2 on problems of the study.
 KNOWN = {
@@ -77,6 +82,30 @@ def test_plane_stress_of_small_strains_is_linear(degree):
     assert found[0].squares == pytest.approx(found[1].squares, rel=1e-8)
     assert found[0].energy == pytest.approx(found[1].energy, rel=1e-10)
     assert found[0].stiffness_ratio is found[1].stiffness_ratio is None
+
+
+def test_wrong_pressures_in_the_fluxes_are_overestimated():
+    """Nearly incompressible, 3.5 times: with the right ones the estimate is the error.
+
+    That is k e_p^2 of the pressures, which are off by ten times their size, and what is left.
+    """
+    tube = Tube(law=Linear(1.0, 0.4999))
+    problem = tube.problem(8, 2)
+    body, state, law = problem.equilibrium, state_of(problem), tube.law
+    error = errors(body, state.x, tube.displacement).energy
+    assert np.sqrt(estimated(problem, state).total) > 2 * error
+    flux = sampled(DerivedFields(body, state))[0]
+    off = flux[..., :3].mean(axis=-1) - 2 * law.bulk * tube.constants[0]
+    assert np.abs(off).max() > 10 * abs(2 * law.bulk * tube.constants[0])
+    shape, of = shape_of(problem.domain.mesh), geometry_nodes(problem.domain)
+    at, weights = rule(shape, 4)
+    volumes = measures(True, shape, of, at, weights)
+    total = np.sum(volumes * (off @ shape.lagrange(2, at).T) ** 2) / law.bulk
+    flux[..., :3] -= off[..., None]
+    cells = np.arange(len(flux), dtype=np.int32)
+    stiffness = mandel(isotropic(law.young, law.poisson))[None]
+    total += np.sum(LocalProblems(problem, state, flux).squares(cells, stiffness))
+    assert 0.95 < np.sqrt(total) / error < 1.05
 
 
 @pytest.mark.parametrize("degree", [1, 2])
