@@ -70,6 +70,16 @@ def pytest_report_header() -> str:
     return f"contact: {len(files)} files, {lines} lines"
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests that are for another number of ranks."""
+    marks = [item.get_closest_marker("parallel") for item in items]
+    kept = [mark is None or _comm.size in (1, *(mark.args or (_comm.size,))) for mark in marks]
+    config.hook.pytest_deselected(
+        items=[x for x, keep in zip(items, kept, strict=True) if not keep]
+    )
+    items[:] = [x for x, keep in zip(items, kept, strict=True) if keep]
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call() -> Iterator[None]:
     """Fail a test on all ranks if it fails on one, so that they stay in step."""

@@ -223,7 +223,7 @@ def test_missing_files(shared_tmp_path: Path, capfd: pytest.CaptureFixture[str])
     refuse(write(shared_tmp_path, MESH.format(file="absent.msh")), ["absent.msh"], capfd)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize(
     "name",
     [

@@ -29,7 +29,7 @@ def test_problem_without_solution(
     refuse(write(shared_tmp_path, text), words, capfd)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("method", ["uzawa", "newton"])
 def test_held_nodes_that_conduct_determine_the_potential(
     method: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
@@ -67,7 +67,7 @@ against = "lower_top"
 CONDUCTS = '[electric]\nlaw = "perfect"\nk_e = 1.0\n'
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("name", ["insulated", "apart", "electrode", "conducting"])
 def test_each_body_of_a_pair_needs_a_potential(
     name: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
@@ -90,7 +90,7 @@ def test_each_body_of_a_pair_needs_a_potential(
         )
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 def test_not_converged_writes_outputs(
     shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

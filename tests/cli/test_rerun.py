@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(2)
 
 
 @pytest.fixture

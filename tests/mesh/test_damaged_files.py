@@ -151,7 +151,7 @@ def test_damaged_files(batch, tmp_path):
     assert refused > 0
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize(
     ("fixture", "old", "new"),
     [

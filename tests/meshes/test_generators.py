@@ -34,7 +34,7 @@ BAR = {"left": 1.0, "right": 1.0, "bottom": 4.0, "top": 4.0, "loaded": 2.0}
 SIDES = ("left", "right", "front", "back", "bottom", "top")
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 def test_a_running_gmsh_is_left_as_it_was():
     if COMM.rank == 0:
         gmsh.initialize(interruptible=False)
@@ -168,7 +168,7 @@ GENERATORS = {
 }
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("name", meshes.GENERATORS)
 def test_generators_make_their_parts(name):
     volume, expected = GENERATORS[name]
@@ -181,7 +181,7 @@ def test_generators_make_their_parts(name):
 ROUND = [name for name in GENERATORS if re.search("disc|sphere|cylinder|ball|bracket", name)]
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", [name for name in meshes.GENERATORS if name not in meshes.SWEPT])
 def test_generators_make_other_cells(name, order):
@@ -273,7 +273,7 @@ def test_smaller_sizes_give_more_nodes(name):
     assert nodes(from_generator(COMM, name, **sizes)) > nodes(from_generator(COMM, name))
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize(
     ("name", "given", "message"),
     [

@@ -70,7 +70,7 @@ LEFT_ALONE = (
 )
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 def test_a_static_run_leaves_a_users_files(
     cases: dict[str, Path], shared_tmp_path: Path, comm: MPI.Intracomm
 ) -> None:
@@ -85,7 +85,7 @@ def test_a_static_run_leaves_a_users_files(
         comm.barrier()
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("name", ["checkpoints/notes.txt", "checkpoints.new/00001.npz"])
 def test_an_evolution_refuses_checkpoints_that_no_run_has_left(
     name: str, cases: dict[str, Path], shared_tmp_path: Path, comm: MPI.Intracomm,
@@ -101,7 +101,7 @@ def test_an_evolution_refuses_checkpoints_that_no_run_has_left(
         comm.barrier()
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("name", ["contact.csv", "fields.vtu", "fields.bp/data.0", "summary.json"])
 def test_a_file_under_the_name_of_a_result_is_replaced_when_that_is_asked_for(
     name: str, cases: dict[str, Path], shared_tmp_path: Path, comm: MPI.Intracomm,
@@ -118,7 +118,7 @@ def test_a_file_under_the_name_of_a_result_is_replaced_when_that_is_asked_for(
     assert on_the_line("solve", cases["static"], "--out", out, "--overwrite") == 0
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 def test_a_file_in_our_checkpoints_stays(
     shared_tmp_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch,
     cases: dict[str, Path],

@@ -182,7 +182,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_refused(name: str) -> None:
     make, words = WRONG[name]
@@ -220,7 +220,7 @@ def test_a_case_is_refused_in_the_same_words() -> None:
     build_problem(parse_case({**CASE, **steps, "fixed": waves}))
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 def test_what_agrees_is_accepted() -> None:
     plain = solve(problem())
     # The same value by another formula; parts that meet at a corner alone.

@@ -27,7 +27,7 @@ from contact import (
 from contact.mesh.grid import rectangle
 from forms.laws import Coulomb, PotentialFactor
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(2)
 
 LAW = Linear(10.0, 0.3)
 TOP = Fixed("top", [0.0, -0.005])

@@ -22,7 +22,7 @@ from forms.elasticity import Anisotropic, hexagonal, isotropic
 from forms.laws import Compliance, PotentialFactor, ShiftedConductivity, SlipCoefficient, Truncation
 from forms.piezo import hexagonal as piezo_of
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(2)
 
 STIFF = {"c11": 139.0, "c12": 77.8, "c13": 74.3, "c33": 113.0, "c44": 25.6}
 COUPLING = {"e31": -6.98, "e33": 13.84, "e15": 13.44, "beta11": 6.0, "beta33": 5.47}
