@@ -30,7 +30,7 @@ from contact.interface.mortar.operator import CouplingOperator, coupling_operato
 from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoothing
-from contact.linear.layout import Inclined
+from contact.linear.layout import Inclined, projectors
 from contact.typing import Array
 from forms.laws import (
     Compliance,
@@ -168,10 +168,31 @@ def joined_nodes(
     nodes = _side_by_side([entry.nodes for entry in entries])
     given = [entry.coupling or entry.mixing for entry in entries]
     rows = [jumps for jumps in given if jumps is not None]
-    coupling = coupling_operator(nodes.comm, index_map, rows, nodes.nodes, free)
+    there = None if inclined is None else inclined.at(nodes.nodes)
+    unknowns = _unknowns(nodes, projectors(free[nodes.nodes], there))
+    coupling = coupling_operator(nodes.comm, index_map, rows, (nodes.nodes, unknowns), free)
     if coupling is not None and inclined is not None:
         _check_rollers(nodes.comm, coupling, inclined)
-    return replace(nodes, coupling=coupling, carried=_carried(nodes, coupling, ties, free))
+    return replace(nodes, coupling=coupling, carried=_carried(nodes, coupling, ties, unknowns))
+
+
+def _unknowns(nodes: ContactNodes, movable: Array) -> Array:
+    """Return the unknowns of nodes by their jumps, shape (n, block size, block size).
+
+    They are the components that are free. The normal component of a jump is that of its unknowns,
+    of which the `lift` stands for that of the components that supports hold.
+
+    Parameters
+    ----------
+    nodes
+        The contact nodes.
+    movable
+        The projectors onto the unknowns that are free, shape (n, block size, block size).
+    """
+    d, made = nodes.dim, movable.copy()
+    held = nodes.normal - np.einsum("nij,nj->ni", movable[:, :d, :d], nodes.normal)
+    made[:, :d, :d] += nodes.lift[:, :, None] * held[:, None, :]
+    return made
 
 
 def _check_rollers(comm: MPI.Comm, coupling: CouplingOperator, inclined: Inclined) -> None:
@@ -185,19 +206,16 @@ def _check_rollers(comm: MPI.Comm, coupling: CouplingOperator, inclined: Incline
 
 
 def _carried(
-    nodes: ContactNodes,
-    coupling: CouplingOperator | None,
-    ties: sparse.csr_array,
-    free: NDArray[np.bool_],
+    nodes: ContactNodes, coupling: CouplingOperator | None, ties: sparse.csr_array, unknowns: Array
 ) -> Array | None:
     """Return how nodes move with the global unknowns where no jump changes. Collective."""
-    if nodes.motion is None or coupling is None:
-        return nodes.motion
-    carried = nodes.motion.copy()
-    for k, column in enumerate(ties.toarray().T):
-        beside = coupling.apply(column.reshape(free.shape))
-        carried[coupling.places, :, k] -= beside * free[nodes.nodes[coupling.places]]
-    return carried
+    if nodes.motion is None:
+        return None
+    moved = nodes.motion.copy()
+    if coupling is not None:
+        for k, column in enumerate(ties.toarray().T):
+            moved[coupling.places, :, k] -= coupling.apply(column.reshape(-1, nodes.block_size))
+    return np.asarray(unknowns @ moved)
 
 
 def _check_apart(entries: Sequence[Entry]) -> None:
@@ -218,12 +236,10 @@ def _side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
         return first
     together: dict[str, Any] = {
         name: np.concatenate([getattr(nodes, name) for nodes in pieces])
-        for name in ("nodes", "points", "weight", "normal", "tangent", "gap")
+        for name in ("nodes", "points", "weight", "normal", "lift", "tangent", "gap")
     }
     if first.motion is not None:
         together["motion"] = np.concatenate([nodes.motion for nodes in pieces])
-    held = [np.zeros_like(n.normal) if n.held is None else n.held for n in pieces]
-    together["held"] = np.concatenate(held)
     for name in ("cut", "deviation"):
         together[name] = max(getattr(nodes, name) for nodes in pieces)
     return replace(first, **together)

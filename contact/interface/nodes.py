@@ -18,17 +18,24 @@ from contact.interface.mortar.operator import CouplingOperator
 from contact.typing import Array
 
 
-def projectors(direction: Array, movable: Array) -> Array:
-    """Return the projectors onto the free tangential directions, shape (n, d, d).
+def free_directions(normal: Array, movable: Array) -> tuple[Array, Array]:
+    """Return the lifts of unit normals, and the projectors onto the free tangential directions.
 
     Parameters
     ----------
-    direction
-        Unit vectors with nothing along directions that are not free, shape (n, d).
+    normal
+        Contact directions, of which some part is free, shape (n, d).
     movable
-        The projectors onto those that are, shape (n, d, d).
+        The projectors onto the directions that no support holds, shape (n, d, d).
+
+    Returns
+    -------
+    See `ContactNodes.lift` and `ContactNodes.tangent`, shapes (n, d) and (n, d, d).
     """
-    return movable - direction[:, :, None] * direction[:, None, :]
+    admissible = np.einsum("nij,nj->ni", movable, normal)
+    length = np.linalg.norm(admissible, axis=1)[:, None]
+    unit = admissible / length
+    return unit / length, movable - unit[:, :, None] * unit[:, None, :]
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,9 @@ class ContactNodes:
         `contact.interface.mortar.lumping`).
     normal
         Contact direction, a unit vector out of the body, shape (n, d).
+    lift
+        The least displacement along directions that no support holds whose normal component is 1,
+        shape (n, d): the normal, but where a support holds nodes aslant to it.
     tangent
         Projector onto the free tangential directions, shape (n, d, d).
     gap
@@ -68,13 +78,11 @@ class ContactNodes:
         Whether the nodes stand for the rings through them, about the axis x = 0.
     carried
         How the nodes move with these unknowns where no jump changes, likewise: as the foundation
-        does, and against nodes beside them that follow a rigid part.
+        does, and against nodes beside them that follow a rigid part. Along directions that supports
+        hold they do not; the `lift` then closes the gap as much.
     coupling
         The operator of jumps that are no nodal values, between bodies and on quadratic triangles;
         None for none.
-    held
-        The part of the contact direction that supports have taken, shape (n, d): times the
-        displacement that they prescribe at time 1 it is off the gap. None for nothing.
     """
 
     comm: MPI.Comm
@@ -82,6 +90,7 @@ class ContactNodes:
     points: Array
     weight: Array
     normal: Array
+    lift: Array
     tangent: Array
     gap: Array
     block_size: int
@@ -91,7 +100,6 @@ class ContactNodes:
     motion: Array | None = None
     carried: Array | None = None
     coupling: CouplingOperator | None = None
-    held: Array | None = None
 
     @property
     def dim(self) -> int:

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.rollers import APART
 from contact.errors import InputError
 from contact.interface.mortar.coupling import Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
-from contact.interface.nodes import ContactNodes, projectors
+from contact.interface.nodes import ContactNodes, free_directions
 from contact.interface.obstacle import Obstacle
 from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
@@ -77,10 +78,6 @@ def find_pair(
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     _, added = measured(distance, points, normal, body.comm, key)
     check_gap(body.domain, added, key, press)
-    movable = body.movable(local)
-    admissible = np.einsum("nij,nj->ni", movable, normal)
-    length = np.linalg.norm(admissible, axis=1)
-    direction = admissible / length[:, None]
     sides = (side.unknown_deviation for side in (slave, master))
     unknown = max(sides, default=0.0)
     nodes = ContactNodes(
@@ -88,9 +85,9 @@ def find_pair(
         local,
         points,
         coupling.weight,
-        direction,
-        projectors(direction, movable),
-        (gap + added) / length,
+        normal,
+        *free_directions(normal, body.movable(local)),
+        gap + added,
         body.block_size,
         cut,
         body.comm.allreduce(unknown, op=MPI.MAX),
@@ -153,7 +150,7 @@ def _stuck(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
     """Return the slave nodes of this rank whose normal is fixed."""
     _, local = owned_among(body.layout.index_map, coupling.nodes)
     moves = body.free[local, : body.dim]
-    held = np.linalg.norm(coupling.normal * moves, axis=1) <= 0.5
+    held = np.linalg.norm(coupling.normal * moves, axis=1) <= APART
     return coupling.nodes[held]
 
 

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from contact.arguments import naming
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.rollers import APART
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import surface_of
-from contact.interface.nodes import ContactNodes, projectors
+from contact.interface.nodes import ContactNodes, free_directions
 from contact.interface.obstacle import Obstacle, Shape
 from contact.interface.obstacle.protocol import measured
 from contact.mesh.cells import shape_of
@@ -215,10 +216,11 @@ def find_nodes(
 ) -> tuple[ContactNodes, Mixing | None]:
     """Collect the contact nodes of a boundary part, and the jumps there. Collective.
 
-    A node whose contact direction is fixed by a Dirichlet condition, or that follows a rigid part,
-    is left out; a fixed tangential component is removed from its tangent projector. On a symmetry
-    line the direction is turned into the free components, and the contribution of the fixed ones to
-    u_nu is taken off the gap. So it is with a foundation that moves.
+    A node whose contact direction supports hold, or that follows a rigid part, is left out. Where
+    they hold it aslant to that, as a plane of symmetry beside an inclined foundation does, it is
+    met by the displacements that are free and those that are prescribed; the force along directions
+    that are held is borne by the supports. Friction acts along tangential directions alone that are
+    free.
 
     Parameters
     ----------
@@ -236,7 +238,7 @@ def find_nodes(
         direction or a gap that is no number, or the foundation lies behind the contact part or
         cuts the body in the reference configuration.
     """
-    domain, space, d = body.domain, body.space, body.dim
+    domain, space = body.domain, body.space
     found = candidates(domain, space, part)
     nodes, points, weight = found.nodes, found.points, found.weight
     front = found.in_front_of(obstacle)
@@ -252,13 +254,9 @@ def find_nodes(
             gap, cut = _place(domain, space, obstacle, found, direction, gap, press)
     else:
         check_gap(domain, gap, key, press)
-    movable = body.movable(nodes)
-    fixed = found.jumps(body.nodal(body.prescribe(body.rest()))[nodes, :d])
     gap = found.along(direction, gap)
-    admissible = np.einsum("nij,nj->ni", movable, direction)
-    held = direction - admissible
-    gap = gap - np.einsum("ni,ni->n", held, fixed)
-    length = np.linalg.norm(admissible, axis=1)
+    movable = body.movable(nodes)
+    free = np.linalg.norm(np.einsum("nij,nj->ni", movable, direction), axis=1)
     # A gap is infinite where the contact direction does not lead to the foundation.
     meets = np.isfinite(gap)
     if not domain.comm.allreduce(bool(meets.any()), op=MPI.LOR):
@@ -266,26 +264,21 @@ def find_nodes(
             f"{key}: from no node of the part {part!r} does the contact direction meet the "
             "foundation; accepted: a shape in front of the part; an axis from the body towards it"
         )
-    keep = (length > 0.5) & meets & (weight > 0)
-    nodes, points, weight = nodes[keep], points[keep], weight[keep]
-    gap, movable = gap[keep], movable[keep]
-    held = held[keep] / length[keep, None]
-    direction = admissible[keep] / length[keep, None]
-    gap = gap / length[keep]
+    keep = (free > APART) & meets & (weight > 0)
+    nodes, points, direction = nodes[keep], points[keep], direction[keep]
     jump = ContactNodes(
         domain.comm,
         nodes,
         points,
-        weight,
+        weight[keep],
         direction,
-        projectors(direction, movable),
-        gap,
+        *free_directions(direction, movable[keep]),
+        gap[keep],
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
         found.unknown if obstacle.is_shape else 0.0,
         domain.revolved,
-        _motion(body, part, points, direction, (movable, held)),
-        held=held,
+        _motion(body, part, points),
     )
     if jump.size == 0:
         raise InputError(
@@ -294,34 +287,12 @@ def find_nodes(
     return jump, found.mixing
 
 
-def _motion(
-    body: BodyEquilibrium,
-    part: str,
-    points: Array,
-    direction: Array,
-    supports: tuple[Array, Array],
-) -> Array | None:
-    """Return how the foundation moves at contact nodes, shape (n, block size, m).
-
-    Parameters
-    ----------
-    body, part, points
-        The body, and the contact nodes of its part.
-    direction
-        The admissible part of the contact direction, of length 1, shape (n, d).
-    supports
-        Projectors onto the directions that no support holds, shape (n, d, d), and the part of the
-        direction that supports have taken, (n, d).
-    """
-    masters, (movable, held) = body.global_unknowns, supports
-    motion, member = masters.still(len(points), body.block_size), masters.member(part)
+def _motion(body: BodyEquilibrium, part: str, points: Array) -> Array | None:
+    """Return how the foundation moves at contact nodes of a part, shape (n, block size, m)."""
+    unknowns = body.global_unknowns
+    motion, member = unknowns.still(len(points), body.block_size), unknowns.member(part)
     if motion is not None and member is not None:
-        own, d = member.motion(points, body.block_size), body.dim
-        # Along the supports the motion counts as far as it closes the gap.
-        towards = np.einsum("ni,nik->nk", held, own[:, :d])
-        own[:, :d] = movable @ own[:, :d]
-        own[:, :d] += direction[:, :, None] * towards[:, None, :]
-        motion[:, :, member.columns] = own
+        motion[:, :, member.columns] = member.motion(points, body.block_size)
     return motion
 
 
@@ -352,8 +323,8 @@ def held_nodes(
         points=found.points[keep],
         weight=found.weight[keep],
         normal=direction[keep],
+        lift=direction[keep],
         tangent=np.zeros((np.count_nonzero(keep), jump.dim, jump.dim)),
         gap=gap[keep],
         motion=None,
-        held=None,
     )

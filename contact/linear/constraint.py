@@ -60,7 +60,7 @@ class Change:
         halo: Halo,
         rows: NDArray[np.intp],
         jumps: sparse.csr_array,
-        free: NDArray[np.bool_],
+        unknowns: tuple[Array, NDArray[np.bool_]],
     ) -> Change:
         """Return the change that makes jumps unknowns, in place of those of some nodes. Collective.
 
@@ -77,22 +77,23 @@ class Change:
         jumps
             The jumps by the values at the nodes of the halo, shape (r, nodes). One is made of the
             node itself, of nodes that are not replaced, and of replaced ones, but in no circle.
-        free
-            Which unknowns of this rank's nodes are not fixed, shape (nodes, block size).
+        unknowns
+            The unknowns that take the place of the free ones by the jumps, shape (r, block size,
+            block size): those of the node's own free components are these themselves. And which
+            unknowns of this rank's nodes are not fixed, shape (nodes, block size).
         """
+        made, free = unknowns
         (count, size), entries = free.shape, sparse.coo_array(jumps)
         known = halo.forward(free.astype(float)) > 0
-        at, unit = rows[entries.row], np.arange(size)
+        at = rows[entries.row]
         own = at == entries.col
         scale = np.ones((count, size))
         scale[at[own]] = np.where(free[at[own]], entries.data[own, None], 1.0)
-        # An unknown of a replaced node for each of its entries in each component.
-        taken = free[at] & known[entries.col] & ~own[:, None] & (entries.data != 0)[:, None]
-        row, column = (
-            np.broadcast_to(part[:, None] * size + unit, taken.shape)[taken]
-            for part in (at, halo.numbers[entries.col])
-        )
-        value = np.broadcast_to(entries.data[:, None], taken.shape)[taken]
+        # Unknowns of a replaced node by those of other nodes that are not fixed.
+        blocks = entries.data[:, None, None] * made[entries.row] * known[entries.col][:, None, :]
+        entry, first, second = np.nonzero(np.where(own[:, None, None], 0.0, blocks))
+        row, column = at[entry] * size + first, halo.numbers[entries.col[entry]] * size + second
+        value = blocks[entry, first, second]
         begin, here = halo.begin * size, np.arange(count * size)
         follows = _matrix(comm, size, count, row, column, -value / scale.ravel()[row])
         diagonal = scale.ravel()

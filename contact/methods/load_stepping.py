@@ -12,9 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 
-from contact.errors import InputError
 from contact.linear.operator import Counters
 from contact.methods.method import Method
 from contact.methods.report import IterationHistory, Outcome
@@ -23,7 +21,6 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate
 from contact.problem.rigid_modes import released, unilateral_supports
 from contact.problem.state import State
-from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solve")
@@ -93,13 +90,7 @@ class Evolution:
             Ends of the steps, increasing. Those that the start has passed are left out.
         begin
             Time of the reference configuration.
-
-        Raises
-        ------
-        InputError
-            If supports that move take contact nodes towards the foundation.
         """
-        check_gaps(self.problem, times)
         for k, end in enumerate(times):
             whole = end - (times[k - 1] if k > 0 else begin)
             while (now := begin if self._last is None else self._last.time) < end:
@@ -151,38 +142,6 @@ class Evolution:
             start, linearised_at = predicted(problem, Reached.of(problem, last), before)
         state, outcome = solve_step(problem, method, start, linearised_at)
         return LoadStep(problem, state, outcome, method.history, since(method.counters, counted))
-
-
-def check_gaps(problem: ContactProblem, times: Sequence[float]) -> None:
-    """Refuse supports that close gaps in the course of time. Collective.
-
-    A component that is fixed aslant to the contact direction is off the gap, with its value at
-    time 1.
-
-    Raises
-    ------
-    InputError
-        If that value is another one at the end of a step.
-    """
-    nodes, body = problem.nodes, problem.equilibrium
-    slant = nodes.held is not None and bool(np.abs(nodes.held).max(initial=0.0) > 0)
-    if not problem.comm.allreduce(slant, op=MPI.LOR):
-        return
-
-    def closed(time: float) -> Array:
-        given = body.nodal(body.prescribe(body.rest(), time))[nodes.nodes, : nodes.dim]
-        held = np.zeros_like(given) if nodes.held is None else nodes.held
-        return np.asarray(np.einsum("ni,ni->n", held, given))
-
-    counted = closed(1.0)
-    for time in times:
-        change = nodes.maximum(np.abs(closed(time) - counted))
-        if change > ROUNDING * problem.domain.size:
-            raise InputError(
-                f"fixed: by time {time:g} a support moves contact nodes by {change:.3g} along "
-                "their contact direction, which it meets aslant; accepted: supports that move "
-                "contact nodes along the foundation, or hold them where they are"
-            )
 
 
 def solve_step(

@@ -196,7 +196,7 @@ class UnconstrainedModes:
         for group in self._unsupported:
             free = null_space(group.held(self.problem.frictional, pressed))
             if free.shape[1] > 0:
-                along = group.normal[:, None, :] * jump.normal[:, :, None]
+                along = group.normal[:, None, :] * jump.lift[:, :, None]
                 columns.append((along + group.tangential) @ free)
                 motions.append(group.moved @ free)
         if not motions:

@@ -201,16 +201,13 @@ def small_strain(solution: Solution) -> Iterator[Remark]:
 
 
 def held_aslant(solution: Solution) -> Iterator[Remark]:
-    """Say where a support holds contact nodes aslant to the contact direction."""
+    """Say where a support holds touching nodes aslant to the contact direction, with friction."""
     nodes = solution.problem.nodes
-    along = np.zeros((nodes.nodes.size, 1)) if nodes.held is None else nodes.held
-    held = np.where(solution.status != "open", np.linalg.norm(along, axis=1), 0.0)
-    share = 1 - 1 / np.sqrt(1 + nodes.maximum(held) ** 2)
-    if share > 0.01:
-        yield (
-            "a support holds contact nodes aslant to the contact direction: their pressures are "
-            f"those along the free direction, up to {share:.0%} too low, and so is their share of "
-            "the contact force, whose rest is among the reactions"
+    aslant = np.linalg.norm(nodes.lift - nodes.normal, axis=1)
+    if nodes.maximum(np.where(solution.friction_bound > 0, aslant, 0.0)) > 0.1:
+        yield Note(
+            "a support holds contact nodes aslant to the contact direction: no friction acts there "
+            "along the directions that it holds, and their pressures bear its share"
         )
 
 

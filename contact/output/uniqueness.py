@@ -72,7 +72,7 @@ def critical_factor(
     stiffness = condensation.stiffness(state)
     if stiffness is None:
         return np.inf
-    ranks = jump.comm.gather((jump.normal, jump.tangent, state.forces.friction, closed, mu))
+    ranks = jump.comm.gather((jump.lift, jump.tangent, state.forces.friction, closed, mu))
 
     def factor() -> float:
         normal, tangent, force, touches, rates = (

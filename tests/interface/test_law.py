@@ -37,6 +37,7 @@ def random_nodes(n: int, dim: int, block_size: int, rng: np.random.Generator) ->
         np.zeros((n, dim)),
         np.ones(n),
         normal,
+        normal,
         tangent,
         rng.uniform(0.0, 0.4, n),
         block_size,

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from contact import build_problem, evolve, load_case
-from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.problem.energy import StepEnd, balance, step_end
@@ -179,28 +178,3 @@ def test_a_linear_body_is_factorised_once():
 def test_times_have_to_increase(ends):
     with pytest.raises(InputError, match=r"times: given .*; accepted: numbers that increase"):
         list(evolve(shaken(), ends))
-
-
-@pytest.mark.parametrize("moves", [True, False])
-def test_a_support_that_closes_gaps_on_its_way_is_refused(moves):
-    """A side that is pushed along x towards an inclined plane, or beside a level one."""
-    normal = [-np.sin(0.3), np.cos(0.3)] if moves else [0.0, 1.0]
-    plane = {"shape": "plane", "point": [0.0, 0.0], "normal": normal}
-    case = parse_case(
-        {
-            "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
-            "material": {"young": 1.0, "poisson": 0.3},
-            "fixed": [
-                {"on": "left", "displacement": ["0.001*t", "free"]},
-                {"on": "top", "displacement": ["free", "-0.02*t"]},
-            ],
-            "contact": {"on": "bottom", "foundation": plane, "overlap": "press"},
-            "evolution": {"times": [0.0, 1.0], "steps": [2]},
-        }
-    )
-    problem = build_problem(case)
-    if moves:
-        with pytest.raises(InputError, match=r"fixed: by time 0\.5 .* aslant; accepted"):
-            steps_of(problem, [0.5, 1.0])
-    else:
-        assert steps_of(problem, [0.5, 1.0])[-1].outcome.converged

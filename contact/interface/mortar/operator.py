@@ -81,7 +81,7 @@ def coupling_operator(
     comm: MPI.Intracomm,
     index_map: IndexMap,
     given: Sequence[Mixing],
-    nodes: NDArray[np.int32],
+    nodes: tuple[NDArray[np.int32], Array],
     free: NDArray[np.bool_],
 ) -> CouplingOperator | None:
     """Return the operator of all contacts; None where there are none. Collective.
@@ -93,7 +93,8 @@ def coupling_operator(
     given
         The jumps that are no nodal values.
     nodes
-        Local numbers of the contact nodes of this rank.
+        Local numbers of the contact nodes of this rank, shape (n,), and their unknowns by jumps,
+        shape (n, block size, block size): the free components of those of all others.
     free
         Which unknowns of the owned nodes are not fixed, shape (nodes, block size).
 
@@ -125,12 +126,18 @@ def coupling_operator(
         )
     taking = np.zeros((halo.numbers.size, 1))
     taking[jumps.indices] = 1.0
-    change = Change.of(comm, halo, replaced, jumps, free)
+    local, unknowns = nodes
+    named = index_map.local_to_global(local)
+    order, every = np.argsort(named), np.eye(free.shape[1]) * free[replaced][:, None, :]
+    of_contact = np.isin(numbers, named)
+    found = np.searchsorted(named, numbers[of_contact], sorter=order)
+    every[of_contact] = unknowns[order[found]]
+    change = Change.of(comm, halo, replaced, jumps, (every, free))
     none = np.zeros(0, dtype=np.intp)
     between = comm.allreduce(any(rows.masters.size for rows in given), op=MPI.LOR)
-    local = np.flatnonzero(halo.reverse(taking)[:, 0])
-    operator = CouplingOperator(halo, jumps, change, numbers, between, local, none, none)
-    return operator.at(index_map.local_to_global(nodes))
+    taken = np.flatnonzero(halo.reverse(taking)[:, 0])
+    operator = CouplingOperator(halo, jumps, change, numbers, between, taken, none, none)
+    return operator.at(named)
 
 
 def _over(rows: Mixing, places: NDArray[np.intp], count: int) -> sparse.csr_array:
