@@ -19,12 +19,16 @@ from dolfinx.mesh import compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.body.description import Body
+from contact.body.fields import constant
 from contact.body.global_unknowns import GlobalUnknowns
+from contact.body.loads import Loads
 from contact.body.rigid import Bolt
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cell_facets
 from contact.mesh.together import members
+from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 
@@ -37,13 +41,15 @@ class Cuts:
         Mesh, and space of the unknowns.
     places
         Where the shortenings are among the global unknowns, shape (k,).
-    parts
-        Names of the cuts.
+    body
+        The body as it is described: its bolts are the cuts, and its loads act on both sides.
 
     Attributes
     ----------
     places
         As given.
+    parts
+        Names of the cuts.
     directions
         The functions -psi n, discontinuous, of unit shortenings.
     jump, secant_jump
@@ -55,21 +61,59 @@ class Cuts:
         domain: Domain,
         space: fem.FunctionSpace,
         places: Sequence[int],
-        parts: Sequence[str],
+        body: Body,
     ) -> None:
         degree = space.ufl_element().embedded_superdegree
         whole = fem.functionspace(domain.mesh, ("DG", degree, (domain.dim,)))
-        self.places = list(places)
-        self.directions = [_direction(domain, space, whole, part) for part in parts]
+        self.places, self._comm = list(places), domain.comm
+        self.parts = [bolt.on for bolt in body.bolts]
+        found = [_direction(domain, space, whole, part) for part in self.parts]
+        self.directions = [direction for direction, _, _ in found]
+        self._ends = [(nodes, normal) for _, nodes, normal in found]
+        zero = constant(domain.mesh, 0.0)
+        self._loads = [Loads(domain, body, direction, zero, 1) for direction in self.directions]
+        self._last: tuple[float, Array] | None = None
         self.jump, self.secant_jump = fem.Function(whole), fem.Function(whole)
 
     @staticmethod
-    def of(domain: Domain, space: fem.FunctionSpace, unknowns: GlobalUnknowns) -> Cuts | None:
+    def of(
+        domain: Domain, space: fem.FunctionSpace, unknowns: GlobalUnknowns, body: Body
+    ) -> Cuts | None:
         """Return those of a body; None without any. Collective."""
-        bolts = [m for m in unknowns.members if isinstance(m.description, Bolt)]
-        if not bolts:
-            return None
-        return Cuts(domain, space, [m.begin for m in bolts], [m.description.on for m in bolts])
+        places = [m.begin for m in unknowns.members if isinstance(m.description, Bolt)]
+        return Cuts(domain, space, places, body) if places else None
+
+    def external(self, time: float) -> Array:
+        """Return the work of the loads at a time by unit shortenings, shape (k,). Collective."""
+        if self._last is None or self._last[0] != time:
+            own = np.array([loads.at(time)[0] for loads in self._loads])
+            self._last = time, np.asarray(self._comm.allreduce(own, op=MPI.SUM))
+        return self._last[1]
+
+    def check(self, nodes: NDArray[np.int32], along: Array, text: str) -> None:
+        """Refuse anything that acts on nodes of a cut by their displacement across it. Collective.
+
+        There it would be that of one side.
+
+        Parameters
+        ----------
+        nodes, along
+            Owned nodes, shape (n,), and the directions in which it acts, shape (n, d, k).
+        text
+            Words for it.
+
+        Raises
+        ------
+        InputError
+            On all ranks.
+        """
+        for part, (ends, normal) in zip(self.parts, self._ends, strict=True):
+            here = np.einsum("nik,i->nk", along[np.isin(nodes, ends)], normal)
+            if self._comm.allreduce(float(np.abs(here).max(initial=0.0)), op=MPI.MAX) > NEGLIGIBLE:
+                raise InputError(
+                    f"bolt on {part!r}: {text} nodes of the cut along its normal; accepted: parts "
+                    "that end a row of cells before the cut, or act along it"
+                )
 
     def set(self, into: fem.Function, q: Array) -> None:
         """Put the jumps of global unknowns into a function."""
@@ -80,8 +124,8 @@ class Cuts:
 
 def _direction(
     domain: Domain, space: fem.FunctionSpace, whole: fem.FunctionSpace, part: str
-) -> fem.Function:
-    """Return -psi n of a cut. Collective.
+) -> tuple[fem.Function, NDArray[np.int32], Array]:
+    """Return -psi n of a cut, its owned nodes, and n. Collective.
 
     Raises
     ------
@@ -115,7 +159,8 @@ def _direction(
     _check_through(domain, part, facets, touches.any(axis=1), above)
     made, moved = fem.Function(whole), touches & above[:, None]
     made.x.array.reshape(-1, d)[whole.dofmap.list[moved]] = -normal
-    return made
+    own = np.flatnonzero(flags.array[: space.dofmap.index_map.size_local] > 0)
+    return made, own.astype(np.int32), normal
 
 
 def _check_through(

@@ -32,10 +32,9 @@ from contact.body.global_unknowns import make_global_unknowns
 from contact.body.loads import Loads, assembled
 from contact.body.materials import cells_of, factor_of
 from contact.body.pointwise import Pointwise
-from contact.body.rollers import rollers_of
+from contact.body.rollers import Rollers
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
-from contact.errors import InputError
 from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout, masked, projectors, times
@@ -89,7 +88,7 @@ class BodyEquilibrium:
         index_map = self.space.dofmap.index_map
         #: Which unknowns of the owned nodes no support holds, shape (nodes, block size).
         self.unsupported = free_components(self.space, self.supports)
-        self.rollers, inclined = rollers_of(domain, self.space, body, self.unsupported)
+        self.rollers = Rollers(domain, self.space, body, self.unsupported)
         self.global_unknowns = make_global_unknowns(domain, self.space, body, self.unsupported)
         #: Which forces are compared with each other.
         self.components = components(self.space)
@@ -104,11 +103,11 @@ class BodyEquilibrium:
             domain.size,
             float(body.law.young),
             domain.revolved,
-            inclined,
+            self.rollers.inclined,
         )
-        self._check_rollers()
+        self.rollers.check_apart(self.global_unknowns.tied)
         #: The jumps across cuts of bolts; None without any.
-        self.cuts = Cuts.of(domain, self.space, self.global_unknowns)
+        self.cuts = Cuts.of(domain, self.space, self.global_unknowns, body)
         #: Where the forms are evaluated is written anew by each query.
         self.forms = WeakForms(
             domain, body, self.space, self.cells, degree, element, self.pointwise, self.cuts
@@ -118,6 +117,12 @@ class BodyEquilibrium:
         self.laws = self.forms.laws
         test = self.forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
+        # Values that are no numbers, or contradict each other, are refused first of all.
+        self.prescribe(self.rest())
+        if self.cuts is not None:
+            every = np.arange(len(self.free), dtype=np.int32)
+            held = projectors(self.unsupported, self.layout.inclined)[:, : self.dim, : self.dim]
+            self.cuts.check(every, np.eye(self.dim) - held, "a support holds")
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -189,8 +194,7 @@ class BodyEquilibrium:
             ]
         for support in self.supports:
             support.set(at.array, time)
-        for roller in self.rollers:
-            roller.set(at.array[: self.owned].reshape(-1, self.block_size), time)
+        self.rollers.set(at.array[: self.owned].reshape(-1, self.block_size), time)
         at.scatter_forward()
         return np.concatenate([at.array, q])
 
@@ -336,9 +340,8 @@ class BodyEquilibrium:
 
     def elastic_forces(self, x: Array) -> list[Array]:
         """Return the owned nodal forces of each elastic support at local unknowns. Collective."""
-        forms = self.forms
-        forms.at.x.array[:] = self.nodal(x).ravel()
-        return [assembled(form, self.owned) for form in forms.elastic_forces]
+        self.forms.put(self.nodal(x), self.motion(x))
+        return [assembled(form, self.owned) for form in self.forms.elastic_forces]
 
     @cached_property
     def loads_by_cell(self) -> tuple[fem.FunctionSpace, Loads]:
@@ -350,7 +353,10 @@ class BodyEquilibrium:
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""
-        return np.concatenate([self._loads.at(time), self.global_unknowns.forces(time)])
+        on_q = self.global_unknowns.forces(time)
+        if self.cuts is not None:
+            on_q[self.cuts.places] += self.cuts.external(time)
+        return np.concatenate([self._loads.at(time), on_q])
 
     def unbalanced(self, forces: Array) -> Array:
         """Return the forces that have to vanish in equilibrium. Collective.
@@ -372,16 +378,6 @@ class BodyEquilibrium:
         """The projector onto the directions that no roller holds. Collective."""
         assert self.layout.inclined is not None
         return self.layout.inclined.projection(self.layout)
-
-    def _check_rollers(self) -> None:
-        """Refuse rollers whose nodes follow a rigid part. Collective."""
-        tied = self.global_unknowns.tied[:, : self.dim]
-        for roller in self.rollers:
-            if self.comm.allreduce(bool(tied[roller.nodes].any()), op=MPI.LOR):
-                raise InputError(
-                    f"fixed.{roller.number}.normal: the part shares nodes with a rigid part; "
-                    "accepted: parts apart"
-                )
 
     def movable(self, nodes: NDArray[np.int32]) -> Array:
         """Return the projectors onto the directions in which owned nodes can move, (n, d, d)."""

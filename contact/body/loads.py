@@ -97,7 +97,9 @@ class Loads:
 
 
 def assembled(form: fem.Form, owned: int) -> Array:
-    """Return the owned part of an assembled vector. Collective."""
+    """Return the owned part of an assembled vector, or this rank's part of a number. Collective."""
+    if form.rank == 0:
+        return np.array([fem.assemble_scalar(form)])
     vector = fem.assemble_vector(form)
     vector.scatter_reverse(InsertMode.add)
     return np.asarray(vector.array[:owned].copy())

@@ -11,21 +11,21 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact import _compat
 from contact.body.description import Body, Field
 from contact.body.fields import Amplitude, Moving, values_at
 from contact.errors import InputError
 from contact.linear.layout import Inclined
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
-from contact.mesh.entities import cells_at
-from contact.mesh.geometry import across, jacobians
+from contact.mesh.geometry import facet_normals
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 #: Least cosine of the angle between the normals of a node and of a facet there. More is an edge.
 SMOOTH = 0.8
 
-#: Least sine of the angle between two normals of a node that hold it in two directions.
+#: Least singular value of the normals of a node that hold it in as many directions: the sine of the
+#: angle between a normal and the plane, or line, that is held.
 APART = 0.2
 
 
@@ -39,8 +39,11 @@ class Roller:
         Which of the body's `fixed` it is.
     nodes, points, normal
         Owned nodes, their coordinates (length) and unit normals, shapes (n,) and (n, d).
-    along
-        The part of the normal along which nothing else holds the node, of length 1, shape (n, d).
+    lift
+        How its nodes move by a unit of it, in directions along which nothing else holds them,
+        shape (n, d).
+    slack
+        Part of it that may be missing where others hold its nodes already, shape (n,).
     field, amplitude
         The prescribed function and its factor as a function of time.
     comm
@@ -51,21 +54,21 @@ class Roller:
     nodes: NDArray[np.int32]
     points: Array
     normal: Array
-    along: Array
+    lift: Array
+    slack: Array
     field: Field | Moving
     amplitude: Amplitude
     comm: MPI.Intracomm
 
-    def set(self, nodal: Array, time: float) -> None:
-        """Put the displacement at a time into nodal unknowns, (nodes, >= d). Collective.
+    def given(self, time: float) -> Array:
+        """Return the displacements along the normal at a time, shape (n,). Collective."""
+        name = f"fixed.{self.number}.normal"
+        return self.amplitude(time) * values_at(self.field, self.points, time, name, self.comm)
 
-        Components that other supports hold at the nodes remain.
-        """
-        name, d = f"fixed.{self.number}.normal", self.normal.shape[1]
-        given = self.amplitude(time) * values_at(self.field, self.points, time, name, self.comm)
-        missing = given - np.einsum("ni,ni->n", self.normal, nodal[self.nodes, :d])
-        share = np.einsum("ni,ni->n", self.normal, self.along)
-        nodal[self.nodes, :d] += self.along * (missing / share)[:, None]
+    def along(self, nodal: Array) -> Array:
+        """Return those of nodal unknowns, (nodes, >= d), shape (n,)."""
+        d = self.normal.shape[1]
+        return np.asarray(np.einsum("ni,ni->n", self.normal, nodal[self.nodes, :d]))
 
 
 def nodal_normals(
@@ -78,16 +81,10 @@ def nodal_normals(
     The nodes, shape (n,); unit normals out of the body, shape (n, d); and the least cosine of their
     angles to those of facets.
     """
-    mesh, d, facets = domain.mesh, domain.dim, domain.facets(part)
-    cells, place = cells_at(mesh, facets)
-    degree, shape = space.ufl_element().embedded_superdegree, shape_of(mesh)
+    d, facets = domain.dim, domain.facets(part)
+    degree, shape = space.ufl_element().embedded_superdegree, shape_of(domain.mesh)
+    cells, place, normal = facet_normals(domain, part, degree)
     nodes = np.take_along_axis(space.dofmap.list[cells], shape.facet_nodes(degree)[place], axis=1)
-    x = mesh.geometry.x[_compat.geometry_dofmap(mesh)[cells]][:, :, :d]
-    corners = shape.facet_nodes(domain.order)[place]
-    points = np.take_along_axis(x, corners[:, :, None], axis=1)
-    normal = across(jacobians(shape.facet, points, shape.facet.nodes(degree)))
-    away = points.mean(axis=1) - x.mean(axis=1)
-    normal = normal * np.sign(np.einsum("fqd,fd->fq", normal, away))[..., None]
     normal = np.broadcast_to(normal, (*nodes.shape, d))
     total = la.vector(space.dofmap.index_map, d)
     sums = total.array.reshape(-1, d)
@@ -105,10 +102,13 @@ def nodal_normals(
     return found, mean[found], least
 
 
-def rollers_of(
-    domain: Domain, space: fem.FunctionSpace, body: Body, unsupported: NDArray[np.bool_]
-) -> tuple[list[Roller], Inclined | None]:
-    """Return the rollers of a body, and the directions that they hold. Collective.
+class Rollers:
+    """The rollers of a body, which hold the nodes that they share together.
+
+    At a node with normals n_i, and A their parts along components that no other support fixes, the
+    displacement is that of least squares, by A's pseudo-inverse. The forces are their transpose:
+    each roller bears a force along its own normal, and the least of several that are dependent.
+    Nothing depends on their order. Collective to make.
 
     Parameters
     ----------
@@ -117,58 +117,155 @@ def rollers_of(
     unsupported
         Which unknowns of the owned nodes no other support holds, shape (nodes, block size).
 
-    Returns
-    -------
-    The rollers; and their directions, None where there are no rollers.
+    Attributes
+    ----------
+    each
+        The rollers.
+    inclined
+        The directions that they hold; None where there are no rollers.
 
     Raises
     ------
     InputError
         If a part is missing, or has an edge.
     """
-    chosen = [(i, fixed) for i, fixed in enumerate(body.fixed) if fixed.normal is not None]
-    if not chosen:
-        return [], None
-    d, size = domain.dim, unsupported.shape[1]
-    held = np.zeros((len(unsupported), size, size))
-    rollers = []
-    for number, fixed in chosen:
-        assert fixed.normal is not None
-        nodes, normal, least = nodal_normals(domain, space, fixed.on)
-        if least < SMOOTH:
-            raise InputError(
-                f"fixed.{number}.normal: {fixed.on} has an edge, where it has no normal; accepted: "
-                "a smooth part; each face of an edge as a part and an entry of its own"
-            )
-        free = normal * unsupported[nodes, :d]
-        free -= np.einsum("nij,nj->ni", held[nodes, :d, :d], free)
-        length = np.linalg.norm(free, axis=1)
-        keep = length > APART
-        nodes, along = nodes[keep], free[keep] / length[keep, None]
-        held[nodes, :d, :d] += along[:, :, None] * along[:, None, :]
-        points = space.tabulate_dof_coordinates()[nodes, :d]
-        given = fixed.normal, fixed.factor, domain.comm
-        rollers.append(Roller(number, nodes, points, normal[keep], along, *given))
-    nodes = np.unique(np.concatenate([roller.nodes for roller in rollers])).astype(np.int32)
-    return rollers, Inclined(nodes, held[nodes])
+
+    def __init__(
+        self,
+        domain: Domain,
+        space: fem.FunctionSpace,
+        body: Body,
+        unsupported: NDArray[np.bool_],
+    ) -> None:
+        self._domain, self._space, self._body = domain, space, body
+        self.each: list[Roller] = []
+        self.inclined: Inclined | None = None
+        chosen = [(i, fixed) for i, fixed in enumerate(body.fixed) if fixed.normal is not None]
+        if not chosen:
+            return
+        found = []
+        for number, fixed in chosen:
+            nodes, normal, least = nodal_normals(domain, space, fixed.on)
+            if least < SMOOTH:
+                raise InputError(
+                    f"fixed.{number}.normal: {fixed.on} has an edge, where it has no normal; "
+                    "accepted: a smooth part; each face of an edge as a part and an entry of its "
+                    "own"
+                )
+            found.append((nodes, normal))
+        d, size = domain.dim, unsupported.shape[1]
+        every = np.unique(np.concatenate([nodes for nodes, _ in found])).astype(np.int32)
+        places = [np.searchsorted(every, nodes) for nodes, _ in found]
+        normals = np.zeros((every.size, len(found), d))
+        count = np.zeros(every.size, dtype=np.intp)
+        for k, (place, (_, normal)) in enumerate(zip(places, found, strict=True)):
+            normals[place, k] = normal
+            count[place] += 1
+        left, values, right = np.linalg.svd(
+            normals * unsupported[every, None, :d], full_matrices=False
+        )
+        holds = values > APART
+        inverse = np.divide(1.0, values, out=np.zeros_like(values), where=holds)
+        lift = np.einsum("mkr,mr,mrd->mkd", left, inverse, right)
+        across = np.zeros((every.size, size, size))
+        across[:, :d, :d] = np.einsum("mrd,mr,mre->mde", right, holds, right)
+        # Normals that are nearly parallel are one direction, and their values differ a little.
+        slack = np.maximum(np.where(holds, 0.0, values).max(axis=1), ROUNDING**0.5)
+        for k, (place, (number, fixed)) in enumerate(zip(places, chosen, strict=True)):
+            assert fixed.normal is not None
+            nodes = every[place]
+            points = space.tabulate_dof_coordinates()[nodes, :d]
+            own = normals[place, k], lift[place, k], slack[place]
+            given = fixed.normal, fixed.factor, domain.comm
+            self.each.append(Roller(number, nodes, points, *own, *given))
+        some = holds.any(axis=1)
+        self.inclined = Inclined(every[some], across[some])
+        self._nodes, self._borne = every, np.einsum("mki,mkj->mij", normals, lift)
+        spare = bool((count > holds.sum(axis=1)).any())
+        self._spare = domain.comm.allreduce(spare, op=MPI.LOR)
+
+    def check_apart(self, tied: NDArray[np.bool_]) -> None:
+        """Refuse rollers whose nodes follow a rigid part; `GlobalUnknowns.tied`. Collective."""
+        for roller in self.each:
+            shared = bool(tied[roller.nodes, : self._domain.dim].any())
+            if self._domain.comm.allreduce(shared, op=MPI.LOR):
+                raise InputError(
+                    f"fixed.{roller.number}.normal: the part shares nodes with a rigid part; "
+                    "accepted: parts apart"
+                )
+
+    def set(self, nodal: Array, time: float) -> None:
+        """Put the displacements at a time into nodal unknowns, (nodes, >= d). Collective.
+
+        Components that other supports hold at the nodes remain.
+
+        Raises
+        ------
+        InputError
+            On all ranks, if they contradict each other or other supports.
+        """
+        given = [roller.given(time) for roller in self.each]
+        missing = [g - roller.along(nodal) for g, roller in zip(given, self.each, strict=True)]
+        for roller, way in zip(self.each, missing, strict=True):
+            nodal[roller.nodes, : self._domain.dim] += roller.lift * way[:, None]
+        if self.each and self._spare:
+            self._check(given, [roller.along(nodal) for roller in self.each])
+
+    def _check(self, given: Sequence[Array], met: Sequence[Array]) -> None:
+        """Refuse displacements that cannot be met at nodes of several supports. Collective."""
+        comm, least = self._domain.comm, ROUNDING * self._domain.size
+        worst = (0.0, 0, 0, np.zeros(0), 0.0, 0.0)
+        for k, (roller, asked, got) in enumerate(zip(self.each, given, met, strict=True)):
+            left = np.abs(asked - got)
+            left -= roller.slack * np.maximum(np.abs(asked), np.abs(got)) + least
+            at = int(left.argmax()) if left.size else 0
+            if left.size and left[at] > worst[0]:
+                place = roller.points[at], float(asked[at]), float(got[at])
+                worst = (float(left[at]), k, int(roller.nodes[at]), *place)
+        every = comm.allgather(worst[0])
+        if max(every) <= 0:
+            return
+        root = int(np.argmax(every))
+        _, k, node, point, asked_there, got_there = comm.bcast(worst, root)
+        beside = []
+        for number, fixed in enumerate(self._body.fixed):
+            facets = self._domain.facets_anywhere(fixed.on)
+            nodes = fem.locate_dofs_topological(self._space, self._domain.dim - 1, facets)
+            there = comm.bcast(bool(np.isin(node, nodes)), root)
+            moves = fixed.displacement is not None or fixed.normal is not None
+            beside += [fixed.on] * (moves and there and number != self.each[k].number)
+        number = self.each[k].number
+        names = " and ".join(repr(name) for name in beside) or "the axis"
+        where = ", ".join(f"{x + 0.0:.4g}" for x in np.where(np.abs(point) < least, 0.0, point))
+        raise InputError(
+            f"fixed.{number}.normal: given {asked_there:.4g} along the normal of "
+            f"{self._body.fixed[number].on!r}, and at ({where}) {names} asks for {got_there:.4g}; "
+            "accepted: displacements that agree where parts meet, or parts apart"
+        )
+
+    def forces(self, number: int, nodes: NDArray[np.int32]) -> Array:
+        """Return the matrices from residuals at nodes to the forces of a roller, (n, d, d).
+
+        Parameters
+        ----------
+        number
+            Which of the body's `fixed`.
+        nodes
+            Which of the owned nodes.
+        """
+        roller = next(roller for roller in self.each if roller.number == number)
+        return _at(nodes, roller.nodes, np.einsum("ni,nj->nij", roller.normal, roller.lift))
+
+    def borne(self, nodes: NDArray[np.int32]) -> Array:
+        """Return those to the forces of all rollers, likewise."""
+        if not self.each:
+            return np.zeros((nodes.size, self._domain.dim, self._domain.dim))
+        return _at(nodes, self._nodes, self._borne)
 
 
-def directions_of(rollers: Sequence[Roller], number: int, nodes: NDArray[np.int32]) -> Array:
-    """Return the projectors onto the directions of a support along its normal, (n, d, d).
-
-    Parameters
-    ----------
-    rollers
-        Those of the body.
-    number
-        Which of the body's `fixed`.
-    nodes
-        At which of the owned nodes.
-    """
-    for roller in rollers:
-        if roller.number == number:
-            _, at, own = np.intersect1d(nodes, roller.nodes, return_indices=True)
-            found = np.zeros((nodes.size, *2 * roller.along.shape[1:]))
-            found[at] = np.einsum("ni,nj->nij", roller.along[own], roller.along[own])
-            return found
-    raise ValueError(f"fixed.{number} is no roller")
+def _at(nodes: NDArray[np.int32], known: NDArray[np.int32], values: Array) -> Array:
+    """Return values at some nodes, 0 at those that are not known."""
+    found = np.zeros((nodes.size, *values.shape[1:]))
+    _, at, own = np.intersect1d(nodes, known, return_indices=True)
+    found[at] = values[own]
+    return found

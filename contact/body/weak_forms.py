@@ -148,8 +148,8 @@ class WeakForms:
         They are the forms of all quadrature rules, which add up: in one form FFCx would take values
         of a rule of one point for those of the others.
         """
-        (u, _), (v, _) = self.split(self.at), test or self._test
-        supports = [functions * form for form in self._supported(u, v)]
+        v, _ = test or self._test
+        supports = [functions * form for form in self._supported(self._displacement(self.at), v)]
         forms = self._stresses(secant_at, history_at, test or self._test, functions)
         return forms + ([sum(supports)] if supports else [])
 
@@ -197,7 +197,10 @@ class WeakForms:
         return np.asarray(into.x.array)
 
     def on_global(self, size: int, secant: bool = False) -> Array:
-        """Return the forces of the stresses on the global unknowns, shape (m,). Collective."""
+        """Return the forces of the stresses on the global unknowns, shape (m,). Collective.
+
+        Those of elastic supports are among them.
+        """
         found = np.zeros(size)
         if self._cuts is not None:
             forms = self._secant_section_forces if secant else self._section_forces
@@ -244,7 +247,7 @@ class WeakForms:
     def _forces_across(self, at: fem.Function) -> list[list[fem.Form]]:
         assert self._cuts is not None
         count = range(len(self._cuts.places))
-        return [fem.form(self._stresses(at, at, self._across(k))) for k in count]
+        return [fem.form(self._internal(at, at, self._across(k))) for k in count]
 
     @cached_property
     def _secant_border(self) -> Any:
@@ -263,9 +266,9 @@ class WeakForms:
             return fem.form(made)  # type: ignore[no-any-return]
 
         count = range(len(cuts.places))
-        own = self._stresses(secant_at, secant_at, self._test)
+        own = self._internal(secant_at, secant_at)
         return [along(own, k) for k in count], [
-            [along(self._stresses(secant_at, secant_at, self._across(j)), k) for k in count]
+            [along(self._internal(secant_at, secant_at, self._across(j)), k) for k in count]
             for j in count
         ]
 
@@ -280,7 +283,7 @@ class WeakForms:
     @cached_property
     def elastic_forces(self) -> list[fem.Form]:
         """Forces of each elastic support against the displacement `at`."""
-        (u, _), (v, _) = self.split(self.at), self._test
+        u, (v, _) = self._displacement(self.at), self._test
         return fem.form(self._supported(u, v)) if self._elastic else []
 
     # For each function of a form dolfinx packs the values in all cells: with the law itself those

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
@@ -30,12 +31,14 @@ from contact.errors import InputError
 from contact.mesh import grid
 from contact.mesh.cells import SHAPES, Shape
 from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_further_names
+from contact.mesh.geometry import shares, volumes
 from contact.mesh.grid import rotate
 from contact.mesh.reader import from_file, from_generator
 from contact.mesh.transfer import refined
 from contact.methods.signals import deaf
 from contact.ranks import on_all_ranks
 from contact.settings import Accepted, Count, Number, Positive
+from contact.typing import Array
 from meshes.grading import memory
 
 #: Keys of `[mesh]` that go with every generator and file.
@@ -49,6 +52,9 @@ CELL_SECONDS = 6e-6
 
 #: Number of cells from which on a warning gives their memory and time: about a minute.
 MANY = 10_000_000
+
+#: Share of a region from which on cells that its boundary cuts are worth a warning.
+CUT = 0.02
 
 logger = logging.getLogger("contact.mesh")
 
@@ -328,7 +334,10 @@ class Mesh(Section):
             cells = {
                 name: cells_in(mesh, marker(formula)) for name, formula in self.regions.items()
             }
-        return with_further_names(domain, facets, cells)
+            sides = {
+                name: shares(domain, marker(formula)) for name, formula in self.regions.items()
+            }
+        return straddled(with_further_names(domain, facets, cells), sides)
 
     def _check_memory(self, comm: MPI.Intracomm, cells: int, dim: int) -> None:
         """Refuse a mesh that certainly does not fit, and warn of a large one, which takes long."""
@@ -349,6 +358,34 @@ class Mesh(Section):
                 f"{place}{total:.3g} cells: their mesh alone takes some {gigabytes:.2g} GB a rank "
                 f"and {seconds:.2g} s"
             )
+
+
+def straddled(domain: Domain, sides: Mapping[str, Array]) -> Domain:
+    """Return a domain with notes on regions whose boundary cuts cells, and warn. Collective.
+
+    Parameters
+    ----------
+    domain
+        With the regions.
+    sides
+        Region -> the shares of the owned cells that were asked for, shape (cells,).
+    """
+    size, found = volumes(domain), []
+    for name, share in sides.items():
+        got = size[domain.regions[name]].sum()
+        cut = size @ np.minimum(share, 1 - share)
+        got, asked, cut = domain.comm.allreduce(np.array([got, size @ share, cut]), op=MPI.SUM)
+        if cut > CUT * asked:
+            word = "volume" if domain.dim == 3 else "area"
+            found.append(
+                f"mesh.regions.{name}: its boundary cuts cells; whole ones make its {word} "
+                f"{got:.4g}, for some {asked:.3g}, and the boundary rough; "
+                "facets that lie on it have it"
+            )
+    if domain.comm.rank == 0:
+        for text in found:
+            logger.warning(text)
+    return replace(domain, notes=(*domain.notes, *found))
 
 
 def _check_parameters(name: str, parameters: Mapping[str, Any]) -> None:

@@ -11,15 +11,20 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import _compat
+from contact.body.rollers import SMOOTH
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
-from contact.mesh.geometry import measures
+from contact.mesh.geometry import facet_normals, measures
 from contact.typing import Array
 
 #: Length of the mean of a part's normals from which on the part counts as flat, and below which
 #: they cancel.
 FLAT, CLOSED = 1 - 1e-6, 1e-6
+
+#: Most directions of plane faces, as of a polyhedron with edges, and at smaller angles, if each of
+#: them has so many facets.
+MOST, FACES, FACETS = 12, 3, 4
 
 
 def parts(domain: Domain) -> list[str]:
@@ -39,11 +44,14 @@ def parts(domain: Domain) -> list[str]:
             continue
         centroid, mean = np.reshape(rest, (2, d)) / area
         length = float(np.linalg.norm(mean))
+        faces = 1 if length >= FLAT else plane_faces(domain, name, count)
         across = f"normal {_vector(mean)}"
         if length < CLOSED:
             across = "normals that cancel"
         elif length < FLAT:
-            across = f"curved, mean normal {_vector(mean / length)}"
+            across = f"mean normal {_vector(mean / length)}"
+        if faces != 1:
+            across = f"{f'plane faces in {faces} directions' if faces else 'curved'}, {across}"
         place = f"centroid {_vector(domain.resultant(centroid))}"
         rows.append([name, f"{count} facets", f"{_extent(domain)} {area:.6g}", place, across])
     inside = [*_table([_inside(domain, name) for name in sorted(domain.inside)])]
@@ -53,6 +61,29 @@ def parts(domain: Domain) -> list[str]:
         *(["# parts inside of it:"] if inside else []),
         *inside,
     ]
+
+
+def plane_faces(domain: Domain, part: str, count: int) -> int:
+    """Return how many directions the plane faces of a part have, 0 if it is curved. Collective.
+
+    Between plane faces are edges. At most `FACES` may also meet at smaller angles, for they have
+    several facets each: a curved part has as many directions as facets, or as rows of these.
+
+    Parameters
+    ----------
+    domain, part
+        The mesh, and a part of its boundary.
+    count
+        How many facets it has.
+    """
+    normal = facet_normals(domain, part, domain.order)[2].reshape(-1, domain.dim)
+    unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    own = np.unique(np.round(unit, 6) + 0.0, axis=0)[: MOST + 1]
+    every = np.unique(np.concatenate(domain.comm.allgather(own)), axis=0)
+    apart = every @ every.T - 2 * np.eye(len(every))
+    edges = len(every) <= MOST and apart.max(initial=-1.0) < SMOOTH
+    few = len(every) <= FACES and count >= FACETS * len(every)
+    return len(every) if edges or few else 0
 
 
 def _inside(domain: Domain, name: str) -> list[str]:

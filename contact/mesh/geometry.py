@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contact import _compat
 from contact.mesh.cells import Shape, rule, shape_of
-from contact.mesh.domain import Domain
+from contact.mesh.domain import Domain, Marker
+from contact.mesh.entities import cells_at
 from contact.typing import Array
+
+#: Places of the corners of cells, over their distance from the middle, that no edge of a region
+#: beside them reaches; and the degree of the rule by which cells on both sides are shared.
+INWARD, FINE = 0.99, 20
 
 
 def geometry_nodes(domain: Domain) -> Array:
@@ -60,6 +66,24 @@ def across(jacobian: Array) -> Array:
     return np.asarray(columns[0][..., ::-1] * [-1.0, 1.0])
 
 
+def facet_normals(domain: Domain, part: str, degree: int) -> tuple[Array, Array, Array]:
+    """Return the normals of the facets of a part at their nodes of a degree, out of the body.
+
+    Returns
+    -------
+    The cells of the facets, (f,), the numbers of these in their cells, (f,), and vectors as long as
+    the facets are large, (f, q, d), q = 1 for straight simplices.
+    """
+    mesh, d, shape = domain.mesh, domain.dim, shape_of(domain.mesh)
+    cells, place = cells_at(mesh, domain.facets(part))
+    x = mesh.geometry.x[_compat.geometry_dofmap(mesh)[cells]][:, :, :d]
+    own = shape.facet_nodes(domain.order)[place]
+    points = np.take_along_axis(x, own[:, :, None], axis=1)
+    normal = across(jacobians(shape.facet, points, shape.facet.nodes(degree)))
+    away = points.mean(axis=1) - x.mean(axis=1)
+    return cells, place, normal * np.sign(np.einsum("fqd,fd->fq", normal, away))[..., None]
+
+
 def determinant(matrix: Array) -> Array:
     """Return the determinants of matrices, shape (..., d, d), in closed form."""
     columns = np.moveaxis(matrix, -1, 0)
@@ -110,3 +134,26 @@ def volumes(domain: Domain) -> Array:
     shape = shape_of(domain.mesh)
     points, weights = rule(shape, 1 if shape.simplex and domain.order == 1 else 3 * domain.order)
     return measures(domain.revolved, shape, geometry_nodes(domain), points, weights).sum(axis=1)
+
+
+def shares(domain: Domain, marker: Marker) -> Array:
+    """Return the shares of the owned cells in which a function of x is true, shape (cells,).
+
+    Cells at whose corners it is as in their middle are taken for one side of its boundary.
+    """
+    shape, of = shape_of(domain.mesh), geometry_nodes(domain)
+
+    def there(nodes: Array, at: Array) -> NDArray[np.bool_]:
+        """Tell where it is true at points of cells, (cells, q)."""
+        basis = shape.lagrange(shape.degree_of(nodes.shape[1]), at)
+        points = np.einsum("qk,nkd->nqd", basis, nodes)
+        return np.reshape(marker(points.reshape(-1, domain.dim).T), points.shape[:2])
+
+    corners = shape.nodes(1)
+    middle = corners.mean(axis=0, keepdims=True)
+    seen = there(of, np.concatenate([middle, middle + INWARD * (corners - middle)]))
+    found = seen[:, 0].astype(float)
+    both = np.flatnonzero(seen.any(axis=1) & ~seen.all(axis=1))
+    at, weights = rule(shape, FINE)
+    found[both] = there(of[both], at) @ (weights / weights.sum())
+    return found

@@ -14,13 +14,13 @@ from mpi4py import MPI
 from contact.body.rigid import Electrode, Rigid
 from contact.output.resultants import (
     NAMES,
+    DrivenPart,
     columns_of,
-    driven_part,
     holding,
     name_ends,
     nodes_of,
 )
-from contact.problem.energy import dissipated, stored, working_forces
+from contact.problem.energy import dissipated, stored
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
@@ -281,13 +281,13 @@ def named_quantities(problem: ContactProblem) -> dict[str, Quantity]:
     if body.laws.initial is not None:
         found["plastic_dissipation"] = _lost
     found |= {f"contact_force_{axis}": ContactForce(i) for i, axis in enumerate(axes)}
-    driven = driven_part(problem)
+    driven = DrivenPart.of(problem)
     for i, axis in enumerate(axes):
         for part in holding(problem, electric=False):
             found[f"reaction_{axis}_{part}"] = Reaction(partial(_on_support, part=part, axis=i))
         if driven is not None:
-            found[f"driven_{axis}"] = MeanDisplacement(driven, i)
-            found[f"driven_force_{axis}"] = partial(_driving, part=driven, axis=i)
+            found[f"driven_{axis}"] = MeanDisplacement(driven.on, i)
+            found[f"driven_force_{axis}"] = partial(_driving, axis=i)
     if problem.piezoelectric:
         found["charge_foundation"] = FoundationCharge()
         for part in holding(problem, electric=True):
@@ -333,11 +333,11 @@ def _lost(problem: ContactProblem, state: State) -> float:
     return problem.equilibrium.energies(state)[0]
 
 
-def _driving(problem: ContactProblem, state: State, part: str, axis: int) -> float:
+def _driving(problem: ContactProblem, state: State, axis: int) -> float:
     """Return a component of the force that drives a part. Collective."""
-    given, nodes = working_forces(problem, state)[0], nodes_of(problem, part)
-    own = float(problem.equilibrium.nodal(given)[nodes, axis].sum())
-    return float(problem.comm.allreduce(own, op=MPI.SUM))
+    driven = DrivenPart.of(problem)
+    assert driven is not None
+    return float(driven.force(problem, state)[axis])
 
 
 def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:

@@ -9,7 +9,7 @@ the body, in the sign of the given charges q_2 = D.nu.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,10 +19,10 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.body.description import Body
 from contact.body.fields import constant, knows_time, steady
-from contact.body.loads import expression
+from contact.body.loads import Loads, expression
 from contact.body.rigid import Bolt, Electrode
-from contact.body.rollers import directions_of
 from contact.errors import InputError
 from contact.mesh.together import members
 from contact.problem.problem import ContactProblem
@@ -98,8 +98,8 @@ def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[
 
     Returns
     -------
-    Part -> its nodes, and the projectors of residuals there onto its directions, shape (n, d, d),
-    or (n, 1, 1).
+    Part -> its nodes, and the matrices from residuals there to its forces, shape (n, d, d), or
+    charges, (n, 1, 1). A roller bears forces along its normal alone.
     """
     d, body = problem.dim, problem.equilibrium
     found: dict[str, tuple[NDArray[np.int32], Array]] = {}
@@ -111,9 +111,11 @@ def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[
         for part in members(fixed.on) if held.any() or rolls else ():
             nodes = nodes_of(problem, part)
             if rolls:
-                along = directions_of(body.rollers, number, nodes)
+                along = body.rollers.forces(number, nodes)
             else:
                 along = np.eye(held.size) * (left[nodes] & held)[:, None, :]
+                if not electric:
+                    along = along - along @ body.rollers.borne(nodes)
                 left[nodes] &= ~held
             if part in found:  # prescribed there by several entries
                 along = along + found[part][1]
@@ -129,19 +131,68 @@ def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
     return np.asarray(nodes[nodes < body.owned // body.block_size])
 
 
-def driven_part(problem: ContactProblem) -> str | None:
-    """Return the part that is moved or loaded in time: its way and its force make a loop.
+@dataclass(frozen=True)
+class DrivenPart:
+    """The part that is moved or loaded in time: its way and its force make a loop.
 
-    That is the first one whose displacement is prescribed as a function of time, or the first
-    one with a load; None without any.
+    Attributes
+    ----------
+    on
+        The part.
+    nodes
+        Its owned nodes.
+    held
+        Where residuals are reactions of its supports, and the matrices that make them; `holding`.
+    loads
+        The loads that act on it alone.
     """
-    for fixed in problem.body.fixed:
+
+    on: str
+    nodes: NDArray[np.int32]
+    held: Sequence[tuple[NDArray[np.int32], Array]]
+    loads: Loads
+
+    @staticmethod
+    def of(problem: ContactProblem) -> DrivenPart | None:
+        """Return that of a problem; None without any. Collective.
+
+        It is the first one whose displacement is prescribed as a function of time, or the first
+        one with a load.
+        """
+        on = _driven(problem.body)
+        if on is None:
+            return None
+        parts, body = set(members(on)), problem.equilibrium
+        held = [at for part, at in holding(problem, electric=False).items() if part in parts]
+        own = [load for load in problem.body.loads if load.on and parts >= set(members(load.on))]
+        test = body.forms.split(ufl.TestFunction(body.space))
+        loads = Loads(problem.domain, replace(problem.body, loads=own), *test, body.owned)
+        return DrivenPart(on, nodes_of(problem, on), held, loads)
+
+    def way(self, problem: ContactProblem, state: State) -> Array:
+        """Return the mean displacement of its nodes, shape (d,). Collective."""
+        x = problem.equilibrium.nodal(state.x)[self.nodes, : problem.dim]
+        total = problem.comm.allreduce(np.append(x.sum(axis=0), len(x)), op=MPI.SUM)
+        return np.asarray(total[:-1] / max(total[-1], 1.0))
+
+    def force(self, problem: ContactProblem, state: State) -> Array:
+        """Return the force on it, of its own supports and loads, shape (d,). Collective."""
+        d, body = problem.dim, problem.equilibrium
+        residual = body.nodal(residual_forces(problem, state))[:, :d]
+        total = self.loads.at(state.time).reshape(-1, body.block_size)[:, :d].sum(axis=0)
+        for nodes, held in self.held:
+            total = total + np.einsum("nij,nj->i", held, residual[nodes])
+        return np.asarray(problem.comm.allreduce(total, op=MPI.SUM))
+
+
+def _driven(body: Body) -> str | None:
+    for fixed in body.fixed:
         ways = (*(fixed.displacement or ()), fixed.normal)
         given = [component for component in ways if component is not None]
         moves = any(not getattr(component, "is_zero", False) for component in given)
         if moves and (knows_time(given) or fixed.factor is not steady):
-            return fixed.on
-    loaded = [load.on for load in problem.body.loads if load.on is not None]
+            return str(fixed.on)
+    loaded = [load.on for load in body.loads if load.on is not None]
     return loaded[0] if loaded else None
 
 

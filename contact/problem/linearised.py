@@ -172,7 +172,7 @@ class Linearised:
         interface, jump, active = self.problem.interface, self.problem.nodes, self.active
         d, slip = jump.dim, interface.slip(nodal)
         length = np.linalg.norm(slip, axis=1)
-        size = np.maximum(length, np.finfo(float).tiny)
+        size = np.where(active.slips, np.maximum(length, np.finfo(float).tiny), 1.0)
         along = slip / size[:, None]
         normal = jump.normal[:, :, None] * jump.normal[:, None, :]
         friction, closed = interface.friction, active.closed[:, None, None]

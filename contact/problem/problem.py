@@ -220,6 +220,7 @@ class ContactProblem:
             body.global_unknowns.ties,
             body.layout.inclined,
         )
+        self._check_cuts(found)
         stiffness = self._young_of_contacts() / size
         law = joined_law(self.entries, found, body.phi_scale, stiffness)
         friction = joined_friction(self.entries, found)
@@ -233,6 +234,21 @@ class ContactProblem:
         return Interface(
             law.constrained, law, friction, held, stiffness, size, longer, component, components
         )
+
+    def _check_cuts(self, nodes: ContactNodes) -> None:
+        """Refuse contact at nodes of a bolt's cut that moves across it. Collective."""
+        body = self.equilibrium
+        if body.cuts is None:
+            return
+        acting = [nodes.normal]
+        if any(entry.friction.given for entry in self.entries):
+            acting += list(np.moveaxis(nodes.tangent, 2, 0))
+        along = np.zeros((len(body.free), self.dim, len(acting)))
+        for k, vectors in enumerate(acting):
+            into = np.zeros_like(body.owned_part(body.rest()))
+            nodes.transpose(vectors, into)
+            along[:, :, k] = body.nodal(into)[:, : self.dim]
+        body.cuts.check(np.arange(len(along), dtype=np.int32), along, "contact meets")
 
     def _young_of_contacts(self) -> float:
         """Return the modulus of the softer side where bodies touch. Collective.

@@ -165,3 +165,21 @@ def test_supports_at_zero_drive_nothing():
     solution = contact.solve(Problem(domain, body, Contact("bottom", 1.0)), times=[0.5, 1.0])
     moved = [step.row["driven_force_y"] for step in solution.steps]
     assert moved == pytest.approx([DOWN / 2, DOWN])
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("by", ["load", "support"])
+def test_the_force_that_drives_a_part_is_without_supports_beside_it(by):
+    """They share the node of a corner."""
+    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
+    fixed = [Fixed("left", [0.0, 0.0] if by == "load" else [0.0, "free"])]
+    fixed += [Fixed("top", ["free", DOWN])] if by == "support" else []
+    loads = [Load("top", [0.0, DOWN])] if by == "load" else []
+    loads += [Load(density=[0.0, 0.3 * DOWN]), Load("right", [DOWN, DOWN])]
+    problem = Problem(domain, Body(Linear(10.0, 0.3), fixed, loads), Contact("bottom"))
+    solution = contact.solve(problem, times=[0.5, 1.0])
+    assert abs(solution.reaction("left")[0]) > 1e-3
+    for step in solution.steps:
+        force = step.row["driven_force_x"], step.row["driven_force_y"]
+        known = (0.0, step.row["reaction_y_top"] if by == "support" else 2 * DOWN * step.state.time)
+        assert force == pytest.approx(known, abs=1e-14)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Body, Contact, Fixed, Linear, Problem, parse_case, sensitivity, solve
+from contact import Body, Contact, Fixed, Linear, Load, Problem, parse_case, sensitivity, solve
+from contact import NewtonOptions as Newton
 from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.mesh.grid import rectangle
@@ -271,3 +272,67 @@ def test_quadratic_contacts_in_space_that_share_nodes_are_refused():
 def test_in_python_both_are_refused():
     with pytest.raises(InputError, match="normal and displacement; accepted: one of them"):
         Fixed("left", [0.0, None], normal=0.0)
+
+
+def wedge(order, values=(0.0, 0.0), more=()):
+    """Return a block whose left side is inclined by 20 degrees, on rollers there and below."""
+    domain = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [5, 4])
+    x = domain.mesh.geometry.x
+    x[:, 0] += np.tan(np.deg2rad(20)) * x[:, 1] * (1 - x[:, 0])
+    sides = dict(zip(("left", "bottom"), values, strict=True))
+    rolls = [Fixed(side, normal=sides[side]) for side in order] + list(more)
+    return domain, Body(Linear(YOUNG, POISSON), rolls, [Load("right", [-0.3, 0.0])])
+
+
+@pytest.mark.parallel
+def test_forces_of_rollers_that_share_nodes_are_along_their_normals_in_any_order():
+    """The corner is held by two normals that are not orthogonal; a fixed component is no other."""
+    found = []
+    for order in (["left", "bottom"], ["bottom", "left"]):
+        domain, body = wedge(order)
+        solution = solve(Problem(domain, body, Contact("top", gap=1.0)), Newton(tolerance=1e-13))
+        found.append([solution.reaction("left"), solution.reaction("bottom")])
+    domain, body = wedge(["left"], more=[Fixed("bottom", [None, 0.0])])
+    solution = solve(Problem(domain, body, Contact("top", gap=1.0)), Newton(tolerance=1e-13))
+    found.append([solution.reaction("left"), solution.reaction("bottom")])
+    np.testing.assert_allclose(found[1], found[0], atol=1e-13)
+    np.testing.assert_allclose(found[2], found[0], atol=1e-13)
+    left, bottom = found[0]
+    assert left[1] / left[0] == pytest.approx(-np.tan(np.deg2rad(20)), rel=1e-11)
+    assert abs(bottom[0]) < 1e-13
+    assert left + bottom == pytest.approx([0.3, 0.0], abs=1e-12)
+
+
+@pytest.mark.parallel
+def test_rollers_on_two_pieces_of_a_face_bear_the_same_in_any_order():
+    """At the node of both each bears the half."""
+    halves = {"low": {"side": "left", "to": 0.5}, "high": {"side": "left", "from": 0.5}}
+    found = []
+    for order in (["low", "high"], ["high", "low"]):
+        mesh = {"generator": "rectangle", "size": [1.5, 1.0], "cells": [6, 4], "rotation": 30.0}
+        mesh["parts"] = halves
+        case = block(30.0, sides=order, friction={"law": "none"}, mesh=mesh)
+        solution = solve(case, comm=COMM)
+        assert solution.converged
+        found.append([solution.reaction(side) for side in ("low", "high")])
+    np.testing.assert_allclose(found[0], found[1], atol=1e-12)
+    assert np.linalg.norm(found[0], axis=1).min() > 1e-3
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("given", "more", "words"),
+    [
+        ((0.01, 0.0), [Fixed("bottom", [0.0, 0.0])], "'bottom' asks for 0;"),
+        ((0.01, 0.0), [Fixed("left", normal=0.02)], r"given 0.01.* 'left' asks for 0.015"),
+        ((0.0, 0.0), [Fixed("bottom", [0.01, 0.0])], "given 0 along .*'bottom' asks for -0.009397"),
+    ],
+)
+def test_rollers_that_contradict_other_supports_are_refused(given, more, words):
+    order = ["left"] if more[0].normal is None else ["left", "bottom"]
+    domain, body = wedge(order, given, more)
+    with pytest.raises(InputError, match=r"fixed.0.normal:.* " + words):
+        Problem(domain, body, Contact("top", gap=1.0))
+    agreeing = [Fixed("bottom", [-0.01 / np.cos(np.deg2rad(20)), 0.0])]
+    domain, body = wedge(["left"], (0.01, 0.0), agreeing)
+    Problem(domain, body, Contact("top", gap=1.0))

@@ -1,11 +1,16 @@
 """`contact check` says of loads, gaps and the mesh what is so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from contact.case.build import build_problem
 from contact.case.file import load_case, parse_case
+from contact.cli import geometry
 from contact.cli.check import describe, expectations
+from contact.mesh.grid import rectangle
 from scripts.cases import CASES
 from tests.problems.bar import changed
 
@@ -133,3 +138,24 @@ def test_a_curved_part_is_named_as_such():
     case = load_case(CASES / "two-spheres.toml")
     text = describe(case, build_problem(case))
     assert "curved, mean normal (0.57" in text
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("slope", "words"),
+    [
+        (np.inf, "plane faces in 2 directions"),
+        (0.3, "plane faces in 2 directions"),
+        (0.0, "normal (0, 1)"),
+    ],
+)
+def test_a_part_of_plane_faces_is_not_called_curved(slope, words):
+    """Two sides of a rectangle; a roof; and a flat one."""
+    domain = rectangle(MPI.COMM_WORLD, [0.0, 0.0], [2.0, 1.0], [8, 4])
+    x = domain.mesh.geometry.x
+    if np.isfinite(slope):
+        x[:, 1] += x[:, 1] * slope * (1 - np.abs(x[:, 0] - 1))
+    two = [domain.facets(side) for side in ("top", "right")[: 1 + np.isinf(slope)]]
+    made = replace(domain, parts={"roof": np.unique(np.concatenate(two))})
+    (text,) = geometry.parts(made)[1:]
+    assert words in text and "curved" not in text

@@ -12,6 +12,7 @@ from contact.interface.obstacle import GapFunction, Level, Plane, Sphere
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
+from contact.output.resultants import supports
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
@@ -108,8 +109,9 @@ def test_a_direction_that_is_partly_fixed(prescribed, degree):
     """The plane is met where it is, also if the node is displaced along the fixed component."""
     problem, normal = inclined(prescribed, degree)
     nodes = problem.nodes
-    assert nodes.normal == pytest.approx(np.tile([0.0, -1.0], (nodes.size, 1)))
-    assert np.abs(nodes.tangent).max() < 1e-15
+    assert nodes.normal == pytest.approx(np.tile(-normal, (nodes.size, 1)))
+    assert nodes.lift == pytest.approx(np.tile([0.0, -1 / normal[1]], (nodes.size, 1)))
+    assert np.abs(nodes.tangent).max() == 0
     loop = solve(problem, 1e-10)
     u = problem.nodal(loop.state)
     assert u[:, 0] == pytest.approx(prescribed)
@@ -117,7 +119,10 @@ def test_a_direction_that_is_partly_fixed(prescribed, degree):
     assert distance.min() == pytest.approx(0.0, abs=1e-10)
     assert np.abs(distance[loop.state.forces.pressure > 1e-8]).max() < 1e-10
     # The load is carried: the wall takes the horizontal part.
-    assert nodes.sum(loop.state.forces.pressure) == pytest.approx(0.05, rel=1e-9)
+    pressed = nodes.sum(loop.state.forces.pressure)
+    assert pressed * normal[1] == pytest.approx(0.05, rel=1e-9)
+    reaction = supports(problem, loop.state)["bottom"].force
+    assert reaction == pytest.approx([-pressed * normal[0], 0.0], rel=1e-9)
 
 
 def test_nodes_that_cannot_reach_the_foundation_are_left_out():

@@ -260,3 +260,59 @@ def test_what_is_refused(name):
     with pytest.raises(InputError, match=words) as caught:
         build_problem(bar(bolt, **more))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("kind", ["traction", "body force", "total"])
+def test_loads_beside_a_cut_act_on_its_own_side(kind):
+    """The section bears all that pulls at the bar above it, whichever cells that is."""
+    pull, side = 0.03, {"on": "right", "traction": [0.0, 0.03]}
+    load = {"traction": side, "body force": {"everywhere": True, "body_force": [0.0, pull / 0.4]}}
+    load["total"] = {"on": "right", "force": [0.0, pull * LENGTH]}
+    held = [{"on": "bottom", "displacement": [0.0, 0.0]}]
+    contact = {"on": "left", "gap": 10.0}
+    case = bar({"shortening": 0.004}, fixed=held, load=[load[kind]], contact=contact)
+    solution = solve(case, comm=COMM)
+    found = solution.movements["bolts"]["cut"]["force"]
+    assert found == pytest.approx(pull * 0.6 * LENGTH, rel=1e-10)
+    assert solution.reaction("bottom")[1] == pytest.approx(-pull * LENGTH, rel=1e-10)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+def test_elastic_supports_beside_a_cut_hold_its_own_side(linear):
+    """Two stiff halves on a side of stiffness k are drawn together."""
+    k, s = 2.0, 0.004
+    case = bar(
+        {"shortening": s},
+        fixed=[],
+        material={"young": 1e6, "poisson": 0.0},
+        elastic=[{"on": "left", "stiffness": [k, k]}],
+        solver={"tolerance": 1e-12, "linear": linear},
+    )
+    solution = solve(case, comm=COMM)
+    below, above = 0.4 * LENGTH, 0.6 * LENGTH
+    force = k * s * below * above / LENGTH
+    assert solution.movements["bolts"]["cut"]["force"] == pytest.approx(force, rel=1e-4)
+    assert np.abs(solution.reaction("left")).max() < 1e-6 * force
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"fixed": [{"on": "left", "displacement": [0.0, "free"]}]}, ""),
+        ({"fixed": [{"on": "left", "displacement": ["free", 0.0]}]}, "a support holds nodes"),
+        ({"fixed": [{"on": "left", "normal": 0.0}], "rotation": 20.0}, ""),
+        ({"contact": {"on": "right", "gap": 0.0}}, ""),
+        ({"contact": {"on": "right"}, "friction": {"law": "coulomb", "mu": 0.3}}, "contact meets"),
+    ],
+)
+def test_supports_and_contact_that_meet_a_cut(more, words):
+    """They are refused where they act across it."""
+    held = [{"on": "bottom", "displacement": [0.0, 0.0]}, *more.pop("fixed", [])]
+    case = bar({"shortening": 0.004}, rotation=more.pop("rotation", 0.0), fixed=held, **more)
+    if words:
+        with pytest.raises(InputError, match=rf"bolt on 'cut': {words}.* along its normal"):
+            build_problem(case, MPI.COMM_SELF)
+    else:
+        build_problem(case, MPI.COMM_SELF)
