@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -66,7 +68,9 @@ def across(jacobian: Array) -> Array:
     return np.asarray(columns[0][..., ::-1] * [-1.0, 1.0])
 
 
-def facet_normals(domain: Domain, part: str, degree: int) -> tuple[Array, Array, Array]:
+def facet_normals(
+    domain: Domain, part: str, degree: int
+) -> tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]], Array]:
     """Return the normals of the facets of a part at their nodes of a degree, out of the body.
 
     Returns
