@@ -27,13 +27,13 @@ def bar(comm=MPI.COMM_SELF, cells=(8, 2), degree=1, **adapt):
 
 
 def test_the_error_of_the_bar_falls_like_one_over_the_root_of_unknowns():
-    rows = bar(error=0.005).adaptation
+    rows = bar(error=0.008).adaptation
     unknowns, error = (np.array([row[name] for row in rows]) for name in ("unknowns", "error"))
-    assert np.all(np.diff(unknowns) > 0) and error[-2] > 0.005 >= error[-1]
+    assert np.all(np.diff(unknowns) > 0) and error[-2] > 0.008 >= error[-1]
     decade = unknowns > unknowns[-1] / 12
     assert -np.polyfit(np.log(unknowns[decade]), np.log(error[decade]), 1)[0] > 0.47
-    # Uniform meshes, here 32 cells a unit, need more than twice the unknowns for the same error.
-    uniform = solve(parse_case(changed(mesh__cells=[128, 32], **LINEAR)))
+    # Uniform meshes, here 24 cells a unit, need more than twice the unknowns for the same error.
+    uniform = solve(parse_case(changed(mesh__cells=[96, 24], **LINEAR)))
     needed = np.interp(-np.log(uniform.error.relative), -np.log(error), np.log(unknowns))
     assert uniform.problem.equilibrium.layout.unknowns > 2 * np.exp(needed)
 

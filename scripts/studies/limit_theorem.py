@@ -186,9 +186,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Compute, print and draw all. Collective."""
     chosen = options(__doc__, "limit_theorem", arguments)
     report, cells = Report(chosen.out), (24, 4) if chosen.coarse else (96, 16)
+    # From the end, which the orders are of.
+    some = slice(None, None, -4 if chosen.coarse else -1)
+    values, stiffness, thickness = (every[some][::-1] for every in (VALUES, STIFFNESS, THICKNESS))
     limits = {
-        "layer of thickness 0.1": theorem_6_3(True, cells),
-        "as printed": theorem_6_3(False, cells),
+        "layer of thickness 0.1": theorem_6_3(True, cells, values),
+        "as printed": theorem_6_3(False, cells, values),
     }
     for name, (label, errors) in zip(("layer", "printed"), limits.items(), strict=True):
         caption = f"Theorem 6.3: distance of x(mu, k_e) to x(0, 0), Example 8.4, {label}"
@@ -210,12 +213,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     caption = "Theorems 6.4 and 6.5: errors of Algorithms 8 and 6, layer and current lagged"
     report.figure("figure-theorems-6-4-6-5", caption, draw_iterations(iterations), iterations)
 
-    stiff = stiffness_limit(cells)
+    stiff = stiffness_limit(cells, stiffness)
     caption = "The normal compliance law (1.28) tends to Signorini's as c grows"
     table(report, "compliance-stiffness", caption, stiff, NORMS)
     report.figure("figure-compliance-stiffness", caption, *draw_errors({"p = c [r]^+": stiff}))
 
-    far, depth = distance_limit(cells)
+    far, depth = distance_limit(cells, thickness)
     caption = "Law (1.29) tends to (1.27), c = 10, as the rigid part moves away"
     report.table(
         "compliance-distance",

@@ -162,7 +162,7 @@ def test_moved_grids_have_the_sides_of_the_cube(name: str, order: int) -> None:
 
 
 def test_known_contacts_on_moved_cells(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(cell_orders, "CELLS", {(2, 1): (8, 32), (2, 2): (8, 32)})
+    monkeypatch.setattr(cell_orders, "CELLS", {(2, 1): (8, 32), (2, 2): (8, 16)})
     known = {name: row for name, row in cell_orders.KNOWN.items() if row[1] == 2}
     monkeypatch.setattr(cell_orders, "KNOWN", known)
     found = cell_orders.orders(Report(tmp_path), coarse=False)

@@ -33,10 +33,10 @@ def errors(dim: int, degree: int, n: int, law: Hencky) -> np.ndarray:
 
 
 CASES = [
-    (2, 1, (8, 16, 32)),
-    (2, 2, (4, 8, 16)),
-    (3, 1, (3, 6, 12)),
-    (3, 2, (2, 4, 8)),
+    (2, 1, (16, 32)),
+    (2, 2, (8, 16)),
+    (3, 1, (5, 10)),
+    (3, 2, (3, 6)),
 ]
 
 
@@ -50,7 +50,7 @@ def test_orders(dim, degree, cells):
     assert np.all(orders < expected + 0.5), orders
 
 
-@pytest.mark.parametrize(("degree", "cells"), [(1, (8, 16, 32)), (2, (4, 8, 16))])
+@pytest.mark.parametrize(("degree", "cells"), [(1, (16, 32)), (2, (8, 16))])
 def test_orders_beyond_yield(degree, cells):
     """With the logarithmic law, yielded throughout: |dev eps| is between 0.02 and 0.2."""
     law = Log(YOUNG, POISSON, yield_strain=0.01)

@@ -62,7 +62,7 @@ EXPECTED = {
              0.00824324, 0.00346328, 0.026193295),
 }  # fmt: skip
 ACROSS = {"none": 0.017233958, "H": 0.016669968, "K": 0.016683946, "voce": 0.015667921}
-FINE = {"none": (-0.00461879, -0.00229875), "H": (-0.00560102, -0.00272757)}
+FINE = -0.00560102, -0.00272757
 ENDS = (-0.02, -0.014, 0.004)
 
 
@@ -157,10 +157,9 @@ def test_the_balance_sees_a_wrong_dissipation(monkeypatch):
     assert left() > 0.1
 
 
-@pytest.mark.parametrize("law", list(FINE))
-def test_plane_strain_in_eight_times_as_many_steps(law):
-    stress, _ = found(run("plane", material(law), path(-0.02, steps=400), cells=1))
-    assert (stress[1, 1], stress[2, 2]) == pytest.approx(FINE[law], abs=1e-8)
+def test_plane_strain_in_eight_times_as_many_steps():
+    stress, _ = found(run("plane", material("H"), path(-0.02, steps=400), cells=1))
+    assert (stress[1, 1], stress[2, 2]) == pytest.approx(FINE, abs=1e-8)
 
 
 @pytest.mark.parametrize(
