@@ -12,12 +12,15 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from contact import _compat
 from contact.case.file import Case
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
+from contact.mesh.geometry import facet_normals
 from contact.output.figures.body import rendered
 from contact.output.figures.style import BLUE, GREEN, ORANGE, SKY, STYLE, heading
 from contact.output.options import Units
@@ -26,6 +29,9 @@ from contact.typing import Array
 
 #: Colours of supports, electrodes, loads, contact parts and foundations.
 HELD, ELECTRODE, LOADED, TOUCHED, FOUNDATION = "#000000", GREEN, ORANGE, BLUE, SKY
+
+#: Lines of rollers, elastic supports, and bolts and electrodes of unknown potential.
+ROLLERS, ELASTIC, UNKNOWN = "-.", ":", "--"
 
 #: Cells up to which the mesh is drawn, and most arrows of a load on one part.
 MOST_CELLS, ARROWS = 20_000, 32
@@ -43,12 +49,15 @@ class Role:
         How it is drawn, and its entry in the legend.
     force
         Given force on each facet, shape (n, d); None for none.
+    dashes
+        Style of its line in 2-D, by which roles of one colour differ.
     """
 
     facets: Array
     colour: str
     words: str
     force: Array | None = None
+    dashes: str = "-"
 
     def arrows(self, middle: Array, reach: float) -> tuple[Array, Array]:
         """Return starts and steps of a load's arrows, the longest of a length, outside the body."""
@@ -95,7 +104,7 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
         axes = "rz" if domain.revolved else "xy"
         figure = draw(boundary, cells, given, surface, case.case.units, axes)
         figure.suptitle(heading(case.title), fontsize="medium")
-        figure.legend(loc="outside lower center", ncols=2, fontsize=7)
+        figure.legend(loc="outside lower center", ncols=2, fontsize=7, handlelength=4)
     return figure
 
 
@@ -118,25 +127,25 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
     for fixed in case.fixed:
         if fixed.symmetry is not None:
             words = f"symmetry across ${fixed.symmetry}$ on {fixed.on}"
-            yield _role(domain, fixed.on, HELD, words)
+            yield _role(domain, fixed.on, HELD, words, dashes=ROLLERS)
         if fixed.displacement is not None:
             words = f"$u$ = ({_said(*fixed.displacement)}) on {fixed.on}"
             yield _role(domain, fixed.on, HELD, words)
         if fixed.normal is not None:
             words = rf"$u_\nu$ = {_said(fixed.normal)} on {fixed.on}"
-            yield _role(domain, fixed.on, HELD, words)
+            yield _role(domain, fixed.on, HELD, words, dashes=ROLLERS)
         if fixed.potential is not None:
             words = rf"$\varphi$ = {_said(fixed.potential)} on {fixed.on}"
             yield _role(domain, fixed.on, ELECTRODE, words)
     for support in case.elastic:
-        yield _role(domain, support.on, HELD, f"elastic support: {support.on}")
+        yield _role(domain, support.on, HELD, f"elastic support: {support.on}", dashes=ELASTIC)
     for bolt in case.bolt:
         key = "shortening" if bolt.force is None else "force"
         words = f"bolt, {key} {_said(getattr(bolt, key))}: {bolt.on}"
-        yield _role(domain, bolt.on, LOADED, words)
+        yield _role(domain, bolt.on, LOADED, words, dashes=UNKNOWN)
     for electrode in case.electrode:
         words = f"electrode of charge {_said(electrode.charge)}: {electrode.on}"
-        yield _role(domain, electrode.on, ELECTRODE, words)
+        yield _role(domain, electrode.on, ELECTRODE, words, dashes=UNKNOWN)
     for part in case.rigid:
         yield _role(domain, part.on, HELD, f"rigid part: {part.on}")
     for given, load in zip(case.load, problem.body.loads, strict=True):
@@ -150,8 +159,8 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
         if given.charge is not None and _said(given.charge) != "0":
             said.append(f"charge {_said(given.charge)}")
         if given.on is not None and said:
-            arrows = load.density or load.force
-            yield _role(domain, given.on, LOADED, f"{', '.join(said)} on {given.on}", arrows)
+            words = f"{', '.join(said)} on {given.on}"
+            yield _role(domain, given.on, LOADED, words, load.density or load.force, load.pressure)
 
 
 def _contact_words(case: Case, key: str, section: Any) -> str:
@@ -176,16 +185,31 @@ def _said(*values: Any) -> str:
 
 
 def _role(
-    domain: Domain, part: str, colour: str, words: str, given: Sequence[Any] | None = None
+    domain: Domain,
+    part: str,
+    colour: str,
+    words: str,
+    given: Sequence[Any] | None = None,
+    pressure: Any = None,
+    dashes: str = "-",
 ) -> Role | None:
+    """Return a part on rank 0, None elsewhere; given are its traction and pressure. Collective."""
     corners, force = _corners(domain, domain.facets_anywhere(part)), None
+    middle = corners.mean(axis=1)
+
+    def values(field: Any) -> Array:
+        """Return those of a field; of one that moves at the end of an evolution."""
+        return np.asarray((field.at(1.0) if hasattr(field, "at") else field).numpy(middle))
+
     if given is not None:
-        # Those that move, at the end of an evolution.
-        fields = [field.at(1.0) if hasattr(field, "at") else field for field in given]
-        force = np.column_stack([field.numpy(corners.mean(axis=1)) for field in fields])
-        force = _gathered(domain, force)
-    facets = _gathered(domain, corners)
-    return None if facets is None else Role(facets, colour, words, force)
+        force = np.column_stack([values(field) for field in given])
+    if pressure is not None:
+        normal = facet_normals(domain, part, 1)[2].mean(axis=1)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        push = -values(pressure)[:, None] * normal
+        force = push if force is None else force + push
+    facets, force = _gathered(domain, corners), None if force is None else _gathered(domain, force)
+    return None if facets is None else Role(facets, colour, words, force, dashes)
 
 
 def _corners(domain: Domain, facets: Indices) -> Array:
@@ -202,6 +226,36 @@ def _gathered(domain: Domain, values: Array) -> Array | None:
     return None if parts is None else np.concatenate(parts)
 
 
+def chains(edges: Array) -> list[Array]:
+    """Return edges, shape (n, 2, 2), as lines from end to end, each of shape (m, 2).
+
+    Lines that branch are left as edges.
+    """
+    if not len(edges):
+        return []
+    points = edges.reshape(-1, 2)
+    size = max(float(np.ptp(points, axis=0).max()), np.finfo(float).tiny)
+    _, first, number = np.unique(
+        np.round(points / (1e-9 * size)), axis=0, return_index=True, return_inverse=True
+    )
+    ends, places = number.reshape(-1, 2), points[first]
+    graph = sparse.coo_array((np.ones(len(ends)), ends.T), shape=2 * (len(places),)).tocsr()
+    graph = graph + graph.T
+    degree = np.diff(graph.indptr)
+    if degree.max() > 2:
+        return list(edges)
+    count, piece = csgraph.connected_components(graph, directed=False)
+    # The end of a piece; a closed curve has none.
+    order = np.lexsort((degree > 1, piece))
+    starts = order[np.searchsorted(piece[order], np.arange(count))]
+    found = []
+    for start in starts:
+        line = csgraph.depth_first_order(graph, start, False, return_predecessors=False)
+        closed = degree[start] > 1
+        found.append(places[np.append(line, start) if closed else line])
+    return found
+
+
 def _draw_plane(
     boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
 ) -> Figure:
@@ -216,8 +270,10 @@ def _draw_plane(
         ax.add_collection(PolyCollection(list(cells[:, around]), facecolor="none", **thin))
     middle = cells.reshape(-1, 2).mean(axis=0)
     for role in roles:
-        wide = 1.5 if role.colour == LOADED else 3.0
-        lines = LineCollection(list(role.facets), colors=role.colour, lw=wide, label=role.words)
+        wide = 1.5 if role.colour == LOADED and role.dashes == "-" else 3.0
+        # Whole lines, for dashes begin anew at each facet.
+        lines = LineCollection(chains(role.facets), colors=role.colour, lw=wide, ls=role.dashes)
+        lines.set(label=role.words, capstyle="butt")
         lines.set_alpha(0.6 if role.colour == ELECTRODE else 1.0)
         ax.add_collection(lines)
         start, step = role.arrows(middle, 0.12 * float(extent.max()))
@@ -228,7 +284,7 @@ def _draw_plane(
     if surface.size:
         order = np.lexsort(surface.T[::-1])
         ax.plot(*surface[order].T, ".", ms=2, color=FOUNDATION, label="foundation")
-    sides = [f"{side:g} {units.length or ''}".rstrip() for side in extent]
+    sides = [f"{side:.4g} {units.length or ''}".rstrip() for side in extent]
     ax.text(0.5, 1.01, sides[0], transform=ax.transAxes, ha="center", va="bottom", fontsize=8)
     upright = {"ha": "left", "va": "center", "rotation": 90.0}
     ax.text(1.01, 0.5, sides[1], transform=ax.transAxes, fontsize=8, **upright)  # type: ignore[arg-type]
@@ -258,7 +314,10 @@ def _draw_space(
         edges = {"show_edges": len(boundary) <= MOST_CELLS, "edge_opacity": 0.4, "line_width": 0.5}
         plotter.add_mesh(facets(boundary), color="#EEEEEE", opacity=0.3, **edges)
         for role, (start, step) in zip(roles, arrows, strict=True):
-            if role.colour != HELD:
+            if role.colour == HELD:
+                outline = {"style": "wireframe", "line_width": 2.5}
+                plotter.add_mesh(facets(role.facets), color=HELD, **outline)
+            else:
                 lit = {"opacity": 0.7, "ambient": 0.6, "diffuse": 0.4}
                 plotter.add_mesh(facets(role.facets), color=role.colour, **lit)
             if start.size:
@@ -276,8 +335,9 @@ def _draw_space(
     sides = r" $\times$ ".join(f"{side:.4g}" for side in extent)
     ax.set_title(f"{sides} {units.length or ''}".rstrip(), y=-0.02, fontsize=8)
     for role in roles:
-        face = "none" if role.colour == HELD else role.colour
-        ax.plot([], [], "s", color="0.6", markerfacecolor=face, label=role.words)
+        held = role.colour == HELD
+        edge, face = (HELD, "none") if held else ("0.6", role.colour)
+        ax.plot([], [], "s", color=edge, markerfacecolor=face, label=role.words)
     if surface.size:
         ax.plot([], [], "o", ms=3, color=FOUNDATION, label="foundation")
     return figure

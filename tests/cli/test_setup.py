@@ -10,7 +10,7 @@ from matplotlib.quiver import Quiver
 
 from contact import build_problem, load_case, parse_case
 from contact.cli.main import main
-from contact.cli.setup import draw_setup
+from contact.cli.setup import chains, draw_setup
 from scripts.cases import CASES
 
 SMALL = {
@@ -95,3 +95,38 @@ def test_parts_inside_of_a_body_are_drawn():
     (legend,) = draw_setup(case, build_problem(case)).legends
     words = {text.get_text() for text in legend.get_texts()}
     assert {"electrode of charge 1: middle", "bolt, force 2: cut"} <= words
+
+
+def test_roles_of_one_colour_have_lines_of_their_own():
+    """Rollers, elastic supports, bolts and electrodes; a pressure has arrows towards the body."""
+    mesh = {"generator": "rectangle", "size": [4.0, 2.0], "cells": [8, 4]}
+    case = parse_case(
+        {
+            "mesh": mesh | {"inside": {"cut": "abs(y - 1) < 1e-6"}},
+            "material": {"young": 1.0, "poisson": 0.3},
+            "fixed": [{"on": "left", "normal": 0.0}],
+            "elastic": [{"on": "right", "stiffness": [1.0, 0.0]}],
+            "bolt": [{"on": "cut", "force": 1.0}],
+            "load": [{"on": "top", "pressure": 0.1}],
+            "contact": {"on": "bottom"},
+        }
+    )
+    collections = draw_setup(case, build_problem(case)).axes[0].collections
+    lines = {c.get_label(): c for c in collections if isinstance(c, LineCollection)}
+    found = {name: line.get_linestyle()[0][1] for name, line in lines.items()}
+    styles = [found[name] for name in found if name.startswith(("$u", "elastic", "bolt"))]
+    assert len(styles) == 3 and None not in styles
+    assert len({tuple(style) for style in styles}) == 3
+    assert [len(line.get_segments()) for name, line in lines.items() if "bolt" in name] == [1]
+    (arrows,) = (each for each in collections if isinstance(each, Quiver))
+    assert np.all(arrows.U == pytest.approx(0.0, abs=1e-12)) and np.all(arrows.V < 0)
+
+
+def test_edges_are_joined_from_end_to_end():
+    corners = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [5, 5], [6, 5], [6, 6]], dtype=float)
+    edges = np.array([[2, 1], [0, 1], [2, 3], [4, 5], [5, 6], [6, 4]])
+    line, ring = chains(corners[edges])
+    ways = [line.tolist(), line[::-1].tolist()]
+    assert corners[:4].tolist() in ways
+    assert len(ring) == 4 and np.array_equal(ring[0], ring[-1])
+    assert len(chains(corners[[[0, 1], [1, 2], [1, 3]]])) == 3  # a branch

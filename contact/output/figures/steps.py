@@ -107,7 +107,7 @@ def draw_energies(run: Run) -> Figure:
         ax.plot(time, plastic, color=SKY, label="dissipated by plastic flow")
     ax.set_xlabel("time")
     ax.set_ylabel(f"energy{_unit(run, 2)}")
-    ax.legend(ncols=1 if narrow else 2, loc="lower left", bbox_to_anchor=(0, 1))
+    figure.legend(ncols=1 if narrow else 3, loc="outside lower center")
     ax.grid(alpha=0.25)
     return figure
 

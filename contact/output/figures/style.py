@@ -21,6 +21,7 @@ STYLE: dict[str, Any] = {
     "font.family": "serif",
     "mathtext.fontset": "dejavuserif",
     "axes.linewidth": 0.6,
+    "axes.formatter.use_mathtext": True,
     "lines.linewidth": 1.2,
     "legend.frameon": False,
     "legend.fontsize": 8,

@@ -13,6 +13,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from contact.errors import InputError
 from contact.output.figures.figures import image
@@ -97,14 +98,24 @@ def _figure(keys: Sequence[str], rows: Sequence[dict[str, str]], drawn: Sequence
             words = ", ".join(f"{k} = {_short(v)}" for k, v in zip(others, line, strict=True))
             _line(panel, last, name, own, linestyle=style, color=colour, label=words)
         panel.set_xlabel(last)
-        panel.set_ylabel(name.replace("_", " "))
+        panel.set_ylabel(_label(name))
+        panel.yaxis.set_major_locator(MaxNLocator(5))
         panel.grid(alpha=0.25)
+    figure.align_ylabels()
     for panel in panels[len(drawn) :]:
         panel.axis("off")
     if len(lines) > 1:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=2)
     return figure
+
+
+def _label(name: str) -> str:
+    """Return a column in words: a component by its axis."""
+    words = name.removeprefix("max_").replace("_", " ").replace("von mises", "von Mises stress")
+    if words[-2:] in (" x", " y", " z"):
+        words = f"{words[:-2]}, ${words[-1]}$"
+    return f"largest {words}" if name.startswith("max_") else words
 
 
 def _short(text: str) -> str:
