@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from contact.case.build import build_problem
 from contact.case.file import Case
+from contact.case.mesh import Adapt
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.transfer import with_parents
 from contact.methods.report import tell
@@ -17,7 +19,7 @@ from contact.nesting import prolong
 from contact.output.error_estimate import estimated
 from contact.output.intervals import intervals
 from contact.output.quantities import ADAPT, values_of
-from contact.output.solution import Solution
+from contact.output.solution import Remark, Solution
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.tolerances import ROUNDING
@@ -35,6 +37,10 @@ TIE = 1e-6
 #: A mesh has so many times the cells of the one before, half as many at least and twice as many at
 #: most where that reaches the goal: all solves together take about one and a half times the last.
 GROWTH = 4
+
+#: Least factor of the cells, where the room for unknowns ends: a last mesh with hardly more would
+#: cost as much again.
+LEAST = 1.5
 
 
 def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
@@ -56,6 +62,8 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
             start = prolong(solution.problem, solution.state, problem)
         before = solution
         solution = solve(problem, start)
+        if solution.outcome.signal:
+            break
         solution.error = estimated(solution.problem, solution.state)
         squares, error = indicators(solution)
         rows.append(values_of(ADAPT, solution))
@@ -63,15 +71,36 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
         if before is not None:
             for phase, seconds in before.seconds.items():
                 solution.seconds[phase] += seconds
-        if not solution.converged or (asked.error is not None and error <= asked.error):
+        # A first mesh may have seen nothing of a narrow load, or of contact between its nodes.
+        seen = error > ROUNDING or before is not None
+        if not solution.converged or (asked.error is not None and error <= asked.error and seen):
             break
-        goal = 0.0 if asked.error is None else (asked.error / error) ** 2
+        goal = (asked.error / error) ** 2 if asked.error is not None and seen else 0.0
         room = asked.max_unknowns / unknowns
-        domain = grown(domain, squares, asked.fraction, goal, room, problem.equilibrium.degree)
+        finer = grown(domain, squares, asked.fraction, goal, room, problem.equilibrium.degree)
+        if _cells(finer) < LEAST * _cells(domain):
+            break
+        domain = finer
     solution.adaptation = rows
+    for identifier, remarks in {"adapt": missed(asked, rows)}.items():
+        solution.warnings += [f"{text} [{identifier}]" for text in remarks]
     if asked.fraction == 1 and solution.converged:
         solution.intervals = intervals(rows)
     return solution
+
+
+def missed(asked: Adapt, rows: Sequence[Mapping[str, Any]]) -> Iterator[Remark]:
+    """Say that the error that was asked for has not been reached."""
+    error = rows[-1]["error"] if rows else 0.0
+    if asked.error is not None and error > asked.error:
+        yield (
+            f"the estimated discretisation error is {error:.2g}, and mesh.adapt.error = "
+            f"{asked.error:g}: the next mesh would have more unknowns than mesh.adapt.max_unknowns"
+        )
+
+
+def _cells(domain: Domain) -> int:
+    return int(domain.mesh.topology.index_map(domain.dim).size_global)
 
 
 def grown(

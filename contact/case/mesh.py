@@ -34,7 +34,7 @@ from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_fu
 from contact.mesh.geometry import shares, volumes
 from contact.mesh.grid import rotate
 from contact.mesh.reader import from_file, from_generator
-from contact.mesh.transfer import refined
+from contact.mesh.transfer import check_adaptable, refined
 from contact.methods.signals import deaf
 from contact.ranks import on_all_ranks
 from contact.settings import Accepted, Count, Number, Positive
@@ -89,8 +89,8 @@ Pieces: TypeAlias = Annotated[
 class Adapt(Section):
     """`[mesh.adapt]`: the mesh is refined where the error is, and the case solved again.
 
-    It ends when the estimated error, or the number of unknowns, is reached. A curved boundary keeps
-    the facets of the first mesh.
+    It ends when the estimated error, or the number of unknowns, is reached. New nodes of
+    curved boundaries follow the curve that the vertices of the first mesh tell.
     """
 
     error: Annotated[float, Field(gt=0, lt=1), Accepted("a number between 0 and 1")] | None = None
@@ -313,6 +313,8 @@ class Mesh(Section):
             self._check_memory(comm, cells, domain.dim)
         for _ in range(self.refine):
             domain = refined(domain)
+        if self.adapt is not None:
+            check_adaptable(domain.mesh)
         return domain
 
     def _named(self, domain: Domain) -> Domain:

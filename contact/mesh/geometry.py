@@ -43,6 +43,14 @@ def jacobians(shape: Shape, of: Array, at: Array) -> Array:
     return np.einsum("qkr,nkd->nqdr", shape.gradients(degree, at), of)
 
 
+def outward(shape: Shape, points: Array, inside: Array) -> Array:
+    """Return unit normals in the middle that point away from a point of the body, shape (f, d)."""
+    normal = across(jacobians(shape, points, shape.middle)[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    away = np.einsum("fd,fd->f", normal, points[:, 0] - inside)
+    return np.asarray(normal * np.sign(away)[:, None])
+
+
 def sizes(shape: Shape, of: Array, at: Array) -> Array:
     """Return the size of each over that of the reference one at points, (n, q) or (n, 1).
 

@@ -16,6 +16,7 @@ from contact import _compat
 from contact._compat import lasting
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
+from contact.mesh.curves import follow
 from contact.mesh.domain import Domain, exterior_facets, with_names
 from contact.mesh.entities import Indices, cell_facets
 
@@ -31,8 +32,8 @@ def refined(domain: Domain, marked: Indices | None = None) -> Domain:
 def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain, Indices]:
     """Cut every edge, or those of marked cells, in two; names are inherited. Collective.
 
-    The cells of the new mesh lie in the cells of the old one, on the same rank. A curved
-    boundary keeps its old straight facets.
+    The cells of the new mesh lie in the cells of the old one, on the same rank. Where all edges are
+    cut a curved boundary keeps its old straight facets; those of marked cells follow the curve.
 
     Parameters
     ----------
@@ -61,6 +62,8 @@ def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain,
     owner = np.full(fine_facets.max(initial=-1) + 1, -1, dtype=np.int32)
     owner[fine_facets[cells, places]] = coarse_facets[parent[cells], local[cells, places]]
 
+    if marked is not None:
+        follow(domain, fine, facets, owner[facets])
     parts = {name: facets[np.isin(owner[facets], old)] for name, old in domain.parts.items()}
     facets = np.arange(min(owner.size, fine.topology.index_map(tdim - 1).size_local))
     inside = {
@@ -97,13 +100,10 @@ def _cut(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indice
 
     Collective. The refined cells stay on the rank of their parent.
     """
-    if _compat.geometry_degree(coarse) > 1:
-        raise InputError(
-            "mesh.refine, mesh.adapt: the cells are curved; accepted: cells of order 1, or a finer "
-            "mesh of order 2"
-        )
-    if not shape_of(coarse).simplex:
-        return _halved(coarse, marked)
+    if not shape_of(coarse).simplex and marked is None:
+        _check_straight(coarse)
+        return _halved(coarse)
+    check_adaptable(coarse)
     coarse.topology.create_entities(1)
     edges = None
     if marked is not None:
@@ -115,20 +115,34 @@ def _cut(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indice
     return made
 
 
-def _halved(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indices, Indices]:
-    """Cut each quadrilateral in 4, each hexahedron in 8. Collective.
+def check_adaptable(mesh: dmesh.Mesh) -> None:
+    """Refuse cells that cannot be refined alone.
 
     Raises
     ------
     InputError
-        If some cells are marked: dolfinx has no hanging nodes.
+        If they are curved, or no simplices: dolfinx has no hanging nodes.
     """
-    shape, d = shape_of(coarse), coarse.topology.dim
-    if marked is not None:
+    _check_straight(mesh)
+    shape = shape_of(mesh)
+    if not shape.simplex:
         raise InputError(
             f"mesh.adapt: the cells are {shape.plural}, of which some cannot be refined alone; "
             "accepted: triangles or tetrahedra, or mesh.refine"
         )
+
+
+def _check_straight(mesh: dmesh.Mesh) -> None:
+    if _compat.geometry_degree(mesh) > 1:
+        raise InputError(
+            "mesh.refine, mesh.adapt: the cells are curved; accepted: cells of order 1, or a finer "
+            "mesh of order 2"
+        )
+
+
+def _halved(coarse: dmesh.Mesh) -> tuple[dmesh.Mesh, Indices, Indices]:
+    """Cut each quadrilateral in 4, each hexahedron in 8. Collective."""
+    shape, d = shape_of(coarse), coarse.topology.dim
     space = fem.functionspace(coarse, ("Lagrange", 2))
     owned = coarse.topology.index_map(d).size_local
     nodes, children = space.dofmap.list[:owned], shape.children

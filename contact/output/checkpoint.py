@@ -336,7 +336,7 @@ def _files(folder: Path) -> list[Path]:
             return found
     raise InputError(
         f"--restart {folder}: no checkpoints there; accepted: the folder of an evolution that was "
-        "ended before its last step"
+        "ended before its last step, of one mesh (none are kept with [mesh.adapt])"
     )
 
 

@@ -11,10 +11,10 @@ from scipy.spatial import Delaunay
 from contact.body.description import Body, Fixed
 from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.mortar.coupling import couple
-from contact.interface.mortar.deviation import deviations
 from contact.interface.mortar.segments import clipped
 from contact.interface.mortar.surface import Surface, dual_basis_transformation, surface_of
 from contact.mesh.cells import INTERVAL, QUADRILATERAL, TRIANGLE, rule
+from contact.mesh.deviation import deviations
 from contact.mesh.grid import box, rectangle
 from forms.hencky import Linear
 from tests.problems.mechanics import constant

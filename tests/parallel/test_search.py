@@ -8,9 +8,9 @@ from mpi4py import MPI
 from scipy.spatial import Delaunay, cKDTree
 
 from contact.interface.mortar.coupling import couple
-from contact.interface.mortar.deviation import deviations
 from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.search import nearest, nearest_named
+from contact.mesh.deviation import deviations
 from contact.mesh.owners import Halo, Owners
 from contact.ranks import exchanged
 from tests.problems.sides import FIRST, KINDS, NAMES, flat, oriented

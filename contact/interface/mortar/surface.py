@@ -14,11 +14,11 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from contact import _compat
-from contact.interface.mortar.deviation import deviations
 from contact.mesh.cells import Shape, facet_with, rule, shape_of
+from contact.mesh.deviation import deviations
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
-from contact.mesh.geometry import across, inverse, jacobians, measures
+from contact.mesh.geometry import across, inverse, jacobians, measures, outward
 from contact.mesh.owners import ALONE, Owners
 from contact.ranks import exchanged
 from contact.tolerances import NEGLIGIBLE
@@ -57,7 +57,7 @@ class Surface:
     normal
         Unit normals out of the body in the middle of the facets, shape (f, d).
     deviation
-        Of the curved surface from straight facets (`contact.interface.mortar.deviation`), shape
+        Of the curved surface from straight facets (`contact.mesh.deviation`), shape
         (f, edges).
     degree
         Of the space.
@@ -233,7 +233,7 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     points = np.take_along_axis(x, shape.facet_nodes(order)[place][:, :, None], axis=1)
     numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
     names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
-    normal = _outward(shape.facet, points, x.mean(axis=1))
+    normal = outward(shape.facet, points, x.mean(axis=1))
     corners = shape.facet.corners
     owners = Owners.of(space.dofmap.index_map, domain.comm)
     if order == 1:
@@ -242,11 +242,3 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
         deviation = np.zeros((len(names), len(shape.facet.edges)))
     refined = domain.levels > 0
     return Surface(names, points, normal, deviation, degree, domain.revolved, refined, owners)
-
-
-def _outward(shape: Shape, points: Array, inside: Array) -> Array:
-    """Return unit normals in the middle that point away from a point of the body, shape (f, d)."""
-    normal = across(jacobians(shape, points, shape.middle)[:, 0])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    away = np.einsum("fd,fd->f", normal, points[:, 0] - inside)
-    return np.asarray(normal * np.sign(away)[:, None])
