@@ -1,7 +1,7 @@
 """The gallery of examples: each case is solved, and its results set beside reference values.
 
 `python3 -m scripts.gallery [--out docs/examples] [NAME ...]` writes for each example a table, which
-its page of the documentation includes, and its figure.
+its page of the documentation includes, and its figure; for some a table of other meshes, too.
 """
 
 from __future__ import annotations
@@ -81,6 +81,8 @@ class Example:
         Name of the figure of the run.
     changes
         Changed keys of the case.
+    meshes
+        Other meshes beside it: their names, and changed keys of the case.
     """
 
     case: str
@@ -89,6 +91,7 @@ class Example:
     within: float
     figure: str = "figure-contact.png"
     changes: tuple[str, ...] = ()
+    meshes: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 def _hertz(run: Run) -> Iterator[Compared]:
@@ -167,9 +170,31 @@ def _balance(run: Run) -> Iterator[Compared]:
     )
 
 
+def _on_meshes(run: Run) -> dict[str, float]:
+    """Return the row of a run in the table of meshes."""
+    found = run.summary
+    return {
+        "unknowns": found["dofs"],
+        "largest displacement": found["max_displacement"],
+        "force on the floor": -found["contact_force"][2],
+        "estimated error": found["error"]["energy"],
+    }
+
+
+def on_meshes(name: str, folder: Path = FOLDER) -> list[dict[str, str]]:
+    """Return the rows of the table of meshes of an example."""
+    with (folder / f"{name}-meshes.csv").open() as stream:
+        return list(csv.DictReader(stream))
+
+
 def _hexahedra(run: Run) -> Iterator[Compared]:
-    yield "largest displacement", run.summary["max_displacement"], 0.93089
-    yield "force on the floor", -run.summary["contact_force"][2], 3067.9
+    found, finest = _on_meshes(run), on_meshes("bracket")[-1]
+    for quantity in ("largest displacement", "force on the floor"):
+        yield quantity, found[quantity], float(finest[quantity])
+
+
+#: Cells of the reference.
+FINEST = ("mesh.cell=hexahedron", "mesh.size=6.0", "mesh.contact_size=2.5")
 
 
 #: Name of a page, without `example-` -> its example.
@@ -192,13 +217,26 @@ EXAMPLES = {
     "column": Example("piezo-column", _column, "closed form", 1e-6, "figure-deformed.png"),
     "layer": Example("layer-column", _layer, "closed form", 1e-6),
     "bimorph": Example("bimorph-stop", _balance, "balance of energy", 0.05, "figure-deformed.png"),
-    "bracket": Example("bracket", _hexahedra, "hexahedra of degree 2", 0.01, "figure-deformed.png"),
+    "bracket": Example(
+        "bracket",
+        _hexahedra,
+        "hexahedra of degree 2",
+        0.01,
+        "figure-deformed.png",
+        meshes=(
+            ("curved tetrahedra, degree 2", ()),
+            ("hexahedra, degree 1", (*FINEST, "space.degree=1")),
+            ("hexahedra, degree 2", FINEST),
+        ),
+    ),
 }
 
 
-def solved(example: Example, folder: Path, figures: bool = True) -> Run:
-    """Solve an example into a folder."""
-    solution = solve(load_case(CASES / f"{example.case}.toml", example.changes))
+def solved(
+    example: Example, folder: Path, figures: bool = True, changes: tuple[str, ...] = ()
+) -> Run:
+    """Solve an example, with further changes, into a folder."""
+    solution = solve(load_case(CASES / f"{example.case}.toml", (*example.changes, *changes)))
     assert solution.converged, solution.outcome.reason
     write_outputs(solution, folder, figures=figures)
     return Run(folder)
@@ -214,6 +252,25 @@ def table(example: Example, run: Run) -> str:
     return "\n".join(lines) + "\n"
 
 
+def write_meshes(name: str, out: Path) -> None:
+    """Solve an example on several meshes and write the table of its results."""
+    rows = []
+    for words, changes in EXAMPLES[name].meshes:
+        with tempfile.TemporaryDirectory() as place:
+            run = solved(EXAMPLES[name], Path(place), figures=False, changes=changes)
+            rows.append({"cells": words, **_on_meshes(run)})
+    with (out / f"{name}-meshes.csv").open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, [*rows[0]])
+        writer.writeheader()
+        writer.writerows(rows)
+    lines = [f"| {' | '.join(rows[0])} |", "|" + "---|" * len(rows[0])]
+    for row in rows:
+        *values, error = row.values()
+        shown = [f"{v:.4g}" if isinstance(v, float) else f"{v}" for v in values]
+        lines.append(f"| {' | '.join(shown)} | {100 * error:.2g} % |")
+    (out / f"{name}-meshes.md").write_text("\n".join(lines) + "\n")
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Write tables and figures of the examples named, or of all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -223,6 +280,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given.out.mkdir(parents=True, exist_ok=True)
     for name in given.names or EXAMPLES:
         example = EXAMPLES[name]
+        if example.meshes:
+            write_meshes(name, given.out)
         with tempfile.TemporaryDirectory() as place:
             run = solved(example, Path(place))
             text = table(example, run)
