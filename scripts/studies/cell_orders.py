@@ -72,8 +72,14 @@ def moved(points: Array, amount: float = AMOUNT) -> Array:
     return np.asarray((x + amount / np.pi * np.sin(np.pi * x) * waves).T)
 
 
-def grid(comm: MPI.Intracomm, cell: str, order: int, n: int) -> Domain:
-    """Return the unit square or cube of moved cells, with the sides of a rectangle or box.
+def grid(
+    comm: MPI.Intracomm,
+    cell: str,
+    order: int,
+    n: int,
+    image: Callable[[Array], Array] = moved,
+) -> Domain:
+    """Return an image of the unit square or cube, with the sides of a rectangle or box.
 
     Parameters
     ----------
@@ -85,13 +91,15 @@ def grid(comm: MPI.Intracomm, cell: str, order: int, n: int) -> Domain:
         Degree of their geometry.
     n
         Squares or cubes along each edge.
+    image
+        From points of the square or cube to those of the body; by default cells are moved.
     """
     d = Shape(cell).dim
     make, name = (rectangle, "rectangle") if d == 2 else (box, "box")
     regular = make(MPI.COMM_SELF, (0.0,) * d, (1.0,) * d, (n,) * d, cell=cell).mesh
     space = fem.functionspace(regular, ("Lagrange", order))
     last = None if comm.rank == 0 else 0
-    x = moved(space.tabulate_dof_coordinates()[:last, :d])
+    x = space.tabulate_dof_coordinates()[:last, :d]
     cells = space.dofmap.list[:last].astype(np.int64)
     element = basix.ufl.element("Lagrange", cell, order, shape=(d,), dtype=np.float64)
     mesh = dmesh.create_mesh(comm, cells=cells, x=x, e=ufl.Mesh(element))
@@ -102,6 +110,7 @@ def grid(comm: MPI.Intracomm, cell: str, order: int, n: int) -> Domain:
         side: facets[np.abs(middle[:, axis] - end) < 1e-9]
         for side, (axis, end) in SIDES[name].items()
     }
+    mesh.geometry.x[:, :d] = image(mesh.geometry.x[:, :d])
     return from_mesh(mesh, parts, 1.0)
 
 

@@ -29,6 +29,8 @@ def test_case_converges(path: Path) -> None:
     if case.mesh.cells is not None:
         coarse = ", ".join(str(max(n // 4, 2)) for n in case.mesh.cells)
         case = load_case(path, [f"mesh.cells=[{coarse}]"])
+    if path.stem == "bracket":
+        case = load_case(path, ["mesh.size=16.0", "mesh.contact_size=6.0"])
     solution = solve(case)
     assert solution.converged, solution.outcome.reason
     assert solution.outcome.kkt.largest <= case.solver.tolerance

@@ -24,7 +24,7 @@ from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from scripts.force_balance import force_balance
 from scripts.reporting import Report
-from scripts.studies import cell_orders, curved_cells
+from scripts.studies import cell_orders, curved_cells, round_bodies
 from scripts.studies.curved_cells import LAME, LAW, on_a_shaft, solved, supports, two_rings
 from scripts.studies.lame_rings import error, rings
 
@@ -173,7 +173,8 @@ def test_known_contacts_on_moved_cells(tmp_path, monkeypatch) -> None:
         assert all(float(row["p in L2"]) < 0.017 for row in csv.DictReader(file))
 
 
-def test_quadrilaterals_need_fewer_unknowns_than_triangles(tmp_path) -> None:
+def test_quadrilaterals_need_fewer_unknowns_than_triangles(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(cell_orders, "ELEMENTS", ((1, 1),))
     found = cell_orders.times(Report(tmp_path), coarse=True)
     for name in ("ring on a shaft", "root-like"):
         one, other = (found[name, cell, 1, 1] for cell in ("triangle", "quadrilateral"))
@@ -183,8 +184,30 @@ def test_quadrilaterals_need_fewer_unknowns_than_triangles(tmp_path) -> None:
 def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(curved_cells, "SHAPES", SHAPES[:1])
     monkeypatch.setattr(cell_orders, "orders", lambda *_: {})
+    monkeypatch.setattr(round_bodies, "orders", lambda *_: {})
     monkeypatch.setattr(cell_orders, "times", lambda *_: {})
     orders = curved_cells.main(["--coarse", "--out", str(tmp_path)])
     for kind in ("shaft", "two rings"):
         assert orders[kind, "triangle", 2, 2] > 2.8 > 2.3 > orders[kind, "triangle", 1, 2]
     assert (tmp_path / "curved-cells.md").exists()
+
+
+def test_a_disc_on_a_plane_converges_on_straight_and_on_curved_cells(tmp_path, monkeypatch) -> None:
+    """Where contact ends limits both: displacements of order 2 at the vertices, pressures of 1."""
+    monkeypatch.setattr(round_bodies, "FINE", {2: 32})
+    monkeypatch.setattr(round_bodies, "CELLS", {(2, 1): (8, 16), (2, 2): (8, 16)})
+    found = round_bodies.orders(Report(tmp_path), coarse=False)
+    assert len(found) == 6
+    for (_, _, degree), (force, displacement, pressure) in found.items():
+        assert force > 1.6
+        assert displacement > (1.4, 1.8)[degree - 1]
+        assert pressure > 0.8
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("name", NAMES[:2])
+def test_a_small_contact_of_a_disc_is_hertz(name: str, order: int) -> None:
+    """Its peak for its force, where the rim is twelve times as thick as half the contact."""
+    a, ratio = round_bodies.solution(2, name, order, 2, 48, 0.003).beside_hertz()
+    assert round_bodies.CORE / a == pytest.approx(12, abs=0.3)
+    assert ratio == pytest.approx(1.0, abs=0.005)
