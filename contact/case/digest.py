@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from contact.case.file import Case, load_case
 from contact.case.messages import shown
@@ -15,7 +17,11 @@ from contact.case.section import FilePath, walk
 from contact.case.text import to_toml
 from contact.errors import InputError
 from contact.library.materials import PACKAGED
+from contact.mesh.formats import files
 from contact.output.checkpoint import stored_input
+
+#: Key of the mesh file.
+MESH = "mesh.file"
 
 #: Sections that say how a problem is solved and shown, not which one it is.
 MANNER = frozenset({"title", "case", "solver", "output"})
@@ -27,26 +33,31 @@ def digest(case: Case) -> dict[str, str]:
     Returns
     -------
     The digests by the keys of the files (``mesh.file``, ``contact.foundation.file``,
-    ``material.0.library``).
+    ``material.0.library``); of a file that a mesh file refers to by its name, too
+    (``mesh.file/part.h5``).
 
     Raises
     ------
     InputError
         If a file cannot be read.
     """
-    files = [(key, Path(value)) for key, value, _ in walk(case) if isinstance(value, FilePath)]
+    given = [(key, Path(value)) for key, value, _ in walk(case) if isinstance(value, FilePath)]
     for key, material in case.materials:
         if material.name is not None and material.library is None:
-            files.append((f"{key}.library", PACKAGED))
+            given.append((f"{key}.library", PACKAGED))
     found = {}
-    for key, path in files:
+    for key, path in given:
         try:
-            with open(path, "rb") as file:
-                found[key] = hashlib.file_digest(file, "sha256").hexdigest()
-        except OSError as error:
-            reason = error.strerror or "not readable"
+            for file in files(path) if key == MESH else [path]:
+                # No spaces: the table of a sweep separates digests by them.
+                inner = "" if file == path else f"/{quote(os.path.relpath(file, path.parent))}"
+                with open(file, "rb") as stream:
+                    found[key + inner] = hashlib.file_digest(stream, "sha256").hexdigest()
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", str(error)) or "not readable"
+            where = getattr(error, "filename", None) or path
             raise InputError(
-                f"{case.source}: {key}: {path}: {reason}; accepted: a file that can be read"
+                f"{case.source}: {key}: {where}: {reason}; accepted: a file that can be read"
             ) from None
     return found
 

@@ -69,6 +69,9 @@ FACES = {
 #: Keywords without a meaning for a mesh that are not worth a word.
 SILENT = {"HEADING", "PREPRINT", "END PART", "PART", "ASSEMBLY", "END ASSEMBLY", "END INSTANCE"}
 
+#: Keywords whose data lines may stand in a file of their own, by INPUT.
+FROM_FILES = {"NODE", "ELEMENT"}
+
 
 @dataclass
 class _Read:
@@ -98,44 +101,68 @@ def read(file: Path) -> Contents:
         If something is missing, or no number where one belongs; the message names it.
     """
     found = _Read()
-    for keyword, options, lines in _blocks(file, 0):
+    for keyword, options, lines in _blocks(file):
         _take(found, keyword, options, lines)
     return _deck(found)
 
 
-def _blocks(file: Path, depth: int) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
+def included(file: Path) -> list[Path]:
+    """Return an input file and those that it includes, each once.
+
+    Raises
+    ------
+    ValueError
+        If one of them is missing.
+    """
+    return [*dict.fromkeys([file, *(inner for inner, _ in _lines(file))])]
+
+
+def _blocks(file: Path) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
     """Yield keywords with their options and the values of their data lines."""
+    keyword = ""
+    options: dict[str, str] = {}
+    values: list[list[str]] = []
+    for _, line in _lines(file):
+        if not line.startswith("*"):
+            values.append([value.strip() for value in line.rstrip(",").split(",")])
+            continue
+        if keyword:
+            yield keyword, options, values
+        (keyword, options), values = _keyword(line), []
+    if keyword:
+        yield keyword, options, values
+
+
+def _keyword(line: str) -> tuple[str, dict[str, str]]:
+    """Return the keyword of a line, and its options."""
+    first, *others = line[1:].split(",")
+    pairs = (other.partition("=") for other in others)
+    options = {key.strip().upper().replace(" ", ""): value.strip() for key, _, value in pairs}
+    return " ".join(first.upper().split()), options
+
+
+def _lines(file: Path, depth: int = 0) -> Iterator[tuple[Path, str]]:
+    """Yield the lines without comments, those of included files in their places, with the files."""
     if depth > 10:
         raise ValueError(f"*INCLUDE: {file.name} includes itself")
-    keyword, pending = "", ""
-    options: dict[str, str] = {}
-    lines: list[list[str]] = []
+    pending = ""
     for raw in file.read_text(encoding="utf-8", errors="replace").splitlines():
         line = pending + raw.strip()
         pending = ""
         if not line or line.startswith("**"):
             continue
-        if not line.startswith("*"):
-            lines.append([value.strip() for value in line.rstrip(",").split(",")])
-            continue
-        if line.endswith(","):
+        if line.startswith("*") and line.endswith(","):
             pending = line
             continue
-        if keyword:
-            yield keyword, options, lines
-        first, *others = line[1:].split(",")
-        keyword, lines = " ".join(first.upper().split()), []
-        pairs = (other.partition("=") for other in others)
-        options = {key.strip().upper().replace(" ", ""): value.strip() for key, _, value in pairs}
-        if keyword == "INCLUDE":
+        keyword, options = _keyword(line) if line.startswith("*") else ("", {})
+        if keyword != "INCLUDE":
+            yield file, line
+        if keyword == "INCLUDE" or (keyword in FROM_FILES and "INPUT" in options):
             given = options.get("INPUT", "").strip('"')
             inner = file.parent / given
             if not given or not inner.is_file():
-                raise ValueError(f"*INCLUDE: there is no file {given!r} beside {file.name}")
-            yield from _blocks(inner, depth + 1)
-            keyword = ""
-    if keyword:
-        yield keyword, options, lines
+                raise ValueError(f"*{keyword}: there is no file {given!r} beside {file.name}")
+            yield from _lines(inner, depth + 1)
 
 
 def _take(

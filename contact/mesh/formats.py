@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -46,6 +48,36 @@ def read(file: Path) -> Model:
     if program == "Exodus":
         exodus.add(file, contents)
     return model_of(contents)
+
+
+def files(file: Path) -> list[Path]:
+    """Return the files of which a mesh consists: its mesh file, and those that it refers to.
+
+    Raises
+    ------
+    OSError
+        If one cannot be read.
+    ValueError
+        If an input file of Abaqus includes one that is missing.
+    """
+    program = OTHERS.get(file.suffix.lower())
+    if program == "Abaqus":
+        return abaqus.included(file)
+    return [file, *(_heavy(file) if program == "XDMF" else ())]
+
+
+def _heavy(file: Path) -> list[Path]:
+    """Return the files with the arrays of an XDMF file, each once."""
+    names = []
+    with suppress(ElementTree.ParseError):  # the reader says that it is damaged
+        for _, item in ElementTree.iterparse(file):
+            kind, text = item.get("Format"), (item.text or "").strip()
+            if kind == "HDF":
+                names.append(text.rpartition(":")[0])  # FILE:/PLACE
+            elif kind == "Binary":
+                names.append(text)
+            item.clear()
+    return [file.parent / name for name in dict.fromkeys(names)]
 
 
 def _contents(mesh: Any) -> Contents:

@@ -171,6 +171,7 @@ def _result(command: list[str], plain: Path, out: Path, file: Path, reader: str)
         done = subprocess.run(
             command,
             env=environment,
+            cwd=file.parent,  # where XDMF has its binary files
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

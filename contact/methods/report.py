@@ -164,12 +164,10 @@ class Outcome:
         """Why the method ended, and its residuals, in words."""
         if self.signal:
             return self.ended
-        excess, said = self.kkt.excess(self.allowed), self.ended or self.criterion
-        if excess and said:
-            # A failure is explained by the residual, any other end is contradicted.
-            return f"{said}{': ' if 'not converged' in said else ', but '}{excess}"
-        if excess:
-            return excess
+        if excess := self.kkt.excess(self.allowed):
+            # A criterion that is met is contradicted by the residual, any other end explained.
+            met = f"{self.criterion}, but " if self.criterion else ""
+            return (f"{self.ended}: " if self.ended else met) + excess
         # A converged end is no failure, even where the method had given up.
         words = self.criterion or f"all residuals <= {self.allowed.largest:g}"
         granted = self.kkt.granted(self.allowed)

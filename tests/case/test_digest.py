@@ -86,3 +86,27 @@ def test_the_library_of_the_package_counts(written):
     text = CASE.replace('library = "own.toml"\n', "")
     written.write_text(text)
     assert "material.library" in digest(load_case(written))
+
+
+@pytest.mark.parametrize("suffix", ["xdmf", "inp"])
+def test_the_other_files_of_a_mesh_count(written, suffix):
+    """An .h5 file was exchanged beside its .xdmf file, and rows of two meshes were in a table."""
+    texts = {
+        "xdmf": '<Xdmf><DataItem Format="HDF">a b.h5:/x</DataItem><DataItem Format="HDF">'
+        'a b.h5:/y</DataItem><DataItem Format="Binary">0.bin</DataItem></Xdmf>',
+        "inp": "*NODE\n*INCLUDE, INPUT=a b.h5\n*NODE, INPUT=0.bin\n",
+    }
+    folder = written.parent
+    (folder / f"body.{suffix}").write_text(texts[suffix])
+    for name in ("a b.h5", "0.bin"):
+        (folder / name).write_text("1, 0, 0\n")
+    written.write_text(CASE.replace("body.msh", f"body.{suffix}"))
+    first = digest(load_case(written))
+    others = {"mesh.file/a%20b.h5", "mesh.file/0.bin"}
+    assert set(first) == {"mesh.file", "material.library", "contact.foundation.file"} | others
+    (folder / "a b.h5").write_text("1, 0, 1\n")
+    with pytest.raises(InputError, match=r"the file mesh\.file/a%20b\.h5 has changed since then"):
+        check_files("here", "then", first, digest(load_case(written)))
+    (folder / "0.bin").unlink()
+    with pytest.raises(InputError, match=r"mesh\.file: .*0\.bin"):
+        digest(load_case(written))

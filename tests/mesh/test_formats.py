@@ -9,6 +9,7 @@ from mpi4py import MPI
 import meshes
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
+from contact.mesh.formats import files
 from contact.mesh.reader import from_file
 from contact.mesh.validity import SERENDIPITY
 from tests.problems.sizes import integral, measures
@@ -366,6 +367,8 @@ def test_damaged_files_end_in_one_line(name, share, tmp_path, capsys):
         ("Eall, S3", "Eall, S9", "elements Eall have no face 'S9'"),
         ("right, 7", "both", "the set BOTH holds itself"),
         ("*STATIC", "*INCLUDE, INPUT=away.inp", "there is no file 'away.inp' beside plate.inp"),
+        ("*STATIC", "*INCLUDE, INPUT=plate.inp", "plate.inp includes itself"),
+        ("NSET=Nall", "INPUT=away.inp", "NODE: there is no file 'away.inp' beside plate.inp"),
         ("1, 0., 0., 0.", "1, zero, 0.", "could not convert string to float: 'zero'"),
     ],
 )
@@ -376,3 +379,39 @@ def test_what_is_wrong_with_a_deck_is_said(old, new, words, tmp_path):
         InputError, match="mesh file .*plate.inp: the Abaqus reader says of it: .*" + words
     ):
         from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
+
+
+def test_data_lines_from_another_file(tmp_path):
+    """Of a keyword that stands before *INCLUDE, or by INPUT: they are as if they stood there."""
+    (tmp_path / "plate.inp").write_text(PLATE)
+    head, rest = PLATE.split("1, 0., 0., 0.\n")
+    nodes, rest = ("1, 0., 0., 0.\n" + rest).split("** elements")
+    elements, rest = rest.split("*Element, type=CPE4, elset=Eall\n")[1].split("*NSET, NSET=ground")
+    (tmp_path / "nodes.inc").write_text(nodes)
+    (tmp_path / "elements.inc").write_text(elements)
+    (tmp_path / "split.inp").write_text(
+        f"{head}*INCLUDE,\n INPUT=nodes.inc\n*ELEMENT, TYPE=CPE4, ELSET=Eall, "
+        f"INPUT=elements.inc\n*NSET, NSET=ground{rest}"
+    )
+    whole, split = (from_file(MPI.COMM_SELF, tmp_path / f"{n}.inp") for n in ("plate", "split"))
+    assert measures(split) == measures(whole) and regions(split) == regions(whole)
+    assert np.array_equal(split.mesh.geometry.x, whole.mesh.geometry.x)
+    found = [path.name for path in files(tmp_path / "split.inp")]
+    assert found == ["split.inp", "nodes.inc", "elements.inc"]
+    assert files(tmp_path / "plate.inp") == [tmp_path / "plate.inp"]
+
+
+def test_binary_arrays_are_beside_their_xdmf(tmp_path, monkeypatch):
+    """Wherever the program runs."""
+    meshio = pytest.importorskip("meshio")
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    monkeypatch.chdir(tmp_path)
+    marked = {"set": np.array([1, 1, 0])}
+    made = meshio.Mesh(points, [("triangle", np.array([[0, 1, 2]]))], point_data=marked)
+    meshio.write("part.xdmf", made, data_format="Binary")
+    monkeypatch.chdir("/")
+    domain = from_file(MPI.COMM_SELF, tmp_path / "part.xdmf")
+    assert measures(domain) == pytest.approx({"set 1": 1.0})
+    assert {path.name for path in files(tmp_path / "part.xdmf")} == {
+        path.name for path in tmp_path.iterdir()
+    }

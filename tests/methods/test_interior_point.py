@@ -168,7 +168,8 @@ def test_a_method_cannot_call_itself_converged(monkeypatch):
     """What it says of its end is one thing, the residuals of the whole problem another."""
 
     def boast(method: Newton, *given):
-        outcome = Outcome(Residuals(0.0, 0.0, 0.0), Residuals(1.0, 1.0, 1.0), "all is well")
+        allowed = Residuals(1.0, 1.0, 1.0)
+        outcome = Outcome(Residuals(0.0, 0.0, 0.0), allowed, criterion="all is well")
         return method.problem.start(0.1), outcome
 
     monkeypatch.setattr(Newton, "solve", boast)

@@ -23,7 +23,7 @@ def test_what_has_converged_is_said_to_have_met_its_residuals(ended):
     [
         ("", "the contact residual is 1.00e-06, above 1e-08"),
         ("not converged in 3 steps", "not converged in 3 steps: the contact residual is 1.00e-06"),
-        ("all is well", "all is well, but the contact residual is 1.00e-06"),
+        ("it stalled at 3.1e-02", "it stalled at 3.1e-02: the contact residual is 1.00e-06"),
     ],
 )
 def test_a_residual_explains_a_failure(ended, reason):
