@@ -276,7 +276,8 @@ _RUN = (
         lambda r: _item(r.driven, 0), (STEPS,), _VECTOR,
     ),
     Quantity(
-        "driven_force", "force", "The force that drives it: with `driven_x` it makes the loop.",
+        "driven_force", "force",
+        "Force of its own supports and loads on it: with `driven_x` it makes the loop.",
         lambda r: _item(r.driven, 1), (STEPS,), _VECTOR,
     ),
     Quantity("notes", "", "Assumptions that hold, or that were not checked, in words."),

@@ -98,7 +98,7 @@ def test_two_rings_with_a_small_interference(degree):
     assert len(found) == (degree == 1)
     if found:
         assert "by up to 0.000803 " in found[0]
-        assert "at most 0.000774" in found[0]
+        assert "at most 0.000773" in found[0]
 
 
 def test_chords_that_hide_a_contact_are_named():
