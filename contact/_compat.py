@@ -1,6 +1,8 @@
 """Differences between dolfinx 0.9, 0.10 and 0.11, between their PETSc, and faults around them."""
 
+import ctypes
 import inspect
+import os
 from typing import Any
 
 import numpy as np
@@ -102,3 +104,28 @@ def lasting(comm: MPI.Intracomm) -> MPI.Intracomm:
     same = MPI.IDENT, MPI.CONGRUENT
     whole = (MPI.COMM_WORLD, MPI.COMM_SELF)
     return next((known for known in whole if MPI.Comm.Compare(comm, known) in same), comm)
+
+
+#: Variables of the environment by which users set glibc's allocator, their numbers for `mallopt`,
+#: and values: the most arrays that are mapped, the size of one (bytes) from which it is, and the
+#: room at the end (bytes) from which that is returned.
+ALLOCATOR = (
+    ("MALLOC_MMAP_MAX_", -4, 65_536),
+    ("MALLOC_MMAP_THRESHOLD_", -3, 1 << 20),
+    ("MALLOC_TRIM_THRESHOLD_", -1, 1 << 20),
+)
+
+
+def give_memory_back() -> None:
+    """Let the allocator return freed memory to the system, where it is glibc's.
+
+    SuperLU_DIST, which PETSc may load, tells it to map no large arrays and never to return any:
+    memory that one phase has freed would lie beside that of the next.
+    """
+    allocator = getattr(ctypes.CDLL(None), "mallopt", None)
+    for name, number, value in ALLOCATOR:
+        if allocator is not None and name not in os.environ:
+            allocator(number, value)
+
+
+give_memory_back()

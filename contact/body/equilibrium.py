@@ -385,7 +385,7 @@ class BodyEquilibrium:
 
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective."""
-        return create_matrix(self.forms.secant[0])
+        return create_matrix(self.forms.pattern)
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated, held: bool = True) -> None:
         """Assemble Kacanov's "secant", Newton's "tangent" or its "symmetric" part. Collective.
@@ -404,7 +404,8 @@ class BodyEquilibrium:
         matrix.zeroEntries()
         for form in forms.secant if kind == "secant" else forms.tangent:
             assemble_matrix(matrix, form, bcs=conditions)
-            matrix.assemble()
+            matrix.assemble(PETSc.Mat.AssemblyType.FLUSH)  # keeps entries yet to be filled
+        matrix.assemble()
         inclined = self.layout.inclined
         if held and inclined is not None:
             # P K P + 1 - P, as of fixed unknowns: P has the pattern of the nodes' blocks.

@@ -15,6 +15,7 @@ from mpi4py import MPI
 from contact.arguments import expect
 from contact.body.description import Material
 from contact.body.fields import constant, values_at
+from contact.body.pointwise import CHUNK
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices, Measure
 from contact.mesh.entities import cells_at
@@ -103,8 +104,23 @@ def _count(domain: Domain) -> int:
     return int(domain.mesh.topology.index_map(domain.dim).size_local)
 
 
+def in_parts(domain: Domain, cells: Sequence[Indices]) -> list[list[Indices]]:
+    """Divide the cells of each material, into as many parts on all ranks. Collective.
+
+    A large body has several: for each function of a form dolfinx packs the values in all of its
+    cells, which are more than the unknowns by far.
+    """
+    most = domain.comm.allreduce(max(own.size for own in cells), op=MPI.MAX)
+    parts = [np.array_split(own, most // (4 * CHUNK) + 1) for own in cells]
+    return [[*part] for part in zip(*parts, strict=True)]
+
+
 def material_measures(
-    domain: Domain, materials: Sequence[Material], cells: Sequence[Indices], degree: int
+    domain: Domain,
+    materials: Sequence[Material],
+    cells: Sequence[Indices],
+    degree: int,
+    divided: bool = False,
 ) -> Iterator[MaterialMeasure]:
     """Yield each material with the measure of its cells.
 
@@ -114,10 +130,11 @@ def material_measures(
         As in and from `cells_of`.
     degree
         Of the quadrature.
+    divided
+        Whether the cells are one of several of `in_parts`.
     """
     metadata = {"quadrature_degree": degree}
-    whole = len(cells) == 1
-    measures = [domain.dx] if whole else domain.divided(cells)
+    measures = domain.divided(cells) if divided or len(cells) > 1 else [domain.dx]
     for material, dx in zip(materials, measures, strict=True):
         law, piezo = form_law(material, domain.mesh), material.piezo
         constants = None if piezo is None else piezo_with_constants(piezo, domain.mesh)
@@ -142,7 +159,7 @@ def factor_of(domain: Domain, material: Material, cells: Indices) -> Array:
     """
     if material.factor is None:
         return np.ones(cells.size)
-    middles = geometry_nodes(domain)[cells].mean(axis=1)
+    middles = geometry_nodes(domain, cells).mean(axis=1)
     values = values_at(material.factor, middles, 1.0, "material: factor", domain.comm)
     least = domain.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
     expect("material: factor", least, "a function that is positive everywhere", least > 0)

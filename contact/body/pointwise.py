@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -13,6 +14,11 @@ from contact.typing import Array
 
 #: Cells, or pairs of facets, that are evaluated at once: bounds the memory.
 CHUNK = 100_000
+
+
+def in_chunks(cells: NDArray[np.integer[Any]]) -> list[NDArray[Any]]:
+    """Return cells, or their places, part by part; an empty part where there are none."""
+    return np.array_split(cells, cells.size // CHUNK + 1)
 
 
 class Pointwise:
@@ -63,7 +69,7 @@ class Pointwise:
         if name not in self._made:
             self._made[name] = fem.Expression(expression(at), points)
         made, reader = self._made[name], object()
-        for chosen in np.array_split(cells, cells.size // CHUNK + 1):
+        for chosen in in_chunks(cells):
             if self._reader is not reader:
                 self._reader, at.x.array[:] = reader, x
             found = np.asarray(made.eval(self._space.mesh, chosen))

@@ -19,7 +19,7 @@ from contact.body.elements import MEAN_DILATATION, kinematics_of
 from contact.body.fields import Number
 from contact.body.internal_variables import QuadratureLaws
 from contact.body.loads import assembled, expression
-from contact.body.materials import material_measures
+from contact.body.materials import in_parts, material_measures
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
@@ -109,17 +109,22 @@ class WeakForms:
         #: Elastic supports: the stiffness of each component, that along the normal, the measure.
         self._elastic = [*_elastic(domain, body)]
         self._normal = ufl.FacetNormal(domain.mesh)
-        #: Integrals by quadrature rule: sign, kinematics, law, piezoelectric tensors, measure.
+        parts = in_parts(domain, cells)
+        #: Integrals by quadrature rule and part of the body: sign, kinematics, law, piezoelectric
+        #: tensors, measure.
         self._rules = [
             [
                 (sign, kinematics, self.laws.law(law), piezo, dx)
-                for law, piezo, dx in material_measures(domain, body.materials, cells, points)
+                for law, piezo, dx in material_measures(
+                    domain, body.materials, part, points, len(parts) > 1
+                )
                 # Stresses at points are those of the whole strain there.
                 for sign, kinematics in (
                     ((1, seen),) * (points == exact) if isinstance(law, HistoryLaw) else terms
                 )
             ]
             for points, terms in rules
+            for part in parts
         ]
 
     def split(self, x: Any) -> tuple[Expr, Expr | None]:
@@ -304,6 +309,13 @@ class WeakForms:
         """Kacanov's matrix at `secant_at`."""
         # The derivative, for with a history the forces are affine.
         return self._derivative(self._internal(self.secant_at, self.secant_at))
+
+    @cached_property
+    def pattern(self) -> fem.Form:
+        """A form over all cells, with the pattern of the matrices."""
+        if len(self._rules) == 1:
+            return self.secant[0]
+        return fem.form(ufl.inner(self._trial, ufl.TestFunction(self.at.function_space)) * ufl.dx)
 
     @cached_property
     def tangent(self) -> list[fem.Form]:

@@ -147,6 +147,14 @@ class Layout:
         """Number of unknowns over all ranks."""
         return int(self.index_map.size_global) * self.block_size
 
+    @property
+    def restrained(self) -> NDArray[np.int32]:
+        """The owned nodes of which not all unknowns are free, ascending."""
+        some = np.asarray(~self.free.all(axis=1))
+        if self.inclined is not None:
+            some[self.inclined.nodes] = True
+        return np.flatnonzero(some).astype(np.int32)
+
     def mask(self, values: Array) -> Array:
         """Return owned values, 0 where the unknown is fixed, and along fixed directions."""
         return masked(self.free, self.inclined, values)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from contact import _compat
 from contact.mesh.cells import Shape, rule, shape_of
-from contact.mesh.domain import Domain, Marker
+from contact.mesh.domain import Domain, Indices, Marker
 from contact.mesh.entities import cells_at
 from contact.typing import Array
 
@@ -18,11 +18,12 @@ from contact.typing import Array
 INWARD, FINE = 0.99, 20
 
 
-def geometry_nodes(domain: Domain) -> Array:
-    """Return the nodes of the owned cells, corners first, (cells, nodes, d)."""
+def geometry_nodes(domain: Domain, cells: Indices | None = None) -> Array:
+    """Return the nodes of the owned cells, or of some, corners first, (cells, nodes, d)."""
     mesh, d = domain.mesh, domain.dim
-    owned = mesh.topology.index_map(d).size_local
-    return np.asarray(mesh.geometry.x[_compat.geometry_dofmap(mesh)[:owned], :d])
+    of = _compat.geometry_dofmap(mesh)
+    chosen = of[: mesh.topology.index_map(d).size_local] if cells is None else of[cells]
+    return np.asarray(mesh.geometry.x[chosen, :d])
 
 
 def jacobians(shape: Shape, of: Array, at: Array) -> Array:

@@ -19,9 +19,11 @@ import numpy as np
 from dolfinx import la
 from mpi4py import MPI
 
+from contact._compat import geometry_dofmap
 from contact.body.description import Material
 from contact.body.elements import MEAN_DILATATION
 from contact.body.materials import factor_of
+from contact.body.pointwise import in_chunks
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import geometry_nodes, measures
@@ -105,33 +107,42 @@ def estimated(
     if body.degree == 2 and body.element != MEAN_DILATATION:
         local = LocalProblems(problem, state, flux)
     at, weights = rule(shape, 2 * body.degree)
-    volumes = measures(body.domain.revolved, shape, geometry_nodes(body.domain), at, weights)
     linear, shapes = shape.lagrange(1, at), shape.lagrange(shape.degree_of(flux.shape[1]), at)
-    squares, sums = np.zeros(len(flux)), np.zeros(3)
+    vertices = geometry_dofmap(body.domain.mesh)[:, : shape.corners]
+    squares, sums, volume = np.zeros(len(flux)), np.zeros(3), 0.0
     for material, cells in zip(body.body.materials, body.cells, strict=True):
-        law, own = material.law, flux[cells]
+        law = material.law
         if isinstance(law, Anisotropic | HistoryLaw):
             shear = secant[cells]
         else:
             shear = np.asarray(law.secant_modulus(strain[cells] ** 2)).mean(axis=1)
         factor = factor_of(body.domain, material, cells)
-        energy = _density(material, shear, factor)
+        means = None
         if local is not None:
             squares[cells] = local.squares(cells, _stiffness(material, shear, factor))
         else:
             # Of degree 1 stresses are most exact in the middle of a cell.
+            own = flux[cells]
             values = own.mean(axis=1) if body.degree == 1 else own[:, : shape.corners]
-            smooth = nodal_means(body.domain, cells, values)
-            squares[cells] = np.sum(volumes[cells] * energy(linear @ smooth - shapes @ own), axis=1)
-        known = np.sum(volumes[cells] * energy(shapes @ own), axis=1)
-        sums[0] += known.sum()
-        if not (isinstance(law, Anisotropic) or material.in_plane_stress):
-            sums[1:] += known @ (_bulk(material) / shear), known.sum()
+            means = nodal_means(body.domain, cells, values)
+        for some in in_chunks(np.arange(cells.size)):
+            chosen = cells[some]
+            energy = _density(material, shear[some], factor[some])
+            of, raw = geometry_nodes(body.domain, chosen), shapes @ flux[chosen]
+            volumes = measures(body.domain.revolved, shape, of, at, weights)
+            volume += float(volumes.sum())
+            if means is not None:
+                smooth = linear @ means[vertices[chosen]]
+                squares[chosen] = np.sum(volumes * energy(smooth - raw), axis=1)
+            known = np.sum(volumes * energy(raw), axis=1)
+            sums[0] += known.sum()
+            if not (isinstance(law, Anisotropic) or material.in_plane_stress):
+                sums[1:] += known @ (_bulk(material) / shear[some]), known.sum()
     at_contact = _at_contact(problem, state)
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
     energy_sum, locked, shearing, total, contact = sums
-    if energy_sum <= _rounding(problem, state, float(volumes.sum())):
+    if energy_sum <= _rounding(problem, state, volume):
         return Estimate(np.zeros_like(squares), 0.0, 0.0, 0.0, None)
     ratio = float(locked / shearing) if shearing > 0 else None
     return Estimate(squares, float(contact), float(energy_sum), float(total), ratio)
@@ -252,7 +263,7 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     density = np.maximum(pressure, 0.0) * np.abs(opening) + np.abs(
         bound * np.linalg.norm(slip, axis=-1) - np.sum(slip * friction, axis=-1)
     )
-    behind = geometry_nodes(domain)[cells]
+    behind = geometry_nodes(domain, cells)
     ends = shape.facet_nodes(domain.order)[place]
     of_facet = np.take_along_axis(behind, ends[..., None], axis=1)
     areas = measures(domain.revolved, shape.facet, of_facet, at, weights)

@@ -7,13 +7,16 @@ from dolfinx import la
 from scipy import sparse
 
 from contact import _compat
+from contact.body.pointwise import in_chunks
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.typing import Array
 
 
 def nodal_means(domain: Domain, cells: Indices, values: Array) -> Array:
-    """Return the means around the corners of cells, (cells, corners, components). Collective.
+    """Return the means around local vertices, shape (vertices, components). Collective.
+
+    They are NaN at vertices of none of the cells.
 
     Parameters
     ----------
@@ -26,20 +29,21 @@ def nodal_means(domain: Domain, cells: Indices, values: Array) -> Array:
         shape (cells, components).
     """
     corners = shape_of(domain.mesh).corners
-    vertices = _compat.geometry_dofmap(domain.mesh)[cells, :corners]
-    index_map = domain.mesh.geometry.index_map()
-    count = index_map.size_local + index_map.num_ghosts
-    at_corners = values if values.ndim == 3 else values[:, None]
-    at_corners = np.broadcast_to(at_corners, (*vertices.shape, values.shape[-1]))
-    with_ones = np.concatenate([at_corners, np.ones((*vertices.shape, 1))], axis=2)
-    rows = np.ones(vertices.size), (vertices.ravel(), np.arange(vertices.size))
-    around = sparse.csr_array(rows, shape=(count, vertices.size))
-    sums = around @ with_ones.reshape(vertices.size, values.shape[-1] + 1)
+    dofmap, index_map = _compat.geometry_dofmap(domain.mesh), domain.mesh.geometry.index_map()
+    sums = np.zeros((index_map.size_local + index_map.num_ghosts, values.shape[-1] + 1))
+    for part in in_chunks(np.arange(cells.size)):
+        vertices = dofmap[cells[part], :corners]
+        at_corners = values[part] if values.ndim == 3 else values[part, None]
+        at_corners = np.broadcast_to(at_corners, (*vertices.shape, values.shape[-1]))
+        with_ones = np.concatenate([at_corners, np.ones((*vertices.shape, 1))], axis=2)
+        rows = np.ones(vertices.size), (vertices.ravel(), np.arange(vertices.size))
+        around = sparse.csr_array(rows, shape=(len(sums), vertices.size))
+        sums += around @ with_ones.reshape(vertices.size, values.shape[-1] + 1)
     if domain.comm.size > 1:
         total = la.vector(index_map, sums.shape[1])
         total.array[:] = sums.ravel()
         total.scatter_reverse(la.InsertMode.add)
         total.scatter_forward()
         sums = total.array.reshape(sums.shape)
-    found = sums[vertices]
-    return np.asarray(found[..., :-1] / found[..., -1:])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(sums[:, :-1] / sums[:, -1:])

@@ -192,28 +192,29 @@ def _group(
     """
     body, d = problem.equilibrium, problem.dim
     points, global_unknowns = body.layout.points, body.global_unknowns
-    columns, names, centres, centre = [], [], [], _centre(problem)
+    names: list[str] = []
+    centres, centre = [], _centre(problem)
     own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
+    many = len(own_names) * len(components) + len(moving)
+    moved = np.zeros((body.owned + global_unknowns.size, many))
+    motions = moved[: body.owned].reshape(*body.free.shape, many)
     for k in components:
         inside, size = component == k, problem.domain.size
         if count > 1:
             centre, size = middle(problem, points[inside])
         rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
-        motions = np.zeros((*body.free.shape, rigid.shape[2]))
-        motions[inside, :d] = rigid
+        motions[inside, :d, len(names) : len(names) + len(own_names)] = rigid
         centres.append(centre)
-        still = np.zeros(global_unknowns.size)
-        columns += [np.append(motion.ravel(), still) for motion in np.moveaxis(motions, 2, 0)]
         names += own_names
     for k, name in moving.items():
-        columns.append(np.append(np.zeros(body.owned), np.eye(global_unknowns.size)[k]))
+        moved[body.owned + k, len(names)] = 1.0
         names.append(name)
-    moved = np.stack(columns, axis=1)
     # Relative to its restraints: supports, and rigid parts where nodes follow them.
-    apart = moved[: body.owned] - global_unknowns.ties @ moved[body.owned :]
-    nodal = apart.reshape(*body.free.shape, moved.shape[1])[:, :d]
-    every = np.arange(len(body.free), dtype=np.int32)
-    held = nodal - np.einsum("nij,njk->nik", body.movable(every), nodal)
+    nodes = body.layout.restrained
+    dofs = nodes[:, None] * body.block_size + np.arange(d)
+    follows = global_unknowns.ties[dofs.ravel()] @ moved[body.owned :]
+    nodal = motions[nodes, :d] - follows.reshape(nodes.size, d, many)
+    held = nodal - np.einsum("nij,njk->nik", body.movable(nodes), nodal)
     return Group(
         problem,
         components,
