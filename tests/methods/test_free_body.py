@@ -7,9 +7,12 @@ import pytest
 from mpi4py import MPI
 from scipy.optimize import minimize
 
+from contact.case.file import parse_case
 from contact.methods.unconstrained_modes import UnconstrainedModes, _least_distance
 from contact.problem.rigid_modes import groups
 from contact.solving import solve
+from scripts.studies.fresh_check import write_msh
+from scripts.studies.fresh_families import Bodies
 from tests.problems.rings import between_plates, squeezed
 
 COMM = MPI.COMM_WORLD
@@ -70,3 +73,37 @@ def test_least_distance_by_another_method(seed):
     )
     assert np.all(cone @ found + room > -1e-12)
     np.testing.assert_allclose(found, other.x, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_pads_that_are_lifted_off_stay_where_they_were(seed, tmp_path):
+    """Nothing presses any more, and forces are rounding: one was returned as far as 1e10 away."""
+    bodies = Bodies(np.random.default_rng(seed))
+    for name, (left, right, low, high) in {
+        "base": (-2.0, 2.0, -1.0, 0.0), "p0": (-1.4, -0.8, 0.0, 0.4),
+        "p1": (0.8, 1.4, 0.0, 0.4), "lid": (-2.0, 2.0, 0.4, 1.0),
+    }.items():  # fmt: skip
+        bodies.block(name, [[left, low], [right, low], [right, high], [left, high]], 0.2)
+    write_msh(bodies.mesh(), tmp_path / "pads.msh")
+    young = {"base": 1.0, "p0": 1.0, "p1": 1.0, "lid": 1.0}
+    case = {
+        "mesh": {"file": str(tmp_path / "pads.msh")},
+        "material": [{"on": on, "young": value, "poisson": 0.3} for on, value in young.items()],
+        "fixed": [
+            {"on": "base_bottom", "displacement": [0.0, 0.0]},
+            {"on": "lid_top", "displacement": [0.0021, -0.003], "amplitude": "d"},
+        ],
+        "contact": [
+            {"on": f"{pad}_{side}", "against": other, "friction": {"law": "coulomb", "mu": 0.2}}
+            for pad in ("p0", "p1")
+            for side, other in (("bottom", "base_top"), ("top", "lid_bottom"))
+        ],
+        "evolution": {
+            "times": [0.0, 1.0, 2.0],
+            "steps": [1, 3],
+            "amplitudes": {"d": {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, -0.3]}},
+        },
+    }
+    solution = solve(parse_case(case), comm=MPI.COMM_SELF)
+    assert solution.converged
+    assert np.abs(solution.state.x).max() < 0.01
