@@ -41,6 +41,11 @@ INTRODUCTION = """\
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
+Of more than 100,000 contact nodes on several ranks, each rank writes its own: `contact.0000.csv`,
+`contact.0001.csv` and so on, by x, y and z, and the pieces of `contact.pvtu`, which ParaView and
+pyvista open as one; a `row` there is that in the file of the rank that has the node. Figures are
+not drawn of pieces.
+
 They replace those of an earlier run all together, once they are complete; other files in DIR are
 left alone. Results of another problem are replaced with `--overwrite` only: the same one may be
 solved again by another method, to another tolerance, with other outputs.

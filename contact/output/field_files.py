@@ -27,7 +27,7 @@ from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.output.fields import DerivedFields, discontinuous, linear, unknowns
 from contact.output.folder import ROOM
-from contact.output.formats import Grid, Values, gathered, write_vtu
+from contact.output.formats import Grid, Values, gathered, write_pieces, write_vtu
 from contact.output.solution import Solution
 from contact.output.surface import contact_surface
 from contact.problem.problem import ContactProblem
@@ -103,13 +103,18 @@ def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> 
     lines: dict[str, list[str]] = {"fields": [], "contact": []}
     for k, (time, state) in enumerate(frames):
         for kind in lines:
-            file = f"{kind}-{k:04d}.vtu"
+            pieces = kind == "contact" and solution.in_pieces
+            file = f"{kind}-{k:04d}.{'pvtu' if pieces else 'vtu'}"
             lines[kind].append(f'<DataSet timestep="{time!r}" file="{file}"/>')
         derived.move_to(state)
         share = body_share(problem, state, names, derived)
         write_share(problem.comm, share, folder / f"fields-{k:04d}.vtu")
         surface = contact_surface(solution.at_step(state))
-        on_root(problem.comm, partial(write_vtu, folder / f"contact-{k:04d}.vtu", surface))
+        path = folder / f"contact-{k:04d}.vtu"
+        if solution.in_pieces:
+            write_pieces(problem.comm, path, surface)
+        else:
+            on_root(problem.comm, partial(write_vtu, path, surface))
 
     def write_names() -> None:
         for kind, sets in lines.items():

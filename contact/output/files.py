@@ -13,11 +13,12 @@ import numpy as np
 from contact.arguments import expect
 from contact.output.field_files import write_fields
 from contact.output.folder import ResultFolder, result_folder
-from contact.output.formats import write_csv, write_table, write_vtu
+from contact.output.formats import piece, write_csv, write_pieces, write_table, write_vtu
 from contact.output.quantities import (
     ADAPT,
     AGAINST,
     HISTORY,
+    NODES,
     OPPOSITE,
     SUMMARY,
     SURFACE,
@@ -27,7 +28,6 @@ from contact.output.quantities import (
 from contact.output.solution import Solution, StepRecord
 from contact.output.surface import (
     contact_surface,
-    contact_table,
     opposite_surface,
     opposite_table,
 )
@@ -75,11 +75,17 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
     failures: list[Exception] = []
 
     def write(new: Path) -> Mapping[str, Any]:
-        table, surface = contact_table(solution), contact_surface(solution)
-        opposite = opposite_surface(solution)
+        surface, opposite = contact_surface(solution), opposite_surface(solution)
+        table, pieces = values_of(NODES, solution.listed_contact), solution.in_pieces
+        if pieces:
+            with on_all_ranks(comm):
+                write_table(table, piece(new / NODES, comm.rank))
+            write_pieces(comm, new / SURFACE, surface)
 
         def write_contact() -> None:
-            write_table(table, new / "contact.csv")
+            if not pieces:
+                write_table(table, new / NODES)
+                write_vtu(new / SURFACE, surface)
             rows = [values_of(HISTORY, record) for record in solution.history.records]
             header = [quantity.name for quantity in quantities(HISTORY)]
             write_csv(new / "history.csv", header, (row.values() for row in rows))
@@ -88,7 +94,6 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             if solution.adaptation:
                 rows = solution.adaptation
                 write_csv(new / ADAPT, rows[0], (row.values() for row in rows))
-            write_vtu(new / SURFACE, surface)
             if opposite is not None:
                 write_table(opposite_table(solution.problem, opposite), new / AGAINST)
                 write_vtu(new / OPPOSITE, opposite)

@@ -49,11 +49,14 @@ MANIFEST = "files"
 
 #: Names that each run may write, and those that a summary may name: it may be of anybody.
 _RESULT = re.compile(
-    r"summary\.json|(history|steps|adapt|contact(-steps|-against)?)\.csv|contact(-against|-\d{4,})?\.vtu|"
+    r"summary\.json|(history|steps|adapt|contact(-steps|-against|\.\d{4,})?)\.csv|"
+    r"contact(-against|-\d{4,})?(\.\d{4,})?\.p?vtu|"
     r"fields(-\d{4,})?\.vtu|contact\.pvd|fields\.(pvd|bp|xdmf|h5)|cells\.bp|checkpoint\.npz|"
     r"figure-(contact|loop|zones|energy|deformed|potential)\.png"
 )
-_MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|npz|xdmf|h5|vtkhdf|pvd|vtu|png|pdf|svg|gif)")
+_MEMBER = re.compile(
+    r"[A-Za-z0-9][\w-]*(\.\d{4,})?\.(json|csv|bp|npz|xdmf|h5|vtkhdf|pvd|p?vtu|png|pdf|svg|gif)"
+)
 #: Files of ADIOS2 in a folder of fields.
 _ADIOS = re.compile(r"(data|md|mmd)\.(\d+|idx)|profiling\.json|active")
 #: Answers of file systems without locks.

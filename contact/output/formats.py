@@ -1,6 +1,7 @@
 """Tables as csv files; grids as VTK's XML files (.vtu), which ParaView, pyvista and meshio open.
 
-A grid is one piece whatever the number of ranks: the shares are gathered on rank 0, which writes.
+A grid is one piece whatever the number of ranks: the shares are gathered on rank 0, which writes;
+large contact parts alone are pieces.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.mesh.cells import Shape
+from contact.ranks import on_all_ranks, on_root
 from contact.typing import Array
 
 Values = NDArray[Any]
@@ -104,6 +106,35 @@ def write_vtu(path: Path, grid: Grid) -> None:
     writer.WriteToOutputStringOn()  # on a full disk VTK itself would crash
     writer.Write()
     path.write_text(writer.GetOutputString(), encoding="ascii")
+
+
+def write_pieces(comm: MPI.Intracomm, path: Path, grid: Grid) -> None:
+    """Write the share of each rank, numbered by itself, and a file that names all. Collective."""
+    with on_all_ranks(comm):
+        write_vtu(piece(path, comm.rank), grid)
+    fields = {
+        kind: "".join(
+            f'<PDataArray type="{"Float64" if array.dtype.kind == "f" else "Int32"}" '
+            f'Name="{name}" NumberOfComponents="{array[0].size}"/>\n'
+            for name, values in own.items()
+            for array in [_filled(np.zeros((1, *values.shape[1:]), values.dtype))]
+        )
+        for kind, own in (("PPointData", grid.at_points), ("PCellData", grid.in_cells))
+    }
+    parts = "".join(f'<Piece Source="{piece(path, k).name}"/>\n' for k in range(comm.size))
+    text = (
+        '<VTKFile type="PUnstructuredGrid" byte_order="LittleEndian" header_type="UInt64">\n'
+        '<PUnstructuredGrid GhostLevel="0">\n'
+        + "".join(f"<{kind}>\n{arrays}</{kind}>\n" for kind, arrays in fields.items())
+        + '<PPoints><PDataArray type="Float64" NumberOfComponents="3"/></PPoints>\n'
+        + f"{parts}</PUnstructuredGrid>\n</VTKFile>\n"
+    )
+    on_root(comm, lambda: path.with_suffix(".pvtu").write_text(text, encoding="utf-8"))
+
+
+def piece(path: Path, rank: int) -> Path:
+    """Return the name of a rank's piece of a file: ``contact.0003.csv``."""
+    return path.with_name(f"{path.stem}.{rank:04d}{path.suffix}")
 
 
 def _filled(values: Values) -> Values:

@@ -20,6 +20,9 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 
+#: Contact nodes of all ranks up to which files list them together; of more, a file a rank.
+TOGETHER = 100_000
+
 
 @dataclass(repr=False)
 class Solved:
@@ -36,6 +39,11 @@ class Solved:
 
     problem: ContactProblem
     state: State
+
+    @property
+    def in_pieces(self) -> bool:
+        """Whether each rank writes its own contact nodes. Collective."""
+        return self.problem.comm.size > 1 and self.problem.nodes.size > TOGETHER
 
     @property
     def nodal(self) -> Array:
@@ -192,8 +200,16 @@ class ContactResult:
         return made
 
 
-def contact_result(solved: Solved) -> ContactResult:
-    """Return the contact nodes of a solved problem. Collective."""
+def contact_result(solved: Solved, whole: bool = True) -> ContactResult:
+    """Return the contact nodes of a solved problem. Collective.
+
+    Parameters
+    ----------
+    solved
+        The solved problem.
+    whole
+        Whether those of all ranks; else those of this one, in the order of their places.
+    """
     problem, nodes, forces = solved.problem, solved.problem.nodes, solved.forces
     gap, normal_displacement = problem.interface.law.jump.gap, solved.normal_displacement
     own: dict[str, NDArray[Any]] = {
@@ -218,10 +234,13 @@ def contact_result(solved: Solved) -> ContactResult:
     if problem.piezoelectric:
         own["potential"] = problem.equilibrium.phi_scale * solved.nodal[:, -1]
         own["charge"] = problem.interface.law.charge(solved.nodal, solved.pressure)
-    whole = {name: nodes.gather(values) for name, values in own.items()}
-    order = _order(problem, nodes.gather(nodes.points), whole["node"])
-    order = order[np.argsort(whole["entry"][order], kind="stable")]
-    arrays: dict[str, Any] = {name: values[order] for name, values in whole.items()}
+    if whole:
+        own = {name: nodes.gather(values) for name, values in own.items()}
+        order = _order(problem, nodes.gather(nodes.points), own["node"])
+    else:
+        order = _by_position(problem, nodes.points)
+    order = order[np.argsort(own["entry"][order], kind="stable")]
+    arrays: dict[str, Any] = {name: values[order] for name, values in own.items()}
     return ContactResult(**arrays, _problem=problem)
 
 
@@ -231,12 +250,16 @@ def _order(problem: ContactProblem, points: Array, names: NDArray[np.int64]) -> 
     In 2-D from node to node along Gamma_3, each connected component from its end with the smaller
     x (then y); in 3-D by x, then y, then z. Collective.
     """
-    # Coordinates that differ by rounding alone must not change the order.
-    rounded = np.round(points / (1e-9 * problem.domain.size))
-    by_position = np.lexsort(rounded.T[::-1])
+    by_position = _by_position(problem, points)
     if problem.dim == 3:
         return by_position
     return _along_chain(names, by_position, problem.nodes.gather(_links(problem)))
+
+
+def _by_position(problem: ContactProblem, points: Array) -> NDArray[np.intp]:
+    """Return the order of points by x, then y, then z."""
+    # Coordinates that differ by rounding alone must not change the order.
+    return np.lexsort(np.round(points / (1e-9 * problem.domain.size)).T[::-1])
 
 
 def _links(problem: ContactProblem) -> NDArray[np.int64]:

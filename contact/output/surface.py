@@ -15,8 +15,8 @@ from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.mesh.cells import shape_of
 from contact.mesh.entities import owned_among
-from contact.mesh.owners import ALONE
-from contact.output.formats import Grid, Table
+from contact.mesh.owners import ALONE, Owners
+from contact.output.formats import Grid, Table, Values
 from contact.output.quantities import AGAINST, NODES, SURFACE, values_of
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
@@ -36,32 +36,35 @@ def contact_table(solution: Solution) -> Table:
 
 
 def contact_surface(solution: Solution) -> Grid:
-    """Return the contact part, the same on all ranks. Collective."""
+    """Return the contact part, the same on all ranks, or in pieces the facets of this one.
+
+    Collective.
+    """
     problem, d = solution.problem, solution.problem.dim
-    body, comm = problem.equilibrium, problem.comm
+    body, comm, whole = problem.equilibrium, problem.comm, not solution.in_pieces
     size = body.space.dofmap.index_map.size_global
     # A node of two contacts is one of each.
+    own = [
+        k * size + surface_of(problem.domain, body.space, entry.on).nodes
+        for k, entry in enumerate(problem.entries)
+    ]
     facets = np.concatenate(
-        [
-            nodes
-            for k, entry in enumerate(problem.entries)
-            for nodes in comm.allgather(
-                k * size + surface_of(problem.domain, body.space, entry.on).nodes
-            )
-        ]
+        [n for own_k in own for n in (comm.allgather(own_k) if whole else [own_k])]
     )
     known, cells = np.unique(facets, return_inverse=True)
-    points, x = _at_nodes(solution, known % size)
+    points, x = (_at_nodes if whole else _near_nodes)(solution, known % size)
     owner = (known // size).astype(np.int32)
     rigid = np.array([contact.against is None for contact in problem.contacts], dtype=np.int32)
     fields = {"displacement": x[:, :d], "entry": owner, "rigid": rigid[owner]}
     if problem.piezoelectric:
         fields["potential"] = body.phi_scale * x[:, d]
-    rows = np.searchsorted(known, solution.contact.entry * size + solution.contact.node)
-    for name, values in values_of(SURFACE, solution.contact).items():
-        none = np.nan if values.dtype.kind == "f" else -1
-        fields[name] = np.full((len(known), *values.shape[1:]), none, dtype=values.dtype)
-        fields[name][rows] = values
+    listed = solution.listed_contact
+    numbers = listed.entry * size + listed.node
+    for name, values in values_of(SURFACE, listed).items():
+        if whole:
+            fields[name] = _at(known, numbers, values)
+        else:
+            fields[name] = _of_owners(solution, known, size, numbers, values)
     return Grid(points, cells.reshape(facets.shape), shape_of(problem.domain.mesh).facet, fields)
 
 
@@ -74,6 +77,48 @@ def _at_nodes(solution: Solution, nodes: NDArray[np.int64]) -> tuple[Array, Arra
     found = np.zeros((nodes.size, values.shape[1]))
     found[here] = values[local]
     problem.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
+    return found[:, : problem.dim], found[:, problem.dim :]
+
+
+def _at(known: NDArray[np.int64], numbers: NDArray[np.int64], values: Values) -> Values:
+    """Return values by numbers at some that are known: NaN, or -1, where there is none."""
+    none = np.nan if values.dtype.kind == "f" else -1
+    found = np.full((len(known), *values.shape[1:]), none, dtype=values.dtype)
+    order = np.argsort(numbers)
+    place = np.searchsorted(numbers, known, sorter=order)
+    there = place < numbers.size
+    there[there] = numbers[order[place[there]]] == known[there]
+    found[there] = values[order[place[there]]]
+    return found
+
+
+def _of_owners(
+    solution: Solution,
+    known: NDArray[np.int64],
+    size: int,
+    numbers: NDArray[np.int64],
+    values: Values,
+) -> Values:
+    """Return values as `_at`, those of nodes of other ranks from these. Collective."""
+    problem = solution.problem
+    owners = Owners.of(problem.equilibrium.layout.index_map, problem.comm)
+    found = _at(known, numbers, values)
+    for k in range(len(problem.entries)):
+
+        def of(given: NDArray[np.int64], begin: int = k * size) -> Values:
+            return _at(begin + given, numbers, values)
+
+        here = known // size == k
+        found[here] = owners.values(known[here] % size, of)
+    return found
+
+
+def _near_nodes(solution: Solution, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return points and unknowns as `_at_nodes`, each from the owner of the node. Collective."""
+    problem, body = solution.problem, solution.problem.equilibrium
+    owners, points = Owners.of(body.layout.index_map, problem.comm), body.layout.points
+    values = np.concatenate([points, body.nodal(solution.state.x)[: len(points)]], axis=1)
+    found = owners.values(nodes, lambda given: values[given - owners.begin])
     return found[:, : problem.dim], found[:, problem.dim :]
 
 

@@ -111,6 +111,11 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
     InputError
         If the folder has not all that is needed.
     """
+    if (folder / "contact.pvtu").exists():
+        raise InputError(
+            f"{folder}: the contact part is in pieces, one a rank; accepted: results of one rank, "
+            "or of fewer contact nodes; ParaView opens contact.pvtu"
+        )
     about = summary or read(folder, "summary.json", _table_of)
     surface, body = (read(folder, name, read_grid) for name in ("contact.vtu", "fields.vtu"))
     columns = read(folder, "contact.csv", _nodes)
