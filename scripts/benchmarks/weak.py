@@ -27,8 +27,14 @@ from contact import solve
 from contact._compat import destinations
 from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
+from contact.linear.operator import Counters
 from contact.mesh.domain import Domain, from_mesh
 from contact.methods.options import NewtonOptions
+from contact.methods.report import IterationHistory, Outcome
+from contact.output import solved
+from contact.output.quantities import NODES, values_of
+from contact.output.solution import Solution
+from contact.output.surface import contact_surface
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
@@ -143,7 +149,24 @@ def held(problem: ContactProblem) -> int:
     return found
 
 
-def measure(comm: MPI.Intracomm, n: int, bodies: int, solved: bool = False) -> dict[str, Any]:
+def surface_bytes(problem: ContactProblem) -> dict[str, int]:
+    """Return the bytes of the contact nodes that this rank writes, each in pieces. Collective."""
+    most, solved.TOGETHER = solved.TOGETHER, 0
+    try:
+        state = problem.start()
+        found = Solution(problem, state, Outcome(evaluate(problem, state), 0.0), *_NOTHING, {})
+        listed, surface = values_of(NODES, found.listed_contact), contact_surface(found)
+    finally:
+        solved.TOGETHER = most
+    arrays = [surface.points, surface.cells, *surface.at_points.values(), *listed.values()]
+    return {"held": _size(arrays)}
+
+
+#: History, counters and method of a solution that is none.
+_NOTHING: tuple[IterationHistory, Counters, str] = (IterationHistory(), Counters(), "")
+
+
+def measure(comm: MPI.Intracomm, n: int, bodies: int, solving: bool = False) -> dict[str, Any]:
     """Return the counts: the most of any rank, but for bytes received, the sum. Collective."""
     whole = Domain.comm
     Domain.comm = property(lambda domain: Counted(whole.fget(domain)))  # type: ignore[assignment]
@@ -155,6 +178,10 @@ def measure(comm: MPI.Intracomm, n: int, bodies: int, solved: bool = False) -> d
         made = time.perf_counter() - begin
         evaluate(problem, problem.start())
         peak = tracemalloc.get_traced_memory()[1]
+        before = Counted.received["bytes"]
+        written = surface_bytes(problem)
+        written["exchanged"] = Counted.received["bytes"] - before
+        Counted.received["bytes"] = before
     finally:
         tracemalloc.stop()
         Domain.comm = whole  # type: ignore[method-assign]
@@ -165,10 +192,12 @@ def measure(comm: MPI.Intracomm, n: int, bodies: int, solved: bool = False) -> d
         "python": comm.allreduce(peak, op=MPI.MAX),
         "coupling": comm.allreduce(held(problem), op=MPI.MAX),
         "received": comm.allreduce(Counted.received["bytes"], op=MPI.SUM),
+        "listed": comm.allreduce(written["held"], op=MPI.MAX),
+        "exchanged": comm.allreduce(written["exchanged"], op=MPI.SUM),
         "calls": comm.allreduce(Counted.received["calls"], op=MPI.MAX),
         "seconds": made,
     }
-    if solved:
+    if solving:
         solution = solve(problem, NewtonOptions(linear="iterative"))
         found |= {
             "converged": solution.converged,

@@ -1,4 +1,4 @@
-"""Coupling and messages of a rank do not grow with the number of ranks, at fixed work a rank."""
+"""Coupling, files, messages of a rank do not grow with the number of ranks, at fixed work each."""
 
 import pytest
 from mpi4py import MPI
@@ -21,6 +21,8 @@ def test_no_rank_has_more_where_there_are_more(bodies: int) -> None:
     found = COMM.bcast(found)  # the first rank is in all of them
     for size, counts in found.items():
         assert counts["coupling"] <= 1.1 * found[1]["coupling"], size
+        assert counts["listed"] <= 1.1 * found[1]["listed"], size
         if size > 1:
+            assert counts["exchanged"] / (size - 1) <= 1.1 * found[2]["exchanged"], size
             cuts = counts["received"] / (size - 1), found[2]["received"]
             assert cuts[0] <= 1.1 * cuts[1], size
