@@ -116,6 +116,16 @@ ALLOCATOR = (
 )
 
 
+def destroy_unused(*comms: MPI.Intracomm) -> None:
+    """Destroy objects of PETSc that are no longer in use. Collective.
+
+    Where several ranks share one, petsc4py leaves it to this call: each collects its garbage at
+    another moment.
+    """
+    for comm in comms:
+        PETSc.garbage_cleanup(comm)
+
+
 def give_memory_back() -> None:
     """Let the allocator return freed memory to the system, where it is glibc's.
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from ufl.core.expr import Expr
 
+from contact._compat import destroy_unused
 from contact.body.component_norms import component_norms_of
 from contact.body.cuts import Cuts
 from contact.body.description import Body
@@ -328,6 +329,7 @@ class BodyEquilibrium:
             Unknowns at which the secant modulus is taken; those of the state by default: the
             material law itself.
         """
+        destroy_unused(self.comm, self.domain.mesh.comm)
         forms, secant = self.forms, secant_at is not None and not self.linear
         at = forms.put(self.nodal(state.x), self.motion(state.x))
         if secant:
