@@ -16,7 +16,7 @@ from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.linear.constraint import Change
 from contact.mesh.entities import component_sums
-from contact.tolerances import EPS, ROUNDING
+from contact.tolerances import EPS, NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 
 
@@ -179,6 +179,13 @@ class Interface:
         """Return a pressure that rounding of the displacements makes (stress). Collective."""
         displacement = np.abs(nodal[:, : self.jump.dim]).max(axis=1, initial=0.0)
         return 2 * ROUNDING * self.stiffness * self.jump.maximum(displacement)
+
+    def negligible(self, nodal: Array, pressure: Array) -> float:
+        """Return a pressure that counts as none beside all others. Collective.
+
+        That is rounding of the displacements, or of the largest pressure.
+        """
+        return max(NEGLIGIBLE * self.jump.maximum(pressure), self.rounding(nodal))
 
     def acting(self, x: Array, forces: Multipliers) -> Iterator[tuple[InterfaceLaw, Array, Array]]:
         """Yield the law, unknowns and pressures of contact nodes, then of held ones. Collective."""

@@ -151,7 +151,7 @@ def passing(problem: ContactProblem) -> Iterator[Remark]:
 
 
 def unresisted_motions(solution: Solution) -> Iterator[Remark]:
-    """Warn of a rigid motion that supports leave free and contact hardly resists. Collective.
+    """Warn of rigid motions that supports leave free and contact hardly resists. Collective.
 
     A cylinder without friction rolls in its place against next to nothing, and wherever it has
     rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas:
@@ -169,14 +169,20 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
         free = null_space(group.supports)
         if free.shape[1] == 0:
             continue
-        share, motion = _least_held(solution, group, free, solution.pressure > 0)
-        words = described(motion[:, None] / np.linalg.norm(motion), group.names)
-        name = _named(group, motion)
+        shares, motions = _least_held(solution, group, free, solution.status != "open")
+        share, motion = shares[0], motions[:, 0]
+        # All that cost nothing, or the one that costs least.
+        motions = linalg.orth(motions[:, : max(1, np.count_nonzero(shares < EPS))])
+        words, name = described(motions, group.names), _named(group, motions)
         if share < EPS:
+            several = motions.shape[1] > 1
             yield (
-                f"nothing holds {name} against a rigid motion ({words}), which costs nothing: "
+                f"nothing holds {name} against "
+                f"{f'rigid motions ({words})' if several else f'a rigid motion ({words})'}, which "
+                f"{'cost' if several else 'costs'} nothing: "
                 "of all places the one with the least displacements at the contact nodes is given; "
-                "friction, or a support against that motion, hold it"
+                f"friction, or supports against {'those motions' if several else 'that motion'}, "
+                "hold it"
             )
             return
         moved = left * _reach(group, motion) / (whole * share)
@@ -190,14 +196,14 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
             return
 
 
-def _named(group: Group, motion: Array) -> str:
-    """Return the regions of the components that a motion of a group moves most. Collective."""
+def _named(group: Group, motions: Array) -> str:
+    """Return the regions of the components that motions of a group move most. Collective."""
     problem, names = group.problem, group.problem.domain.regions
     if group.count == 1 or len(names) == 1:
         return "the body"
     component, dofs = problem.equilibrium.components[0], problem.equilibrium.space.dofmap.list
     each = 1 if problem.domain.revolved else 3 * (problem.dim - 1)  # motions of a component
-    own = motion[: each * len(group.components)].reshape(-1, each)
+    own = motions[: each * len(group.components)].reshape(len(group.components), -1)
     amounts = np.linalg.norm(own, axis=1)
     moved = np.array(group.components)[amounts >= amounts.max() / 2]
     found = []
@@ -226,11 +232,11 @@ def adrift(solution: Solution) -> Iterator[Remark]:
 
 def _least_held(
     solution: Solution, group: Group, free: Array, touches: NDArray[np.bool_]
-) -> tuple[float, Array]:
-    """Return the free motion that contact holds least, and how far. Collective.
+) -> tuple[Array, Array]:
+    """Return how far contact holds free motions, ascending, and the motions. Collective.
 
-    That is the share of its square at all contact nodes that is where it is held; the motion, shape
-    (m,), has a mean square of 1 there.
+    That is the share of their squares at all contact nodes that is where they are held; the
+    motions, shape (m, k), have mean squares of 1 there.
     """
     nodes = group.problem.nodes
     normal, tangential = group.normal @ free, group.tangential @ free
@@ -247,7 +253,7 @@ def _least_held(
     held, moved = nodes.comm.allreduce(sums, op=MPI.SUM)
     area = nodes.sum(np.ones_like(nodes.weight))
     values, motions = linalg.eigh(held / area, moved / area)
-    return max(float(values[0]), 0.0), free @ motions[:, 0]
+    return np.maximum(values, 0.0), free @ motions
 
 
 def _reach(group: Group, motion: Array) -> float:

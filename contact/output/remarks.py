@@ -16,7 +16,7 @@ from contact.output.solution import Note, Remark, Solution
 from contact.output.uniqueness import MOST
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import left_as_pressures, residual_forces
-from contact.tolerances import LARGEST_VIOLATION
+from contact.tolerances import EPS, LARGEST_VIOLATION
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky
 from forms.history import HistoryLaw
@@ -291,6 +291,8 @@ def untouched(solution: Solution) -> Iterator[Remark]:
     """
     problem = solution.problem
     closed = bool(np.any(solution.status != "open"))
+    if any(record.row["contact_nodes"] > 0 for record in solution.steps):
+        return
     if problem.since is not None or problem.comm.allreduce(closed, op=MPI.LOR):
         return
     masters = problem.equilibrium.global_unknowns
@@ -327,8 +329,9 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     acting = (loads + body.sizes(on_contact))[0]
     left = body.sizes(body.unbalanced(residual))[0]
     borne = body.sizes(body.reactions(residual))[0]
-    # Where supports bear no more than the loads, the residual is rounding.
-    much = (acting > 0) & (left > max(LEFT, asked) * acting) & (borne > acting)
+    # Where supports bear no more than the loads, the residual is rounding; so are all forces on a
+    # body that are rounding of those on others.
+    much = (acting > EPS * acting.max()) & (left > max(LEFT, asked) * acting) & (borne > acting)
     if solution.converged and not moved and much.any():
         worst = np.max(left[much] / acting[much])
         known.append(

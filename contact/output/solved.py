@@ -87,10 +87,10 @@ class Solved:
         A node is in contact where p - c (gap - u_nu) > 0 for the multiplier p, or where the
         layer presses; c = E / size. There it slips if |lambda_f + c u_tau|
         exceeds the friction bound (always where that is 0), and sticks else. Pressures
-        below 1e-9 of the largest count as rounding.
+        below 1e-9 of the largest count as rounding, and those that rounding of displacements makes.
         """
         interface, nodal = self.problem.interface, self.nodal
-        rounding = 1e-9 * interface.jump.maximum(self.pressure)
+        rounding = interface.negligible(nodal, self.pressure)
         active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
         layer = interface.law.layer_pressure(nodal) > rounding
         touches = active.closed | layer

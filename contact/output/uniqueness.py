@@ -63,7 +63,7 @@ def critical_factor(
         return np.inf
     nodal = jump.apply(state.x)
     pressure = interface.pressure(nodal, state.forces)
-    rounding = 1e-9 * jump.maximum(pressure)  # as of `Solution.status`
+    rounding = interface.negligible(nodal, pressure)
     closed = touching(pressure, interface.opening(nodal), interface.stiffness, rounding)
     if jump.maximum(closed.astype(float)) == 0:
         closed = jump.gap <= EPS * interface.size

@@ -188,10 +188,11 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     """Return the largest of norms of pressures over the pressure on each component. Collective.
 
     The remainder of a multiplier at open nodes presses nothing, and neither does
-    rounding beside the pressures on other components.
+    rounding beside the pressures on other components, or of the displacements.
     """
     nodal, own = interface.jump.apply(state.x), state.forces.pressure
-    on = touching(own, interface.opening(nodal), interface.stiffness)
+    rounding = interface.rounding(nodal)
+    on = touching(own, interface.opening(nodal), interface.stiffness, rounding)
     pressed = interface.norms(interface.pressure(nodal, state.forces) - own * ~on)
     much = (pressed > 0) & (pressed > EPS * pressed.max())
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from contact.body.description import Fixed
 from contact.body.rigid import Motion, Rigid
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.output.remarks import rounding, untouched
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, left_as_pressures, residual_forces
 from contact.problem.state import State
@@ -121,6 +122,28 @@ def test_what_is_left_of_a_body_that_is_no_longer_loaded(method, linear):
     found = solve(problem, METHODS[method](linear=linear), times=[1.0, 2.0], comm=MPI.COMM_SELF)
     assert found.converged, found.outcome.reason
     assert np.abs(of_second(found, found.state.forces.pressure)).max() < 1e-14
+
+
+def test_forces_that_are_rounding_do_not_press():
+    """Nodes with pressures of 6e-30 stuck, and 3.1 of all forces were out of balance."""
+    given = pressed(blocks(MPI.COMM_SELF), -0.01, 0.01)
+    first, second = given.body.loads
+    loads = (first, replace(second, amplitude=lambda t: 1.0 if t <= 1 else 0.0))
+    problem = ContactProblem(given.domain, replace(given.body, loads=loads), given.contacts)
+    found = solve(problem, times=[1.0, 2.0], comm=MPI.COMM_SELF)
+    rng, nodes = np.random.default_rng(1), found.problem.nodes
+    on_second = nodes.points[:, 0] > 1.5
+    x, forces = found.state.x.copy(), found.state.forces
+    loaded = found.problem.equilibrium.layout.points[:, 0] > 1.5
+    body = found.problem.equilibrium.nodal(x)
+    body[loaded] = 1e-29 * rng.standard_normal(body[loaded].shape)
+    body[~found.problem.equilibrium.free] = 0.0
+    pressure = np.where(on_second, 6e-30 * rng.random(on_second.size), 0.0)
+    found.state = replace(found.state, x=x, forces=replace(forces, pressure=pressure))
+    assert np.abs(found.displacement.x.array).max() > 1e-3
+    assert set(found.status) == {"open"}
+    assert not [*rounding(found)]
+    assert not [*untouched(found)]
 
 
 @pytest.mark.parametrize(("remaining", "gap"), [(0.0, 0.001), (1e-6, 0.001), (0.0, 0.0)])
