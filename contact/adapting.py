@@ -64,16 +64,19 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
         solution = solve(problem, start)
         if solution.outcome.signal:
             break
-        solution.error = estimated(solution.problem, solution.state)
-        squares, error = indicators(solution)
+        if solution.converged:
+            solution.error = estimated(solution.problem, solution.state)
         rows.append(values_of(ADAPT, solution))
-        tell(logger, 0.0, "%d unknowns, estimated error %.2g %%", unknowns, 100 * error)
         if before is not None:
             for phase, seconds in before.seconds.items():
                 solution.seconds[phase] += seconds
+        if not solution.converged:
+            break
+        squares, error = indicators(solution)
+        tell(logger, 0.0, "%d unknowns, estimated error %.2g %%", unknowns, 100 * error)
         # A first mesh may have seen nothing of a narrow load, or of contact between its nodes.
         seen = error > ROUNDING or before is not None
-        if not solution.converged or (asked.error is not None and error <= asked.error and seen):
+        if asked.error is not None and error <= asked.error and seen:
             break
         goal = (asked.error / error) ** 2 if asked.error is not None and seen else 0.0
         room = asked.max_unknowns / unknowns

@@ -31,11 +31,14 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.ranks import on_root
 from contact.typing import Array
+from forms.elasticity import Anisotropic
 
 #: Mean ratio below which a cell is called thin.
 THIN = 0.1
 #: Poisson's ratio from which on elements of degree 1 lock: the bulk modulus is 19.7 times mu.
 INCOMPRESSIBLE = 0.475
+#: Stiffness of a crystal's strain over that of another one, from which on check warns, too.
+STIFFER = 100.0
 #: Displacements above this share of the body are not small.
 LARGE = 0.05
 #: Loads over the contact part and Young's modulus from which on units are asked for: sharp
@@ -118,18 +121,24 @@ def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> li
 
 
 def _locking(problem: ContactProblem) -> list[str]:
-    """Say which materials change their volume so little that elements of degree 1 lock."""
+    """Say which materials resist some strains so much that elements of degree 1 lock."""
     body = problem.equilibrium
     remedy = unlocked(body.element, body.degree, shape_of(body.domain.mesh))
     if remedy is None:
         return []
     # In plane stress volumes are free to change.
-    ratios = [float(m.law.poisson) for m in problem.body.materials if not m.in_plane_stress]
+    laws = [m.law for m in problem.body.materials if not m.in_plane_stress]
+    ratios = [float(law.poisson) for law in laws]
+    crystals = [law.eigenvalues for law in laws if isinstance(law, Anisotropic)]
+    stiffer = [values[-1] / values[0] for values in crystals]
+    found = [
+        *(f"Poisson's ratio {ratio:g}" for ratio in ratios if ratio >= INCOMPRESSIBLE),
+        *(f"a strain {more:.3g} times as stiff as another" for more in stiffer if more >= STIFFER),
+    ]
     return [
-        f"# warning: Poisson's ratio {ratio:g}, and from {INCOMPRESSIBLE:g} on elements of degree "
-        f"1 are much too stiff, they lock: {remedy} [locking]"
-        for ratio in dict.fromkeys(ratios)
-        if ratio >= INCOMPRESSIBLE
+        f"# warning: {text}: elements of degree 1 can be much too stiff, they lock; {remedy} "
+        "[locking]"
+        for text in dict.fromkeys(found)
     ]
 
 

@@ -107,8 +107,10 @@ def _results(solution: Solution) -> list[str]:
         "seconds": seconds,
     }
     lines = [f"  {name:18}{value}".rstrip() for name, value in rows.items()]
-    if solution.error is not None:
-        bound = ", a lower bound: the mesh locks" if locks(solution) else ""
+    if solution.error is None:
+        lines.append("estimated discretisation error: none, for the equations are not solved")
+    else:
+        bound = ", perhaps a lower bound: the mesh may lock" if locks(solution) else ""
         share = f"{100 * solution.error.relative:.2g} % (energy norm){bound}"
         lines.append(f"estimated discretisation error {share}")
     return lines

@@ -13,6 +13,9 @@ from contact.output.solution import Remark, Solution
 #: Ratio of bulk to shear modulus, of nu = 0.475, from which on elements of degree 1 lock.
 LOCKED = 20.0
 
+#: Estimated error below which no mesh locks: there the solution is one that these elements have.
+EXACT = 5e-3
+
 #: Largest estimated error without a warning: its square is that of displacements under loads.
 COARSE = 0.15
 
@@ -21,9 +24,11 @@ DEVIATION = 0.1
 
 
 def locks(solution: Solution) -> bool:
-    """Whether elements of degree 1 are much too stiff, for volumes hardly change."""
-    ratio = None if solution.error is None else solution.error.stiffness_ratio
-    return _remedy(solution) is not None and ratio is not None and ratio >= LOCKED
+    """Whether elements of degree 1 may be much too stiff, for volumes hardly change."""
+    error = solution.error
+    if error is None or error.stiffness_ratio is None or _remedy(solution) is None:
+        return False
+    return error.stiffness_ratio >= LOCKED and error.relative > EXACT
 
 
 def _remedy(solution: Solution) -> str | None:
@@ -32,13 +37,14 @@ def _remedy(solution: Solution) -> str | None:
 
 
 def locking(solution: Solution) -> Iterator[Remark]:
-    """Say where the mesh locks."""
+    """Say where the mesh may lock."""
     error = solution.error
     if error is not None and locks(solution):
         yield (
-            f"the mesh locks: the bulk modulus is {error.stiffness_ratio:.3g} times the shear "
-            f"modulus where the energy is, and from {LOCKED:g} on elements of degree 1 are too "
-            "stiff: displacements are too small, and the estimated error is a lower bound; "
+            f"the mesh may lock: the ratio of bulk and shear modulus, of crystals and fibres of "
+            f"the stiffest strain and the others, is {error.stiffness_ratio:.3g} where the energy "
+            f"is, and from {LOCKED:g} on elements of degree 1 can be much too stiff: displacements "
+            "may be too small, and the estimated error a lower bound; "
             f"{_remedy(solution)}"
         )
 

@@ -25,6 +25,7 @@ from contact.body.elements import MEAN_DILATATION
 from contact.body.materials import factor_of
 from contact.body.pointwise import in_chunks
 from contact.mesh.cells import rule, shape_of
+from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import geometry_nodes, measures
 from contact.mesh.together import members, part
@@ -33,7 +34,7 @@ from contact.output.local_problems import LocalProblems
 from contact.output.recovery import nodal_means
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.tolerances import ROUNDING
+from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 from forms.crystal import VOIGT
 from forms.elasticity import Anisotropic, mandel, moduli
@@ -61,8 +62,9 @@ class Estimate:
     total
         The sum of eta_K^2 over all ranks.
     stiffness_ratio
-        Mean of bulk over secant shear modulus, weighted by the energy; None for a crystal, and in
-        plane stress, where volumes are free to change.
+        Mean of bulk over shear modulus, weighted by the energy, the latter |s|/(2 |e|) of the
+        deviatoric stress and the whole deviatoric strain; of a crystal as of `_of_crystal`. None
+        in plane stress, where volumes are free to change.
     """
 
     squares: Array
@@ -136,8 +138,18 @@ def estimated(
                 squares[chosen] = np.sum(volumes * energy(smooth - raw), axis=1)
             known = np.sum(volumes * energy(raw), axis=1)
             sums[0] += known.sum()
-            if not (isinstance(law, Anisotropic) or material.in_plane_stress):
-                sums[1:] += known @ (_bulk(material) / shear[some]), known.sum()
+            if material.in_plane_stress:
+                continue
+            if isinstance(law, Anisotropic):
+                stiffer = _of_crystal(problem.domain, material, flux[chosen].mean(axis=1))
+            elif isinstance(law, HistoryLaw):
+                whole = _over_whole_strain(law, flux[chosen], strain[chosen])
+                energy = _density(material, whole, factor[some])
+                known = np.sum(volumes * energy(raw), axis=1)
+                stiffer = np.asarray(_bulk(material) / whole)
+            else:
+                stiffer = np.asarray(_bulk(material) / shear[some], dtype=np.float64)
+            sums[1:] += known @ stiffer, known.sum()
     at_contact = _at_contact(problem, state)
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
@@ -179,6 +191,59 @@ def sampled(fields: DerivedFields) -> tuple[Array, Array]:
 def _bulk(material: Material) -> float:
     """Return the bulk modulus."""
     return moduli(float(material.law.young), float(material.law.poisson))[0]
+
+
+def _over_whole_strain(law: HistoryLaw, flux: Array, strain: Array) -> Array:
+    """Return |s|/(2 |e|) of cells, at most the shear modulus, and positive.
+
+    Volumes change wrongly with the whole strain, however many steps it has been in: the pressure
+    of that is to be seen beside s. The secant of a step is nearly elastic where the step is short.
+
+    Parameters
+    ----------
+    law
+        The law.
+    flux, strain
+        Stress, shape (cells, points, components), and |e|, shape (cells, points).
+    """
+    stress = flux[..., :6].copy()
+    stress[..., :3] -= stress[..., :3].mean(axis=-1, keepdims=True)
+    modulus = moduli(float(law.young), float(law.poisson))[1]
+    elastic = 2 * modulus * strain.mean(axis=1)
+    size = np.linalg.norm(stress, axis=-1).mean(axis=1)
+    whole = np.linalg.norm(flux[..., :6], axis=-1).mean(axis=1)
+    strained = elastic > NEGLIGIBLE * whole
+    share = np.divide(size, elastic, out=np.ones_like(size), where=strained)
+    return np.asarray(modulus * np.clip(share, NEGLIGIBLE, 1.0))
+
+
+def _of_crystal(domain: Domain, material: Material, flux: Array) -> Array:
+    """Return by how much the stiffest strain is stiffer than the rest of the strain of cells.
+
+    The eigenvalue of the stiffest strain over the Rayleigh quotient of the strain without that, by
+    3/2 in 3-D, so that it is the ratio of bulk and shear modulus where the stiffness is isotropic:
+    then the stiffest strain is that of the volume, of fibres that along them.
+
+    Parameters
+    ----------
+    domain, material
+        The mesh, whose strains may all be in the plane, and the crystal.
+    flux
+        Of cells, shape (cells, 6 or 9).
+    """
+    whole = _stiffness(material, np.ones(1), np.ones(1))[0]
+    kept = list(range(6)) if domain.dim == 3 else [0, 1, 5]
+    if domain.revolved:
+        kept = [0, 1, 2, 5]
+    strain = (flux[:, : len(whole)] @ np.linalg.inv(whole).T)[:, kept]
+    stiffness = whole[np.ix_(kept, kept)]
+    values, ways = np.linalg.eigh(stiffness)
+    rest = strain - np.outer(strain @ ways[:, -1], ways[:, -1])
+    square = np.sum(rest**2, axis=1)
+    seen = square > NEGLIGIBLE**2 * np.sum(strain**2, axis=1)
+    quotient = np.full(len(flux), values[:-1].mean())
+    np.divide(np.sum((rest @ stiffness) * rest, axis=1), square, out=quotient, where=seen)
+    return np.asarray(values[-1] / quotient * 2 / sum(k < 3 for k in kept))
 
 
 def _density(material: Material, shear: Array, factor: Array) -> Callable[[Array], Array]:

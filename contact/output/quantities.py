@@ -47,6 +47,11 @@ def _elsewhere(given: Any) -> None:
     """Return nothing: the value of a quantity that is written by who knows it."""
 
 
+def _error(given: Any) -> float:
+    """Return the estimated error; no number where the equations are not solved."""
+    return float("nan") if given.error is None else float(given.error.relative)
+
+
 def _item(values: Any, index: int) -> Any:
     return None if values is None else values[index]
 
@@ -87,7 +92,7 @@ _RUN = (
         "unknowns", "", "Number of unknowns of a mesh of `[mesh.adapt]`, a row each.",
         lambda r: r.problem.equilibrium.layout.unknowns, (ADAPT,),
     ),
-    Quantity("error", "", "`energy` of `error`.", lambda r: r.error.relative, (ADAPT,)),
+    Quantity("error", "", "`energy` of `error`.", _error, (ADAPT,)),
     Quantity(
         "contact_force", "force", "Force that the body exerts on the foundation, a vector; in 2-D "
         "a unit of depth. Between bodies the one that the body with `on` exerts on the other; of "
@@ -124,9 +129,10 @@ _RUN = (
         "that of displacements under given loads; its `effectivity`, the estimate over the "
         "error itself, `null` where that is not known; and `intervals`, in which forces, the "
         "largest displacement and pressure lie: of the last three meshes of `[mesh.adapt]` with "
-        "`fraction = 1`, `null` of one that does not converge, as a pressure at a corner.",
-        lambda r: r.error and {
-            "energy": r.error.relative, "effectivity": None, "intervals": r.intervals,
+        "`fraction = 1`, `null` of one that does not converge, as a pressure at a corner. All "
+        "are `null` where the equations are not solved.",
+        lambda r: {
+            "energy": _error(r), "effectivity": None, "intervals": r.intervals,
         },
     ),
     Quantity(

@@ -80,7 +80,10 @@ def measure(solution: Solution, whole: bool = True) -> list[float]:
         )
     if whole:
         solution.deformation = deformation(body, solution.state.x)
-        solution.error = solution.error or estimated(solution.problem, solution.state, fields)
+        if not solution.converged:
+            solution.error = None  # it estimates the distance of the mesh's solution alone
+        elif solution.error is None:
+            solution.error = estimated(solution.problem, solution.state, fields)
     return strains
 
 
