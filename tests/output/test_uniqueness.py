@@ -54,6 +54,51 @@ def test_several_solutions_of_a_triangle_are_warned_of(mu, warned, load, method,
     assert not warned or "mu up to 1.497" in said[0]
 
 
+def under_a_cylinder(method):
+    """Return a block on a plane, pressed by a rigid cylinder up whose flanks it slides."""
+    return parse_case({
+        "mesh": {"generator": "rectangle", "size": [2.0, 0.8], "cells": [20, 8]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "contact": [
+            {"on": "bottom"},
+            {"on": "top", "foundation": {"shape": "sphere", "centre": [1.07, 2.4], "radius": 1.6},
+             "rigid": {"displacement": [0.0, "free"], "force": [0.0, -0.01]}},
+        ],
+        "friction": {"law": "coulomb", "mu": 0.2},
+        "solver": {"method": method},
+    })  # fmt: skip
+
+
+def test_bodies_that_slide_like_rigid_ones_are_not_warned_of():
+    """The pencil was singular from mu = 0.19 on, and other methods found the same pressures."""
+    newton, uzawa = (
+        solve(under_a_cylinder(method), comm=MPI.COMM_SELF) for method in ("newton", "uzawa")
+    )
+    assert newton.converged and uzawa.converged
+    largest = newton.pressure.max()
+    np.testing.assert_allclose(newton.pressure, uzawa.pressure, rtol=0, atol=1e-5 * largest)
+    for solution in (newton, uzawa):
+        assert 5 < solution.critical_factor < np.inf
+        assert not [text for text in solution.warnings if SAID in text]
+
+
+def test_critical_friction_beside_a_body_that_slides(tmp_path):
+    """The triangle's, beside a free block: nothing was known, since the block slides like rigid."""
+    case = triangle(tmp_path, 3.0, [0.01, -0.01])
+    points = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.5345], [3.0, 0.0], [4.0, 0.0], [4.0, 1.0], [3.0, 1.0]]
+    parts = {"bottom": [[0, 1], [3, 4]], "slope": [[1, 2]], "side": [[0, 2]], "top": [[5, 6]]}
+    mesh = Mesh(
+        np.array(points), np.array([[0, 1, 2], [3, 4, 5], [3, 5, 6]]), np.zeros(3, dtype=int),
+        ["body"], {name: np.array(rows) for name, rows in parts.items()},
+    )  # fmt: skip
+    write_msh(mesh, tmp_path / "triangle.msh")
+    loads = [{"on": part, "traction": [0.01 * (part == "side"), -0.01]} for part in ("side", "top")]
+    tables = case.model_dump(mode="json", exclude_unset=True) | {"load": loads}
+    solution = solve(parse_case(tables), comm=MPI.COMM_SELF)
+    assert solution.converged
+    assert 3 * solution.critical_factor == pytest.approx(1.4966629560336764, rel=1e-10)
+
+
 @pytest.mark.parametrize("hard", [False, True])
 def test_single_solutions_are_not_warned_of(hard):
     """Problems of the sweeps at mu up to 0.5."""
