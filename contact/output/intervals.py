@@ -28,7 +28,8 @@ def intervals(rows: Sequence[Mapping[str, Any]]) -> Intervals | None:
     The grid convergence index (Roache, J. Fluids Eng. 116, 1994) with |Q - Q_h| <= C e, e being the
     estimated error in the energy norm: C is the larger |Q_j - Q_k|/(e_j - e_k) of the last two
     refinements. Where C grows it goes on to grow, and the changes to come are a geometric series.
-    Most quantities converge faster, and lie well inside. Residuals of the solutions are added.
+    Most quantities converge faster, and lie well inside. Residuals of the solutions are added. One
+    whose changes are of both signs has not begun to converge, and has none.
 
     Parameters
     ----------
@@ -48,13 +49,14 @@ def intervals(rows: Sequence[Mapping[str, Any]]) -> Intervals | None:
     for name in quantities:
         unknown = max(ROUNDING, *(row["kkt"] for row in last)) * sizes[_whole(name)]
         values = [float(row[name]) for row in last]
+        changes = [values[k + 1] - values[k] for k in (0, 1)]
         first, second = (
-            max(abs(values[k + 1] - values[k]) - 2 * unknown, 0.0) / (error[k] - error[k + 1])
-            for k in (0, 1)
+            max(abs(changes[k]) - 2 * unknown, 0.0) / (error[k] - error[k + 1]) for k in (0, 1)
         )
+        turns = min(first, second) > 0 and changes[0] * changes[1] < 0
         growth = max(second / first, 1.0) if first > 0 else 1.0 if second == 0 else np.inf
         ratio = growth * error[2] / error[1]
-        if growth > SAFETY or ratio >= 1:
+        if turns or growth > SAFETY or ratio >= 1:
             found[name] = None
             continue
         change = max(first, second) * (error[1] - error[2])
