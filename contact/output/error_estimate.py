@@ -19,11 +19,11 @@ import numpy as np
 from dolfinx import la
 from mpi4py import MPI
 
-from contact._compat import geometry_dofmap
 from contact.body.description import Material
 from contact.body.elements import MEAN_DILATATION
 from contact.body.materials import factor_of
 from contact.body.pointwise import in_chunks
+from contact.body.rigid import Bolt
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
@@ -110,7 +110,7 @@ def estimated(
         local = LocalProblems(problem, state, flux)
     at, weights = rule(shape, 2 * body.degree)
     linear, shapes = shape.lagrange(1, at), shape.lagrange(shape.degree_of(flux.shape[1]), at)
-    vertices = geometry_dofmap(body.domain.mesh)[:, : shape.corners]
+    apart = _acting_inside(problem)
     squares, sums, volume = np.zeros(len(flux)), np.zeros(3), 0.0
     for material, cells in zip(body.body.materials, body.cells, strict=True):
         law = material.law
@@ -119,22 +119,22 @@ def estimated(
         else:
             shear = np.asarray(law.secant_modulus(strain[cells] ** 2)).mean(axis=1)
         factor = factor_of(body.domain, material, cells)
-        means = None
+        means, places = None, None
         if local is not None:
             squares[cells] = local.squares(cells, _stiffness(material, shear, factor))
         else:
             # Of degree 1 stresses are most exact in the middle of a cell.
             own = flux[cells]
             values = own.mean(axis=1) if body.degree == 1 else own[:, : shape.corners]
-            means = nodal_means(body.domain, cells, values)
+            means, places = nodal_means(body.domain, cells, values, apart)
         for some in in_chunks(np.arange(cells.size)):
             chosen = cells[some]
             energy = _density(material, shear[some], factor[some])
             of, raw = geometry_nodes(body.domain, chosen), shapes @ flux[chosen]
             volumes = measures(body.domain.revolved, shape, of, at, weights)
             volume += float(volumes.sum())
-            if means is not None:
-                smooth = linear @ means[vertices[chosen]]
+            if means is not None and places is not None:
+                smooth = linear @ means[places[some]]
                 squares[chosen] = np.sum(volumes * energy(smooth - raw), axis=1)
             known = np.sum(volumes * energy(raw), axis=1)
             sums[0] += known.sum()
@@ -158,6 +158,18 @@ def estimated(
         return Estimate(np.zeros_like(squares), 0.0, 0.0, 0.0, None)
     ratio = float(locked / shearing) if shearing > 0 else None
     return Estimate(squares, float(contact), float(energy_sum), float(total), ratio)
+
+
+def _acting_inside(problem: ContactProblem) -> list[str]:
+    """Return the parts inside of the body at which something acts, and stresses jump.
+
+    At cuts of bolts it is the displacement that jumps.
+    """
+    body = problem.equilibrium
+    unknown = [member.description for member in body.global_unknowns.members]
+    acting = [*body.body.fixed, *(one for one in unknown if not isinstance(one, Bolt))]
+    parts = dict.fromkeys(name for one in acting for name in members(one.on))
+    return [name for name in parts if name in problem.domain.inside]
 
 
 def _rounding(problem: ContactProblem, state: State, volume: float) -> float:

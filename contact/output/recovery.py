@@ -1,22 +1,32 @@
-"""Recovered fields: means of the values in the cells around each vertex, linear in between."""
+"""Recovered fields: means of the values in the cells around each vertex, linear in between.
+
+Across facets inside of the body at which something acts, stresses jump: there the cells around a
+vertex fall into groups that these facets separate, as the materials do.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from dolfinx import la
+from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from contact import _compat
 from contact.body.pointwise import in_chunks
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
+from contact.mesh.entities import cell_facets
 from contact.typing import Array
 
 
-def nodal_means(domain: Domain, cells: Indices, values: Array) -> Array:
-    """Return the means around local vertices, shape (vertices, components). Collective.
-
-    They are NaN at vertices of none of the cells.
+def nodal_means(
+    domain: Domain, cells: Indices, values: Array, apart: Sequence[str] = ()
+) -> tuple[Array, NDArray[np.integer]]:
+    """Return means around vertices, (n, components), and which are those of corners. Collective.
 
     Parameters
     ----------
@@ -27,6 +37,12 @@ def nodal_means(domain: Domain, cells: Indices, values: Array) -> Array:
     values
         At the corners of each of the cells, shape (cells, corners, components); or constant there,
         shape (cells, components).
+    apart
+        Names of parts inside of the body across which there are no means.
+
+    Returns
+    -------
+    The means, and their places at the corners of the cells, shape (cells, corners).
     """
     corners = shape_of(domain.mesh).corners
     dofmap, index_map = _compat.geometry_dofmap(domain.mesh), domain.mesh.geometry.index_map()
@@ -46,4 +62,59 @@ def nodal_means(domain: Domain, cells: Indices, values: Array) -> Array:
         total.scatter_forward()
         sums = total.array.reshape(sums.shape)
     with np.errstate(invalid="ignore"):
-        return np.asarray(sums[:, :-1] / sums[:, -1:])
+        means = np.asarray(sums[:, :-1] / sums[:, -1:])
+    places = dofmap[cells, :corners]
+    return _separated(domain, cells, values, apart, means, places) if apart else (means, places)
+
+
+def _separated(
+    domain: Domain,
+    cells: Indices,
+    values: Array,
+    apart: Sequence[str],
+    means: Array,
+    places: NDArray[np.integer],
+) -> tuple[Array, NDArray[np.integer]]:
+    """Return means and places with those of groups at the vertices of parts. Collective.
+
+    Corners of two cells at a vertex are of one group where a facet joins the cells that has the
+    vertex and is in no part. Groups reach over ranks: few as they are, all are put together on
+    each.
+    """
+    mesh, comm, d = domain.mesh, domain.comm, domain.dim
+    shape = shape_of(mesh)
+    mesh.topology.create_connectivity(d, d - 1)
+    of_facets, of_nodes = mesh.topology.index_map(d - 1), mesh.geometry.index_map()
+
+    def every(rows: NDArray[Any]) -> NDArray[Any]:
+        """Return the rows of all ranks, one after the other."""
+        return np.concatenate(comm.allgather(rows))
+
+    own = np.unique(np.concatenate([domain.facets_anywhere(name) for name in apart]))
+    within = every(of_facets.local_to_global(own.astype(np.int32)))
+    facets = cell_facets(mesh)[cells]
+    facets = of_facets.local_to_global(facets.ravel()).reshape(facets.shape)
+    nodes = of_nodes.local_to_global(places.ravel()).reshape(places.shape)
+    cut = np.isin(facets, within)
+    chosen = np.isin(nodes, every(nodes[:, shape.facet_corners][cut].ravel()))
+    joins = np.zeros((len(shape.facet_corners), shape.corners), dtype=bool)
+    np.put_along_axis(joins, shape.facet_corners, True, axis=1)
+    cell, facet, corner = np.nonzero(chosen[:, None] & joins & ~cut[:, :, None])
+    before = comm.exscan(int(chosen.sum())) or 0
+    number = before + np.cumsum(chosen).reshape(chosen.shape) - 1
+    # A cell at a vertex is joined to those of its facets that are in no part.
+    joined = every(
+        np.column_stack([number[cell, corner], facets[cell, facet], nodes[cell, corner]])
+    )
+    values = every(values[chosen] if values.ndim == 3 else values[np.nonzero(chosen)[0]])
+    _, meets = np.unique(joined[:, 1:], axis=0, return_inverse=True)
+    size = len(values) + len(joined)
+    links = np.ones(len(joined)), (joined[:, 0], len(values) + meets)
+    groups = connected_components(sparse.csr_array(links, shape=(size, size)), directed=False)[1]
+    _, group = np.unique(groups[: len(values)], return_inverse=True)
+    entries = np.ones(group.size), (group, np.arange(group.size))
+    onto = sparse.csr_array(entries, shape=(group.max(initial=-1) + 1, group.size))
+    sums = onto @ np.column_stack([values, np.ones(group.size)])
+    places = places.copy()
+    places[chosen] = len(means) + group[before : before + np.count_nonzero(chosen)]
+    return np.concatenate([means, sums[:, :-1] / sums[:, -1:]]), places

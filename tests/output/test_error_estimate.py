@@ -20,6 +20,7 @@ from contact.methods.options import NewtonOptions
 from contact.output.error_estimate import estimated, sampled
 from contact.output.fields import DerivedFields, Point
 from contact.output.local_problems import LocalProblems
+from contact.output.recovery import nodal_means
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -132,6 +133,60 @@ def test_no_error_where_the_solution_is_exact_in_each_material(degree):
         assert found.total - found.contact < 1e-18 * found.energy
         # Of gaps there is their rounding.
         assert found.contact < 1e-9 * found.energy
+
+
+def inside(dim, cell, held, **more):
+    """Return a column on a foundation, held sideways, with a part inside at its middle."""
+    sides = ("left", "right") if dim == 2 else ("left", "right", "front", "back")
+    free = ["free"] * (dim - 1)
+    across = [[0.0, "free"], [0.0, "free"]] if dim == 2 else [[0.0, "free", "free"]] * 2
+    across += [["free", 0.0, "free"]] * 2
+    height = "xyz"[dim - 1]
+    return {
+        "mesh": {
+            "generator": "rectangle" if dim == 2 else "box", "cell": cell,
+            "size": [1.0] * (dim - 1) + [2.0], "cells": [3] * (dim - 1) + [4],
+            "inside": {"middle": f"abs({height} - 1) < 1e-6"},
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [
+            *({"on": on, "displacement": u} for on, u in zip(sides, across, strict=False)),
+            *({"on": on, "displacement": [*free, u]} for on, u in held.items()),
+        ],
+        "contact": {"on": "bottom"},
+        **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
+def test_no_error_where_the_solution_is_exact_on_both_sides_of_a_part_inside(cell):
+    """Pushed down in the middle and held above: the stress jumps there, and is uniform else."""
+    dim = 2 if cell in ("triangle", "quadrilateral") else 3
+    found = solve(parse_case(inside(dim, cell, {"middle": -1e-3, "top": 1e-3}))).error
+    assert found.energy > 0
+    assert found.total - found.contact < 1e-18 * found.energy
+    assert found.contact < 1e-9 * found.energy  # of gaps there is their rounding
+
+
+def test_a_part_that_ends_inside_separates_as_far_as_it_goes():
+    """Beside a short plate the recovery is that of a body without, at its ends of all cells."""
+    data = inside(2, "triangle", {"middle": -1e-3, "top": 0.0})
+    plate = "where(abs(x - 0.5) < 0.26, abs(y - 1) < 1e-6, 0)"
+    data["mesh"] |= {"cells": [8, 16], "inside": {"middle": plate}}
+    solution = solve(parse_case(data), comm=MPI.COMM_SELF)
+    domain = solution.problem.domain
+    cells = np.arange(domain.mesh.topology.index_map(2).size_local, dtype=np.int32)
+    middles = geometry_nodes(domain).mean(axis=1)
+    above = (middles[:, 1] > 1).astype(float)[:, None]
+    found = (nodal_means(domain, cells, above, names) for names in ((), ("middle",)))
+    whole, apart = (means[places] for means, places in found)
+    corners = geometry_nodes(domain)
+    on_line = np.abs(corners[..., 1] - 1) < 1e-9
+    within = on_line & (np.abs(corners[..., 0] - 0.5) < 0.24)
+    assert np.array_equal(apart[within][:, 0], np.broadcast_to(above, within.shape)[within])
+    assert np.abs(whole[within] - 0.5).max() < 0.26
+    assert np.array_equal(apart[~within], whole[~within])
 
 
 @pytest.mark.parametrize("dim", [2, 3])
