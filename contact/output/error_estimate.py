@@ -3,7 +3,8 @@
 Degree 1: eta_K^2 = int_K (G sigma - sigma) : S : (G sigma - sigma), G sigma being the nodal means
 of the stress inside each material (Zienkiewicz and Zhu, IJNME 24, 1987); also of degree 2 with the
 mean dilatation, whose constant pressures leave the stress an error of first order. Degree 2: the
-energy of the errors of `contact.output.local_problems`. S is the compliance of the last
+energy of the errors of `contact.output.local_problems`. Of degree 1 the loads that nodes do not see
+are added (`contact.output.oscillation`). S is the compliance of the last
 linearisation, with the secant modulus. In a piezoelectric body sigma is the pair (sigma, D), and S
 that of [F, -e^T; e, beta], whose energy is eps : F eps + E . beta E. At the contact pressures times
 gaps between the nodes are added, and friction times slip that is not dissipated (Krause, Veeser and
@@ -31,6 +32,7 @@ from contact.mesh.geometry import geometry_nodes, measures
 from contact.mesh.together import members, part
 from contact.output.fields import DerivedFields
 from contact.output.local_problems import LocalProblems
+from contact.output.oscillation import oscillation
 from contact.output.recovery import nodal_means
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -110,7 +112,7 @@ def estimated(
         local = LocalProblems(problem, state, flux)
     at, weights = rule(shape, 2 * body.degree)
     linear, shapes = shape.lagrange(1, at), shape.lagrange(shape.degree_of(flux.shape[1]), at)
-    apart = _acting_inside(problem)
+    apart, modulus = _acting_inside(problem), np.ones(len(flux))
     squares, sums, volume = np.zeros(len(flux)), np.zeros(3), 0.0
     for material, cells in zip(body.body.materials, body.cells, strict=True):
         law = material.law
@@ -119,6 +121,10 @@ def estimated(
         else:
             shear = np.asarray(law.secant_modulus(strain[cells] ** 2)).mean(axis=1)
         factor = factor_of(body.domain, material, cells)
+        modulus[cells] = shear * factor
+        if isinstance(law, Anisotropic):
+            shears = np.diag(mandel(law.stiffness))[5 if body.dim == 2 else 3 :]
+            modulus[cells] = shears.mean() / 2 * factor
         means, places = None, None
         if local is not None:
             squares[cells] = local.squares(cells, _stiffness(material, shear, factor))
@@ -150,6 +156,9 @@ def estimated(
             else:
                 stiffer = np.asarray(_bulk(material) / shear[some], dtype=np.float64)
             sums[1:] += known @ stiffer, known.sum()
+    if body.degree == 1:  # the local problems of degree 2 see loads up to the third degree
+        # A surface is as stiff as E/(1 - nu^2), twice the shear modulus and more.
+        squares += oscillation(problem, state.time) / (2 * modulus)
     at_contact = _at_contact(problem, state)
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
