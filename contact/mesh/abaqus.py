@@ -69,6 +69,13 @@ FACES = {
 #: Keywords without a meaning for a mesh that are not worth a word.
 SILENT = {"HEADING", "PREPRINT", "END PART", "PART", "ASSEMBLY", "END ASSEMBLY", "END INSTANCE"}
 
+#: Keywords that make or move nodes and elements which do not stand in the file.
+MAKING = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPORT"}
+MAKING |= {"SYMMETRIC MODEL GENERATION"}
+
+#: The files that are read.
+FLAT = "accepted: every node and element in the file, by its pre-processor without parts"
+
 #: Keywords whose data lines may stand in a file of their own, by INPUT.
 FROM_FILES = {"NODE", "ELEMENT"}
 
@@ -83,6 +90,7 @@ class _Read:
     sets: dict[str, list[int | str]] = field(default_factory=dict)
     surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
+    placed: set[str] = field(default_factory=set)
     other: list[str] = field(default_factory=list)
 
     def name(self, given: str) -> str:
@@ -169,10 +177,15 @@ def _take(
     found: _Read, keyword: str, options: dict[str, str], lines: Sequence[Sequence[str]]
 ) -> None:
     """Take a keyword with its data."""
+    if keyword in MAKING or (keyword == "NODE" and options.get("SYSTEM", "R").upper() != "R"):
+        word = keyword if keyword in MAKING else f"NODE, SYSTEM={options['SYSTEM']}"
+        raise ValueError(f"*{word} makes or moves nodes or elements; {FLAT}")
     if keyword == "NODE":
         numbers = [int(line[0]) for line in lines]
         for number, line in zip(numbers, lines, strict=True):
-            found.points[number] = [float(value or 0) for value in [*line[1:4], "", ""][:3]]
+            point = [float(value or 0) for value in [*line[1:4], "", ""][:3]]
+            if found.points.setdefault(number, point) != point and not np.isnan(point).any():
+                raise ValueError(f"*NODE: node {number} is at two places; {FLAT}")
         if "NSET" in options:
             found.nodes.setdefault(found.name(options["NSET"]), []).extend(numbers)
     elif keyword == "ELEMENT":
@@ -203,6 +216,13 @@ def _take(
         if "NAME" not in options:
             raise ValueError("*SURFACE without a name")
         found.surfaces[found.name(options["NAME"])] = (kind, rows)
+    elif keyword == "INSTANCE":
+        part = options.get("PART", "").strip('"').upper()
+        moved = len(lines) > 1 or any(float(value or 0) for line in lines for value in line)
+        if moved or part in found.placed:
+            how = "moved" if moved else "placed twice"
+            raise ValueError(f"*INSTANCE: part {part} is {how}; {FLAT}")
+        found.placed.add(part)
     elif keyword not in SILENT and keyword not in found.other:
         found.other.append(keyword)
 
@@ -242,6 +262,9 @@ def _deck(found: _Read) -> Contents:
         homes.append(np.column_stack([rows[:, 0], np.full_like(places, block), places]))
     elements = np.concatenate(homes)
     elements = elements[np.argsort(elements[:, 0], kind="stable")]
+    twice = elements[1:, 0][np.diff(elements[:, 0]) == 0]
+    if twice.size:
+        raise ValueError(f"*ELEMENT: element {twice[0]} is there twice; {FLAT}")
     deck = Contents(points, blocks)
     for key in found.sets:
         members = _members(found.sets, key, ())

@@ -381,6 +381,40 @@ def test_what_is_wrong_with_a_deck_is_said(old, new, words, tmp_path):
         from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
 
 
+INSTANCE = "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=i, PART=p\n{}*END INSTANCE\n"
+ELSE = "accepted: every node and element in the file"
+
+
+@pytest.mark.parametrize(
+    ("added", "words"),
+    [
+        (INSTANCE.format("0., 0., 1.\n"), "INSTANCE: part P is moved"),
+        (INSTANCE.format("0., 0., 0.\n0., 0., 0., 0., 0., 1., 90.\n"), "INSTANCE: part P is moved"),
+        (2 * INSTANCE.format(""), "INSTANCE: part P is placed twice"),
+        ("*NODE\n4, 0., 2.\n", "NODE: node 4 is at two places"),
+        ("*ELEMENT, TYPE=CPE4\n8, 1, 2, 5, 4\n", "ELEMENT: element 8 is there twice"),
+        ("*NODE, SYSTEM=C\n20, 1., 90.\n", "NODE, SYSTEM=C makes or moves nodes"),
+        ("*System\n0, 0, 1\n", "SYSTEM makes or moves nodes"),
+        ("*NGEN\n1, 3, 1\n", "NGEN makes or moves nodes"),
+        ("*ELGEN\n7, 2\n", "ELGEN makes or moves nodes"),
+    ],
+)
+def test_keywords_that_change_the_mesh_are_refused(added, words, tmp_path, capsys):
+    (tmp_path / "plate.inp").write_text(PLATE.replace("*BOUNDARY", f"{added}*BOUNDARY"))
+    assert main(["new", str(tmp_path / "plate.inp")]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert words in said and ELSE in said
+
+
+def test_parts_in_their_places_are_read(tmp_path):
+    """One instance that is not moved, a node that is repeated, directions of *TRANSFORM."""
+    added = INSTANCE.format("0., 0., 0.\n") + "*NODE\n4, 0., 1.\n*TRANSFORM, NSET=ground\n1, 0, 0\n"
+    (tmp_path / "plate.inp").write_text(PLATE.replace("*BOUNDARY", f"{added}*BOUNDARY"))
+    domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
+    assert regions(domain)["Eall"] == pytest.approx(2.0)
+    assert domain.notes[0].startswith("left out: *TRANSFORM, *BOUNDARY")
+
+
 def test_data_lines_from_another_file(tmp_path):
     """Of a keyword that stands before *INCLUDE, or by INPUT: they are as if they stood there."""
     (tmp_path / "plate.inp").write_text(PLATE)
