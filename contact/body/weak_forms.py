@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
@@ -25,6 +26,7 @@ from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Measure
 from contact.mesh.entities import Indices
+from contact.ranks import on_all_ranks
 from contact.typing import Array
 from forms.hencky import is_linear, secant_form
 from forms.history import HistoryLaw, QuadratureLaw
@@ -43,9 +45,30 @@ def _elastic(domain: Domain, body: Body) -> Iterator[tuple[list[Expr], Expr, Mea
                 f"has {domain.dim}"
             )
         key = f"elastic.{number}"
-        parts = [expression(domain, k, x, 0.0, f"{key}.stiffness.{i}") for i, k in enumerate(given)]
         normal = Number(0.0) if support.normal is None else support.normal
+        for name, value in (
+            *((f"stiffness.{i}", k) for i, k in enumerate(given)),
+            ("normal", normal),
+        ):
+            _check_stiffness(domain, support.on, value, f"{key}.{name}")
+        parts = [expression(domain, k, x, 0.0, f"{key}.stiffness.{i}") for i, k in enumerate(given)]
         yield parts, expression(domain, normal, x, 0.0, f"{key}.normal"), domain.ds(support.on)
+
+
+def _check_stiffness(domain: Domain, on: Any, value: Any, key: str) -> None:
+    """Refuse a stiffness that is negative, or no number, somewhere on a part. Collective."""
+    mesh, facets = domain.mesh, domain.facets(on)
+    points = compute_midpoints(mesh, domain.dim - 1, facets)
+    if facets.size > 0:  # dolfinx divides by their number
+        corners = np.unique(entities_to_geometry(mesh, domain.dim - 1, facets))
+        points = np.concatenate([points, mesh.geometry.x[corners]])
+    with on_all_ranks(domain.comm), np.errstate(all="ignore"):
+        values = np.asarray(value.numpy(points[:, : domain.dim]))
+    wrong = ~(np.isfinite(values) & (values >= 0))
+    found = domain.comm.allgather(values[wrong][:1].tolist())
+    worst = [one for own in found for one in own]
+    if worst:
+        raise InputError(f"{key}: given {worst[0]:g} on {on!r}; accepted: numbers >= 0 everywhere")
 
 
 class WeakForms:

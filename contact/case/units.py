@@ -100,6 +100,14 @@ def check_units(case: Case) -> None:
             continue
         own = material.system(labels)
         quantities = ELECTRIC if material.piezoelectric else ELASTIC
+        for known in quantities:
+            if known in labels and systems.foreign(labels[known], known):
+                words = Words(f'the unit "{labels[known]}" is not known')
+                accepted = (
+                    "beside materials by name those of SI with a prefix, and force/area, such as "
+                    "mm, MPa, N/mm^2"
+                )
+                raise fault(f"case.units.{known}", words, accepted)
         quantity = systems.contradiction(own, labels, quantities)
         if quantity is not None:
             words = Words(

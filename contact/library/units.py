@@ -84,6 +84,20 @@ def size(name: str, quantity: str) -> float | None:
     return PREFIXES.get(text.removesuffix(base)) if text.endswith(base) else None
 
 
+#: Units, in small letters, that nothing is converted to. Other words name numbers without units.
+FOREIGN = frozenset(
+    "in inch inches ft foot feet mil micron microns psi ksi msi bar kbar atm".split()
+)
+
+
+def foreign(name: str, quantity: str) -> bool:
+    """Tell whether a name is a unit that is not known, such as ``psi`` or ``MM``."""
+    lower = name.strip().lower()
+    known = (prefix + BASES[quantity] for prefix in PREFIXES)
+    alike = lower in FOREIGN or any(lower == unit.lower() for unit in known)
+    return alike and size(name, quantity) is None
+
+
 def system(units: tuple[str, str, str]) -> System:
     """Return a system by the names of its units of length, force and potential.
 

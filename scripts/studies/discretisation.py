@@ -66,7 +66,7 @@ def locking(report: Report, coarse: bool) -> None:
                 seconds = time.perf_counter() - begin
                 error = solution.error
                 assert error is not None
-                warns = any("locks" in text or "coarse" in text for text in solution.warnings)
+                warns = any("[locking]" in text or "coarse" in text for text in solution.warnings)
                 size = solution.max_displacement
                 append(columns, name, label, n, size, seconds, error.stiffness_ratio,
                        error.relative, warns)  # fmt: skip

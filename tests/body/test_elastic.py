@@ -237,3 +237,12 @@ def test_nothing_in_python_is_refused():
         domain = rectangle(MPI.COMM_SELF, (0.0, 0.0), (1.0, 1.0), (2, 2))
         body = Body(Linear(1.0, 0.0), Fixed("top", [0, 0]), elastic=Elastic("bottom", [1, 1, 1]))
         Problem(domain, body, Contact("right", 1.0))
+
+
+def test_a_stiffness_that_pulls_or_is_no_number_is_refused():
+    """A support that pulls with the load was taken, one without a value ended in a traceback."""
+    domain = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [2, 2])
+    for normal, value in ((-50.0, "-50"), (lambda x: x[0] - 0.5, "-0.")):
+        body = Body(Linear(1.0, 0.3), [], elastic=[Elastic("top", normal=normal)])
+        with pytest.raises(InputError, match=f"elastic.0.normal: given {value}"):
+            Problem(domain, body, Contact("bottom", gap=10.0))

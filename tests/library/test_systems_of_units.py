@@ -106,6 +106,7 @@ MM = {"length": "mm", "stress": "MPa"}
     ("arguments", "words"),
     [
         ({"units": None, "labels": MM}, '"SI" has m for length, and case.units.length = "mm"'),
+        ({"units": None, "labels": {"stress": "psi"}}, 'stress: the unit "psi" is not known'),
         ({"units": "GPa", "labels": MM}, '"GPa" has GPa for stress'),
         ({"units": "SI", "labels": MM}, 'accepted: "N-mm-MPa"$'),
         ({"units": "kN-mm-GPa", "labels": {"stress": "N/mm²"}}, "for stress"),
