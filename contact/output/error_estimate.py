@@ -130,9 +130,9 @@ def estimated(
             squares[cells] = local.squares(cells, _stiffness(material, shear, factor))
         else:
             # Of degree 1 stresses are most exact in the middle of a cell.
-            own = flux[cells]
-            values = own.mean(axis=1) if body.degree == 1 else own[:, : shape.corners]
-            means, places = nodal_means(body.domain, cells, values, apart)
+            values = flux.mean(axis=1) if body.degree == 1 else flux[:, : shape.corners]
+            means, places = nodal_means(body.domain, cells, values[cells], apart)
+            del values  # as large as the stresses
         for some in in_chunks(np.arange(cells.size)):
             chosen = cells[some]
             energy = _density(material, shear[some], factor[some])

@@ -57,7 +57,7 @@ def oscillation(problem: ContactProblem, time: float) -> Array:
         if load.on is not None:
             shape = whole.facet
             cells, place = cells_at(mesh, domain.facets(load.on))
-        of, corners = geometry_nodes(domain)[cells], vertices[cells]
+        of, corners = geometry_nodes(domain, cells), vertices[cells]
         at, weights = rule(shape, IN_CELLS if load.on is None else ON_FACETS)
         points = at
         if load.on is not None:
