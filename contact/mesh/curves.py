@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from dolfinx import la
 from dolfinx import mesh as dmesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
@@ -25,6 +26,9 @@ SAME = 1e-6
 
 #: Least eigenvalue of the normals at a node, over the largest, of facets that are not alike.
 APART = 0.1
+
+#: Differences of normals on a flat part.
+FLAT = 1e-9
 
 #: Share of its size that a cell must keep: else no node is moved.
 KEPT = 0.2
@@ -81,6 +85,10 @@ def _heights(
     part, facet = np.sort(part), shape_of(mesh).facet
     edges = np.array(facet.edges)
     nodes, points, normal = _facets(mesh, part)
+    spread = np.stack([normal.max(axis=0, initial=-1.0), -normal.min(axis=0, initial=1.0)])
+    coarse.comm.Allreduce(MPI.IN_PLACE, spread, op=MPI.MAX)
+    if spread.sum(axis=0).max() < FLAT:
+        return nodes[:0, 0], normal[:0], np.zeros(0)
     index_map = mesh.geometry.index_map()
     names = index_map.local_to_global(nodes.ravel()).reshape(nodes.shape)
     height = deviations(names, points, normal, Owners.of(index_map, coarse.comm)) / 4
