@@ -85,7 +85,7 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
             break
         domain = finer
     solution.adaptation = rows
-    for identifier, remarks in {"adapt": missed(asked, rows)}.items():
+    for identifier, remarks in {"adapt": missed(asked, rows if solution.converged else ())}.items():
         solution.warnings += [f"{text} [{identifier}]" for text in remarks]
     if asked.fraction == 1 and solution.converged:
         solution.intervals = intervals(rows)

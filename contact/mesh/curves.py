@@ -17,7 +17,7 @@ from contact.mesh.cells import shape_of
 from contact.mesh.deviation import deviations
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices, cells_at, exterior_facets
-from contact.mesh.geometry import determinant, jacobians, outward
+from contact.mesh.geometry import determinant, jacobians, unit_normals
 from contact.mesh.owners import Owners
 from contact.typing import Array
 
@@ -109,4 +109,4 @@ def _facets(mesh: dmesh.Mesh, facets: Indices) -> tuple[NDArray[np.int32], Array
     nodes = np.take_along_axis(own, shape.facet_nodes(1)[place], axis=1)
     points = mesh.geometry.x[nodes][:, :, :d]
     inside = mesh.geometry.x[own][:, :, :d].mean(axis=1)
-    return nodes, points, outward(shape.facet, points, inside)
+    return nodes, points, unit_normals(shape.facet, points, inside)

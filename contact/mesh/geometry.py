@@ -44,12 +44,27 @@ def jacobians(shape: Shape, of: Array, at: Array) -> Array:
     return np.einsum("qkr,nkd->nqdr", shape.gradients(degree, at), of)
 
 
-def outward(shape: Shape, points: Array, inside: Array) -> Array:
-    """Return unit normals in the middle that point away from a point of the body, shape (f, d)."""
-    normal = across(jacobians(shape, points, shape.middle)[:, 0])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    away = np.einsum("fd,fd->f", normal, points[:, 0] - inside)
-    return np.asarray(normal * np.sign(away)[:, None])
+def outward(shape: Shape, points: Array, inside: Array, at: Array) -> Array:
+    """Return normals of facets at points, away from the body and as long as facets are large.
+
+    Parameters
+    ----------
+    shape
+        Of the facets.
+    points, inside
+        Their nodes, shape (f, nodes, d), and points of the body behind them, (f, d).
+    at
+        Points of the reference facet, shape (q, d - 1); of straight simplices one vector for all.
+    """
+    normal = across(jacobians(shape, points, at))
+    away = points.mean(axis=1) - inside
+    return np.asarray(normal * np.sign(np.einsum("fqd,fd->fq", normal, away))[..., None])
+
+
+def unit_normals(shape: Shape, points: Array, inside: Array) -> Array:
+    """Return unit normals in the middle of facets, shape (f, d); as `outward`."""
+    normal = outward(shape, points, inside, shape.middle)[:, 0]
+    return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
 
 
 def sizes(shape: Shape, of: Array, at: Array) -> Array:
@@ -92,9 +107,7 @@ def facet_normals(
     x = mesh.geometry.x[_compat.geometry_dofmap(mesh)[cells]][:, :, :d]
     own = shape.facet_nodes(domain.order)[place]
     points = np.take_along_axis(x, own[:, :, None], axis=1)
-    normal = across(jacobians(shape.facet, points, shape.facet.nodes(degree)))
-    away = points.mean(axis=1) - x.mean(axis=1)
-    return cells, place, normal * np.sign(np.einsum("fqd,fd->fq", normal, away))[..., None]
+    return cells, place, outward(shape.facet, points, x.mean(axis=1), shape.facet.nodes(degree))
 
 
 def determinant(matrix: Array) -> Array:

@@ -8,6 +8,7 @@ from contact import parse_case, solve
 from contact.case.build import build_problem
 from contact.cli.check import expectations
 from forms.elasticity import isotropic
+from scripts.studies.discretisation import punch
 from tests.problems.bar import changed
 
 YIELDING = {"material__yield_strain": 0.005, "load__0__traction": [0.0, -0.05]}
@@ -28,36 +29,19 @@ def says(solution):
     return any("the mesh may lock" in text for text in solution.warnings)
 
 
-def punch(cell, degree, element="standard", steps=8):
-    """Prandtl's smooth punch, half width 1: the load is (2 + pi) Y/sqrt(3)."""
-    tables = {
-        "mesh": {
-            "generator": "rectangle", "size": [5.0, 2.5], "cells": [10, 5], "cell": cell,
-            "parts": {"punch": {"side": "top", "to": 1.0}, "rest": {"side": "top", "from": 1.0}},
-        },
-        "space": {"degree": degree, "element": element},
-        "material": {"law": "j2", "young": 1000.0, "poisson": 0.3, "yield_stress": 1.0},
-        "fixed": [
-            {"on": "left", "displacement": [0.0, "free"]},
-            {"on": "right", "displacement": [0.0, "free"]},
-            {"on": "bottom", "displacement": [0.0, 0.0]},
-            {"on": "punch", "displacement": ["free", "-0.08*t"]},
-        ],
-        "contact": {"on": "rest", "gap": 10.0},
-        "evolution": {"times": [0.0, 1.0], "steps": [steps]},
-    }  # fmt: skip
-    return solve(parse_case(tables), comm=MPI.COMM_SELF)
+def pressed(cell, degree, element="standard", steps=8):
+    return solve(punch(2, degree, element, cell, steps), comm=MPI.COMM_SELF)
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 def test_plastic_flow_locks_in_few_steps_and_in_many(cell):
     """The secant of a step is nearly elastic: it was said nowhere, least in many steps."""
-    few, many = punch(cell, 1), punch(cell, 1, steps=16)
+    few, many = pressed(cell, 1), pressed(cell, 1, steps=16)
     for locked in (few, many):
         assert -locked.supports["punch"].force[1] > 1.3 * (2 + np.pi) / np.sqrt(3)
         assert says(locked)
     assert many.error.stiffness_ratio == pytest.approx(few.error.stiffness_ratio, rel=0.1)
-    assert not says(punch("triangle", 2, "mean_dilatation"))
+    assert not says(pressed("triangle", 2, "mean_dilatation"))
 
 
 @pytest.mark.parametrize("steps", [2, 16])

@@ -18,7 +18,7 @@ from contact.mesh.cells import Shape, facet_with, rule, shape_of
 from contact.mesh.deviation import deviations
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
-from contact.mesh.geometry import across, inverse, jacobians, measures, outward
+from contact.mesh.geometry import across, inverse, jacobians, measures, unit_normals
 from contact.mesh.owners import ALONE, Owners
 from contact.ranks import exchanged
 from contact.tolerances import NEGLIGIBLE
@@ -233,7 +233,7 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     points = np.take_along_axis(x, shape.facet_nodes(order)[place][:, :, None], axis=1)
     numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
     names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
-    normal = outward(shape.facet, points, x.mean(axis=1))
+    normal = unit_normals(shape.facet, points, x.mean(axis=1))
     corners = shape.facet.corners
     owners = Owners.of(space.dofmap.index_map, domain.comm)
     if order == 1:
