@@ -11,6 +11,8 @@ it is given, or free under a force that is.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from dolfinx import fem, la
@@ -26,10 +28,37 @@ from contact.body.loads import Loads
 from contact.body.rigid import Bolt
 from contact.errors import InputError
 from contact.mesh.domain import Domain
-from contact.mesh.entities import cell_facets
+from contact.mesh.entities import Indices, cell_facets, connected
 from contact.mesh.together import members
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """The pieces into which cuts of free shortenings divide a body, and where these meet.
+
+    Attributes
+    ----------
+    places
+        Where these shortenings are among the global unknowns, shape (k,).
+    component, count
+        The piece of each owned node, at a cut the one below it, and how many there are.
+    points
+        Nodes of this rank at the cuts, once for each of the pieces above, shape (n, d).
+    below, above
+        The pieces on both sides there, shape (n,).
+    normals
+        By how much those below move farther, by unit shortenings, shape (n, d, k).
+    """
+
+    places: list[int]
+    component: Indices
+    count: int
+    points: Array
+    below: Indices
+    above: Indices
+    normals: Array
 
 
 class Cuts:
@@ -68,8 +97,10 @@ class Cuts:
         self.places, self._comm = list(places), domain.comm
         self.parts = [bolt.on for bolt in body.bolts]
         found = [_direction(domain, space, whole, part) for part in self.parts]
-        self.directions = [direction for direction, _, _ in found]
-        self._ends = [(nodes, normal) for _, nodes, normal in found]
+        self.directions = [direction for direction, _, _, _ in found]
+        self._ends = [(nodes, normal) for _, nodes, normal, _ in found]
+        self._space, self._moved = space, [moved for _, _, _, moved in found]
+        self._free = [k for k, bolt in enumerate(body.bolts) if bolt.shortening is None]
         zero = constant(domain.mesh, 0.0)
         self._loads = [Loads(domain, body, direction, zero, 1) for direction in self.directions]
         self._last: tuple[float, Array] | None = None
@@ -89,6 +120,35 @@ class Cuts:
             own = np.array([loads.at(time)[0] for loads in self._loads])
             self._last = time, np.asarray(self._comm.allreduce(own, op=MPI.SUM))
         return self._last[1]
+
+    @cached_property
+    def pieces(self) -> Pieces | None:
+        """The pieces between cuts under given forces; None without any. Collective.
+
+        A node at a cut stands for two, that of the cells above is moved with these.
+        """
+        if not self._free:
+            return None
+        space, index_map = self._space, self._space.dofmap.index_map
+        size = index_map.size_local + index_map.num_ghosts
+        by = np.stack([self._moved[k].ravel() for k in self._free], axis=1)
+        cells, at = space.dofmap.list.copy(), np.flatnonzero(by.any(axis=1))
+        rows = np.column_stack([cells.ravel()[at], by[at]])
+        doubles, of = np.unique(rows, axis=0, return_inverse=True)
+        cells.ravel()[at] = size + of.ravel()
+        nodes, moved = doubles[:, 0].astype(np.int32), doubles[:, 1:]
+        keys = np.column_stack([index_map.local_to_global(nodes), moved])
+        labels, count = connected(space, cells, keys)
+        normals = np.stack([self._ends[k][1] for k in self._free], axis=1)
+        return Pieces(
+            [self.places[k] for k in self._free],
+            labels[: index_map.size_local],
+            count,
+            space.tabulate_dof_coordinates()[nodes, : len(normals)],
+            labels[nodes],
+            labels[size:],
+            moved[:, None, :] * normals,
+        )
 
     def check(self, nodes: NDArray[np.int32], along: Array, text: str) -> None:
         """Refuse anything that acts on nodes of a cut by their displacement across it. Collective.
@@ -124,8 +184,8 @@ class Cuts:
 
 def _direction(
     domain: Domain, space: fem.FunctionSpace, whole: fem.FunctionSpace, part: str
-) -> tuple[fem.Function, NDArray[np.int32], Array]:
-    """Return -psi n of a cut, its owned nodes, and n. Collective.
+) -> tuple[fem.Function, NDArray[np.int32], Array, NDArray[np.bool_]]:
+    """Return -psi n of a cut, its owned nodes, n, and which nodes of cells it moves. Collective.
 
     Raises
     ------
@@ -160,7 +220,7 @@ def _direction(
     made, moved = fem.Function(whole), touches & above[:, None]
     made.x.array.reshape(-1, d)[whole.dofmap.list[moved]] = -normal
     own = np.flatnonzero(flags.array[: space.dofmap.index_map.size_local] > 0)
-    return made, own.astype(np.int32), normal
+    return made, own.astype(np.int32), normal, moved
 
 
 def _check_through(

@@ -376,8 +376,11 @@ class Body:
             fits = self.law is law and self.piezo is piezo
             expect("regions beside a law", self.regions, accepted, fits)
         history = any(isinstance(m.law, HistoryLaw) for m in self.materials)
-        accepted = "materials without internal variables where a bolt is"
-        expect("bolts", self.bolts, accepted, not (self.bolts and history))
+        if self.bolts and history:
+            raise InputError(
+                f"bolt on {self.bolts[0].on!r}: a material of the body has internal variables, as "
+                "flow theory has; accepted: materials without internal variables where a bolt is"
+            )
         fits = not self.electrodes or self.piezo is not None
         expect("electrodes", self.electrodes, "electrodes of a piezoelectric material", fits)
 

@@ -109,21 +109,48 @@ def components(space: fem.FunctionSpace) -> tuple[Indices, int]:
 
     Collective. Nodes of one cell are connected; regions that share no nodes are not.
     """
-    comm, index_map, cells = lasting(space.mesh.comm), space.dofmap.index_map, space.dofmap.list
-    owned = index_map.size_local
+    labels, count = connected(space, space.dofmap.list)
+    return labels[: space.dofmap.index_map.size_local], count
+
+
+def connected(
+    space: fem.FunctionSpace, cells: Indices, keys: npt.NDArray[np.int64] | None = None
+) -> tuple[Indices, int]:
+    """Return the connected component of each vertex of a graph, and how many there are. Collective.
+
+    Parameters
+    ----------
+    space
+        A space: the first vertices are its local nodes.
+    cells
+        Vertices of each local cell, shape (cells, n): they are connected.
+    keys
+        Of the further vertices, by which several ranks know them, shape (further, k).
+
+    Returns
+    -------
+    The components of the local vertices, shape (nodes + further,), and their number.
+    """
+    comm, index_map = lasting(space.mesh.comm), space.dofmap.index_map
+    owned, nodes = index_map.size_local, index_map.size_local + index_map.num_ghosts
     first = np.repeat(cells[:, 0], cells.shape[1] - 1)
-    count, here = graph_components(first, cells[:, 1:].ravel(), owned + index_map.num_ghosts)
+    further = 0 if keys is None else len(keys)
+    count, here = graph_components(first, cells[:, 1:].ravel(), nodes + further)
     here = here + comm.scan(count) - count
     total = comm.allreduce(count, op=MPI.SUM)
     # The numbers that a ghost has here and at its owner are of one component.
     names = la.vector(index_map)
-    names.array[:] = here
+    names.array[:] = here[:nodes]
     names.scatter_forward()
     there = names.array[owned:].astype(np.int64)
-    pairs = np.unique(np.column_stack([here[owned:], there]), axis=0)
-    both = np.concatenate(comm.allgather(pairs))
+    pairs = [np.unique(np.column_stack([here[owned:nodes], there]), axis=0)]
+    if keys is not None:
+        rows = np.concatenate(comm.allgather(np.column_stack([keys, here[nodes:]])))
+        _, begin, same = np.unique(rows[:, :-1], axis=0, return_index=True, return_inverse=True)
+        pairs.append(np.column_stack([rows[:, -1], rows[begin[same.ravel()], -1]]))
+    both = np.concatenate(comm.allgather(np.concatenate(pairs)))
     count, labels = graph_components(both[:, 0], both[:, 1], total)
-    return labels[here[:owned]], count
+    return labels[here], count
 
 
 def component_sums(

@@ -201,10 +201,8 @@ def _named(group: Group, motions: Array) -> str:
     problem, names = group.problem, group.problem.domain.regions
     if group.count == 1 or len(names) == 1:
         return "the body"
-    component, dofs = problem.equilibrium.components[0], problem.equilibrium.space.dofmap.list
-    each = 1 if problem.domain.revolved else 3 * (problem.dim - 1)  # motions of a component
-    own = motions[: each * len(group.components)].reshape(len(group.components), -1)
-    amounts = np.linalg.norm(own, axis=1)
+    component, dofs = group.component, problem.equilibrium.space.dofmap.list
+    amounts = np.linalg.norm(group.of_components(motions), axis=(1, 2))
     moved = np.array(group.components)[amounts >= amounts.max() / 2]
     found = []
     for name, cells in names.items():

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from mpi4py import MPI
 
+from contact.body.rigid import Rigid
 from contact.interface.law import Conductor
 from contact.output import bodies, discretisation
 from contact.output.error_estimate import estimated
@@ -298,8 +299,8 @@ def untouched(solution: Solution) -> Iterator[Remark]:
         return
     if problem.since is not None or problem.comm.allreduce(closed, op=MPI.LOR):
         return
-    masters = problem.equilibrium.global_unknowns
-    free = np.any(masters.free & masters.mechanical)
+    members = problem.equilibrium.global_unknowns.members
+    free = any(isinstance(m.description, Rigid) and m.free.any() for m in members)
     yield (
         "nothing touches: no contact node has met the foundation; it is too far away, or narrower "
         "than the elements there"

@@ -214,21 +214,25 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
 
 def _unconstrained(problem: ContactProblem, group: Group, unconstrained: Array) -> str:
     """Say which connected components can move, and how."""
-    count = group.count
+    count, accepted = group.count, "displacement components fixed so that it cannot"
     whole = "the body, or a rigid part," if group.moving else "the body"
     if count > 1:
-        one = 1 if problem.domain.revolved else 3 * (problem.dim - 1)
-        own = np.linalg.norm(unconstrained[: len(group.components) * one], axis=1)
-        moves = own.reshape(len(group.components), -1).max(axis=1) > 1e-6
+        moves = np.linalg.norm(group.of_components(unconstrained), axis=2).max(axis=1) > 1e-6
         where = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in group.centres[moves])
         which = "the one" if np.count_nonzero(moves) == 1 else "the group"
-        whole = f"the mesh has {count} connected components, and {which} about {where}"
-    modes = described(unconstrained, group.names)
-    return (
-        f"{whole} is not held: it can move as a rigid body ({modes}); "
-        "accepted: displacement components fixed so that it cannot"
-        + (", or regions that share the nodes between them" if count > 1 else "")
-    )
+        pieces = f"the cuts of bolts make {count} pieces" if group.cut else ""
+        whole = pieces or f"the mesh has {count} connected components"
+        whole += f", and {which} about {where}"
+        accepted += (
+            ", or a shortening of a bolt instead of its force"
+            if group.cut
+            else ", or regions that share the nodes between them"
+        )
+    motions = unconstrained
+    if group.cut:  # shortenings only follow
+        motions = linalg.orth(np.concatenate(group.of_components(unconstrained)))
+    modes = described(motions, group.names[: len(motions)])
+    return f"{whole} is not held: it can move as a rigid body ({modes}); accepted: {accepted}"
 
 
 def check_potential(problem: ContactProblem, state: State | None = None) -> None:

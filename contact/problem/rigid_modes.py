@@ -2,7 +2,8 @@
 
 Of each connected component of the mesh, or of those that move together, the modes are seen by their
 Gram matrices at supports and contact nodes; whether contact forces can balance the loads on them is
-a linear program (Farkas).
+a linear program (Farkas). A cut of a bolt under a given force ends a component: its sides move
+together, but for the shortening.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.rigid import Rigid, rigid_motions
+from contact.body.cuts import Pieces
+from contact.body.rigid import Bolt, Rigid, rigid_motions
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.tolerances import NEGLIGIBLE
@@ -37,29 +39,41 @@ class Group:
     ----------
     problem
         The problem.
-    components, count
-        Which components they are, and how many the mesh has.
-    inside
-        Which owned nodes are theirs.
+    component, count
+        The component of each owned node, and how many there are.
+    components
+        Which of them are the group's.
     moved
         The motions, of owned unknowns and global ones, shape (owned + global, m).
     names, centres
         The names of the motions, and the middles of the components.
     supports
         Gram matrix of the motions where supports hold the body, shape (m, m).
-    moving
-        Whether global unknowns are among them.
+    moving, cut
+        Whether rigid parts, and cuts of bolts, move with them.
     """
 
     problem: ContactProblem
-    components: list[int]
+    component: NDArray[np.int32]
     count: int
-    inside: NDArray[np.bool_]
+    components: list[int]
     moved: Array
     names: list[str]
     centres: Array
     supports: Array
     moving: bool
+    cut: bool
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """Which owned nodes are its components'."""
+        return np.isin(self.component, self.components)
+
+    def of_components(self, motions: Array) -> Array:
+        """Return the rows of motions, shape (m, k), by its components: (components, 1 to 6, k)."""
+        each = 1 if self.problem.domain.revolved else 3 * (self.problem.dim - 1)
+        own = motions[: each * len(self.components)]
+        return own.reshape(len(self.components), each, motions.shape[1])
 
     @cached_property
     def _at_contact(self) -> Array:
@@ -94,10 +108,12 @@ class Group:
 def groups(problem: ContactProblem) -> Iterator[Group]:
     """Give the components of the mesh one by one, joined ones together. Collective.
 
-    That is for those that touch each other, or that a rigid part or a foundation joins: they are
-    looked at together, with its motion.
+    That is for those that touch each other, or that a rigid part, a foundation or a cut joins: they
+    are looked at together, with its motion.
     """
-    component, count = problem.equilibrium.components
+    pieces = _pieces(problem)
+    whole = problem.equilibrium.components
+    component, count = whole if pieces is None else (pieces.component, pieces.count)
     joined = _joined(problem, component, count)
     for k in map(int, np.flatnonzero(~joined)):
         yield _group(problem, component, [k], count)
@@ -143,12 +159,24 @@ def _touching(problem: ContactProblem) -> NDArray[np.bool_]:
 
 def _free_motions(problem: ContactProblem) -> dict[int, str]:
     """Return the global unknowns that are motions and not given, with their names."""
-    return {
+    members = problem.equilibrium.global_unknowns.members
+    rigid = {
         member.begin + k: f"{NAMES[problem.dim][k]} of the rigid part"
-        for member in problem.equilibrium.global_unknowns.members
+        for member in members
         if isinstance(member.description, Rigid)
         for k in map(int, np.flatnonzero(member.free))
     }
+    return rigid | {
+        member.begin: f"shortening of the bolt on {member.description.on!r}"
+        for member in members
+        if isinstance(member.description, Bolt) and member.free.any()
+    }
+
+
+def _pieces(problem: ContactProblem) -> Pieces | None:
+    """Return the pieces between cuts under given forces; None without any. Collective."""
+    cuts = problem.equilibrium.cuts
+    return None if cuts is None else cuts.pieces
 
 
 def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
@@ -158,6 +186,7 @@ def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -
         problem.nodes,
         problem.equilibrium.global_unknowns.ties,
     )
+    pieces = _pieces(problem)
     touched = np.zeros(count, dtype=np.intc)
     if free and nodes.motion is not None:
         moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
@@ -166,6 +195,8 @@ def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -
         touched[component[rows // problem.equilibrium.block_size]] = 1
     if nodes.coupling is not None and nodes.coupling.between:
         touched[component[nodes.coupling.local]] = 1
+    if pieces is not None:
+        touched[pieces.below] = touched[pieces.above] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
     return touched > 0
 
@@ -194,22 +225,32 @@ def _group(
     points, global_unknowns = body.layout.points, body.global_unknowns
     names: list[str] = []
     centres, centre = [], _centre(problem)
+    pieces = _pieces(problem) if moving else None
     own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
     many = len(own_names) * len(components) + len(moving)
     moved = np.zeros((body.owned + global_unknowns.size, many))
     motions = moved[: body.owned].reshape(*body.free.shape, many)
+    at_cuts = np.zeros((0, d)) if pieces is None else pieces.points
+    joints = np.zeros((len(at_cuts), d, many))
     for k in components:
         inside, size = component == k, problem.domain.size
+        side = np.zeros(0) if pieces is None else (pieces.above == k) * 1.0 - (pieces.below == k)
         if count > 1:
-            centre, size = middle(problem, points[inside])
+            centre, size = middle(problem, np.concatenate([points[inside], at_cuts[side != 0]]))
+        columns = slice(len(names), len(names) + len(own_names))
         rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
-        motions[inside, :d, len(names) : len(names) + len(own_names)] = rigid
+        motions[inside, :d, columns] = rigid
+        rigid = rigid_motions((at_cuts - centre) / size, problem.domain.revolved)
+        joints[:, :, columns] = side[:, None, None] * rigid
         centres.append(centre)
         names += own_names
     for k, name in moving.items():
         moved[body.owned + k, len(names)] = 1.0
+        if pieces is not None and k in pieces.places:
+            joints[:, :, len(names)] = pieces.normals[:, :, pieces.places.index(k)]
         names.append(name)
-    # Relative to its restraints: supports, and rigid parts where nodes follow them.
+    # Relative to its restraints: supports, rigid parts where nodes follow them, the other side of
+    # a cut.
     nodes = body.layout.restrained
     dofs = nodes[:, None] * body.block_size + np.arange(d)
     follows = global_unknowns.ties[dofs.ravel()] @ moved[body.owned :]
@@ -217,14 +258,15 @@ def _group(
     held = nodal - np.einsum("nij,njk->nik", body.movable(nodes), nodal)
     return Group(
         problem,
-        components,
+        component,
         count,
-        np.isin(component, components),
+        components,
         moved,
         names,
         np.array(centres),
-        _gram(problem, held) + _elastic_gram(problem, moved),
-        bool(moving),
+        _gram(problem, held) + _elastic_gram(problem, moved) + _gram(problem, joints),
+        any("rigid part" in name for name in moving.values()),
+        pieces is not None,
     )
 
 
@@ -367,6 +409,7 @@ class UnilateralSupport:
     def besides(self) -> str:
         """The other motions that may be lost besides a body that is pulled off, in words."""
         moving = ", or force and moment the rigid part off the body" if self.group.moving else ""
+        moving += ", or the force of a bolt one side of its cut" if self.group.cut else ""
         along = ", or along it by more than friction holds" if self.group.problem.frictional else ""
         return moving + along
 

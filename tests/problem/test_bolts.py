@@ -26,6 +26,7 @@ from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.methods.options import NewtonOptions
 from contact.output.fields import DerivedFields
+from contact.problem.checks import check_problem
 
 COMM = MPI.COMM_WORLD
 LENGTH, YOUNG = 2.0, 10.0
@@ -247,7 +248,7 @@ WRONG = {
     "plastic": (
         {"force": 1.0},
         {"material": {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 1.0}},
-        "without internal variables",
+        "bolt on 'cut': a material of the body has internal variables",
     ),
 }
 
@@ -260,6 +261,55 @@ def test_what_is_refused(name):
     with pytest.raises(InputError, match=words) as caught:
         build_problem(bar(bolt, **more))
     assert "\n" not in str(caught.value)
+
+
+def two(one, other, cut="abs(y - 1.2) < 1e-6", **more):
+    """Return the bar with a second cut."""
+    data = bar(one, **more).model_dump(exclude_unset=True)
+    data["mesh"]["inside"]["other"] = cut
+    data["bolt"] = [*data["bolt"], {"on": "other"} | other]
+    return parse_case(data)
+
+
+@pytest.mark.parallel
+def test_forces_in_series_leave_the_piece_between_to_nothing():
+    """Its place is that of one bolt's shortening: where it is given, the other's force decides."""
+    with pytest.raises(InputError, match=r"cuts of bolts make 3 pieces.*0\.2, 1.*along y\)"):
+        solve(two({"force": 0.02}, {"force": 0.02}), comm=COMM)
+    solution = solve(two({"force": 0.02}, {"shortening": 0.001}), comm=COMM)
+    found = solution.movements["bolts"]
+    assert found["other"]["force"] == pytest.approx(0.02)
+    assert found["cut"]["shortening"] == pytest.approx(0.02 * LENGTH / YOUNG / 0.4 - 0.001)
+
+
+@pytest.mark.parallel
+def test_cuts_that_cross_make_four_pieces():
+    held = [{"on": on, "displacement": ["free", 0.0]} for on in ("bottom", "top")]
+    held.append({"on": "left", "displacement": [0.0, "free"]})
+    bolts = {"force": 0.02}, {"force": -0.05}, "abs(x - 0.2) < 1e-6"
+    solution = solve(two(*bolts, fixed=held, contact={"on": "right"}), comm=COMM)
+    stress = stresses(solution)
+    assert np.allclose(stress[:, 1, 1], 0.02 / 0.4) and np.allclose(stress[:, 0, 0], -0.05 / LENGTH)
+    free = two(*bolts, fixed=held[::2], contact={"on": "top"})
+    with pytest.raises(InputError, match=r"make 4 pieces, and the group .*along x, together\)"):
+        check_problem(build_problem(free, COMM))
+
+
+@pytest.mark.parallel
+def test_a_force_that_nothing_bears_is_refused():
+    held = {"fixed": [{"on": "top", "displacement": [0.0, 0.0]}]}
+    words = "or the force of a bolt one side of its cut"
+    with pytest.raises(InputError, match=words):
+        solve(bar({"force": 0.02}, **held, contact={"on": "bottom"}), comm=COMM)
+    pressed = solve(bar({"force": -0.02}, **held, contact={"on": "bottom"}), comm=COMM)
+    assert pressed.contact_force[1] == pytest.approx(-0.02)
+    with pytest.raises(InputError, match=r"make 2 pieces, and the one about \(0\.2, 0\.4\)"):
+        solve(bar({"force": 0.02}, **held), comm=COMM)
+
+
+def test_a_bolt_is_no_rigid_part_in_words():
+    (said,) = (w for w in solve(bar({"force": 0.02})).warnings if "[no-contact]" in w)
+    assert "rigid" not in said
 
 
 @pytest.mark.parallel
