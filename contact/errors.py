@@ -1,11 +1,21 @@
 """Errors that a user can mend."""
 
+import re
+
+#: How NumPy writes a number where Python's own writing is asked for.
+NUMBER = re.compile(r"\bnp\.(?:u?int|float|bool|str)\d*_?\(([^()]*)\)|\bnp\.(True|False)_?\b")
+
 
 class InputError(ValueError):
     """Bad input: the message names the fault and the accepted values.
 
-    The command line prints the message alone and leaves with exit status 2.
+    The command line prints the message alone and leaves with exit status 2. Numbers of NumPy that
+    it repeats stand there as numbers.
     """
+
+    def __str__(self) -> str:
+        """Return the message."""
+        return NUMBER.sub(lambda found: found[1] or found[2] or "", super().__str__())
 
 
 class SingularError(InputError):

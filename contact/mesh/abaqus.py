@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from contact.mesh.cells import together
-from contact.mesh.extraction import Contents, Ints
+from contact.mesh.cells import distinct, once, together
+from contact.mesh.extraction import Contents, Ints, same_name
 
 #: meshio's names of elements by their dimension and number of nodes.
 KINDS = {
@@ -66,6 +66,12 @@ FACES = {
     ),
 }
 
+#: Dimensions of elements by meshio's names.
+DIMENSIONS = {name: dim for (dim, _), name in KINDS.items()}
+
+#: Either side of a shell, which is a facet of solids as a whole.
+SIDES = {"", "S1", "S2", "SPOS", "SNEG"}
+
 #: Keywords without a meaning for a mesh that are not worth a word.
 SILENT = {"HEADING", "PREPRINT", "END PART", "PART", "ASSEMBLY", "END ASSEMBLY", "END INSTANCE"}
 
@@ -87,6 +93,7 @@ class _Read:
     points: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[str, list[int]] = field(default_factory=dict)
     nodes: dict[str, list[int | str]] = field(default_factory=dict)
+    nodes_of: dict[str, list[str]] = field(default_factory=dict)
     sets: dict[str, list[int | str]] = field(default_factory=dict)
     surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
@@ -202,8 +209,11 @@ def _take(
         if keyword not in options:
             raise ValueError(f"*{keyword} without a name")
         into = found.nodes if keyword == "NSET" else found.sets
-        members = into.setdefault(found.name(options[keyword]), [])
-        if "GENERATE" in options:
+        key = found.name(options[keyword])
+        members = into.setdefault(key, [])
+        if keyword == "NSET" and "ELSET" in options:
+            found.nodes_of.setdefault(key, []).append(found.name(options["ELSET"]))
+        elif "GENERATE" in options:
             for line in lines:
                 first, last, step = (*(int(value) for value in line[:3]), 1)[:3]
                 members.extend(range(first, last + 1, step))
@@ -269,15 +279,26 @@ def _deck(found: _Read) -> Contents:
     for key in found.sets:
         members = _members(found.sets, key, ())
         deck.groups[found.names[key]] = _by_block(members, elements)
+    for key, sets in found.nodes_of.items():
+        chosen = [number for name in sets for number in _members(found.sets, name, ())]
+        for block, within in _by_block(chosen, elements).items():
+            found.nodes[key] += map(int, tags[np.unique(blocks[block][1][within])])
     for key in found.nodes:
         numbers = _members(found.nodes, key, ())
         deck.nodes[found.names[key]] = np.flatnonzero(np.isin(tags, numbers))
+    dim, twice = max((DIMENSIONS[name] for name, _ in blocks), default=0), []
     for key, (sort, lines) in found.surfaces.items():
+        name = found.names[key]
         if sort == "NODE":
             numbers = _named(found, found.nodes, [line[0] for line in lines])
-            deck.nodes[found.names[key]] = np.flatnonzero(np.isin(tags, numbers))
+            own = np.flatnonzero(np.isin(tags, numbers))
+            if not np.array_equal(deck.nodes.setdefault(name, own), own):
+                twice.append(name)
+            deck.nodes[name] = own
         elif sort == "ELEMENT":
-            deck.surfaces[found.names[key]] = _faces(found, lines, elements, blocks)
+            deck.surfaces[name] = _faces(found, lines, elements, blocks, dim)
+    if twice:
+        deck.notes.append(same_name(twice))
     if found.other:
         deck.notes.append(f"left out: {', '.join(f'*{word}' for word in found.other)}")
     return deck
@@ -330,34 +351,27 @@ def _faces(
     rows: Sequence[Sequence[str]],
     elements: Ints,
     blocks: Sequence[tuple[str, Ints]],
+    dim: int,
 ) -> Ints:
-    """Return the faces of a surface by their corners."""
+    """Return the faces of a surface by their corners; edges of shells are no faces of solids."""
     faces: list[Ints] = []
-    every: dict[int, list[Ints]] = {}
+    whole: dict[str, list[Ints]] = {}
     for given, label in ((row[0], row[1].upper() if len(row) > 1 else "") for row in rows):
         for block, members in _by_block(_named(found, found.sets, [given]), elements).items():
             name, nodes = blocks[block]
-            corners = FACES.get(name.rstrip("0123456789"), ())
-            if re.fullmatch(r"[SE]\d", label) and 0 < int(label[1]) <= len(corners):
-                faces.append(nodes[members][:, list(corners[int(label[1]) - 1])])
-            elif label in ("", "SPOS", "SNEG"):
-                # Shells and membranes; of solids the faces of one of them alone.
-                if name.startswith(("triangle", "quad")):
-                    faces.append(nodes[members][:, : len(corners)])
-                else:
-                    for face in corners:
-                        every.setdefault(len(face), []).append(nodes[members][:, list(face)])
-            else:
+            stem, of = name.rstrip("0123456789"), DIMENSIONS[name]
+            corners = FACES.get(stem, ())
+            number = int(label[1]) if re.fullmatch(r"[SE]\d", label) else 0
+            if of == dim - 1 and label in SIDES:
+                faces.append(nodes[members][:, : len(corners) or 2])
+            elif of == dim and 0 < number <= len(corners):
+                faces.append(nodes[members][:, list(corners[number - 1])])
+            elif of == dim and label == "":
+                whole.setdefault(name, []).append(nodes[members])
+            elif of == dim or not (number or label in SIDES):
                 raise ValueError(f"*SURFACE: elements {given} have no face {label!r}")
-    faces += [once(np.concatenate(alike)) for alike in every.values()]
-    least = min((face.shape[1] for face in faces), default=1)
-    # Edges of shells are no faces of solids.
-    return together([face for face in faces if least > 2 or face.shape[1] == least])
-
-
-def once(faces: Ints) -> Ints:
-    """Return the faces that are there once."""
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    return np.asarray(faces[np.sort(first[count == 1])])
+    every: list[Ints] = []
+    for name, alike in whole.items():
+        cells = distinct(np.concatenate(alike))
+        every += [cells[:, list(face)] for face in FACES[name.rstrip("0123456789")]]
+    return together([*faces, once(together(every))] if every else faces)

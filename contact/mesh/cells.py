@@ -304,23 +304,49 @@ def simplices(rows: Nodes, dim: int) -> Nodes:
 
 
 def together(faces: Sequence[Nodes]) -> Nodes:
-    """Return facets of one dimension as one array, cut into triangles where they are unlike."""
-    if len({face.shape[1] for face in faces}) > 1:
+    """Return facets of one dimension as one array, without those that have collapsed.
+
+    They are cut into triangles where they are unlike, or two corners of one are one node.
+    """
+    unlike = len({face.shape[1] for face in faces}) > 1
+    if unlike or any(face.shape[1] > 3 and not proper(face).all() for face in faces):
         faces = [simplices(face, 2).reshape(-1, 3) for face in faces]
-    return np.concatenate(faces) if faces else np.zeros((0, 1), dtype=np.int64)
+    found = np.concatenate(faces) if faces else np.zeros((0, 1), dtype=np.int64)
+    return found[proper(found)]
+
+
+def proper(rows: Nodes) -> NDArray[np.bool_]:
+    """Return which cells or facets have no node twice, shape (n,)."""
+    return np.asarray(np.all(np.diff(np.sort(rows, axis=1), axis=1) != 0, axis=1))
+
+
+def distinct(rows: Nodes) -> Nodes:
+    """Return cells or facets without those that have the nodes of one before."""
+    first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)[1]
+    return rows[np.sort(first)]
+
+
+def once(faces: Nodes) -> Nodes:
+    """Return the facets that are there once."""
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return faces[np.sort(first[count == 1])]
 
 
 #: Name, dimension and order of a type of elements, as Gmsh has them.
 Kind = tuple[str, int, int]
 
 
-def as_simplices(kinds: Sequence[Kind]) -> tuple[Shape, list[Kind], str] | None:
+def as_simplices(kinds: Sequence[Kind], collapsed: int = 0) -> tuple[Shape, list[Kind], str] | None:
     """Return how cells that are not all of one shape of ours are taken; None if they are.
 
     Parameters
     ----------
     kinds
         The types of elements of a mesh.
+    collapsed
+        How many of its cells have a node at two corners: a hexahedron that is a prism.
 
     Returns
     -------
@@ -331,11 +357,13 @@ def as_simplices(kinds: Sequence[Kind]) -> tuple[Shape, list[Kind], str] | None:
     words = {name.split()[0] for name, _ in cells}
     if dim < 2 or not words <= {*CUT} or max(order for _, order in cells) > 2:
         return None
-    if len(cells) == 1 and words <= {shape.name.capitalize() for shape in SHAPES}:
+    if not collapsed and len(cells) == 1 and words <= {s.name.capitalize() for s in SHAPES}:
         return None
     shape = {2: TRIANGLE, 3: TETRAHEDRON}[dim]
     found = " beside ".join(repr(name) for name, _ in cells)
     straight = " with straight edges" if any(order > 1 for _, order in cells) else ""
+    if collapsed:
+        found += f", {collapsed} of them with one node at several corners"
     note = f"its cells, {found}, become {shape.plural}{straight}: a mesh has cells of one kind"
     others = [kind for kind in kinds if kind[1] < dim]
     return shape, [*others, (f"{shape.name.capitalize()} {shape.corners}", dim, 1)], note

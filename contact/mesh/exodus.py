@@ -1,9 +1,12 @@
-"""Blocks and side sets of Exodus files, which meshio leaves out.
+"""Exodus files: their blocks, node sets and side sets.
+
+meshio's reader leaves out side sets and names, and knows neither elements of MOOSE, such as TET10,
+nor node sets without names.
 
 References
 ----------
 Schoof and Yarberry, EXODUS II: a finite element data model, Sandia report SAND92-2137 (1994),
-tables of the sides of elements.
+tables of the nodes and the sides of elements.
 """
 
 from __future__ import annotations
@@ -15,6 +18,22 @@ import numpy as np
 
 from contact.mesh.cells import together
 from contact.mesh.extraction import Contents, Ints
+
+#: Beginnings of the names of elements, and meshio's names without a number; "" for points.
+KINDS = {
+    "SPHERE": "",
+    "BEAM": "line",
+    "BAR": "line",
+    "TRUSS": "line",
+    "EDGE": "line",
+    "TRI": "triangle",
+    "QUAD": "quad",
+    "SHELL": "quad",
+    "TET": "tetra",
+    "PYR": "pyramid",
+    "WEDGE": "wedge",
+    "HEX": "hexahedron",
+}
 
 #: Corners of the sides of elements, by meshio's names without a number.
 SIDES = {
@@ -33,22 +52,76 @@ SIDES = {
     ),
 }
 
+#: Sides of shells in 3-D, whose first two are the whole; their edges are no facets of solids.
+SHELLS = {"triangle": ((0, 1, 2), (0, 2, 1)), "quad": ((0, 1, 2, 3), (0, 3, 2, 1))}
 
-def add(file: Path, contents: Contents) -> None:
-    """Add the blocks and the side sets of a file to its other contents."""
+
+def read(file: Path) -> Contents:
+    """Read an Exodus file.
+
+    Raises
+    ------
+    ValueError
+        If it has elements that are not known, or whose nodes it does not have.
+    Exception
+        Of any kind, if it is damaged.
+    """
     import netCDF4
 
     with netCDF4.Dataset(str(file)) as data:
         data.set_auto_mask(False)
-        for block, name in enumerate(_names(data, "eb", len(contents.blocks))):
-            members = np.arange(len(contents.blocks[block][1]), dtype=np.int64)
-            contents.groups.setdefault(name, {})[block] = members
-        count = len(data.dimensions["num_side_sets"]) if "num_side_sets" in data.dimensions else 0
-        for number, name in enumerate(_names(data, "ss", count), 1):
-            if f"elem_ss{number}" in data.variables:
-                elements = np.asarray(data.variables[f"elem_ss{number}"][:], dtype=np.int64) - 1
-                sides = np.asarray(data.variables[f"side_ss{number}"][:], dtype=np.int64) - 1
-                contents.surfaces[name] = _facets(contents, elements, sides)
+        points = np.zeros((len(data.dimensions["num_nodes"]), 3))
+        if "coord" in data.variables:
+            given = np.asarray(data.variables["coord"][:], dtype=float)
+            points[:, : len(given)] = given.T
+        else:
+            for axis, name in enumerate(("coordx", "coordy", "coordz")):
+                if name in data.variables:
+                    points[:, axis] = data.variables[name][:]
+        made = Contents(points, [])
+        _add_blocks(data, made)
+        _add_sets(data, made)
+    return made
+
+
+def _add_blocks(data: Any, made: Contents) -> None:
+    """Add the elements, and each block as a group."""
+    blocks: list[tuple[str, Ints]] = []
+    for number, name in enumerate(_names(data, "eb", _count(data, "num_el_blk"))):
+        if f"connect{number + 1}" not in data.variables:  # a block of no elements
+            blocks.append(("vertex", np.zeros((0, 1), dtype=np.int64)))
+            continue
+        given = data.variables[f"connect{number + 1}"]
+        rows = np.asarray(given[:], dtype=np.int64) - 1
+        if rows.size and not 0 <= rows.min() <= rows.max() < len(made.points):
+            raise ValueError("it has elements whose nodes it does not have")
+        kind = str(given.elem_type).upper()
+        known = [own for begins, own in KINDS.items() if kind.startswith(begins)]
+        if not known:
+            raise ValueError(f"elements {kind} that are not known")
+        blocks.append((known[0] or "vertex", rows))
+        made.groups.setdefault(name, {})[number] = np.arange(len(rows), dtype=np.int64)
+    made.blocks = blocks
+
+
+def _add_sets(data: Any, made: Contents) -> None:
+    """Add node sets and side sets."""
+    for number, name in enumerate(_names(data, "ns", _count(data, "num_node_sets")), 1):
+        if f"node_ns{number}" in data.variables:
+            chosen = np.asarray(data.variables[f"node_ns{number}"][:], dtype=np.int64) - 1
+            made.nodes[name] = np.union1d(made.nodes.get(name, chosen), chosen)
+    for number, name in enumerate(_names(data, "ss", _count(data, "num_side_sets")), 1):
+        if f"elem_ss{number}" in data.variables:
+            elements, sides = (
+                np.asarray(data.variables[f"{of}_ss{number}"][:], dtype=np.int64) - 1
+                for of in ("elem", "side")
+            )
+            made.surfaces[name] = _facets(made, elements, sides)
+
+
+def _count(data: Any, dimension: str) -> int:
+    """Return a dimension of the file, 0 without it."""
+    return len(data.dimensions[dimension]) if dimension in data.dimensions else 0
 
 
 def _names(data: Any, kind: str, count: int) -> list[str]:
@@ -66,13 +139,15 @@ def _names(data: Any, kind: str, count: int) -> list[str]:
 def _facets(contents: Contents, elements: Ints, sides: Ints) -> Ints:
     """Return the sides of elements by their corners."""
     found: list[Ints] = []
-    first = 0
+    tables, first = SIDES, 0
+    if {name for name, _ in contents.blocks} & {"tetra", "pyramid", "wedge", "hexahedron"}:
+        tables = SIDES | SHELLS
     for name, nodes in contents.blocks:
         here = (elements >= first) & (elements < first + len(nodes))
-        table = SIDES.get(name.rstrip("0123456789"))
-        if here.any() and table is not None:
-            rows = nodes[elements[here] - first]
-            for side in np.unique(sides[here]):
-                found.append(rows[sides[here] == side][:, list(table[side])])
+        table = tables.get(name, ())
+        for side in np.unique(sides[here]):
+            if side < len(table):
+                rows = nodes[elements[here & (sides == side)] - first]
+                found.append(rows[:, list(table[side])])
         first += len(nodes)
     return together(found)

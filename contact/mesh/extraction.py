@@ -134,6 +134,11 @@ class Contents:
     notes: list[str] = field(default_factory=list)
 
 
+def same_name(names: Sequence[str]) -> str:
+    """Return the note on sets of nodes that are left out, as a surface has their name."""
+    return f"sets left out, as a surface of other facets has their name: {', '.join(names)}"
+
+
 def extract(model: Any, entities_are_groups: bool) -> Model:
     """Take nodes, simplices and groups out of `gmsh.model`.
 
@@ -237,7 +242,9 @@ def run(read: Callable[[Path], Model], file: str, out: str) -> None:
             resource.setrlimit(resource.RLIMIT_AS, (size, hard))
         read(Path(file)).save(Path(out))
     except Exception as error:
-        print(str(error) or type(error).__name__)
+        # That of a missing key is the key alone.
+        missing = isinstance(error, KeyError) and error.args
+        print(f"not found: {error.args[0]}" if missing else str(error) or type(error).__name__)
     sys.stdout.flush()
     # Whatever a damaged file has done to Gmsh's memory, nothing of it is freed.
     os._exit(0)

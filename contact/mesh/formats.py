@@ -1,4 +1,4 @@
-"""Mesh files of other programs: by meshio, or by readers of their own (`abaqus`, `med`).
+"""Mesh files of other programs: by meshio, or by readers of their own where it knows too little.
 
 Files are read by a process of their own, as by `contact.mesh.extraction`. Groups of elements, tags
 of cells and sets of nodes become regions and parts.
@@ -14,14 +14,27 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-from contact.mesh import abaqus, exodus, med
-from contact.mesh.cells import CUT, INTERVAL, SHAPES, Kind, Shape, as_simplices, simplices
-from contact.mesh.extraction import BODY, OTHERS, Contents, Ints, Model, run
+from contact.mesh import abaqus, exodus, med, xdmf
+from contact.mesh.cells import (
+    CUT,
+    INTERVAL,
+    SHAPES,
+    Kind,
+    Shape,
+    as_simplices,
+    distinct,
+    once,
+    proper,
+    simplices,
+    together,
+)
+from contact.mesh.extraction import BODY, OTHERS, Contents, Ints, Model, run, same_name
 from contact.typing import Array
 
 #: Readers that know more of a program's files than meshio.
-OWN = {"Abaqus": abaqus.read, "MED": med.read}
+OWN = {"Abaqus": abaqus.read, "MED": med.read, "Exodus": exodus.read}
 
 #: Arrays that hold tags of groups, and those of a program's own.
 TAGS = {"gmsh:physical", "cell_tags", "point_tags", "medit:ref"}
@@ -42,12 +55,11 @@ def read(file: Path) -> Model:
     program = OTHERS[file.suffix.lower()]
     if program in OWN:
         return model_of(OWN[program](file))
+    if program == "XDMF":
+        return model_of(_contents(xdmf.read(file)))
     import meshio
 
-    contents = _contents(meshio.read(file))
-    if program == "Exodus":
-        exodus.add(file, contents)
-    return model_of(contents)
+    return model_of(_contents(meshio.vtu.read(file)))
 
 
 def files(file: Path) -> list[Path]:
@@ -130,7 +142,7 @@ def model_of(contents: Contents) -> Model:
     """Return the contents of a file as they are checked."""
     known = [_kind(name, nodes.shape[1]) for name, nodes in contents.blocks]
     kinds = list(dict.fromkeys(kind for kind, _ in known if kind[1] > 0))
-    cut = as_simplices(kinds)
+    cut = as_simplices(kinds, _collapsed(contents, [kind for kind, _ in known]))
     if cut is not None:
         return model_of(_cut(contents, [kind for kind, _ in known], cut[2]))
     tags = np.arange(1, len(contents.points) + 1)
@@ -144,8 +156,13 @@ def model_of(contents: Contents) -> Model:
     places = _places(shape, blocks[whole[0]].shape[1])
     for b in whole:
         blocks[b] = _middles_in_order(shape, contents.points, blocks[b])
-    cells = np.concatenate([blocks[b] for b in whole])
-    regions, parts = {}, dict(contents.surfaces)
+    every = np.concatenate([blocks[b] for b in whole])
+    cells, notes = distinct(every), list(contents.notes)
+    if twice := len(every) - len(cells):
+        notes.append(f"{twice} cell(s) that stand twice in it count once")
+    of = shape.facet.corners
+    parts = {k: v if len(v) else np.zeros((0, of), int) for k, v in contents.surfaces.items()}
+    regions, left = {}, []
     for name, members in contents.groups.items():
         inside = [blocks[b][members[b]] for b in whole if b in members]
         if sum(map(len, inside)):
@@ -155,18 +172,19 @@ def model_of(contents: Contents) -> Model:
             for b, rows in members.items()
             if known[b][1] == shape.facet and len(rows)
         ]
-        if sides and name not in parts:
-            parts[name] = np.concatenate(sides)
-    notes = list(contents.notes)
-    if regions and len(np.unique(np.concatenate([*regions.values()]), axis=0)) < len(cells):
+        if sides and not _added(parts, name, np.concatenate(sides)):
+            left.append(name)
+    if regions and len(distinct(np.concatenate([*regions.values()]))) < len(cells):
         regions[BODY] = cells
     outside, without = _exterior(shape, cells[:, _corners(shape)]), []
     for name, nodes in contents.nodes.items():
         found = outside[np.isin(outside, nodes).all(axis=1)]
-        if len(found) and name not in parts:
-            parts[name] = found
-        elif not len(found):
+        if not len(found):
             without.append(name)
+        elif not _added(parts, name, found):
+            left.append(name)
+    if left:
+        notes.append(same_name(left))
     if without:
         notes.append(f"sets of nodes that hold no facet of the boundary: {', '.join(without)}")
     return Model(
@@ -181,6 +199,23 @@ def model_of(contents: Contents) -> Model:
     )
 
 
+def _added(parts: dict[str, Ints], name: str, facets: Ints) -> bool:
+    """Add a part unless another has its name; tell whether all of its facets are there then."""
+    there = parts.setdefault(name, facets)
+    return len(distinct(np.concatenate([there, facets]))) == len(distinct(there))
+
+
+def _collapsed(contents: Contents, kinds: Sequence[Kind]) -> int:
+    """Return the number of cells that are no simplices and have a node at several corners."""
+    dim = max((of for _, of, _ in kinds), default=0)
+    count = 0
+    for (kind, of, _), (_, nodes) in zip(kinds, contents.blocks, strict=True):
+        corners = CUT.get(kind.split()[0], 0)
+        if of == dim and corners > dim + 1:
+            count += int(np.count_nonzero(~proper(nodes[:, :corners])))
+    return count
+
+
 def _cut(contents: Contents, kinds: Sequence[Kind], note: str) -> Contents:
     """Return the contents of a file with its cells and their facets cut into simplices.
 
@@ -192,20 +227,25 @@ def _cut(contents: Contents, kinds: Sequence[Kind], note: str) -> Contents:
         The sentence on it.
     """
     dim = max(of for _, of, _ in kinds)
-    blocks, each = list(contents.blocks), np.ones(len(kinds), dtype=np.int64)
+    blocks: list[tuple[str, Ints]] = list(contents.blocks)
+    groups: dict[str, dict[int, Ints]] = {name: {} for name in contents.groups}
     for b, ((kind, of, _), (_, nodes)) in enumerate(zip(kinds, contents.blocks, strict=True)):
+        count = np.ones(len(nodes), dtype=np.int64)
         if of >= dim - 1:
             made = simplices(nodes[:, : CUT[kind.split()[0]]], of)
-            each[b] = made.shape[1]
-            blocks[b] = {1: "line", 2: "triangle", 3: "tetra"}[of], made.reshape(-1, of + 1)
-    groups = {
-        name: {
-            b: (rows[:, None] * each[b] + np.arange(each[b])).ravel() for b, rows in members.items()
-        }
-        for name, members in contents.groups.items()
-    }
+            # Those of no volume are no part of a cell that has collapsed; no simplex may have.
+            full = proper(made.reshape(-1, of + 1)).reshape(made.shape[:2]) | (made.shape[1] == 1)
+            count = full.sum(axis=1)
+            if of == dim and not count.all():
+                raise ValueError(f"it has {np.sum(count == 0)} cell(s) of zero volume")
+            blocks[b] = {1: "line", 2: "triangle", 3: "tetra"}[of], made[full]
+        for name, members in contents.groups.items():
+            if b in members:
+                chosen = np.zeros(len(nodes), dtype=bool)
+                chosen[members[b]] = True
+                groups[name][b] = np.flatnonzero(np.repeat(chosen, count))
     surfaces = {
-        name: simplices(faces, dim - 1).reshape(-1, dim) if len(faces) else faces
+        name: together([simplices(faces, dim - 1).reshape(-1, dim)]) if len(faces) else faces
         for name, faces in contents.surfaces.items()
     }
     notes = [*contents.notes, note]
@@ -230,22 +270,35 @@ def _places(shape: Shape, count: int) -> Any:
 
 
 def _middles_in_order(shape: Shape, points: Array, rows: Ints) -> Ints:
-    """Return cells whose nodes within faces and the cell are in VTK's order.
+    """Return cells whose nodes between corners are in VTK's order.
 
-    Programs number them in ways of their own: Abaqus has that of the cell first, MED the lower face
-    first. They are those next to where the middles of the edges say that they are.
+    Programs number them in ways of their own: of hexahedra Exodus has the upright edges in front
+    of the upper ones, Abaqus the middle in front of the faces, MED the lower face first. A file
+    has one order; it is the one in which the nodes are nearest to the places of straight edges,
+    and then to those within faces and the cell that the edges tell: an assignment problem.
     """
-    if shape.dim < 3 or rows.shape[1] != len(shape.nodes(2)) or not shape.serendipity:
+    if rows.shape[1] == shape.corners or not len(rows):
         return rows
-    columns = np.argsort(shape.vtk(2)[1])  # of the shape's nodes
-    weights = np.concatenate([weights for _, _, weights in shape.serendipity])
-    inner = columns[np.concatenate([nodes for nodes, _, _ in shape.serendipity])]
-    expected, given = weights @ points[rows[:, columns]], points[rows[:, inner]]
-    nearest = np.linalg.norm(expected[:, :, None] - given[:, None], axis=3).argmin(axis=2)
     ordered = rows.copy()
-    ordered[:, inner] = np.take_along_axis(rows[:, inner], nearest, axis=1)
-    each_once = np.all(np.sort(nearest, axis=1) == np.arange(len(inner)), axis=1)
-    return np.where(each_once[:, None], ordered, rows)
+    columns = np.argsort(shape.vtk(2)[1])  # of the shape's nodes
+    edges = shape.corners + np.arange(len(shape.edges))
+    straight = np.zeros((len(edges), len(columns)))
+    straight[:, : shape.corners] = shape.lagrange(1, shape.nodes(2)[edges])
+    expected = [(edges, straight)]
+    if shape.serendipity and rows.shape[1] == len(columns):
+        inner, _, told = map(list, zip(*shape.serendipity, strict=True))
+        expected.append((np.concatenate(inner), np.concatenate(told)))
+    for nodes, weights in expected:
+        known = columns[np.flatnonzero(np.any(weights != 0, axis=0))]
+        at = points[ordered[:, known]]
+        size = np.ptp(at, axis=1).max(axis=1)[:, None, None]
+        middle = at.mean(axis=1, keepdims=True)
+        places = weights[:, np.any(weights != 0, axis=0)] @ (at - middle) / size
+        given = (points[ordered[:, columns[nodes]]] - middle) / size
+        # The part of the squares of distances that depends on the order.
+        costs = -np.einsum("cid,cjd->ij", places, given)
+        ordered[:, columns[nodes]] = ordered[:, columns[nodes[linear_sum_assignment(costs)[1]]]]
+    return ordered
 
 
 def _corners(shape: Shape) -> list[int]:
@@ -256,7 +309,7 @@ def _corners(shape: Shape) -> list[int]:
 def _exterior(shape: Shape, corners: Ints) -> Ints:
     """Return the facets of one cell alone, by their corners, around them."""
     facets = corners[:, shape.facet_corners[:, shape.facet.around]]
-    return abaqus.once(facets.reshape(-1, facets.shape[2]))
+    return once(facets.reshape(-1, facets.shape[2]))
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import meshes
+from contact.errors import InputError
 from contact.mesh.cells import FACES, simplices
 from contact.mesh.extraction import Contents
 from contact.mesh.formats import model_of
@@ -210,3 +211,64 @@ def test_prisms_alone_and_side_sets_of_exodus(tmp_path):
     assert domain.notes == (
         "its cells, 'Prism 6', become tetrahedra: a mesh has cells of one kind",
     )
+
+
+def collapsed() -> Contents:
+    """Return a cube, a prism, a pyramid and a tetrahedron, all as hexahedra.
+
+    They have one node at several corners; the prism's triangles are up and down.
+    """
+    cube = [(x, y, z) for z in (0.0, 1.0) for x, y in [(0, 0), (1, 0), (1, 1), (0, 1)]]
+    points = [*cube, (2.0, 0.5, 0.0), (2.0, 0.5, 1.0), (0.5, 0.5, 2.0), (-1.0, 0.5, 0.5)]
+    prism = [1, 8, 2, 2, 5, 9, 6, 6]
+    pyramid = [4, 5, 6, 7, 10, 10, 10, 10]
+    tetrahedron = [0, 3, 4, 4, 11, 11, 11, 11]
+    blocks = [("hexahedron", np.array([[*range(8)], prism, pyramid, tetrahedron]))]
+    shapes = ("cube", "prism", "pyramid", "tetrahedron")
+    made = Contents(np.array(points), blocks)
+    made.groups |= {name: {0: np.array([k])} for k, name in enumerate(shapes)}
+    made.surfaces["low"] = np.array([[0, 1, 2, 3]])
+    made.nodes["ground"] = np.flatnonzero(made.points[:, 2] == 0)
+    return made
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_hexahedra_that_have_collapsed_are_cut(seed):
+    """Whatever the numbers: volumes of the regions, a part of a square and a triangle."""
+    contents = collapsed()
+    order = np.random.default_rng(seed).permutation(len(contents.points))
+    model = model_of(numbered(contents, order))
+    cells = check_model(model)
+    assert cells.notes == (
+        "its cells, 'Hexahedron 8', 3 of them with one node at several corners, become "
+        "tetrahedra: a mesh has cells of one kind",
+    )
+    found = {name: sizes(model.points, nodes - 1).sum() for name, nodes in model.regions.items()}
+    expected = {"cube": 1.0, "prism": 1 / 2, "pyramid": 1 / 3, "tetrahedron": 1 / 6}
+    assert found == pytest.approx(expected)
+    found = {name: sizes(model.points, nodes - 1).sum() for name, nodes in model.parts.items()}
+    assert found == pytest.approx({"low": 1.0, "ground": 1.5})
+
+
+def test_quadrilaterals_that_are_triangles_and_free_faces_of_prisms(tmp_path):
+    plate = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n5,-1,1\n*ELEMENT,TYPE=CPE4,ELSET=plate\n"
+    plate += "1,1,2,3,4\n2,1,4,5,5\n*SURFACE,NAME=rim\nplate,\n*SURFACE,NAME=end\n1,S3\n2,S2\n"
+    (tmp_path / "plate.inp").write_text(plate)
+    domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
+    assert integral(domain, domain.dx) == pytest.approx(1.5)
+    assert measures(domain) == pytest.approx({"rim": 4 + 2**0.5, "end": 2.0})
+    # Two prisms that share a square, each as a hexahedron, collapsed at corners of other numbers.
+    prisms = "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n"
+    prisms += "*ELEMENT,TYPE=C3D8,ELSET=all\n1,1,2,3,3,5,6,7,7\n2,3,4,1,1,7,8,5,5\n"
+    prisms += "*SURFACE,NAME=skin\nall,\n*SURFACE,NAME=low\nall,S1\n*SURFACE,NAME=end\n1,S4\n2,S3\n"
+    (tmp_path / "prisms.inp").write_text(prisms)
+    domain = from_file(MPI.COMM_SELF, tmp_path / "prisms.inp")
+    assert integral(domain, domain.dx) == pytest.approx(1.0)
+    assert measures(domain) == pytest.approx({"skin": 6.0, "low": 1.0, "end": 2.0})
+
+
+def test_a_cell_that_has_collapsed_to_nothing_is_refused(tmp_path):
+    plate = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n*ELEMENT,TYPE=CPE4\n1,1,2,3,4\n2,1,1,2,2\n"
+    (tmp_path / "plate.inp").write_text(plate)
+    with pytest.raises(InputError, match=r"it has 1 cell\(s\) of zero volume"):
+        from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
