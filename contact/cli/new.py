@@ -14,7 +14,7 @@ from contact.case.text import literal
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.interface.pairing import facing_parts
-from contact.mesh.domain import Domain
+from contact.mesh.domain import ON_AXIS, Domain
 from contact.mesh.reader import from_file
 from contact.ranks import on_root
 
@@ -72,7 +72,7 @@ file = {literal(name)}
 # Parts of its boundary, to be named below:
 {parts}# Regions: {regions}.
 
-{_materials(domain)}
+{_space(domain)}{_materials(domain)}
 [[fixed]]                     # the part that lies highest; "free" for a component that is not held
 {f"on = {literal(highest)}":<30}# or a list of parts
 displacement = {pressed}
@@ -90,6 +90,14 @@ mu = 0.2
 method = "newton"
 tolerance = 1e-8
 """
+
+
+def _space(domain: Domain) -> str:
+    """Return the section for which the elements of the mesh's file were made, if they tell."""
+    if not domain.space:
+        return ""
+    lines = (f"{key} = {literal(value)}" for key, value in domain.space.items())
+    return "\n".join(["[space]                       # as the elements of the file", *lines, "\n"])
 
 
 def _materials(domain: Domain) -> str:
@@ -160,14 +168,20 @@ def _lowest(domain: Domain) -> float:
 
 
 def _heights(domain: Domain) -> dict[str, float]:
-    """Return the mean last coordinate of the facets of each part. Collective."""
+    """Return the mean last coordinate of the facets of each part. Collective.
+
+    Of a body of revolution those on its axis are no parts of its boundary.
+    """
     mesh, d = domain.mesh, domain.dim
+    revolved = domain.space.get("kinematics") == "axisymmetric"
     found = {}
     for name, facets in domain.parts.items():
         middles = np.empty((0, 3))
         if facets.size > 0:  # dolfinx divides by their number
             middles = dmesh.compute_midpoints(mesh, d - 1, facets)
-        sums = np.array([middles[:, d - 1].sum(), len(middles)])
+        sums = np.array([middles[:, d - 1].sum(), np.abs(middles[:, 0]).sum(), len(middles)])
         total = domain.comm.allreduce(sums, op=MPI.SUM)
-        found[name] = round(float(total[0] / total[1]) / domain.size, 6)
+        height, radius = total[:2] / total[2] / domain.size
+        if not revolved or radius > ON_AXIS:
+            found[name] = round(float(height), 6)
     return found

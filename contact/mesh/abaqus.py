@@ -49,6 +49,10 @@ TYPES = (
     (re.compile(r"(?:T2D|T3D|B2|B3|R2D|RAX|SAX|F2D)(\d)"), 1),
 )
 
+#: Beginnings of the names of plane elements, and the kinematics for which they are made.
+KINEMATICS = {"CPS": "plane_stress", "CPE": "plane_strain", "CAX": "axisymmetric"}
+KINEMATICS["CGAX"] = KINEMATICS["CAX"]
+
 #: Corners of the faces S1, S2, ... of elements, by meshio's name without a number.
 FACES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -299,6 +303,10 @@ def _deck(found: _Read) -> Contents:
             deck.surfaces[name] = _faces(found, lines, elements, blocks, dim)
     if twice:
         deck.notes.append(same_name(twice))
+    plane = [kind for kind in found.elements if dim == 2 and _known(kind)[0] == 2]
+    made_for = {own for kind in plane for of, own in KINEMATICS.items() if kind.startswith(of)}
+    if len(made_for) == 1 and made_for != {"plane_strain"}:
+        deck.space["kinematics"] = made_for.pop()
     if found.other:
         deck.notes.append(f"left out: {', '.join(f'*{word}' for word in found.other)}")
     return deck

@@ -97,6 +97,9 @@ class Domain:
     inside
         Name of a group with facets inside of the body -> its facets that this rank owns, as of
         parts. Nothing acts on these, but they may be fixed, or electrodes; they are unusable else.
+    space
+        Keys of a case's ``[space]`` for which the elements of the mesh's file were made: degree,
+        kinematics. A new case has them.
     """
 
     mesh: dmesh.Mesh
@@ -108,6 +111,7 @@ class Domain:
     notes: tuple[str, ...] = ()
     revolved: bool = False
     inside: Mapping[str, Indices] = field(default_factory=dict)
+    space: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the names, not the facets of each part."""

@@ -64,6 +64,8 @@ class Model:
         Groups of cells, likewise, and of facets by the tags of their corners, by name.
     notes
         Other contents of the file, one sentence each.
+    space
+        Keys of a case's ``[space]`` for which its elements were made: degree, kinematics.
     """
 
     kinds: list[tuple[str, int, int]]
@@ -74,6 +76,7 @@ class Model:
     regions: dict[str, Ints]
     parts: dict[str, Ints]
     notes: tuple[str, ...] = ()
+    space: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def dim(self) -> int:
@@ -87,6 +90,7 @@ class Model:
             "regions": [*self.regions],
             "parts": [*self.parts],
             "notes": self.notes,
+            "space": self.space,
         }
         groups = [*self.regions.values(), *self.parts.values()]
         arrays: dict[str, Any] = {f"group {i}": group for i, group in enumerate(groups)}
@@ -103,7 +107,8 @@ class Model:
         regions, parts = ({name: next(groups) for name in names[k]} for k in ("regions", "parts"))
         kinds = [tuple(kind) for kind in names["kinds"]]
         tags, points, places, cells = nodes
-        return cls(kinds, tags, points, places, cells, regions, parts, tuple(names["notes"]))
+        said = tuple(names["notes"]), names["space"]
+        return cls(kinds, tags, points, places, cells, regions, parts, *said)
 
 
 @dataclass
@@ -124,6 +129,8 @@ class Contents:
         Name -> facets by their corners, around them.
     notes
         Its other contents, one sentence each.
+    space
+        As of a `Model`.
     """
 
     points: Any
@@ -132,6 +139,13 @@ class Contents:
     nodes: dict[str, Ints] = field(default_factory=dict)
     surfaces: dict[str, Ints] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    space: dict[str, Any] = field(default_factory=dict)
+
+
+def degree(kinds: Sequence[tuple[str, int, int]]) -> dict[str, int]:
+    """Return the degree for which cells of some types were made, as a key of ``[space]``."""
+    dim = max((of for _, of, _ in kinds), default=0)
+    return {"degree": 2} if any(of == dim and order == 2 for _, of, order in kinds) else {}
 
 
 def same_name(names: Sequence[str]) -> str:
@@ -160,7 +174,7 @@ def extract(model: Any, entities_are_groups: bool) -> Model:
     first = properties(next(iter(cells))) if cells else None
     shape = next((s for s in SHAPES if first and s.name == first[0].split()[0].lower()), None)
     notes: tuple[str, ...] = ()
-    cut = as_simplices(kinds)
+    space, cut = degree(kinds), as_simplices(kinds)
     if cut is not None:
         shape, kinds, note = cut
         places, notes = shape.nodes(1), (note,)
@@ -182,6 +196,7 @@ def extract(model: Any, entities_are_groups: bool) -> Model:
         _groups(model, *whole, entities_are_groups),
         _groups(model, *sides, entities_are_groups),
         notes,
+        space,
     )
 
 

@@ -30,7 +30,16 @@ from contact.mesh.cells import (
     simplices,
     together,
 )
-from contact.mesh.extraction import BODY, OTHERS, Contents, Ints, Model, run, same_name
+from contact.mesh.extraction import (
+    BODY,
+    OTHERS,
+    Contents,
+    Ints,
+    Model,
+    degree,
+    run,
+    same_name,
+)
 from contact.typing import Array
 
 #: Readers that know more of a program's files than meshio.
@@ -196,6 +205,7 @@ def model_of(contents: Contents) -> Model:
         {name: rows + 1 for name, rows in regions.items()},
         {name: rows + 1 for name, rows in parts.items()},
         tuple(notes),
+        degree(kinds) | contents.space,
     )
 
 
@@ -248,8 +258,8 @@ def _cut(contents: Contents, kinds: Sequence[Kind], note: str) -> Contents:
         name: together([simplices(faces, dim - 1).reshape(-1, dim)]) if len(faces) else faces
         for name, faces in contents.surfaces.items()
     }
-    notes = [*contents.notes, note]
-    return Contents(contents.points, blocks, groups, contents.nodes, surfaces, notes)
+    notes, space = [*contents.notes, note], degree(kinds) | contents.space
+    return Contents(contents.points, blocks, groups, contents.nodes, surfaces, notes, space)
 
 
 def _kind(name: str, nodes: int) -> tuple[Kind, Shape | None]:

@@ -296,7 +296,8 @@ def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
         for note in raw.notes:
             logger.info("%s: %s", source, note)
     unusable = {name: f"{source}: {reason}" for name, reason in raw.unusable.items()}
-    return replace(domain, unusable=unusable, notes=raw.notes, inside=inside)
+    more: dict[str, Any] = {"notes": raw.notes, "inside": inside, "space": raw.space}
+    return replace(domain, unusable=unusable, **more)
 
 
 def _sets(mesh: dmesh.Mesh, dim: int, groups: Groups) -> dict[str, Indices]:

@@ -61,7 +61,7 @@ def write(cells: Cells, path: Path) -> None:
         name: {"names": group.names, "sets": group.sets} for name, group in groups.items()
     }
     said |= {"shape": cells.shape.name, "unusable": cells.unusable, "notes": cells.notes}
-    said["inside"] = cells.inside
+    said |= {"inside": cells.inside, "space": dict(cells.space)}
     shapes = {"regions": cells.shape, "parts": cells.shape.facet}
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         made = Path(folder) / heavy.name
@@ -175,5 +175,6 @@ def read(comm: MPI.Intracomm, heavy: Path, digest: str) -> Cells:
             found.append(Groups(tuple(said[name]["names"]), rows[:, inverse], labels, sets))
         regions, parts = found
         notes = tuple(said["notes"])
-        inside = tuple(said.get("inside", ()))  # none in files of 0.1.0
-        return Cells(shape, share("points"), regions, parts, said["unusable"], notes, inside)
+        # None of these in files of 0.1.0.
+        inside, space = tuple(said.get("inside", ())), said.get("space", {})
+        return Cells(shape, share("points"), regions, parts, said["unusable"], notes, inside, space)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -69,6 +70,8 @@ class Cells:
         As in `Domain`.
     inside
         Which of the parts have facets inside of the body; these are unusable too, but for supports.
+    space
+        As of a `Model`.
     """
 
     shape: Shape
@@ -78,6 +81,7 @@ class Cells:
     unusable: dict[str, str]
     notes: tuple[str, ...]
     inside: tuple[str, ...] = ()
+    space: Mapping[str, Any] = field(default_factory=dict)
 
     def without_rows(self) -> Cells:
         """Return the names alone, for ranks that read nothing."""
@@ -148,7 +152,8 @@ def check_model(model: Model) -> Cells:
     ]
     kept_parts = _join(usable | {name: parts[name] for name in inside})
     regions = replace(regions, rows=cells)
-    return Cells(shape, points, regions, kept_parts, reasons, tuple(notes), inside)
+    space = model.space
+    return Cells(shape, points, regions, kept_parts, reasons, tuple(notes), inside, space)
 
 
 def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:

@@ -58,6 +58,53 @@ def test_a_case_to_begin_with(dim: int, tmp_path: Path, capsys: pytest.CaptureFi
     assert path.read_text() == text
 
 
+SIX = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n5,.5,0\n6,1,.5\n7,.5,1\n8,0,.5\n9,.5,.5\n"
+SIX += "*ELEMENT, TYPE={}\n1,1,2,3,5,6,9\n2,1,3,4,9,7,8\n"
+FOUR = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n*ELEMENT, TYPE={}\n1,1,2,3,4\n"
+BOTH = FOUR.format("CPS4") + "*NODE\n5,2,0.5\n*ELEMENT, TYPE=CAX3\n2,2,5,3\n"
+
+
+@pytest.mark.parametrize(
+    ("elements", "degree", "kinematics"),
+    [
+        (FOUR.format("CPE4R"), 1, "plane_strain"),
+        (FOUR.format("CPS4"), 1, "plane_stress"),
+        (FOUR.format("CAX4R"), 1, "axisymmetric"),
+        (SIX.format("CAX6M"), 2, "axisymmetric"),
+        (SIX.format("CPE6"), 2, "plane_strain"),
+        (BOTH, 1, "plane_strain"),
+    ],
+)
+def test_the_space_is_that_of_the_elements(
+    elements: str, degree: int, kinematics: str, tmp_path: Path
+) -> None:
+    """Also of straight cells of second order, and of a converted mesh."""
+    sets = "*NSET, NSET=axis\n1,4\n*NSET, NSET=high\n3,4\n*NSET, NSET=low\n1,2\n"
+    (tmp_path / "plate.inp").write_text(elements + sets)
+    assert main(["mesh", str(tmp_path / "plate.inp"), str(tmp_path / "other.xdmf")]) == CONVERGED
+    for name in ("plate.inp", "other.xdmf"):
+        assert main(["new", str(tmp_path / name)]) == CONVERGED
+        case = load_case((tmp_path / name).with_suffix(".toml"))
+        assert (case.space.degree, case.space.kinematics) == (degree, kinematics)
+        assert (case.fixed[0].on, case.contact.on) == ("high", "low")
+        assert main(["check", str((tmp_path / name).with_suffix(".toml"))]) == CONVERGED
+
+
+def test_the_axis_of_revolution_is_not_pressed_down(tmp_path: Path) -> None:
+    """Though it is the part that lies lowest."""
+    cone = "*NODE\n1,0,0\n2,1,1.2\n3,0,1\n*ELEMENT, TYPE=CAX3\n1,1,2,3\n*NSET, NSET=axis\n1,3\n"
+    (tmp_path / "cone.inp").write_text(cone + "*NSET, NSET=side\n1,2\n*NSET, NSET=lid\n2,3\n")
+    assert main(["new", str(tmp_path / "cone.inp")]) == CONVERGED
+    case = load_case(tmp_path / "cone.toml")
+    assert (case.fixed[0].on, case.contact.on) == ("lid", "side")
+
+
+def test_a_mesh_of_second_order_of_gmsh_is_one_of_degree_2(tmp_path: Path) -> None:
+    write("quarter_disc", tmp_path / "disc.msh", "triangle", 2)
+    assert main(["new", str(tmp_path / "disc.msh")]) == CONVERGED
+    assert load_case(tmp_path / "disc.toml").space.degree == 2
+
+
 def test_two_bodies(tmp_path: Path) -> None:
     """The case presses them onto each other; it passes check as it is, and solves."""
     mesh = tmp_path / "blocks.msh"
