@@ -30,6 +30,7 @@ from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.methods.cones import Array, Cones, Step
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep
+from contact.methods.progress import PROGRESS
 from contact.methods.report import Outcome
 from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
 from contact.problem.protocols import Problem
@@ -87,10 +88,11 @@ def interior_point(
     stuck = modes.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
     aside: tuple[Iterate, Outcome] | None = None
+    best = 1.0
     for _ in range(UPDATES):
         method = InteriorPoint(problem, whole, bound, modes.constrained_by_supports)
         outcome, state = method.run(iteration), method.state
-        iterate, least = Iterate(state), outcome.kkt.significant
+        iterate = Iterate(state)
         if not outcome.converged and iteration.left > 0:
             iterate, outcome = finish(state)
         if outcome.converged and modes.pushed_aside(problem, iterate.state):
@@ -99,8 +101,10 @@ def interior_point(
             return iterate, outcome
         if iteration.left <= 0:
             break
-        if aside is None and outcome.kkt.significant < least:
+        # Where Newton's method makes progress its pressures are nearer; else they may come back.
+        if aside is None and outcome.kkt.significant < PROGRESS * best:
             state = iterate.state
+        best = min(best, outcome.kkt.significant)
         nodal = interface.jump.apply(state.x)
         bound = interface.bound(nodal, state.forces)
         # Where nothing presses, the next problem is solved by the same state.
@@ -137,10 +141,7 @@ class InteriorPoint:
         nodal = jump.apply(self._state.x)
         moved = np.zeros_like(nodal)
         if held:
-            self._update(np.zeros((*nodal.shape, jump.block_size)))
-            moved = jump.apply(
-                whole.operator.solve(-residual_forces(problem, self._state), FORCING)
-            )
+            moved = jump.apply(whole.without_contact(self._state, FORCING).x) - nodal
         opening = interface.opening(nodal + moved)[self._near]
         gap = jump.gap[self._near]
         scales = problem.scales
@@ -218,17 +219,6 @@ class InteriorPoint:
         works = [abs(self._sum(float(own @ force[: body.owned]))) for force in forces]
         return cones.work() / ((contact + sum(works)) or 1.0)
 
-    def _update(self, blocks: Array) -> None:
-        """Assemble the operator with given blocks, and those of layer and current. Collective."""
-        interface, body, x = self.problem.interface, self.problem.equilibrium, self._state.x
-        if interface.law.active:
-            nodal = interface.jump.apply(x)
-            pressure = interface.pressure(nodal, self._state.forces)
-            blocks = blocks + interface.law.block(nodal, pressure)
-        weighted = interface.weighted(blocks, x)
-        at = replace(self._state, x=x)
-        self._whole.operator.update("secant", at, weighted, constant=body.linear)
-
     def step(self) -> bool:
         """Take a step; False if rounding lets no more be taken. Collective."""
         cones, interface, state = self.cones, self.problem.interface, self.state
@@ -246,7 +236,7 @@ class InteriorPoint:
         normal, tangent = jump.normal[near], jump.tangent[frictional]
         blocks[near, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
         blocks[frictional, :d, :d] += tangent @ across @ tangent
-        self._update(blocks / jump.weight[:, None, None])
+        self._whole.assemble(replace(state, x=self._state.x), blocks / jump.weight[:, None, None])
 
         def solve(constants: tuple[Array, Array]) -> tuple[Array, Step]:
             force, friction = cones.reduced(constants)

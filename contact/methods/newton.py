@@ -48,6 +48,7 @@ from functools import partial
 
 import numpy as np
 
+from contact.errors import SingularError
 from contact.interface.active_set import touching
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.multipliers import Multipliers
@@ -58,7 +59,7 @@ from contact.methods.interior_point import INTERIOR_POINT, interior_point
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep, Step
 from contact.methods.options import NewtonOptions
 from contact.methods.parameters import complementarity_parameters, overestimates_stiffness
-from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
+from contact.methods.progress import PROGRESS, Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import IterationHistory, Monitor, Outcome
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
@@ -66,7 +67,6 @@ from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.residuals import Residuals, evaluate, force_rounding, residual_forces
 from contact.problem.state import State
-from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
@@ -82,9 +82,6 @@ SHORT = 4
 #: The same in a continuation: condensed steps cost little beside another value of the parameter,
 #: and Example 8.4 with its steep ramp needs them.
 CONTINUATION_LIMIT = 20
-
-#: Part of the least residual below which a step is progress.
-PROGRESS = 0.5
 
 #: Why an iteration ends whose complementarity parameter overestimates the stiffness.
 OVERESTIMATED = "the complementarity parameter is far above the stiffness of the body"
@@ -236,7 +233,7 @@ class Newton:
         return iterate, outcome
 
     def _without_forces(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
-        """Return the unknowns without contact forces, where these solve it. Collective.
+        """Return where a step without contact forces ends, if that solves it. Collective.
 
         Active sets may cycle on forces that are all rounding of others. Not of bodies that contact
         alone restrains: moved aside they may be in balance, but others hold them.
@@ -244,12 +241,15 @@ class Newton:
         assert self.modes is not None
         if not self.modes.constrained_by_supports:
             return None
-        zero = Multipliers.zero(self.problem.interface.jump)
-        iterate = replace(iterate, state=replace(iterate.state, forces=zero))
-        residuals = evaluate(self.problem, iterate.state)
+        try:
+            state = self.whole.without_contact(iterate.state)
+        except SingularError:  # far away, where no material has a stiffness any more
+            self.whole.renew()
+            return None
+        residuals = evaluate(self.problem, state)
         if residuals.excess(self.options.allowed):
             return None
-        return iterate, Outcome(residuals, self.options.allowed, "")
+        return Iterate(state), Outcome(residuals, self.options.allowed, "")
 
     def _minimal_motion(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
         """Take a rigid motion off a solution that costs nothing. Collective."""
@@ -476,15 +476,16 @@ class NewtonLoop:
         """Return zero displacement where nothing touches any more and nothing acts. Collective.
 
         Displacements fall by their rounding in each step then, and so do the forces beside which
-        residuals are measured: nodes that touch press by rounding of the largest pressure before.
+        residuals are measured: nodes that touch press by a part of the largest pressure before.
         """
         problem = self.iteration.problem
         sizes = _sizes(iterate, problem)
         if sizes is None:
             return None
-        if sizes[1] + sizes[2] > 0 and self._largest_pressure(iterate) > ROUNDING * pressed:
+        tolerance = self.iteration.options.tolerance
+        if sizes[1] + sizes[2] > 0 and self._largest_pressure(iterate) > tolerance * pressed:
             return None
-        found = undeformed_equilibrium(problem)
+        found = undeformed_equilibrium(problem, tolerance)
         if found is None:
             return None
         iterate = replace(iterate, state=found[0])

@@ -214,6 +214,23 @@ class NewtonStep:
             )
         return self._operator
 
+    def assemble(self, state: State, blocks: Array) -> None:
+        """Assemble the operator with given blocks, and those of layer and current. Collective."""
+        interface, body = self.problem.interface, self.problem.equilibrium
+        if interface.law.active:
+            nodal = interface.jump.apply(state.x)
+            blocks = blocks + interface.law.block(nodal, interface.pressure(nodal, state.forces))
+        weighted = interface.weighted(blocks, state.x)
+        self.operator.update("secant", state, weighted, constant=body.linear)
+
+    def without_contact(self, state: State, rtol: float | None = None) -> State:
+        """Return where a state would go without contact forces, by one solve. Collective."""
+        problem, jump = self.problem, self.problem.interface.jump
+        body, free = problem.equilibrium, replace(state, forces=Multipliers.zero(jump))
+        self.assemble(free, np.zeros((jump.nodes.size, jump.block_size, jump.block_size)))
+        step = self.operator.solve(-residual_forces(problem, free), rtol)
+        return replace(free, x=body.prescribe(body.moved(free.x, step), free.time))
+
     def __call__(self, iterate: Iterate, tangent: bool, reached: Residuals) -> StepResult | None:
         """Take a step; see `Step`."""
         state, interface = iterate.state, self.problem.interface

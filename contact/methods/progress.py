@@ -10,7 +10,9 @@ import numpy as np
 from contact.problem.protocols import Problem
 from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
-from contact.tolerances import ROUNDING
+
+#: Part of the least residual below which a step is progress.
+PROGRESS = 0.5
 
 T = TypeVar("T")
 
@@ -77,7 +79,7 @@ class Stagnation:
         return self._since >= (self.limit if limit is None else limit)
 
 
-def undeformed_equilibrium(problem: Problem) -> tuple[State, Residuals] | None:
+def undeformed_equilibrium(problem: Problem, tolerance: float) -> tuple[State, Residuals] | None:
     """Return zero displacement and its residuals, where it is in equilibrium. Collective.
 
     Beside forces that vanish no residual is small, and only those that are 0 have none: a method
@@ -86,4 +88,4 @@ def undeformed_equilibrium(problem: Problem) -> tuple[State, Residuals] | None:
     """
     state = problem.start()
     residuals = evaluate(problem, state)
-    return (state, residuals) if residuals.significant <= ROUNDING else None
+    return (state, residuals) if residuals.significant <= tolerance else None

@@ -54,13 +54,14 @@ def large_error(solution: Solution) -> Iterator[Remark]:
     error = solution.error
     if error is not None and error.relative > COARSE and not locks(solution):
         # The mean dilatation is no bound from below: it may be too soft as well.
-        mean = solution.problem.equilibrium.element == MEAN_DILATATION
+        body = solution.problem.equilibrium
+        mean = body.element == MEAN_DILATATION
         yield (
             f"the mesh is too coarse: the estimated discretisation error is "
             f"{error.relative:.1%} (energy norm), and "
             f"{'displacements are off' if mean else 'the body is too stiff'} by about "
-            f"{error.relative**2:.1%}, more where slender parts bend; a finer mesh, or "
-            "space.degree = 2, has less of it"
+            f"{error.relative**2:.1%}, more where slender parts bend; "
+            f"a finer mesh{'' if body.degree == 2 else ', or space.degree = 2,'} has less of it"
         )
 
 

@@ -123,7 +123,7 @@ class OuterLoop(ABC):
         else:
             ended = f"not converged in {options.max_outer} outer iterations{self._advice()}"
         if best.found is not None and not by_thesis:
-            if rest := undeformed_equilibrium(problem):
+            if rest := undeformed_equilibrium(problem, options.tolerance):
                 best.found, ended = rest, ""
             self.state, residuals = best.found
         return self._outcome(residuals, ended)
