@@ -14,7 +14,8 @@
 4. The iteration ends with the residuals of the problem, computed from scratch, or with their
    stagnation: the active sets cycle. It ends after one step where c overestimates the stiffness.
 
-Fallbacks, in this order, where a stage has ended without convergence:
+Fallbacks, in this order, where a stage has ended without convergence, and a step without contact
+forces does not solve the problem:
 
 1. the condensed body for the whole one, or the whole for the condensed one;
 2. on a condensed body through whose contact nodes charge passes, solutions followed from a
