@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from mpi4py import MPI
 
 from contact.body.elements import MEAN_DILATATION, unlocked
+from contact.interface.mortar.search import nearest
+from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import shape_of
 from contact.output.solution import Remark, Solution
+from contact.typing import Array
 
 #: Ratio of bulk to shear modulus, of nu = 0.475, from which on elements of degree 1 lock.
 LOCKED = 20.0
@@ -19,7 +23,8 @@ EXACT = 5e-3
 #: Largest estimated error without a warning: its square is that of displacements under loads.
 COARSE = 0.15
 
-#: Largest deviation of facets from a curved surface, as a share of the gaps that are closed.
+#: Largest deviation of facets from a curved surface, as a share of the gaps that are closed; and
+#: of the directions of its tangents along a straight edge of degree 2.
 DEVIATION = 0.1
 
 
@@ -84,16 +89,45 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
             )
         return
     size = nodes.maximum(np.where(closed, np.abs(nodes.gap), 0.0))
-    if size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size:
-        if problem.equilibrium.degree == 2 and problem.domain.levels == 0:
-            yield (
-                f"straight edges tell a curved contact surface to about {nodes.deviation:.2g}, and "
-                f"contact closes gaps of at most {size:.3g}: pressures scatter by about that "
-                "share; take curved cells (mesh.order = 2), or a finer mesh"
-            )
-            return
+    unknown = size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size
+    if unknown and problem.equilibrium.degree == 2 and problem.domain.levels == 0:
+        yield (
+            f"straight edges tell a curved contact surface to about {nodes.deviation:.2g}, and "
+            f"contact closes gaps of at most {size:.3g}: pressures scatter by about that share; "
+            "take curved cells (mesh.order = 2), or a finer mesh"
+        )
+    elif unknown:
         yield (
             f"straight facets deviate by up to {nodes.deviation:.3g} from a curved contact "
             f"surface, and contact closes gaps of at most {size:.3g}: pressures are off by about "
             "that share; make the mesh finer from the beginning, or take space.degree = 2"
         )
+    elif (turn := _turn(solution, nodes.points[closed])) > DEVIATION:
+        yield (
+            f"straight edges of a curved contact surface turn by up to {turn:.2g} where it "
+            "touches, and displacements are those of their chords: nodal pressures scatter by "
+            f"about {turn / 4:.1%} of the stress there; take curved cells (mesh.order = 2), or a "
+            "finer mesh"
+        )
+
+
+def _turn(solution: Solution, touching: Array) -> float:
+    """Return the largest turn of straight edges of degree 2 that touch. Collective.
+
+    In their middle, f = h^2/(8 R) below the curve, displacements are taken f eps_nn aside: to them
+    the surface is as stiff as under waves of the length 2 h, and pressures are off by
+    E eps_nn pi h/(16 R), a share of the stress that is of first order in h.
+
+    Parameters
+    ----------
+    solution, touching
+        The solution, and the contact nodes of this rank that touch, shape (n, d).
+    """
+    domain, space = solution.problem.domain, solution.problem.equilibrium.space
+    found = 0.0
+    for part in dict.fromkeys(p for c in solution.problem.contacts for p in (c.on, c.against) if p):
+        side = surface_of(domain, space, part)
+        if side.follows:
+            near = nearest(domain.comm, side.centres, touching) <= side.radii
+            found = max(found, float(side.turns[near].max(initial=0.0)))
+    return domain.comm.allreduce(found, op=MPI.MAX)

@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.errors import InputError
+from contact.interface import pairing
 from contact.interface.obstacle import Sphere
 from contact.mesh.cells import SHAPES, rule, shape_of
 from contact.mesh.geometry import geometry_nodes, inverse, jacobians, sizes, volumes
@@ -26,7 +27,7 @@ from scripts.force_balance import force_balance
 from scripts.reporting import Report
 from scripts.studies import cell_orders, curved_cells, round_bodies
 from scripts.studies.curved_cells import LAME, LAW, on_a_shaft, solved, supports, two_rings
-from scripts.studies.lame_rings import error, rings
+from scripts.studies.lame_rings import Lame, error, rings
 
 COMM = MPI.COMM_WORLD
 NAMES = [shape.name for shape in SHAPES]
@@ -68,6 +69,44 @@ def test_straight_cells_have_the_second_order(name: str) -> None:
     )
     assert straight[0] / straight[1] < 2**2.1
     assert curved[1] < straight[1] / 10
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(("name", "most"), [("triangle", 0.11), ("quadrilateral", 0.07)])
+def test_pressures_of_two_rings_on_straight_cells_are_off_by_a_share(name, most, monkeypatch):
+    """Gaps are those of arcs: with parabolas or gaps along normals the load decides the share."""
+    found = []
+    for load in (1e-2, 1e-5):
+        monkeypatch.setattr(curved_cells, "LAME", Lame(pressure=load))
+        problem = curved_cells.problem_of("two rings", name, 1, 2, 8)
+        np.testing.assert_allclose(problem.nodes.gap, 0, atol=1e-14)
+        found.append(solved(problem)[1] / -float(curved_cells.LAME.radial(np.array(1.5))))
+    assert np.abs(found[0] - 1).max() < most
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6)
+
+
+def test_pressures_on_straight_cells_are_off_by_the_displacements_of_chords(monkeypatch) -> None:
+    """With the exact jump between the chords as the gap they are right to a quarter of that."""
+    pressure = -float(LAME.radial(np.array(1.5)))
+
+    def exact_jump(slave, body, coupling, label):
+        """Return the jump of the exact displacements for the gap."""
+        x = body.space.tabulate_dof_coordinates()[:, :2]
+        radius = np.linalg.norm(x, axis=1)
+        u = (LAME.displacement(radius) / radius)[:, None] * x
+        jump = coupling.own @ u[coupling.slaves] - coupling.other @ u[coupling.masters]
+        return np.einsum("nd,nd->n", jump, coupling.normal), 0.0
+
+    def largest(n):
+        """Return the largest error of a nodal pressure."""
+        problem = curved_cells.problem_of("two rings", "triangle", 1, 2, n)
+        return np.abs(solved(problem)[1] / pressure - 1).max()
+
+    chords = [largest(n) for n in (4, 8, 16)]
+    monkeypatch.setattr(pairing, "_apart", exact_jump)
+    exact = [largest(n) for n in (4, 8, 16)]
+    np.testing.assert_allclose(chords, [0.153, 0.102, 0.058], rtol=0.02)
+    np.testing.assert_allclose(exact, [0.052, 0.023, 0.0085], rtol=0.02)
 
 
 @pytest.mark.parametrize("name", NAMES)

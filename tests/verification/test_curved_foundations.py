@@ -63,7 +63,7 @@ def test_bodies_that_move_along_curved_facets(name, kind):
 
 def warnings(solution):
     """Return what is said about deviations of facets from curves."""
-    words = "straight facets deviate", "straight edges tell"
+    words = "straight facets deviate", "straight edges tell", "straight edges of a curved"
     return [text for text in solution.warnings if any(some in text for some in words)]
 
 
@@ -99,6 +99,30 @@ def test_two_rings_with_a_small_interference(degree):
     if found:
         assert "by up to 0.000803 " in found[0]
         assert "at most 0.000773" in found[0]
+
+
+def test_two_rings_are_right_however_small_their_interference():
+    """Gaps along normals, of parabolas: nodes were between 0 and 2.0 times the pressure."""
+    found = []
+    for overlap in (1e-3, 1e-6):
+        solution, exact = study.two_rings(0.05, 2, overlap)
+        found.append(study.ratios(solution, exact))
+        check(found[-1], 0.002, 0.06)
+    np.testing.assert_allclose(found[1][0], found[0][0], rtol=0.01)
+
+
+@pytest.mark.parallel
+def test_straight_edges_that_turn_much_are_warned_of():
+    """A ring on a shaft, whose interference is so large that its gaps are right."""
+    for h, order, count in ((0.2, 1, 1), (0.2, 2, 0), (0.1, 1, 0)):
+        problem, exact = study.ring("ring on a shaft", h, 2, order, 0.01)
+        solution = solve(problem)
+        off = np.abs(study.ratios(solution, exact)[0] - 1).max()
+        assert off < 0.12 * count or off < 0.06
+        found = warnings(solution)
+        assert len(found) == count
+        if count:
+            assert "turn by up to 0.2 where it touches" in found[0]
 
 
 def test_chords_that_hide_a_contact_are_named():

@@ -144,8 +144,7 @@ def common_points(
     ):
         functions = side.shape.lagrange(side.order, at)
         gap += sign * np.einsum("pk,pk->p", functions, nodes[pair, :, -1])
-        cosine = np.abs(np.einsum("pd,pd->p", side.normal[facets], direction[i]))
-        gap -= side.height(facets[pair], at[:, None])[:, 0] / cosine[pair]
+        gap += sign * side.distance(facets[pair], at, direction[i[pair]])
     slopes = slave.slopes(i[pair], on_slave)
     size = np.linalg.norm(across(slopes), axis=1) / np.abs(_turned(slave, own[pair], on_slave))
     if slave.revolved:

@@ -110,6 +110,12 @@ class Surface:
         return np.asarray(spread.max(axis=1, initial=0.0))
 
     @cached_property
+    def _edges(self) -> Array:
+        """The lengths of the edges, shape (f, edges)."""
+        first, second = np.array(self.shape.edges).T
+        return np.linalg.norm(self.corners[:, second] - self.corners[:, first], axis=2)
+
+    @cached_property
     def bend(self) -> Array:
         """How far facets are from affine images of the reference facet, shape (f,).
 
@@ -138,6 +144,11 @@ class Surface:
         return float(np.abs(self.deviation).max(initial=0.0)) / 4
 
     @property
+    def turns(self) -> Array:
+        """How far the curve turns from end to end of a straight edge, the most, shape (f,)."""
+        return np.asarray(np.abs(2 * self.deviation / self._edges).max(axis=1, initial=0.0))
+
+    @property
     def unknown_deviation(self) -> float:
         """The largest part of the deviations that gaps do not have (length), on this rank.
 
@@ -146,9 +157,7 @@ class Surface:
         """
         if not self.follows:
             return self.largest_deviation
-        first, second = np.array(self.shape.edges).T
-        edges = np.linalg.norm(self.corners[:, second] - self.corners[:, first], axis=2)
-        return float((self.deviation**2 / (4 * edges)).max(initial=0.0))
+        return float((self.deviation**2 / (4 * self._edges)).max(initial=0.0))
 
     @property
     def follows(self) -> bool:
@@ -160,36 +169,66 @@ class Surface:
         return self.degree == 2 and not self.refined and self.order == 1
 
     def height(self, facets: NDArray[np.intp], at: Array) -> Array:
-        """Return how far the surface is above straight facets at points along normals, (p, q).
+        """Return how far the surface is above straight facets at points along normals, (p,).
 
-        Nothing where gaps are those of the facets.
+        Over an edge of the length L that is an arc of the sagitta f = c/4, whose height h over a
+        point is, with w = l_i l_j L^2 the product of the distances to the ends,
+
+            h (h + 2 b) = w,     b = (L^2/4 - f^2)/(2 f),
+
+        and on a facet the sum over its edges. Nothing where gaps are those of the facets.
 
         Parameters
         ----------
         facets, at
-            The facets, and points on each, shapes (p,) and (p, q, dim).
+            The facet of each point, shape (p,), and the points, shape (p, dim).
         """
         if not self.follows:
-            return np.zeros(at.shape[:2])
-        shape = self.shape
-        functions = shape.lagrange(1, at.reshape(-1, shape.dim))
-        functions = functions.reshape(*at.shape[:2], shape.corners)
-        pairs = [(functions[..., i], functions[..., j]) for i, j in shape.edges]
-        products = np.stack([one * other for one, other in pairs], axis=2)
-        if not shape.simplex:
-            # Between opposite edges the curves of both, in proportion.
-            along = np.stack([one + other for one, other in pairs], axis=2)
-            products /= np.where(along > 0, along, 1.0)
-        return np.asarray(np.einsum("pqe,pe->pq", products, self.deviation[facets]))
+            return np.zeros(len(at))
+        first, second = np.array(self.shape.edges).T
+        functions = self.shape.lagrange(1, at)
+        products = functions[:, first] * functions[:, second]
+        along = np.ones_like(products)
+        if not self.shape.simplex:
+            # Between opposite edges the arcs of both, in proportion.
+            along = functions[:, first] + functions[:, second]
+            products /= np.where(along != 0, along, 1.0) ** 2
+        sagitta, square = self.deviation[facets] / 4, self._edges[facets] ** 2
+        base = square / 4 - sagitta**2
+        root = np.sqrt(np.maximum(base**2 + 4 * sagitta**2 * products * square, 0.0))
+        heights = 2 * sagitta * products * square / (base + root)
+        return np.asarray(np.sum(along * heights, axis=1))
+
+    def distance(self, facets: NDArray[np.intp], at: Array, direction: Array) -> Array:
+        """Return how far the surface is from points of straight facets along directions, (p,).
+
+        The foot of a point of an arc is beside the point where its ray leaves the chord: without
+        that gaps would be off by the fourth order, as by a parabola in place of the arc.
+
+        Parameters
+        ----------
+        facets, at
+            As of `height`.
+        direction
+            Unit vectors, shape (p, d).
+        """
+        found = np.zeros(len(at))
+        if not self.follows or not self.deviation.any():
+            return found
+        slope = self.slopes(facets, at)
+        aside = np.einsum("pdr,pd->pr", slope @ inverse(slope.swapaxes(1, 2) @ slope), direction)
+        rise = np.einsum("pd,pd->p", self.normal[facets], direction)
+        for _ in range(6):  # each takes the error by the product of two small slopes
+            found = self.height(facets, at + found[:, None] * aside) / rise
+        return found
 
     @property
     def node_deviations(self) -> Array:
         """From the nodes of each facet to the curved surface, shape (f, k, d) (length)."""
         places = self.shape.nodes(self.degree)
-        heights = self.height(
-            np.arange(self.count), np.broadcast_to(places, (self.count, *places.shape))
-        )
-        return np.asarray(heights[:, :, None] * self.normal[:, None, :])
+        facets = np.repeat(np.arange(self.count), len(places))
+        heights = self.height(facets, np.tile(places, (self.count, 1)))
+        return np.asarray(heights.reshape(self.count, len(places), 1) * self.normal[:, None, :])
 
     def measures(self, at: Array, weights: Array) -> Array:
         """Return the weights of a rule's points in integrals over facets or rings, (f, q)."""
