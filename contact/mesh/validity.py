@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,15 @@ from contact.mesh.cells import SHAPES, Shape, rule
 from contact.mesh.domain import UNLESS
 from contact.mesh.entities import combinations
 from contact.mesh.extraction import BODY, Ints, Model
-from contact.mesh.geometry import determinant, jacobians
+from contact.mesh.geometry import determinant, inverse, jacobians
 from contact.typing import Array
 
 #: A cell is degenerate if its volume is below this times (longest edge)^d. Gmsh's qualities, which
 #: need its model, would not do: the signs of the volumes say whether cells overlap.
 FLAT = 1e-10
+
+#: Halvings of a hexahedron after which its Jacobian, still undecided, is nearly zero somewhere.
+HALVINGS = 6
 
 #: Nodes of degree 2 this near to where straight edges have them, over these, are there (rounding).
 STRAIGHT = 1e-5
@@ -270,6 +274,67 @@ def _first(wrong: npt.NDArray[np.bool_], corners: Array) -> str:
     return "(" + ", ".join(f"{v:g}" for v in corners[wrong][0].mean(axis=0)) + ")"
 
 
+def _may_fold(shape: Shape, x: Array) -> npt.NDArray[np.bool_]:
+    """Return which straight cells may be folded inside though they are not at their corners.
+
+    The Jacobian matrix is affine along each coordinate of the reference cell: everywhere it is a
+    mean of those at the corners. Where these are nearer to that in the middle than it is to a
+    singular one, none between is singular.
+
+    Parameters
+    ----------
+    shape, x
+        Of the cells, and their corners, shape (m, corners, d).
+    """
+    middle = inverse(jacobians(shape, x, shape.middle))
+    change = middle @ jacobians(shape, x, shape.nodes(1)) - np.eye(shape.dim)
+    return np.asarray(~(np.linalg.norm(change, axis=(2, 3)).max(axis=1) < 1))
+
+
+def _folded(shape: Shape, x: Array, limit: Array) -> npt.NDArray[np.bool_]:
+    """Return which straight hexahedra have a Jacobian below a limit anywhere, or nearly.
+
+    The Jacobian is of degree 2 along each coordinate: it lies between its Bezier coefficients, and
+    has those of corners there. In between the cell is halved (Johnen, Remacle and Geuzaine,
+    Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233, 2013).
+
+    Parameters
+    ----------
+    shape, x, limit
+        Of the cells, their corners, shape (m, corners, d), and least Jacobians, (m,).
+    """
+    halves = np.array([[[4, 0, 0], [2, 2, 0], [1, 2, 1]], [[1, 2, 1], [0, 2, 2], [0, 0, 4]]]) / 4
+    to_bezier = np.array([[1.0, 0.0, 0.0], [-0.5, 2.0, -0.5], [0.0, 0.0, 1.0]])
+    at = np.moveaxis(np.indices((3, 3, 3)) / 2, 0, -1).reshape(-1, 3)
+    values = determinant(jacobians(shape, x, at)).reshape(-1, 3, 3, 3)
+    values *= np.sign(values[:, :1, :1, :1])
+    pieces = np.einsum("ia,jb,kc,mabc->mijk", *[to_bezier] * 3, values)
+    of, found = np.arange(len(x)), np.zeros(len(x), dtype=bool)
+    for _ in range(HALVINGS):
+        found[of[(pieces[:, ::2, ::2, ::2].min(axis=(1, 2, 3)) <= limit[of])]] = True
+        open_ = (pieces.min(axis=(1, 2, 3)) <= limit[of]) & ~found[of]
+        pieces = np.einsum("xia,yjb,zkc,mabc->mxyzijk", *[halves] * 3, pieces[open_])
+        pieces, of = pieces.reshape(-1, 3, 3, 3), np.repeat(of[open_], 8)
+    found[of] = True
+    return found
+
+
+def _least_volume(shape: Shape, nodes: Array) -> Array:
+    """Return the least Jacobian of curved cells over its sign at the first corner, shape (m,).
+
+    At the corners, between them, and where integrals are taken.
+
+    Parameters
+    ----------
+    shape, nodes
+        Of the cells, and their nodes, shape (m, k, d).
+    """
+    at = np.concatenate([shape.nodes(2), rule(shape, 4)[0]])
+    each = (determinant(jacobians(shape, nodes, point[None]))[:, 0] for point in at)
+    first = next(each)  # one at a time, for all at once take kilobytes a cell
+    return reduce(np.minimum, (volume * np.sign(first) for volume in each), np.abs(first))
+
+
 def _check_cells(
     shape: Shape, points: Array, cells: Ints, parts: Mapping[str, Ints]
 ) -> tuple[dict[str, str], tuple[str, ...]]:
@@ -307,16 +372,24 @@ def _check_cells(
             f"it has {folded.sum()} cell(s) with a corner of 180 degrees or more, the first near "
             f"{_first(folded, x * unit)}"
         )
-    if nodes.shape[1] > shape.corners:
-        # At the corners, between them, and where integrals are taken.
-        at = np.concatenate([shape.nodes(2), rule(shape, 4)[0]])
-        volume = determinant(jacobians(shape, nodes, at)) * np.sign(volume[:, :1])
-        bent = ~(volume.min(axis=1) > FLAT * longest ** points.shape[1])
-        if np.any(bent):
-            raise InputError(
-                f"it has {bent.sum()} cell(s) that are folded by their curved edges, the first "
-                f"near {_first(bent, x * unit)}"
-            )
+    curved = nodes.shape[1] > shape.corners
+    bent = np.full(len(cells), curved)
+    limit = FLAT * longest ** points.shape[1]
+    if curved:
+        bent[:] = ~(_least_volume(shape, nodes) > limit)
+    elif shape.dim == 3 and not shape.simplex:
+        bent[:] = _may_fold(shape, x)
+        bent[bent] = _folded(shape, x[bent], limit[bent])
+    if np.any(bent) and curved:
+        raise InputError(
+            f"it has {bent.sum()} cell(s) that are folded by their curved edges, the first near "
+            f"{_first(bent, x * unit)}"
+        )
+    if np.any(bent):
+        raise InputError(
+            f"it has {bent.sum()} cell(s) that are folded inside, the first near "
+            f"{_first(bent, x * unit)}"
+        )
 
     cell_facets = np.sort(cells[:, shape.facet_corners], axis=2)
     # Three corners of a facet, two in 2-D, the same for both of its cells, and one inside.
