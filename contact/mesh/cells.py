@@ -361,9 +361,13 @@ def as_simplices(kinds: Sequence[Kind], collapsed: int = 0) -> tuple[Shape, list
         return None
     shape = {2: TRIANGLE, 3: TETRAHEDRON}[dim]
     found = " beside ".join(repr(name) for name, _ in cells)
-    straight = " with straight edges" if any(order > 1 for _, order in cells) else ""
+    second = any(order > 1 for _, order in cells)
+    straight = " with straight edges" if second else ""
+    alone = ", and curved edges in files of one kind alone" if second else ""
     if collapsed:
         found += f", {collapsed} of them with one node at several corners"
-    note = f"its cells, {found}, become {shape.plural}{straight}: a mesh has cells of one kind"
+    note = (
+        f"its cells, {found}, become {shape.plural}{straight}: a mesh has cells of one kind{alone}"
+    )
     others = [kind for kind in kinds if kind[1] < dim]
     return shape, [*others, (f"{shape.name.capitalize()} {shape.corners}", dim, 1)], note

@@ -191,7 +191,7 @@ def test_cells_of_second_order_become_straight(tmp_path):
     assert integral(domain, domain.dx_in("corner")) == pytest.approx(0.5)
     assert domain.notes == (
         "its cells, 'Quadrilateral 4' beside 'Triangle 6', become triangles with straight edges: a "
-        "mesh has cells of one kind",
+        "mesh has cells of one kind, and curved edges in files of one kind alone",
     )
 
 
