@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -81,20 +82,33 @@ class HeightMap(Section):
     """A body below heights along the last axis, smooth between them (cubic splines)."""
     file: Annotated[File, Accepted("a CSV file, or a .npy file with an array of heights")]
     """CSV file with a row of names and the columns x, y (3-D: x, y, z, at all points of a grid); or
-    a NumPy array of heights, an image for instance. Relative to the case file."""
+    a NumPy array of heights, an image for instance. Relative to the case file. A warning tells the
+    share of the contact that lies beyond them, or in a hole."""
     spacing: Annotated[
         list[Positive] | None, Accepted("distances > 0, one a direction of the array")
     ] = None
     """Distances of the points of an array: along its first axis, which is x, and in 3-D along its
     second, y. Required for an array."""
-    origin: list[float] | None = None
+    origin: Annotated[list[float] | None, Accepted("numbers, one a direction of the array")] = None
     """Place of the first point of an array. Default: zeros."""
     above: Switch = False
     """Whether the rigid body lies above the heights, and the elastic one below."""
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("spacing", "origin"):
+            if getattr(self, key) is not None and not self._is_array:
+                accepted = "that of a .npy file alone: the rows of a CSV file have their places"
+                raise fault(key, getattr(self, key), accepted)
+        return self
+
+    @property
+    def _is_array(self) -> bool:
+        return self.file.endswith(".npy")
+
     def build(self) -> Shape:
         """Read the heights."""
-        places, heights = self._array() if self.file.endswith(".npy") else self._columns()
+        places, heights = self._array() if self._is_array else self._columns()
         with naming(self.file):
             return obstacle.Heights(places, heights, above=self.above)
 
@@ -119,11 +133,21 @@ class HeightMap(Section):
         order = np.lexsort(across[::-1])
         places = tuple(np.unique(values) for values in across)
         shape = tuple(axis.size for axis in places)
+        made = f"the grid of {' by '.join(map(str, shape))} points that their coordinates make"
+        if math.prod(shape) > 4 * len(heights):  # scattered points
+            raise InputError(
+                f"{self.file}: {len(heights)} points of {made}; accepted: each point of a grid once"
+            )
         grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(across))
         given = np.column_stack(across)[order]
-        accepted = "each point of a grid once"
-        fits = given.shape == grid.shape and bool(np.all(given == grid))
-        expect(self.file, f"{len(heights)} points", accepted, fits)
+        if given.shape != grid.shape or np.any(given != grid):
+            known, counts = np.unique(given, axis=0, return_counts=True)
+            twice = known[counts > 1]
+            missing = {*map(tuple, grid.tolist())} - {*map(tuple, known.tolist())}
+            one = twice[0].tolist() if twice.size else min(missing)
+            where = f"({', '.join(f'{x:g}' for x in one)})"
+            said = f"{where} stands twice" if twice.size else f"no height at {where}"
+            raise InputError(f"{self.file}: {said}, of {made}; accepted: each point of a grid once")
         return places, heights[order].reshape(shape)
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
@@ -325,20 +326,21 @@ class Mesh(Section):
                     accepted = f"a name that the mesh has not: {', '.join(known)} are there"
                     raise InputError(f"mesh.{key}.{name}: given again; accepted: {accepted}")
 
-        def marker(formula: Expression) -> Marker:
-            return lambda x: formula.numpy(x[: domain.dim].T) != 0
+        def markers(key: str) -> Iterator[tuple[str, Marker]]:
+            for name, formula in getattr(self, key).items():
+                yield name, partial(marked, formula, f"mesh.{key}.{name}")
+
+        def marked(formula: Expression, label: str, x: Array) -> Array:
+            try:
+                return formula.numpy(x[: domain.dim].T) != 0
+            except InputError as error:
+                raise InputError(f"{label}: {error}") from None
 
         mesh = domain.mesh
         with on_all_ranks(domain.comm):  # a formula may have no value on one of them
-            facets = {
-                name: facets_inside(mesh, marker(formula)) for name, formula in self.inside.items()
-            }
-            cells = {
-                name: cells_in(mesh, marker(formula)) for name, formula in self.regions.items()
-            }
-            sides = {
-                name: shares(domain, marker(formula)) for name, formula in self.regions.items()
-            }
+            facets = {name: facets_inside(mesh, marker) for name, marker in markers("inside")}
+            cells = {name: cells_in(mesh, marker) for name, marker in markers("regions")}
+            sides = {name: shares(domain, marker) for name, marker in markers("regions")}
         return straddled(with_further_names(domain, facets, cells), sides)
 
     def _check_memory(self, comm: MPI.Intracomm, cells: int, dim: int) -> None:

@@ -25,7 +25,7 @@ from contact.methods.options import NewtonOptions
 from contact.nesting import coarser_cases
 from contact.output import environment
 from contact.output.bodies import passing
-from contact.output.remarks import fitting
+from contact.output.foundations import fitting, without_heights
 from contact.problem.checks import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
@@ -113,6 +113,7 @@ def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> li
         f"# warning: {text} [{identifier}]"
         for identifier, remarks in {
             "own-shape": fitting(problem),
+            "no-heights": without_heights(problem),
             "passing-bodies": passing(problem),
         }.items()
         for text in remarks

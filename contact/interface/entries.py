@@ -172,7 +172,7 @@ def joined_nodes(
     unknowns = _unknowns(nodes, projectors(free[nodes.nodes], there))
     coupling = coupling_operator(nodes.comm, index_map, rows, (nodes.nodes, unknowns), free)
     if coupling is not None and inclined is not None:
-        _check_rollers(nodes.comm, coupling, inclined)
+        _check_rollers(nodes, coupling, inclined, any(entry.coupling for entry in entries))
     return replace(nodes, coupling=coupling, carried=_carried(nodes, coupling, ties, unknowns))
 
 
@@ -195,14 +195,22 @@ def _unknowns(nodes: ContactNodes, movable: Array) -> Array:
     return made
 
 
-def _check_rollers(comm: MPI.Comm, coupling: CouplingOperator, inclined: Inclined) -> None:
+def _check_rollers(
+    nodes: ContactNodes, coupling: CouplingOperator, inclined: Inclined, bodies: bool
+) -> None:
     """Refuse jumps of several nodes, which have no common direction, on rollers. Collective."""
     shared = bool(np.isin(coupling.local, inclined.nodes).any())
-    if comm.allreduce(shared, op=MPI.LOR):
-        raise InputError(
-            "fixed.normal: its part shares nodes with a contact of two bodies, or of degree 2 in "
-            "3-D; accepted: there a displacement across an axis, or parts apart"
-        )
+    if not nodes.comm.allreduce(shared, op=MPI.LOR):
+        return
+    contact = "contact of degree 2 in 3-D"
+    if bodies:
+        contact = "contact of two bodies"
+    elif nodes.revolved:
+        contact = "contact of a body of revolution that reaches its axis"
+    raise InputError(
+        f"fixed.normal: its part shares nodes with a {contact}, where jumps are sums over nodes; "
+        "accepted: there a displacement across an axis instead, or parts apart"
+    )
 
 
 def _carried(

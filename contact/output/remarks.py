@@ -10,12 +10,11 @@ from mpi4py import MPI
 
 from contact.body.rigid import Rigid
 from contact.interface.law import Conductor
-from contact.output import bodies, discretisation
+from contact.output import bodies, discretisation, foundations
 from contact.output.error_estimate import estimated
 from contact.output.fields import DerivedFields, deformation, unloaded
 from contact.output.solution import Note, Remark, Solution
 from contact.output.uniqueness import MOST
-from contact.problem.problem import ContactProblem
 from contact.problem.residuals import left_as_pressures, residual_forces
 from contact.tolerances import EPS, LARGEST_VIOLATION
 from forms.elasticity import Anisotropic
@@ -97,8 +96,9 @@ def review(solution: Solution) -> None:
         "material": monotonicity(solution, strains),
         "small-strain": small_strain(solution),
         "curved-surface": discretisation.coarse_curves(solution),
-        "held-aslant": held_aslant(solution),
-        "own-shape": fitting(solution.problem),
+        "held-aslant": foundations.held_aslant(solution),
+        "own-shape": foundations.fitting(solution.problem),
+        "no-heights": foundations.without_heights(solution.problem, solution),
         "layer": layers(solution),
         "locking": discretisation.locking(solution),
         "discretisation-error": discretisation.large_error(solution),
@@ -202,37 +202,6 @@ def small_strain(solution: Solution) -> Iterator[Remark]:
         if made.least_volume <= 0:
             text += ": where it is not positive the deformed body would pass through itself"
         yield f"{text}; linear kinematics is a formal model there"
-
-
-def held_aslant(solution: Solution) -> Iterator[Remark]:
-    """Say where a support holds touching nodes aslant to the contact direction, with friction."""
-    nodes = solution.problem.nodes
-    aslant = np.linalg.norm(nodes.lift - nodes.normal, axis=1)
-    if nodes.maximum(np.where(solution.friction_bound > 0, aslant, 0.0)) > 0.1:
-        yield Note(
-            "a support holds contact nodes aslant to the contact direction: no friction acts there "
-            "along the directions that it holds, and their pressures bear its share"
-        )
-
-
-def fitting(problem: ContactProblem) -> Iterator[Remark]:
-    """Say where a curved part has no gap anywhere: its foundation has then its very shape."""
-    comm, size = problem.comm, problem.domain.size
-    found = []
-    for contact, entry in zip(problem.contacts, problem.entries, strict=True):
-        nodes = entry.nodes
-        sums = np.append(nodes.weight @ nodes.normal, nodes.weight.sum())
-        total = comm.allreduce(sums, op=MPI.SUM)
-        flat = np.linalg.norm(total[:-1]) > 0.995 * total[-1]
-        gap = comm.allreduce(float(np.abs(nodes.gap).max(initial=0.0)), op=MPI.MAX)
-        if contact.against is None and not contact.foundation.is_shape:
-            found += [contact.on] * (not flat and gap <= 1e-9 * size)
-    if found:
-        yield (
-            f"the part {', '.join(found)} is curved and its gap is 0 everywhere: the foundation "
-            "has the body's own shape; for a plane, sphere... in front of it give "
-            "contact.foundation, and a gap otherwise"
-        )
 
 
 def layers(solution: Solution) -> Iterator[Remark]:

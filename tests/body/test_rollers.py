@@ -264,11 +264,6 @@ def test_a_roller_alone_leaves_a_motion_along_it():
         build_problem(block(30.0, contact=far | {"on": "right"}, friction={"law": "none"}))
 
 
-def test_quadratic_contacts_in_space_that_share_nodes_are_refused():
-    with pytest.raises(InputError, match="of degree 2 in 3-D; accepted"):
-        build_problem(block(30.0, 3, space={"degree": 2}))
-
-
 def test_in_python_both_are_refused():
     with pytest.raises(InputError, match="normal and displacement; accepted: one of them"):
         Fixed("left", [0.0, None], normal=0.0)
@@ -336,3 +331,35 @@ def test_rollers_that_contradict_other_supports_are_refused(given, more, words):
     agreeing = [Fixed("bottom", [-0.01 / np.cos(np.deg2rad(20)), 0.0])]
     domain, body = wedge(["left"], (0.01, 0.0), agreeing)
     Problem(domain, body, Contact("top", gap=1.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("two bodies", "contact of two bodies"),
+        ("revolved", "contact of a body of revolution that reaches its axis"),
+        ("solid", "contact of degree 2 in 3-D"),
+    ],
+)
+def test_rollers_at_jumps_of_several_nodes(kind, words):
+    """Nodes of the contact's corner; the words are those of the contact that it is."""
+    case = {
+        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [2, 2]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "right", "normal": 0.0}],
+        "load": [{"on": "top", "traction": [0.0, -0.01]}],
+        "contact": {"on": "bottom"},
+    }
+    if kind == "revolved":
+        case["space"] = {"kinematics": "axisymmetric"}
+    elif kind == "solid":
+        case["mesh"] = {"generator": "box", "size": [1.0] * 3, "cells": [2] * 3}
+        case["load"] = [{"on": "top", "traction": [0.0, 0.0, -0.01]}]
+        case["space"] = {"degree": 2}
+    else:
+        case["mesh"] = {"generator": "two_blocks"}
+        case["fixed"] = [{"on": "upper_left", "normal": 0.0}]
+        case["load"] = [{"on": "upper_top", "traction": [0.0, -0.01]}]
+        case["contact"] = {"on": "upper_bottom", "against": "lower_top"}
+    with pytest.raises(InputError, match=f"shares nodes with a {words}, where jumps are sums"):
+        build_problem(parse_case(case))

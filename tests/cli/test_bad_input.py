@@ -97,6 +97,14 @@ FILES = {
         ("-0.005]", '0.0]\ncharge = "log(x-3)"'),
         "load.0.charge: a formula is not finite",
     ),
+    "a part inside that is not finite": (
+        ("[mesh.parts.loaded]", '[mesh.inside]\ncut = "sqrt(x-1)"\n[mesh.parts.loaded]'),
+        'mesh.inside.cut: "sqrt(x-1)" is not finite at (',
+    ),
+    "a region that is not finite": (
+        ("[mesh.parts.loaded]", '[mesh.regions]\nrest = "log(x-1)"\n[mesh.parts.loaded]'),
+        'mesh.regions.rest: "log(x-1)" is not finite at (',
+    ),
     "a key of another shape": (
         ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "sphere", point = [0, 0]}'),
         'point: given [0, 0]; accepted: point with shape = "plane" or "cylinder"',

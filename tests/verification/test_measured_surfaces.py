@@ -107,8 +107,12 @@ def test_arrays_and_columns_are_one_surface(tmp_path, file):
 
 
 BAD = {
-    "a row twice": ("x,y\n0,0\n1,0\n1,1\n", "accepted: each point of a grid once"),
-    "a hole": ("x,y,z\n0,0,0\n1,0,0\n0,1,0\n", "accepted: each point of a grid"),
+    "a row twice": ("x,y\n0,0\n1,0\n1,1\n", "(1) stands twice"),
+    "a hole": ("x,y,z\n0,0,0\n1,0,0\n0,1,0\n", "no height at (1, 1), of the grid of 2 by 2 points"),
+    "no grid": (
+        "x,y,z\n" + "".join(f"{k},{k},0\n" for k in range(9)),
+        "9 points of the grid of 9 by 9 points that their coordinates make; accepted: each point",
+    ),
     "names": ("a,b\n0,0\n1,0\n", "accepted: columns x, y in the plane"),
     "no number": ("x,y\n0,0\n1,nan\n", "accepted: a number at each place"),
     "one point": ("x,y\n0,0\n", "accepted: two places or more a direction"),
@@ -123,6 +127,61 @@ def test_heights_that_are_none(tmp_path, name):
     with pytest.raises(InputError) as error:
         solve(pressed({"shape": "heights", "file": str(tmp_path / "bad.csv")}))
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"spacing": [0.1]}, r"contact.foundation.spacing: given .0.1.*; accepted: that of a .npy"),
+        ({"origin": [0.1]}, r"contact.foundation.origin: given .0.1.*; accepted: that of a .npy"),
+        ({"origin": {"x": 0.1}}, "origin: given a table; accepted: numbers, one a direction"),
+    ],
+)
+def test_places_of_an_array_alone(more, message):
+    with pytest.raises(InputError, match=message):
+        pressed({"shape": "heights", "file": "points.csv"} | more)
+
+
+def flat(tmp_path, x, approach):
+    """Return a block that is moved towards heights of 0 in some places."""
+    write(tmp_path / "flat.csv", np.asarray(x), np.zeros(len(x)))
+    foundation = {"shape": "heights", "file": str(tmp_path / "flat.csv")}
+    return parse_case(
+        {
+            "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [20, 10]},
+            "material": {"young": 1.0, "poisson": 0.3},
+            "fixed": [{"on": "top", "displacement": [0.0, approach]}],
+            "contact": {"on": "bottom", "foundation": foundation},
+        }
+    )
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("direction", ["foundation", "body"])
+def test_contact_beyond_the_heights_is_told(shared_tmp_path, direction):
+    """0.55 to 1.35, half a spacing of 0.1 beyond the points, is known: 8 of 20 cells."""
+    places = 0.6 + 0.1 * np.arange(8)
+    case = flat(shared_tmp_path, places, -0.01)
+    contact = case.contact.model_copy(update={"direction": direction})
+    case = case.model_copy(update={"contact": contact})
+    warned = "60.0% of the part bottom lie where its foundation has no heights (x from 0.6 to 1.3)"
+    share = "so does 60.0% of the area that touches"
+    assert any(warned in w and share in w and "[no-heights]" in w for w in solve(case).warnings)
+    away = solve(flat(shared_tmp_path, places, 0.01))
+    assert any(warned in note and "nothing touches there" in note for note in away.notes)
+    whole = solve(flat(shared_tmp_path, np.linspace(0.05, 1.95, 20), -0.01))
+    assert not any("[no-heights]" in text for text in [*whole.warnings, *whole.notes])
+
+
+def test_a_hole_in_the_heights_is_told(tmp_path):
+    """One place that is left out is none; a graded profile has none."""
+    every = np.linspace(0.0, 2.0, 41)
+    hole = flat(tmp_path, np.delete(every, slice(15, 24)), -0.01)
+    (said,) = (w for w in solve(hole).warnings if "[no-heights]" in w)
+    assert "20.0% of the part" in said and "x from 0 to 2 but 0.725 to 1.175" in said
+    for places in (np.delete(every, 15), 2 * np.linspace(0.0, 1.0, 21) ** 3):
+        solution = solve(flat(tmp_path, places, -0.01))
+        assert not any("[no-heights]" in text for text in [*solution.warnings, *solution.notes])
 
 
 def half_plane(x, heights, load):

@@ -7,9 +7,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contact.arguments import expect
 from contact.interface.obstacle.protocol import Shape
+from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 
@@ -17,9 +19,10 @@ from contact.typing import Array
 class Heights(Shape):
     """A body below, or above, heights along the last axis: cubic splines through given points.
 
-    Beyond the outermost points the surface goes on level. Distances are those along the last axis
-    times the cosine of the slope: exact on the surface, and nearly so close to it; along an axis or
-    the body's normals gaps are exact.
+    Beyond the outermost points the surface goes on level, and a hole between points is bridged:
+    contact there is told (`output.foundations`). Distances are those along the last axis times the
+    cosine of the slope: exact on the surface, and nearly so close to it; along an axis or the
+    body's normals gaps are exact.
 
     Parameters
     ----------
@@ -76,6 +79,31 @@ class Heights(Shape):
             height = self._spline.ev(*inside)
             slopes = [self._spline.ev(*inside, dx=1), self._spline.ev(*inside, dy=1)]
         return height, np.where(beyond, 0.0, slopes).T
+
+    @cached_property
+    def gaps(self) -> tuple[Array, ...]:
+        """Intervals along each axis that have no heights, shape (n, 2): infinite ones at its ends.
+
+        Within it these are longer than both beside them together. They begin and end half a spacing
+        beyond the last place, as an image has its places in the middle of its pixels.
+        """
+        found = []
+        for axis in map(np.asarray, self.places):
+            steps = np.diff(axis)
+            half = (0.5 + NEGLIGIBLE) * steps
+            wide = 1 + np.flatnonzero(steps[1:-1] > 2 * (half[:-2] + half[2:]))
+            begin = np.append(-np.inf, axis[wide] + half[wide - 1])
+            end = np.append(axis[0] - half[0], axis[wide + 1] - half[wide + 1])
+            last = [axis[-1] + half[-1], np.inf]
+            found.append(np.vstack([np.column_stack([begin, end]), last]))
+        return tuple(found)
+
+    def unknown(self, points: Array) -> NDArray[np.bool_]:
+        """Tell which points lie in one of the `gaps` of an axis, shape (n,)."""
+        found = np.zeros(len(points), dtype=bool)
+        for gaps, at in zip(self.gaps, points.T, strict=False):
+            found |= ((at[:, None] > gaps[:, 0]) & (at[:, None] < gaps[:, 1])).any(axis=1)
+        return found
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""

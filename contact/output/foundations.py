@@ -1,0 +1,103 @@
+"""Remarks on foundations: where contact nodes meet them, and which surface they have there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.interface.obstacle import Heights
+from contact.output.solution import Note, Remark, Solution
+from contact.problem.problem import ContactProblem
+
+
+def held_aslant(solution: Solution) -> Iterator[Remark]:
+    """Say where a support holds touching nodes aslant to the contact direction, with friction."""
+    nodes = solution.problem.nodes
+    aslant = np.linalg.norm(nodes.lift - nodes.normal, axis=1)
+    if nodes.maximum(np.where(solution.friction_bound > 0, aslant, 0.0)) > 0.1:
+        yield Note(
+            "a support holds contact nodes aslant to the contact direction: no friction acts there "
+            "along the directions that it holds, and their pressures bear its share on all meshes; "
+            "the error of forces is that of these nodes alone"
+        )
+
+
+def fitting(problem: ContactProblem) -> Iterator[Remark]:
+    """Say where a curved part has no gap anywhere: its foundation has then its very shape."""
+    comm, size = problem.comm, problem.domain.size
+    found = []
+    for contact, entry in zip(problem.contacts, problem.entries, strict=True):
+        nodes = entry.nodes
+        sums = np.append(nodes.weight @ nodes.normal, nodes.weight.sum())
+        total = comm.allreduce(sums, op=MPI.SUM)
+        flat = np.linalg.norm(total[:-1]) > 0.995 * total[-1]
+        gap = comm.allreduce(float(np.abs(nodes.gap).max(initial=0.0)), op=MPI.MAX)
+        if contact.against is None and not contact.foundation.is_shape:
+            found += [contact.on] * (not flat and gap <= 1e-9 * size)
+    if found:
+        yield (
+            f"the part {', '.join(found)} is curved and its gap is 0 everywhere: the foundation "
+            "has the body's own shape; for a plane, sphere... in front of it give "
+            "contact.foundation, and a gap otherwise"
+        )
+
+
+def without_heights(problem: ContactProblem, solution: Solution | None = None) -> Iterator[Remark]:
+    """Say how much of a contact part has no measured heights in front of it. Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    solution
+        Its solution, by which contact there is told; without one it may come to that.
+    """
+    touched, begin = None if solution is None else _touched(solution), 0
+    for contact, entry in zip(problem.contacts, problem.entries, strict=True):
+        nodes, shape = entry.nodes, contact.foundation
+        here = slice(begin, begin + len(nodes.weight))
+        begin = here.stop
+        if not isinstance(shape, Heights):
+            continue
+        aside = np.where(shape.direction == "foundation", 0.0, nodes.gap)
+        unknown = shape.unknown(nodes.points + aside[:, None] * nodes.normal)
+        part = nodes.sum(unknown * 1.0) / nodes.sum(np.ones_like(nodes.weight))
+        if part == 0:
+            continue
+        text = (
+            f"{part:.1%} of the part {contact.on} lie where its foundation has no heights "
+            f"({_known(shape)}), and it is taken to go on level, or smoothly across a hole"
+        )
+        accepted = "accepted: heights in front of all of the part, or a smaller one"
+        if touched is None:
+            yield f"{text}; {accepted}"
+            continue
+        closed = touched[here]
+        area = nodes.sum((unknown & closed) * 1.0)
+        if area == 0:
+            yield Note(f"{text}; nothing touches there")
+        else:
+            share = area / nodes.sum(closed * 1.0)
+            yield f"{text}: so does {share:.1%} of the area that touches; {accepted}"
+
+
+def _known(shape: Heights) -> str:
+    """Say where there are heights."""
+    found = []
+    for name, axis, gaps in zip("xy", shape.places, shape.gaps, strict=False):
+        holes = [f"{begin:.4g} to {end:.4g}" for begin, end in gaps[1:-1]]
+        but = f" but {' and '.join(holes)}" if holes else ""
+        found.append(f"{name} from {axis[0]:.4g} to {axis[-1]:.4g}{but}")
+    return ", ".join(found)
+
+
+def _touched(solution: Solution) -> NDArray[np.bool_]:
+    """Tell which contact nodes touch at the end of any step. Collective."""
+    interface, found = solution.problem.interface, solution.status != "open"
+    for record in solution.steps:
+        nodal = interface.jump.apply(record.state.x)
+        found = found | (interface.pressure(nodal, record.state.forces) > interface.rounding(nodal))
+    return found
