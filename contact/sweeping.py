@@ -26,6 +26,7 @@ from mpi4py import MPI
 from contact.case.build import build_problem, named
 from contact.case.digest import check_files, check_same, digest
 from contact.case.file import Case, load_case
+from contact.case.messages import listed
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
 from contact.mesh.domain import Domain
@@ -42,6 +43,7 @@ from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.solving import Schedule, run_schedule
+from contact.typing import Array
 
 logger = logging.getLogger("contact.sweep")
 
@@ -119,7 +121,7 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
     Parameters
     ----------
     names
-        Of the keys; ``error.energy`` is one of a table in it.
+        Of the keys; ``error.energy`` is one of a table in it. A table stands for all in it.
 
     Raises
     ------
@@ -128,22 +130,39 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
     """
     found: dict[str, float] = {}
     for name in names:
-        top, *inner = name.split(".")
-        value = values_of(SUMMARY, solution, top).get(top)
-        for key in inner:
-            value = value.get(key) if isinstance(value, Mapping) else None
-        every: dict[str, Any] = {name: value}
-        if isinstance(value, Mapping):
-            every = {f"{name}.{key}": inside for key, inside in value.items()}
-        for key, entry in every.items():
-            numbers = np.atleast_1d(np.asarray(entry))
-            if numbers.dtype.kind not in "biuf" or numbers.ndim != 1:
-                kinds = "a number, a vector, or a table of these, in summary.json"
-                raise InputError(f"--columns {name}: given {entry!r:.40}; accepted: {kinds}")
-            ends = [""] if np.ndim(entry) == 0 else [f"_{axis}" for axis in AXES[: numbers.size]]
-            if len(ends) < numbers.size:
-                ends = [f"_{k}" for k in range(numbers.size)]
-            found |= {f"{key}{end}": float(x) for end, x in zip(ends, numbers, strict=True)}
+        top = name.partition(".")[0]
+        known = _numbers(values_of(SUMMARY, solution, top))
+        own = {key: x for key, x in known.items() if f"{key}.".startswith(f"{name}.")}
+        if not own:
+            if not known:  # another quantity is meant, or one that this case has not
+                known = _numbers(values_of(SUMMARY, solution))
+            near = difflib.get_close_matches(name, known, n=1)
+            near = near or [key for key in known if key.startswith(top)][:1]
+            hint = f" (did you mean {near[0]}?)" if near else ""
+            raise InputError(
+                f"--columns {name}: no number, vector or table of these in this case's "
+                f"summary.json{hint}; accepted: {listed(known)}"
+            )
+        for key, numbers in own.items():
+            ends = [""] if np.ndim(numbers) == 0 else [f"_{axis}" for axis in AXES[: len(numbers)]]
+            if len(ends) < np.size(numbers):
+                ends = [f"_{k}" for k in range(np.size(numbers))]
+            columns = zip(ends, np.atleast_1d(numbers), strict=True)
+            found |= {f"{key}{end}": float(x) for end, x in columns}
+    return found
+
+
+def _numbers(table: Mapping[str, Any], before: str = "") -> dict[str, Array]:
+    """Return the numbers and vectors in a table and the tables in it, by their dotted keys."""
+    found: dict[str, Array] = {}
+    for name, entry in table.items():
+        key = f"{before}{name}"
+        if isinstance(entry, Mapping):
+            found |= _numbers(entry, f"{key}.")
+        elif entry is not None:
+            numbers = np.asarray(entry)
+            if numbers.dtype.kind in "biuf" and numbers.ndim < 2 and numbers.size:
+                found[key] = numbers
     return found
 
 
@@ -236,7 +255,7 @@ def sweep(
                 tell(logger, (len(rows) + 1) / len(cases), said)
             rows.append(row)
             # Rows that come later, or are not asked for, remain.
-            on_root(comm, lambda: _write(folder, [*rows, *kept.values()]))
+            on_root(comm, lambda: _write(folder, [*rows, *kept.values()], cases[0]))
     return rows
 
 
@@ -305,8 +324,6 @@ def _kept_rows(
                 "computed; accepted: the table as a sweep has left it, or another folder"
             )
         check_files(f"--out {folder}", made, then, now)
-    if not before.exists():
-        before.write_text(text, encoding="utf-8")
     return {tuple(row[name] for name in names): dict(row) for row in rows}
 
 
@@ -330,12 +347,15 @@ def _read(table: Path) -> list[dict[str, str]]:
     return found
 
 
-def _write(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def _write(folder: Path, rows: Sequence[Mapping[str, Any]], first: Case) -> None:
+    """Write the table, and the case of its first row before that, once there is one."""
     if any([*row] != [*rows[0]] for row in rows):
         raise InputError(
             f"{folder / TABLE}: its rows have other columns than those of this version, or other "
             "--columns; accepted: another folder"
         )
+    if not (folder / CASE).exists():
+        (folder / CASE).write_text(to_toml(first, anchored=True), encoding="utf-8")
     draft = folder / f".contact-{TABLE}"
     write_csv(draft, rows[0], (row.values() for row in rows))
     os.replace(draft, folder / TABLE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
@@ -72,7 +73,7 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     InputError
         If it is not understood.
     """
-    arguments = [SHORT.get(argument, argument) for argument in arguments]
+    arguments = _joined([SHORT.get(argument, argument) for argument in arguments])
     options, rest = _parser().parse_known_args(arguments)
     known = [f"--{name}" for name in vars(options) if name not in POSITIONAL]
     known.append("--help")
@@ -86,6 +87,17 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
             one = ONE.get(options.command, "case file")
             raise InputError(f"{argument}: one argument too many; accepted: one {one}")
     return options, rest
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """Join options and values that begin with a minus sign, which argparse takes for options."""
+    found: list[str] = []
+    for argument in arguments:
+        if found and re.fullmatch(r"--[a-z-]+", found[-1]) and re.match(r"-[\d.]", argument):
+            found[-1] += f"={argument}"
+        else:
+            found.append(argument)
+    return found
 
 
 def _parser() -> Parser:

@@ -37,6 +37,12 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
     def draw() -> list[Path]:
         if (folder / TABLE).is_file() and not (folder / "summary.json").exists():
+            for option in ("xlim", "ylim", "mirror", "animate"):
+                if getattr(options, option):
+                    raise InputError(
+                        f"--{option}: the figure of a sweep shows no places; accepted: --field, "
+                        "--format, --width"
+                    )
             return plot_sweep(folder, options.field, formats, look)
         if options.animate:
             return animate(folder, options.field, look)

@@ -283,7 +283,7 @@ def _draw_plane(
             ax.update_datalim(np.concatenate([start, start + step]))
     if surface.size:
         order = np.lexsort(surface.T[::-1])
-        ax.plot(*surface[order].T, ".", ms=2, color=FOUNDATION, label="foundation")
+        ax.plot(*surface[order].T, ".", ms=4, color=FOUNDATION, label="foundation")
     sides = [f"{side:.4g} {units.length or ''}".rstrip() for side in extent]
     ax.text(0.5, 1.01, sides[0], transform=ax.transAxes, ha="center", va="bottom", fontsize=8)
     upright = {"ha": "left", "va": "center", "rotation": 90.0}

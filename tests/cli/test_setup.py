@@ -88,13 +88,13 @@ def test_parts_inside_of_a_body_are_drawn():
                 {"on": "bottom", "potential": 0.0},
             ],
             "electrode": [{"on": "middle", "charge": 1.0}],
-            "bolt": [{"on": "cut", "force": 2.0}],
+            "bolt": [{"on": "cut", "shortening": 2.0}],
             "contact": {"on": "top", "gap": 1.0},
         }
     )
     (legend,) = draw_setup(case, build_problem(case)).legends
     words = {text.get_text() for text in legend.get_texts()}
-    assert {"electrode of charge 1: middle", "bolt, force 2: cut"} <= words
+    assert {"electrode of charge 1: middle", "bolt, shortening 2: cut"} <= words
 
 
 def test_roles_of_one_colour_have_lines_of_their_own():
@@ -106,7 +106,7 @@ def test_roles_of_one_colour_have_lines_of_their_own():
             "material": {"young": 1.0, "poisson": 0.3},
             "fixed": [{"on": "left", "normal": 0.0}],
             "elastic": [{"on": "right", "stiffness": [1.0, 0.0]}],
-            "bolt": [{"on": "cut", "force": 1.0}],
+            "bolt": [{"on": "cut", "shortening": 0.01}],
             "load": [{"on": "top", "pressure": 0.1}],
             "contact": {"on": "bottom"},
         }

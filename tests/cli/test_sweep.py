@@ -262,13 +262,33 @@ def test_columns_of_the_summary(sweep):
     ("name", "words"),
     [
         ("max_presure", "did you mean max_pressure"),
-        ("reason", "a number, a vector"),
-        ("error.nothing", "a number, a vector"),
+        ("reason", "reason: no number, vector or table of these in this case's summary.json"),
+        ("error.nothing", "(did you mean error.energy?); accepted: error.energy"),
+        ("rigid.force", "rigid.force: no number, vector or table of these"),
+        ("reactions.lft", "(did you mean reactions.left?)"),
     ],
 )
-def test_other_columns_are_refused(sweep, capsys, name, words):
+def test_other_columns_are_refused(sweep, tmp_path, capsys, name, words):
+    """Nothing is left behind."""
+    before = sorted(tmp_path.iterdir())
     assert sweep("--over", "friction.mu=0.2", "--columns", name)[0] == 2
     assert words in capsys.readouterr().err
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_tables_in_tables_are_columns(tmp_path, capsys):
+    """Of a rigid part its motion and force, a column a component."""
+    case = tmp_path / "bar.toml"
+    held = '[[fixed]]\non = "left"\ndisplacement = [0.0, 0.0]'
+    pushed = '[[rigid]]\non = "left"\ndisplacement = [0.0, 0.0]\nrotation = 0.0'
+    assert held in BAR
+    case.write_text(BAR.replace(held, pushed))
+    over = ["--over", "friction.mu=0.2,0.4", "--columns", "rigid_parts,rigid_parts.left.force"]
+    assert main(["sweep", str(case), "--out", str(tmp_path / "out"), *over, "--quiet"]) == 0
+    (row, _) = csv.DictReader((tmp_path / "out" / "sweep.csv").open())
+    balance = float(row["rigid_parts.left.force_y"]) - float(row["contact_force_y"])
+    assert balance == pytest.approx(0.01, rel=1e-6)
+    assert "rigid_parts.left.displacement_x" in row and "rigid_parts.left.moment" in row
 
 
 def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
@@ -280,6 +300,8 @@ def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
     assert main(["plot", out, "--field", "contact_area"]) == 0
     assert main(["plot", out, "--field", "area"]) == 2
     assert "no such column of sweep.csv; accepted: converged" in capsys.readouterr().err
+    assert main(["plot", out, "--xlim", "-0.5,1"]) == 2
+    assert "--xlim: the figure of a sweep shows no places" in capsys.readouterr().err
     (tmp_path / "out" / "sweep.csv").write_text("nothing")
     assert main(["plot", out]) == 2
     assert "damaged" in capsys.readouterr().err

@@ -1,6 +1,7 @@
 """The figures of a solution."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,13 @@ import pytest
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from contact.cli.arguments import parse
+from contact.errors import InputError
 from contact.output.figures.body import draw_plane, picture
 from contact.output.figures.contact import draw_line
 from contact.output.figures.figures import draw
 from contact.output.figures.run import Run
+from contact.output.figures.steps import draw_loop
 from contact.output.figures.style import Look, widened
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
@@ -77,6 +81,66 @@ def test_axes_end_where_they_are_asked_to() -> None:
     assert draw_line(run, look).axes[0].get_xlim() == (0.5, 1.0)
     ax = draw_plane(picture(run, "von_mises"), look).axes[0]
     assert (ax.get_xlim(), ax.get_ylim()) == ((0.5, 1.0), (0.0, 0.4))
+    body = r"beside the body, which is drawn from .*; accepted: ends that show some of it"
+    for beside, words in (
+        (Look(xlim=(5.0, 6.0)), f"--xlim 5,6: {body}"),
+        (Look(ylim=(-3.0, -2.0)), f"--ylim -3,-2: {body}"),
+    ):
+        with pytest.raises(InputError, match=words):
+            draw_plane(picture(run, "von_mises"), beside)
+    with pytest.raises(InputError, match=r"--xlim 5,6: beside the contact part, .* from 0 to 2"):
+        draw_line(run, Look(xlim=(5.0, 6.0)))
+
+
+def test_a_foundation_that_is_far_is_not_drawn() -> None:
+    """The body would be a dot beside it, as its gap is scaled like the displacements."""
+    case = block(2, contact={"on": "bottom", "gap": 1.0})
+    run = run_of(solve(case))
+    assert not draw_plane(picture(run, "von_mises", scale=10.0), Look()).axes[0].lines
+    assert draw_plane(picture(run, "von_mises", scale=0.5), Look()).axes[0].lines
+
+
+def moved(**columns: list[float]) -> Run:
+    """Return the run of a rigid part with these columns in its steps."""
+    run = run_of(solve(block(2)))
+    course = {f"rigid_{axis}": np.zeros(4) for axis in "xy"}
+    course |= {f"rigid_force_{axis}": np.zeros(4) for axis in "xy"}
+    return replace(run, steps=course | {k: np.array(v) for k, v in columns.items()})
+
+
+def test_the_loop_is_along_the_direction_that_moves() -> None:
+    """Where it goes back, by more than the others tremble; else where it goes farthest."""
+    loop = moved(rigid_x=[1.0, 0.0, -1.0, 0.0], rigid_y=[0.5, 0.49, 0.5, 0.49])
+    assert "u_x" in draw_loop(loop, "rigid").axes[0].get_xlabel()
+    along = moved(rigid_x=[0.1, 0.3, 0.1, 0.3], rigid_y=[0.3, 0.6, 0.9, 1.2])
+    assert "u_x" in draw_loop(along, "rigid").axes[0].get_xlabel()
+    far = moved(rigid_x=[0.1, 0.2, 0.3, 0.4], rigid_y=[0.3, 0.6, 0.9, 1.2])
+    assert "u_y" in draw_loop(far, "rigid").axes[0].get_xlabel()
+
+
+@pytest.mark.parametrize("width", [85 / 25.4, 6.3])
+def test_labels_of_a_loop_are_apart(width: float) -> None:
+    look = Look(width)
+    run = moved(rigid_x=[0.005, 0.01, 0.015, 0.02], rigid_force_x=[0.2, 0.4, 0.6, 0.9])
+    with rc_context(look.style):
+        figure = draw_loop(run, "rigid")
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        renderer, ax = canvas.get_renderer(), figure.axes[0]
+        boxes = [label.get_window_extent(renderer) for label in ax.get_xticklabels()]
+        inside = [box for box in boxes if ax.bbox.x0 - 1 <= (box.x0 + box.x1) / 2 <= ax.bbox.x1 + 1]
+        assert len(inside) >= 3
+        assert all(one.x1 + 3 < two.x0 for one, two in pairwise(inside))
+        name = ax.yaxis.label.get_window_extent(renderer)
+        assert 0 <= name.y0 and name.y1 <= figure.bbox.height
+
+
+def test_ends_below_zero_are_values_of_an_option() -> None:
+    """Argparse takes them for options where the second begins with a minus sign."""
+    options, rest = parse(["plot", "out", "--xlim", "-0.5,1", "--ylim", "-.5,-0.1"])
+    assert (options.xlim, options.ylim, rest) == ("-0.5,1", "-.5,-0.1", [])
+    options, rest = parse(["solve", "a.toml", "--quiet", "-contact_ksp_rtol", "-1"])
+    assert rest == ["-contact_ksp_rtol", "-1"]
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -124,7 +124,7 @@ class Picture:
     def title(self) -> str:
         """The title of the run, with the factor of the displacements."""
         times = f"displacements\u00a0$\\times$\u00a0{self.scale:g}"
-        times = times if self.scale != 1 else "displacements to scale"
+        times = times if self.scale != 1 else "displacements to scale".replace(" ", "\u00a0")
         return fitted(f"{self.run.title} ({times})" if self.run.title else times)
 
 
@@ -171,11 +171,12 @@ def draw_plane(picture: Picture, look: Look) -> Figure:
     """Draw a plane body over its outline in the reference configuration, and the foundation."""
     run, box, head = picture.run, picture.box.copy(), picture.title
     mirrored = look.mirror and run.axes == "rz"
-    whole = np.ptp(np.asarray(picture.skin.points)[:, :2], axis=0)
-    cut = np.any(np.ptp(box, axis=0) < 0.99 * whole) or look.xlim or look.ylim
+    places = np.asarray(picture.skin.points)[:, :2]
+    cut = np.any(np.ptp(box, axis=0) < 0.99 * np.ptp(places, axis=0)) or look.xlim or look.ylim
     box[0, 0] = -box[1, 0] if mirrored else box[0, 0]
-    for k, given in enumerate((look.xlim, look.ylim)):
-        box[:, k] = given or box[:, k]
+    for k, (low, high) in enumerate(zip(places.min(axis=0), places.max(axis=0), strict=True)):
+        low = -high if mirrored and k == 0 else low
+        box[:, k] = look.ends(k, low, high, "the body") or box[:, k]
     width, height = box[1] - box[0]
     tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
     more = 0.02 * float(matplotlib.rcParams["font.size"]) * head.count("\n")
@@ -194,7 +195,7 @@ def draw_plane(picture: Picture, look: Look) -> Figure:
         for part in run.contacts:
             if np.all(part["rigid"]):
                 edge = ends(part, run.held)
-                _foundation(ax, part, picture.scale, edge, side, run.diameter)
+                _foundation(ax, part, picture, edge, side)
     _bar(figure, picture)
     ax.set_aspect("equal")
     ax.use_sticky_edges = False
@@ -212,7 +213,8 @@ def _bar(figure: Figure, picture: Picture) -> None:
     """Add the bar of the colours."""
     colours, axes = ScalarMappable(picture.norm, "viridis"), figure.axes
     bar = {"location": "bottom", "label": picture.label, "aspect": 40, "shrink": 0.8}
-    figure.colorbar(colours, ax=axes, **bar)
+    text = figure.colorbar(colours, ax=axes, **bar).ax.xaxis.get_offset_text()
+    text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the label
 
 
 def _colour(ax: Axes, picture: Picture, side: int) -> None:
@@ -226,22 +228,25 @@ def _colour(ax: Axes, picture: Picture, side: int) -> None:
         ax.tripcolor(mesh, skin["values"], shading="gouraud", **shown)
 
 
-def _foundation(
-    ax: Axes, table: Table, scale: float, edges: Array, side: int, diameter: float
-) -> None:
+def _foundation(ax: Axes, table: Table, picture: Picture, edges: Array, side: int) -> None:
     """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled.
 
     Not where it is far: gaps to a curved shape, scaled like the displacements, are no shape; and
-    beside one that is farther than the body is large the body would be a dot.
+    beside one that is farther from the deformed body than that is thick the body would be a dot.
     """
+    scale = picture.scale
     points = np.column_stack([table["x"], table["y"]])
     normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"] + table["moved"]
+    across = normal.mean(axis=0) / (np.linalg.norm(normal.mean(axis=0)) or 1.0)
+    thick = np.ptp(np.asarray(picture.skin.points)[:, :2] @ across)
+    if scale * np.min(table["gap"] - table["u_n"]) > thick > 0:
+        return
     points = np.concatenate([edges[:1], points, edges[1:]]) * [side, 1]
     normal = np.concatenate([normal[:1], normal, normal[-1:]]) * [side, 1]
     gap = np.concatenate([gap[:1], gap, gap[-1:]])
     surface = points + scale * gap[:, None] * normal
     extent = np.ptp(points, axis=0).max()
-    far = max(FAR * extent, min(2 * scale * gap.min(), diameter))
+    far = max(FAR * extent, min(2 * scale * gap.min(), picture.run.diameter))
     near = np.flatnonzero((scale == 1) | (scale * gap <= far))
     for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1):
         ax.plot(*surface[run].T, color="black", lw=0.5)

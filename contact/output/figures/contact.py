@@ -176,7 +176,8 @@ def _draw_rows(rows: Any, table: Table, run: Run, look: Look) -> None:
     rows[-1].set_xlabel(units.label(f"${name}$ along $\\Gamma_3$", "length"))
     (low,), (high,) = window(where[:, None], table["status"] != "open", 0.0)
     cut = low > where.min() or high < where.max()
-    rows[0].set_xlim(look.xlim or (tuple(np.clip([low, high], *whole)) if cut else whole))
+    given = look.ends(int(name == run.axes[1]), *whole, "the contact part")
+    rows[0].set_xlim(given or (tuple(np.clip([low, high], *whole)) if cut else whole))
 
 
 def _draw_opposite(ax: Axes, table: Table, where: Array, opposite: Any) -> None:
@@ -217,8 +218,10 @@ def draw_surface(run: Run, look: Look) -> Figure:
     sides = [(surface, "contact pressure"), (run.opposite, "on the other side")]
     panels = [(side, name) for side, name in sides if side is not None]
     panels.append((surface, "status, friction (arrows)"))
-    low, high = window(surface.points[:, view], touching, 0.13)  # room for the arrows
-    for k, given in enumerate((look.xlim, look.ylim)):
+    places = surface.points[:, view]
+    low, high = window(places, touching, 0.13)  # room for the arrows
+    for k in (0, 1):
+        given = look.ends(k, places[:, k].min(), places[:, k].max(), "the contact part")
         low[k], high[k] = given or (low[k], high[k])
     stacked = page_width() < NARROW
     rows, columns = (len(panels), 1) if stacked else (1, len(panels))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from contact.library.units import force_of
 from contact.output.figures.contact import position, window, zones
@@ -27,7 +28,7 @@ from contact.typing import Array
 #: Parts that move, as the columns of ``steps.csv`` begin; labels of their displacement, and names.
 DRIVEN = {"driven": ("mean displacement", "part"), "rigid": ("displacement", "rigid body")}
 
-#: Share of the largest motion from which on a part moves along an axis.
+#: Share of the largest motion from which on a part moves along an axis, and goes back.
 MOVES = 0.1
 
 
@@ -73,16 +74,16 @@ def draw_loop(run: Run, moves: str) -> Figure:
     """Draw the force on the part that moves over its displacement, from the origin on."""
     names = "xyz"[: len(run.axes)]
     ways = [_course(run, f"{moves}_{axis}") for axis in names]
-    far = max(float(np.ptp(way)) for way in ways)
-    ways = [way if np.ptp(way) > MOVES * far else 0 * way for way in ways]
-    directions = [np.sign(np.diff(way)) for way in ways]
-    turns = [np.count_nonzero(there[1:] * there[:-1] < 0) for there in directions]
-    # Where the part turns back most often; else where it goes farthest.
-    k = int(np.lexsort(([np.ptp(way) for way in ways], turns))[-1])
+    sizes = np.array([np.ptp(way) for way in ways])
+    back = np.array([np.abs(np.diff(way)).sum() for way in ways]) - sizes
+    back[(sizes <= MOVES * sizes.max()) | (back <= MOVES * sizes.max())] = 0.0
+    # Where the part goes back farthest; else where it goes farthest.
+    k = int(np.lexsort((sizes, back))[-1])
     words, part = DRIVEN[moves]
-    figure = sheet(0.66)
+    figure = sheet(0.85 if page_width() < NARROW else 0.66)
     ax = figure.subplots()
     ax.plot(ways[k], _course(run, f"{moves}_force_{names[k]}"), "-o", color=BLUE, markersize=2.5)
+    ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     ax.set_xlabel(run.units.label(f"{words} $u_{run.axes[k]}$", "length"))
     ax.set_ylabel(f"force on the {part} along ${run.axes[k]}${_unit(run, 1)}")
     ax.grid(alpha=0.25)
@@ -120,8 +121,9 @@ def draw_zones(run: Run, look: Look) -> Figure:
     ax = figure.subplots()
     zones(ax, where, whole, status, _course(run, "t"))
     (low,), (high,) = window(where[:, None], (status != "open").any(axis=0), 0.0)
-    if look.xlim or low > where.min() or high < where.max():
-        ax.set_xlim(look.xlim or (low, high))
+    given = look.ends(int(name == run.axes[1]), *whole, "the contact part")
+    if given or low > where.min() or high < where.max():
+        ax.set_xlim(given or tuple(np.clip([low, high], *whole)))
     handles = [Patch(color=colour, label=words) for colour, words in ZONES.values()]
     ax.legend(handles=handles, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     ax.set_xlabel(run.units.label(f"${name}$ along $\\Gamma_3$", "length"))

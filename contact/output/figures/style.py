@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from contact.errors import InputError
 from contact.output.options import Quantity, Units
 from contact.typing import Array
 
@@ -77,8 +78,31 @@ class Look:
         """The settings of the figures."""
         if self.width is None:
             return STYLE
-        small = {"font.size": 7, "legend.fontsize": 6} if self.width < NARROW else {}
+        # Long numbers of an axis would meet: their power of ten stands at its end.
+        small = {"font.size": 7, "legend.fontsize": 6, "axes.formatter.limits": (-2, 4)}
+        small = small if self.width < NARROW else {}
         return STYLE | {"figure.figsize": (self.width, self.width)} | small
+
+    def ends(self, axis: int, low: float, high: float, shown: str) -> tuple[float, float] | None:
+        """Return the ends that are asked for of the x or y axis (0 or 1); None for any.
+
+        Parameters
+        ----------
+        low, high, shown
+            Where that which is drawn begins and ends, and its name.
+
+        Raises
+        ------
+        InputError
+            If it would not be seen.
+        """
+        given = (self.xlim, self.ylim)[axis]
+        if given is not None and not (given[0] < high and low < given[1]):
+            raise InputError(
+                f"--{'xy'[axis]}lim {given[0]:g},{given[1]:g}: beside {shown}, which is drawn from "
+                f"{low:.4g} to {high:.4g}; accepted: ends that show some of it"
+            )
+        return given
 
 
 #: Figures as wide as a page, with axes that suit them.

@@ -17,7 +17,17 @@ from matplotlib.ticker import MaxNLocator
 
 from contact.errors import InputError
 from contact.output.figures.figures import image
-from contact.output.figures.style import BLUE, GREEN, GREY, ORANGE, SKY, Look, sheet
+from contact.output.figures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    NARROW,
+    ORANGE,
+    SKY,
+    Look,
+    page_width,
+    sheet,
+)
 from contact.ranks import refused
 
 #: Columns that are drawn by default, as far as they vary.
@@ -90,7 +100,8 @@ def _figure(keys: Sequence[str], rows: Sequence[dict[str, str]], drawn: Sequence
     lines = list(dict.fromkeys(tuple(row[key] for key in others) for row in rows))
     across = 2 if len(drawn) > 1 else 1
     down = -(-len(drawn) // across)
-    figure = sheet((0.4 if across > 1 else 0.66) * down + (0.1 if len(lines) > 1 else 0.0))
+    tall = 0.5 if page_width() < NARROW else 0.4
+    figure = sheet((tall if across > 1 else 0.66) * down + (0.1 if len(lines) > 1 else 0.0))
     panels = np.ravel(figure.subplots(down, across, squeeze=False))
     for panel, name in zip(panels, drawn, strict=False):
         for line, (style, colour) in zip(lines, itertools.cycle(LINES), strict=False):
@@ -138,4 +149,5 @@ def _line(panel: Axes, key: str, name: str, rows: Sequence[dict[str, str]], **lo
         panel.plot([row[key] for row in rows], values, marker="o", markersize=3, **look)
         return
     order = np.argsort(places)
+    panel.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     panel.plot(places[order], values[order], marker="o", markersize=3, **look)
