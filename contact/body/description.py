@@ -36,8 +36,8 @@ from forms.plane_stress import PlaneStressElastic, PlaneStressHistory, in_plane_
 
 #: For scripts that are older than the meaning of the word.
 CHANGED = (
-    "Load(force=...) is the resultant, spread evenly over the part; until version 0.1 it was the "
-    "force per area, which is traction=..."
+    "Load(force=...) is the resultant, spread evenly over the part; the force per area, which it "
+    "was in scripts from before the first release, is traction=..."
 )
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, model_validator
 
 import meshes
@@ -330,7 +331,7 @@ class Mesh(Section):
             for name, formula in getattr(self, key).items():
                 yield name, partial(marked, formula, f"mesh.{key}.{name}")
 
-        def marked(formula: Expression, label: str, x: Array) -> Array:
+        def marked(formula: Expression, label: str, x: Array) -> NDArray[np.bool_]:
             try:
                 return formula.numpy(x[: domain.dim].T) != 0
             except InputError as error:

@@ -97,7 +97,7 @@ def grows(case: Case) -> list[str]:
     begin, end = case.evolution.times[:2]
     return [
         f"{', '.join(found)} without an amplitude: from 0 at t = {begin:g} to all at t = {end:g}, "
-        'and then constant; amplitude = "constant": all the time, as until version 0.1'
+        'and then constant; amplitude = "constant": all the time'
     ]
 
 
@@ -198,8 +198,8 @@ def _given(problem: ContactProblem, times: Sequence[float]) -> list[str]:
     when = f" at t = {times[-1]:g}" if len(times) > 1 else ""
     total = ", ".join(f"{force:.4g}" for force in found[-1].resultant)
     lines = [
-        f"# given: loads on the body with the resultant ({total}){when}; displacements of up to "
-        f"{moved:.3g}; gap {least:.3g} to {largest:.3g}"
+        f"# given: loads on the body with the resultant ({total}){when}; prescribed displacements "
+        f"of up to {moved:.3g}; gap {least:.3g} to {largest:.3g}"
     ]
     if moved > LARGE * size:
         lines.append(

@@ -64,7 +64,7 @@ def without_heights(problem: ContactProblem, solution: Solution | None = None) -
             continue
         aside = np.where(shape.direction == "foundation", 0.0, nodes.gap)
         unknown = shape.unknown(nodes.points + aside[:, None] * nodes.normal)
-        part = nodes.sum(unknown * 1.0) / nodes.sum(np.ones_like(nodes.weight))
+        part = nodes.sum(unknown.astype(np.float64)) / nodes.sum(np.ones_like(nodes.weight))
         if part == 0:
             continue
         text = (
@@ -76,11 +76,11 @@ def without_heights(problem: ContactProblem, solution: Solution | None = None) -
             yield f"{text}; {accepted}"
             continue
         closed = touched[here]
-        area = nodes.sum((unknown & closed) * 1.0)
+        area = nodes.sum((unknown & closed).astype(np.float64))
         if area == 0:
             yield Note(f"{text}; nothing touches there")
         else:
-            share = area / nodes.sum(closed * 1.0)
+            share = area / nodes.sum(closed.astype(np.float64))
             yield f"{text}: so does {share:.1%} of the area that touches; {accepted}"
 
 

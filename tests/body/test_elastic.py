@@ -210,6 +210,10 @@ def test_in_python_and_in_a_case_alike():
 WRONG = {
     "nothing": ([{"on": "bottom"}], r"elastic\.0\.stiffness: missing; accepted: stiffness, normal"),
     "negative": ([{"on": "bottom", "normal": -1.0}], r"elastic\.0\.normal: .*negative"),
+    "negative somewhere": (
+        [{"on": "bottom", "normal": "100*(x-1)"}],
+        r'elastic\.0\.normal: "100\*\(x-1\)" is -\d+ at a node; accepted: values >= 0',
+    ),
     "three": ([{"on": "bottom", "stiffness": [1.0] * 3}], "2 components in 2-D"),
     "in time": ([{"on": "bottom", "normal": "t"}], "a formula without t"),
     "no part": ([{"on": "base", "normal": 1.0}], r"elastic\.0\.on: given .base."),

@@ -81,14 +81,14 @@ def test_a_load_between_times_at_which_it_is_zero_is_seen():
     case = parse_case(data)
     text = describe(case, build_problem(case))
     assert NOTHING not in text
-    assert "resultant (0, 0) at t = 2; displacements of up to 0;" in text
+    assert "resultant (0, 0) at t = 2; prescribed displacements of up to 0;" in text
 
 
 def test_displacements_are_not_guessed():
     """A cantilever bends by 1e-3 or more, and a block of its size is compressed by 3e-6."""
     text = said(changed(mesh__size=[40.0, 1.0], mesh__parts=None, load__0__on="top"))
     assert "expected" not in text and "some" not in text
-    assert "resultant (0, -0.2); displacements of up to 0; gap 0 to 0" in text
+    assert "resultant (0, -0.2); prescribed displacements of up to 0; gap 0 to 0" in text
 
 
 def test_charges_of_electrodes_are_no_forces():

@@ -101,8 +101,9 @@ class Heights(Shape):
     def unknown(self, points: Array) -> NDArray[np.bool_]:
         """Tell which points lie in one of the `gaps` of an axis, shape (n,)."""
         found = np.zeros(len(points), dtype=bool)
-        for gaps, at in zip(self.gaps, points.T, strict=False):
-            found |= ((at[:, None] > gaps[:, 0]) & (at[:, None] < gaps[:, 1])).any(axis=1)
+        for k, gaps in enumerate(self.gaps):
+            at = points[:, k, None]
+            found |= ((at > gaps[:, 0]) & (at < gaps[:, 1])).any(axis=1)
         return found
 
     def distance(self, points: Array) -> tuple[Array, Array]:
