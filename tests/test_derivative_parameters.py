@@ -143,9 +143,7 @@ def at_zero(length=1.0, young=1.2):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("length", "young"), [(1.0, 1.2), (1e-3, 200e9), (1e-6, 200e9), (1e3, 1.2)]
-)
+@pytest.mark.parametrize(("length", "young"), [(1e-6, 200e9), (1e3, 1.2)])
 def test_numbers_that_are_0_in_any_units(length, young):
     data = at_zero(length, young)
     steps = {

@@ -28,7 +28,7 @@ from contact import (
 )
 from contact.body.fields import field, vector
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(2)
 
 
 def square() -> tuple[dmesh.Mesh, dmesh.MeshTags]:

@@ -16,7 +16,7 @@ from contact.mesh.domain import revolved
 from contact.mesh.grid import box, rectangle
 from tests.problems.bar import changed
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(2)
 
 DOWN = -0.03
 
@@ -167,7 +167,7 @@ def test_supports_at_zero_drive_nothing():
     assert moved == pytest.approx([DOWN / 2, DOWN])
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("by", ["load", "support"])
 def test_the_force_that_drives_a_part_is_without_supports_beside_it(by):
     """They share the node of a corner."""

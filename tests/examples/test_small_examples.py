@@ -15,7 +15,7 @@ from scripts.examples import (
     refinement,
 )
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(2)
 
 
 def test_bar_pressure(shared_tmp_path, capsys):

@@ -33,7 +33,7 @@ from tests.problems.mechanics import Affine, constant, flat
 from tests.problems.piezo import SCALED, pzt
 from tests.problems.revolution import Drum, PoledCylinder, Tube, half_plane, pressed_cylinder
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(2)
 
 
 def solved(problem, options=None):

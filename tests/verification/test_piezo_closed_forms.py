@@ -59,7 +59,7 @@ def test_capacitor_formula():
     assert column.solution()[1] == pytest.approx(expected, rel=1e-14)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("units", [SCALED, SI], ids=["scaled", "SI"])
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("name", COLUMNS)
@@ -96,7 +96,7 @@ def test_perfect_conductor():
     assert max(errors(solver, column, SCALED)) < 1e-10
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("name", ["insulated", "conductive"])
 def test_units_do_not_matter(name, dim):

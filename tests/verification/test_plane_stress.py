@@ -71,7 +71,7 @@ def uniaxial(name, stress):
     return deviator + volume / 3, -deviator / 2 + volume / 3
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", LAWS)
 def test_a_strip_is_a_bar(name, degree):
@@ -94,7 +94,7 @@ def tensors(solution):
     return [every[:, fields.columns[name]].reshape(-1, 3, 3) for name in ("strain", "stress")]
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 def test_a_ring_pressed_inside_is_lames_in_plane_stress():
     """U = p a^2/(E (b^2 - a^2)) ((1 - nu) r + (1 + nu) b^2/r), a = 1 and b = 2."""
     pressure, off = 0.5, []
@@ -127,7 +127,7 @@ def membrane(comm, count):
     return replace(domain, size=60.0)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 def test_cooks_membrane():
     """E = 1, nu = 1/3, a shear of 1: the middle of the end rises by 23.96 (Cook 1974; Bergan)."""
     material = Material(Linear(1.0, 1 / 3)).plane_stress()
@@ -139,7 +139,7 @@ def test_cooks_membrane():
     assert np.concatenate(COMM.allgather(u[end]))[0] == pytest.approx(23.96, rel=2e-3)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 def test_a_ceramic_sheet_under_a_voltage_and_a_pull():
     """Strains are those of the whole compliance and of d, in all three directions."""
     voltage, pull = 0.02, 0.03
