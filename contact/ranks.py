@@ -40,13 +40,25 @@ def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
     InputError
         Also where the system refuses something: see `refused`.
     """
+    result = on_each(comm, lambda: action() if comm.rank == 0 else None)
+    return comm.bcast(result)  # type: ignore[no-any-return]
+
+
+def on_each(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
+    """Do something on each rank; the error of one of them is that of all. Collective.
+
+    Raises
+    ------
+    InputError
+        Also where the system refuses something: see `refused`.
+    """
     result: Any = None
     with on_all_ranks(comm):
         try:
-            result = action() if comm.rank == 0 else None
+            result = action()
         except OSError as error:
             raise refused(error) from None
-    return comm.bcast(result)  # type: ignore[no-any-return]
+    return result  # type: ignore[no-any-return]
 
 
 def exchanged(
@@ -97,10 +109,41 @@ def boxes(comm: MPI.Comm, points: Array) -> Array:
     return found
 
 
-def neighbours(comm: MPI.Comm, points: Array, values: Array, reach: float) -> Array:
+def near_boxes(
+    comm: MPI.Comm, points: Array, asked: Array, reach: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the ranks that ask for points near theirs, and which these are. Collective.
+
+    Each rank tells the others a box, and gets the points in it alone.
+
+    Parameters
+    ----------
+    comm
+        Communicator.
+    points
+        Those of this rank that others may ask for, shape (n, d).
+    asked
+        Those that this rank asks for, shape (m, d).
+    reach
+        How far around the box of these (length).
+
+    Returns
+    -------
+    The rank and the row of each point to be sent, in the order of the ranks, shape (k,).
+    """
+    rows = [
+        np.flatnonzero(np.all((points >= lower - reach) & (points <= upper + reach), axis=1))
+        for lower, upper in boxes(comm, asked)
+    ]
+    return np.repeat(np.arange(comm.size), [some.size for some in rows]), np.concatenate(rows)
+
+
+def neighbours(
+    comm: MPI.Comm, points: Array, values: Array, reach: float, asked: Array | None = None
+) -> Array:
     """Return the values at points near those of this rank, from the ranks that have them.
 
-    Each rank tells the others where its points are, and gets no more than it asks for. Collective.
+    Collective.
 
     Parameters
     ----------
@@ -110,17 +153,15 @@ def neighbours(comm: MPI.Comm, points: Array, values: Array, reach: float) -> Ar
         Those of this rank, shapes (n, d) and (n, k).
     reach
         How far around the box of its points a rank asks (length).
+    asked
+        Points that this rank asks for instead, shape (m, d).
 
     Returns
     -------
     In the order of the ranks, shape (near, k).
     """
-    asked = [
-        np.flatnonzero(np.all((points >= lower - reach) & (points <= upper + reach), axis=1))
-        for lower, upper in boxes(comm, points)
-    ]
-    ranks = np.repeat(np.arange(comm.size), [rows.size for rows in asked])
-    return exchanged(comm, ranks, values[np.concatenate(asked)])[1]
+    ranks, rows = near_boxes(comm, points, points if asked is None else asked, reach)
+    return exchanged(comm, ranks, values[rows])[1]
 
 
 def refused(error: OSError) -> InputError:

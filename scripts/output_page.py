@@ -37,14 +37,16 @@ INTRODUCTION = """\
 | `fields.pvd`, `contact.pvd` | of an evolution: steps of body and contact part, for ParaView |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
-| `checkpoint.npz` | with `output.checkpoint = true` |
+| `checkpoint.npz` | with `output.checkpoint = true`; on several ranks a piece of each |
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
 Of more than 100,000 contact nodes on several ranks, each rank writes its own: `contact.0000.csv`,
 `contact.0001.csv` and so on, by x, y and z, and the pieces of `contact.pvtu`, which ParaView and
-pyvista open as one; a `row` there is that in the file of the rank that has the node. Figures are
-not drawn of pieces.
+pyvista open as one; a `row` there is that in the file of the rank that has the node. So it does
+with `contact-steps` and `contact-against`, and with a body of more nodes: `fields.pvtu`.
+`node` numbers the points of all pieces, for those on two of them are in both. Figures are drawn of
+a body in pieces, and not of contact nodes in pieces.
 
 They replace those of an earlier run all together, once they are complete; other files in DIR are
 left alone. Results of another problem are replaced with `--overwrite` only: the same one may be

@@ -18,7 +18,7 @@ from contact.case.text import to_toml
 from contact.errors import InputError
 from contact.library.materials import PACKAGED
 from contact.mesh.formats import files
-from contact.output.checkpoint import stored_input
+from contact.output.step_files import stored_input
 
 #: Key of the mesh file.
 MESH = "mesh.file"

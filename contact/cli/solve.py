@@ -19,11 +19,11 @@ from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
 from contact.errors import InputError
 from contact.methods.signals import SIGNALLED, Terminated, signals_held
-from contact.output.checkpoint import case_of, discard, kept_case
 from contact.output.discretisation import locks
 from contact.output.files import write_outputs
 from contact.output.folder import SUMMARY, check_members, read_json, result_folder
 from contact.output.solution import Solution
+from contact.output.step_files import case_of, discard, kept_case
 from contact.ranks import on_root
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep

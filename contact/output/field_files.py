@@ -14,7 +14,6 @@ import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -27,7 +26,7 @@ from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.output.fields import DerivedFields, discontinuous, linear, unknowns
 from contact.output.folder import ROOM
-from contact.output.formats import Grid, Values, gathered, write_pieces, write_vtu
+from contact.output.formats import Grid, Values, in_pieces, write_share
 from contact.output.solution import Solution
 from contact.output.surface import contact_surface
 from contact.problem.problem import ContactProblem
@@ -66,13 +65,18 @@ def write_fields(solution: Solution, folder: Path) -> None:
             if solution.error is not None:
                 in_cells["error"] = solution.error.cells
             share = replace(share, in_cells=in_cells)
-            write_share(problem.comm, share, folder / "fields.vtu")
+            write_share(problem.comm, share, folder / "fields.vtu", _in_pieces(problem))
             if solution.steps:
                 _write_series(solution, frames, folder)
         case "vtx":
             _write_vtx(problem, frames, folder)
         case "xdmf":
             _write_xdmf(problem, frames, folder)
+
+
+def _in_pieces(problem: ContactProblem) -> bool:
+    """Whether each rank writes its own share of the body."""
+    return in_pieces(problem.comm, problem.equilibrium.layout.index_map.size_global)
 
 
 def regions_of(problem: ContactProblem) -> NDArray[np.int32]:
@@ -102,19 +106,14 @@ def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> 
     names = (*SERIES, *problem.equilibrium.laws.names)
     lines: dict[str, list[str]] = {"fields": [], "contact": []}
     for k, (time, state) in enumerate(frames):
-        for kind in lines:
-            pieces = kind == "contact" and solution.in_pieces
-            file = f"{kind}-{k:04d}.{'pvtu' if pieces else 'vtu'}"
-            lines[kind].append(f'<DataSet timestep="{time!r}" file="{file}"/>')
         derived.move_to(state)
-        share = body_share(problem, state, names, derived)
-        write_share(problem.comm, share, folder / f"fields-{k:04d}.vtu")
-        surface = contact_surface(solution.at_step(state))
-        path = folder / f"contact-{k:04d}.vtu"
-        if solution.in_pieces:
-            write_pieces(problem.comm, path, surface)
-        else:
-            on_root(problem.comm, partial(write_vtu, path, surface))
+        shares = {
+            "fields": (body_share(problem, state, names, derived), _in_pieces(problem)),
+            "contact": (contact_surface(solution.at_step(state)), solution.in_pieces),
+        }
+        for kind, (share, pieces) in shares.items():
+            path = write_share(problem.comm, share, folder / f"{kind}-{k:04d}.vtu", pieces)
+            lines[kind].append(f'<DataSet timestep="{time!r}" file="{path.name}"/>')
 
     def write_names() -> None:
         for kind, sets in lines.items():
@@ -200,12 +199,6 @@ def _points_of(
 
 def _rows(values: Values) -> Values:
     return values[:, 0] if values.shape[1] == 1 else values
-
-
-def write_share(comm: MPI.Intracomm, share: Grid, path: Path) -> None:
-    """Write a grid with its fields into a VTU file. Collective."""
-    whole = gathered(comm, share)
-    on_root(comm, lambda: None if whole is None else write_vtu(path, whole))
 
 
 def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:

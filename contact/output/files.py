@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +13,20 @@ import numpy as np
 from contact.arguments import expect
 from contact.output.field_files import write_fields
 from contact.output.folder import ResultFolder, result_folder
-from contact.output.formats import piece, write_csv, write_pieces, write_table, write_vtu
+from contact.output.formats import gathered, write_csv, write_rows, write_share
 from contact.output.quantities import (
     ADAPT,
     AGAINST,
     HISTORY,
     NODES,
     OPPOSITE,
+    STEPS,
     SUMMARY,
     SURFACE,
     quantities,
     values_of,
 )
-from contact.output.solution import Solution, StepRecord
+from contact.output.solution import Solution
 from contact.output.surface import (
     contact_surface,
     opposite_surface,
@@ -77,28 +78,28 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
     def write(new: Path) -> Mapping[str, Any]:
         surface, opposite = contact_surface(solution), opposite_surface(solution)
         table, pieces = values_of(NODES, solution.listed_contact), solution.in_pieces
-        if pieces:
-            with on_all_ranks(comm):
-                write_table(table, piece(new / NODES, comm.rank))
-            write_pieces(comm, new / SURFACE, surface)
+        write_rows(comm, table, new / NODES, pieces)
+        write_share(comm, surface, new / SURFACE, pieces)
+        if opposite is not None:
+            whole = opposite if pieces else gathered(comm, opposite)
+            rows = None if whole is None else opposite_table(solution.problem, whole)
+            write_rows(comm, rows, new / AGAINST, pieces)
+            write_share(comm, opposite, new / OPPOSITE, pieces)
 
-        def write_contact() -> None:
-            if not pieces:
-                write_table(table, new / NODES)
-                write_vtu(new / SURFACE, surface)
+        def write_tables() -> None:
             rows = [values_of(HISTORY, record) for record in solution.history.records]
             header = [quantity.name for quantity in quantities(HISTORY)]
             write_csv(new / "history.csv", header, (row.values() for row in rows))
             if solution.steps:
-                _write_steps(solution.steps, new)
+                steps = [record.row for record in solution.steps]
+                write_csv(new / STEPS, steps[0], (row.values() for row in steps))
             if solution.adaptation:
                 rows = solution.adaptation
                 write_csv(new / ADAPT, rows[0], (row.values() for row in rows))
-            if opposite is not None:
-                write_table(opposite_table(solution.problem, opposite), new / AGAINST)
-                write_vtu(new / OPPOSITE, opposite)
 
-        on_root(comm, write_contact)
+        on_root(comm, write_tables)
+        if solution.steps:
+            _write_contact_steps(solution, new)
         if solution.output.fields != "none":
             write_fields(solution, new)
         if solution.output.checkpoint:
@@ -121,15 +122,14 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             raise failure
 
 
-def _write_steps(records: Sequence[StepRecord], folder: Path) -> None:
-    """Write ``steps.csv`` and ``contact-steps.csv``. On one rank."""
-    write_csv(folder / "steps.csv", records[0].row, (record.row.values() for record in records))
-    rows = (
-        [record.state.time, *values]
-        for record in records
-        for values in zip(*(column.tolist() for column in record.table.values()), strict=True)
-    )
-    write_csv(folder / "contact-steps.csv", ["t", *records[0].table], rows)
+def _write_contact_steps(solution: Solution, folder: Path) -> None:
+    """Write ``contact-steps.csv``, of pieces one of each rank. Collective."""
+    path = folder / "contact-steps.csv"
+    for record in solution.steps:
+        step = solution.at_step(record.state)
+        table = values_of(NODES, step.listed_contact)
+        table = {"t": np.full(len(table["x"]), step.state.time), **table}
+        write_rows(solution.problem.comm, table, path, solution.in_pieces, more=True)
 
 
 def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:

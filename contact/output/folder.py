@@ -49,9 +49,9 @@ MANIFEST = "files"
 
 #: Names that each run may write, and those that a summary may name: it may be of anybody.
 _RESULT = re.compile(
-    r"summary\.json|(history|steps|adapt|contact(-steps|-against|\.\d{4,})?)\.csv|"
-    r"contact(-against|-\d{4,})?(\.\d{4,})?\.p?vtu|"
-    r"fields(-\d{4,})?\.vtu|contact\.pvd|fields\.(pvd|bp|xdmf|h5)|cells\.bp|checkpoint\.npz|"
+    r"summary\.json|(history|steps|adapt)\.csv|contact(-steps|-against)?(\.\d{4,})?\.csv|"
+    r"(contact(-against)?|(contact|fields)(-\d{4,})?)(\.\d{4,})?\.p?vtu|contact\.pvd|"
+    r"fields\.(pvd|bp|xdmf|h5)|cells\.bp|checkpoint(\.\d{4,})?\.npz|"
     r"figure-(contact|loop|zones|energy|deformed|potential)\.png"
 )
 _MEMBER = re.compile(

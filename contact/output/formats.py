@@ -1,7 +1,7 @@
 """Tables as csv files; grids as VTK's XML files (.vtu), which ParaView, pyvista and meshio open.
 
-A grid is one piece whatever the number of ranks: the shares are gathered on rank 0, which writes;
-large contact parts alone are pieces.
+A file is one whatever the number of ranks: the shares are gathered on rank 0, which writes. Those
+of many nodes are in pieces, one of each rank.
 """
 
 from __future__ import annotations
@@ -18,8 +18,12 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.mesh.cells import Shape
-from contact.ranks import on_all_ranks, on_root
+from contact.mesh.owners import Owners
+from contact.ranks import on_each, on_root
 from contact.typing import Array
+
+#: Nodes of all ranks up to which a file lists them together; of more, a file a rank.
+TOGETHER = 100_000
 
 Values = NDArray[Any]
 #: Columns of equal length by name.
@@ -108,10 +112,45 @@ def write_vtu(path: Path, grid: Grid) -> None:
     path.write_text(writer.GetOutputString(), encoding="ascii")
 
 
-def write_pieces(comm: MPI.Intracomm, path: Path, grid: Grid) -> None:
-    """Write the share of each rank, numbered by itself, and a file that names all. Collective."""
-    with on_all_ranks(comm):
-        write_vtu(piece(path, comm.rank), grid)
+def in_pieces(comm: MPI.Intracomm, nodes: int) -> bool:
+    """Whether each rank writes its own share of as many nodes."""
+    return comm.size > 1 and nodes > TOGETHER
+
+
+def write_share(comm: MPI.Intracomm, share: Grid, path: Path, pieces: bool = False) -> Path:
+    """Write a grid into a VTU file, or a piece of each rank; return the name of all. Collective."""
+    if pieces:
+        return _write_pieces(comm, path, _by_itself(comm, share))
+    whole = gathered(comm, share)
+    on_root(comm, lambda: None if whole is None else write_vtu(path, whole))
+    return path
+
+
+def _by_itself(comm: MPI.Intracomm, share: Grid) -> Grid:
+    """Return a share with the points of other ranks that its cells have. Collective.
+
+    Its cells are numbered by itself, and points have their numbers over all ranks as ``node``.
+    """
+    begins = np.append(0, np.cumsum(comm.allgather(len(share.points))))
+    owners = Owners(comm, begins)
+    nodes, cells = np.unique(share.cells, return_inverse=True)
+
+    def at(values: Values) -> Values:
+        return owners.values(nodes, lambda given: values[given - owners.begin])
+
+    at_points = {name: at(values) for name, values in share.at_points.items()}
+    return Grid(
+        at(share.points),
+        cells.reshape(share.cells.shape),
+        share.shape,
+        at_points | {"node": nodes},
+        share.in_cells,
+    )
+
+
+def _write_pieces(comm: MPI.Intracomm, path: Path, grid: Grid) -> Path:
+    """Write the share of each rank, and a file that names all, which is returned. Collective."""
+    on_each(comm, lambda: write_vtu(piece(path, comm.rank), grid))
     fields = {
         kind: "".join(
             f'<PDataArray type="{"Float64" if array.dtype.kind == "f" else "Int32"}" '
@@ -129,7 +168,9 @@ def write_pieces(comm: MPI.Intracomm, path: Path, grid: Grid) -> None:
         + '<PPoints><PDataArray type="Float64" NumberOfComponents="3"/></PPoints>\n'
         + f"{parts}</PUnstructuredGrid>\n</VTKFile>\n"
     )
-    on_root(comm, lambda: path.with_suffix(".pvtu").write_text(text, encoding="utf-8"))
+    names = path.with_suffix(".pvtu")
+    on_root(comm, lambda: names.write_text(text, encoding="utf-8"))
+    return names
 
 
 def piece(path: Path, rank: int) -> Path:
@@ -145,17 +186,34 @@ def _filled(values: Values) -> Values:
     return np.ascontiguousarray(values)
 
 
-def write_table(columns: Table, path: Path) -> None:
-    """Write columns. On one rank."""
+def write_rows(
+    comm: MPI.Intracomm, columns: Table | None, path: Path, pieces: bool, more: bool = False
+) -> None:
+    """Write the columns of rank 0, or those of each into a file of its own. Collective."""
+    own = piece(path, comm.rank) if pieces else path
+
+    def write() -> None:
+        if columns is not None and (pieces or comm.rank == 0):
+            write_table(columns, own, more)
+
+    on_each(comm, write)
+
+
+def write_table(columns: Table, path: Path, more: bool = False) -> None:
+    """Write columns, or put more behind those that are there. On one rank."""
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    write_csv(path, columns, rows)
+    write_csv(path, columns, rows, more)
 
 
-def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
-    """Write a table, numbers to the last digit. On one rank."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+def write_csv(
+    path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]], more: bool = False
+) -> None:
+    """Write a table, numbers to the last digit, or more rows of one. On one rank."""
+    begun = more and path.exists()
+    with path.open("a" if begun else "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
+        if not begun:
+            writer.writerow(header)
         writer.writerows(rows)
 
 

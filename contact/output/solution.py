@@ -20,7 +20,6 @@ from contact.linear.operator import Counters
 from contact.methods.report import IterationHistory, Outcome
 from contact.output.error_estimate import Estimate
 from contact.output.fields import Deformation, DerivedFields, unknowns
-from contact.output.formats import Table
 from contact.output.intervals import Intervals
 from contact.output.options import OutputOptions, Units
 from contact.output.resultants import (
@@ -55,14 +54,12 @@ class Note(str):
 
 @dataclass(frozen=True, repr=False)
 class StepRecord:
-    """The end of a step of an evolution, and its rows in the tables.
+    """The end of a step of an evolution, and its row in the table of steps.
 
     Attributes
     ----------
     row
         The columns of ``steps.csv``.
-    table
-        The columns of ``contact.csv``, as `surface.contact_table` returns them.
     enthalpy
         Where the energy balance of the next step begins, see `problem.energy.Moment`.
     rounding
@@ -71,7 +68,6 @@ class StepRecord:
 
     state: State
     row: Mapping[str, float]
-    table: Table
     enthalpy: float
     rounding: float = 0.0
 

@@ -16,12 +16,10 @@ from scipy.spatial import KDTree
 from contact.errors import InputError
 from contact.interface.mortar.surface import surface_of
 from contact.interface.multipliers import Multipliers
+from contact.output.formats import in_pieces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
-
-#: Contact nodes of all ranks up to which files list them together; of more, a file a rank.
-TOGETHER = 100_000
 
 
 @dataclass(repr=False)
@@ -43,7 +41,7 @@ class Solved:
     @property
     def in_pieces(self) -> bool:
         """Whether each rank writes its own contact nodes. Collective."""
-        return self.problem.comm.size > 1 and self.problem.nodes.size > TOGETHER
+        return in_pieces(self.problem.comm, self.problem.nodes.size)
 
     @property
     def nodal(self) -> Array:

@@ -1,4 +1,4 @@
-"""The records of the steps of an evolution: a row each, and the contact nodes at its end."""
+"""The records of the steps of an evolution: a row each, and the state at its end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from contact.methods.load_stepping import LoadStep
 from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import DrivenPart
 from contact.output.solution import Solution, StepRecord
-from contact.output.surface import contact_table
 from contact.problem.energy import StepEnd, balance, step_end
 from contact.problem.problem import ContactProblem
 
@@ -44,6 +43,6 @@ class StepRecorder:
         if self._driven is not None:
             way, force = (find(problem, state) for find in (self._driven.way, self._driven.force))
             solution.driven = way, force
-        table, row = contact_table(solution), values_of(STEPS, solution)
+        row = values_of(STEPS, solution)
         self._rounding = max(self._rounding, step.outcome.kkt.rounding)
-        return StepRecord(state, row, table, now.enthalpy, self._rounding)
+        return StepRecord(state, row, now.enthalpy, self._rounding)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
 from contact.interface.entries import Entry
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Lumping
-from contact.interface.mortar.surface import Surface, surface_of
+from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import shape_of
-from contact.mesh.entities import owned_among
-from contact.mesh.owners import ALONE, Owners
+from contact.mesh.owners import Owners
 from contact.output.formats import Grid, Table, Values
 from contact.output.quantities import AGAINST, NODES, SURFACE, values_of
 from contact.output.solution import Solution
@@ -36,48 +33,58 @@ def contact_table(solution: Solution) -> Table:
 
 
 def contact_surface(solution: Solution) -> Grid:
-    """Return the contact part, the same on all ranks, or in pieces the facets of this one.
-
-    Collective.
-    """
+    """Return this rank's share of the contact part. Collective."""
     problem, d = solution.problem, solution.problem.dim
-    body, comm, whole = problem.equilibrium, problem.comm, not solution.in_pieces
-    size = body.space.dofmap.index_map.size_global
+    body = problem.equilibrium
+    owners = Owners.of(body.layout.index_map, problem.comm)
+    parts = [surface_of(problem.domain, body.space, entry.on) for entry in problem.entries]
     # A node of two contacts is one of each.
-    own = [
-        k * size + surface_of(problem.domain, body.space, entry.on).nodes
-        for k, entry in enumerate(problem.entries)
-    ]
-    facets = np.concatenate(
-        [n for own_k in own for n in (comm.allgather(own_k) if whole else [own_k])]
-    )
-    known, cells = np.unique(facets, return_inverse=True)
-    points, x = (_at_nodes if whole else _near_nodes)(solution, known % size)
-    owner = (known // size).astype(np.int32)
+    nodes, cells = _numbered(owners, [part.nodes for part in parts])
+    owner = np.repeat(np.arange(len(nodes)), [own.size for own in nodes]).astype(np.int32)
+    points, x = _at_nodes(solution, np.concatenate(nodes) - owners.begin)
     rigid = np.array([contact.against is None for contact in problem.contacts], dtype=np.int32)
-    fields = {"displacement": x[:, :d], "entry": owner, "rigid": rigid[owner]}
+    fields: dict[str, Values] = {
+        "displacement": x[:, :d],
+        "entry": owner,
+        "rigid": rigid[owner],
+    }
     if problem.piezoelectric:
         fields["potential"] = body.phi_scale * x[:, d]
-    listed = solution.listed_contact
-    numbers = listed.entry * size + listed.node
+    listed, size = solution.listed_contact, owners.begins[-1]
+    known, numbers = owner * size + np.concatenate(nodes), listed.entry * size + listed.node
     for name, values in values_of(SURFACE, listed).items():
-        if whole:
-            fields[name] = _at(known, numbers, values)
-        else:
-            fields[name] = _of_owners(solution, known, size, numbers, values)
-    return Grid(points, cells.reshape(facets.shape), shape_of(problem.domain.mesh).facet, fields)
+        fields[name] = _at(known, numbers, values)
+    return Grid(points, cells, shape_of(problem.domain.mesh).facet, fields)
+
+
+def _numbered(
+    owners: Owners, sides: Sequence[NDArray[np.int64]]
+) -> tuple[list[NDArray[np.int64]], NDArray[np.int64]]:
+    """Return the nodes of this rank on facets, and the facets by numbers of them. Collective.
+
+    The nodes of each side, ascending, and those of the ranks one after the other.
+
+    Parameters
+    ----------
+    owners, sides
+        The owners of the nodes, and the nodes of the facets of this rank on each side.
+    """
+    nodes = [owners.named(facets.ravel()) for facets in sides]
+    begin, cells = owners.comm.exscan(sum(own.size for own in nodes)) or 0, []
+    for own, facets in zip(nodes, sides, strict=True):
+
+        def of(given: NDArray[np.int64], own: Values = own, first: int = begin) -> Values:
+            return first + np.searchsorted(own, given)
+
+        cells.append(owners.values(facets.ravel(), of).reshape(facets.shape))
+        begin += own.size
+    return nodes, np.concatenate(cells)
 
 
 def _at_nodes(solution: Solution, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return points and unknowns, (n, d) and (n, k), of nodes by global numbers. Collective."""
-    problem, body = solution.problem, solution.problem.equilibrium
-    points = body.layout.points
-    values = np.concatenate([points, body.nodal(solution.state.x)[: len(points)]], axis=1)
-    here, local = owned_among(body.layout.index_map, nodes)
-    found = np.zeros((nodes.size, values.shape[1]))
-    found[here] = values[local]
-    problem.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
-    return found[:, : problem.dim], found[:, problem.dim :]
+    """Return points and unknowns, (n, d) and (n, k), of nodes of this rank."""
+    body = solution.problem.equilibrium
+    return body.layout.points[nodes], body.nodal(solution.state.x)[nodes]
 
 
 def _at(known: NDArray[np.int64], numbers: NDArray[np.int64], values: Values) -> Values:
@@ -92,38 +99,8 @@ def _at(known: NDArray[np.int64], numbers: NDArray[np.int64], values: Values) ->
     return found
 
 
-def _of_owners(
-    solution: Solution,
-    known: NDArray[np.int64],
-    size: int,
-    numbers: NDArray[np.int64],
-    values: Values,
-) -> Values:
-    """Return values as `_at`, those of nodes of other ranks from these. Collective."""
-    problem = solution.problem
-    owners = Owners.of(problem.equilibrium.layout.index_map, problem.comm)
-    found = _at(known, numbers, values)
-    for k in range(len(problem.entries)):
-
-        def of(given: NDArray[np.int64], begin: int = k * size) -> Values:
-            return _at(begin + given, numbers, values)
-
-        here = known // size == k
-        found[here] = owners.values(known[here] % size, of)
-    return found
-
-
-def _near_nodes(solution: Solution, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return points and unknowns as `_at_nodes`, each from the owner of the node. Collective."""
-    problem, body = solution.problem, solution.problem.equilibrium
-    owners, points = Owners.of(body.layout.index_map, problem.comm), body.layout.points
-    values = np.concatenate([points, body.nodal(solution.state.x)[: len(points)]], axis=1)
-    found = owners.values(nodes, lambda given: values[given - owners.begin])
-    return found[:, : problem.dim], found[:, problem.dim :]
-
-
 def opposite_surface(solution: Solution) -> Grid | None:
-    """Return the parts `against` with the stresses there, the same on all ranks. Collective.
+    """Return this rank's share of the parts `against` with the stresses there. Collective.
 
     Multipliers live on the other side. Here the forces int N_l lambda act, which belong to nodes of
     this one; divided by the areas of these they are stresses again. A constant pressure is the same
@@ -133,17 +110,18 @@ def opposite_surface(solution: Solution) -> Grid | None:
     """
     problem, d = solution.problem, solution.problem.dim
     body = problem.equilibrium
+    owners = Owners.of(body.layout.index_map, problem.comm)
     stresses = np.column_stack([solution.pressure, solution.forces.vectors(problem.nodes)])
     ends = np.cumsum([entry.nodes.nodes.size for entry in problem.entries])[:-1]
-    sides, cells, count = [], [], 0
+    sides, facets = [], []
     for i, own in enumerate(np.split(stresses, ends)):
         against, entry = problem.contacts[i].against, problem.entries[i]
         if against is None or entry.coupling is None:
             continue
-        surface = _whole(surface_of(problem.domain, body.space, against))
+        surface = surface_of(problem.domain, body.space, against)
         lumped = Lumping.of(surface)
-        acting = _acting(problem, entry, entry.coupling, lumped, own)
-        points, x = _at_nodes(solution, lumped.nodes)
+        acting = _acting(owners, entry, entry.coupling, lumped, own)
+        points, x = _at_nodes(solution, lumped.nodes - owners.begin)
         sides.append(
             {
                 "points": points,
@@ -155,39 +133,29 @@ def opposite_surface(solution: Solution) -> Grid | None:
                 "entry": np.full(lumped.nodes.size, i, dtype=np.int32),
             }
         )
-        cells.append(count + np.searchsorted(lumped.nodes, surface.nodes))
-        count += lumped.nodes.size
+        facets.append(surface.nodes)
     if not sides:
         return None
     fields = {name: np.concatenate([side[name] for side in sides]) for name in sides[0]}
-    return Grid(
-        fields.pop("points"), np.concatenate(cells), shape_of(problem.domain.mesh).facet, fields
-    )
+    _, cells = _numbered(owners, facets)
+    return Grid(fields.pop("points"), cells, shape_of(problem.domain.mesh).facet, fields)
 
 
-def _whole(surface: Surface) -> Surface:
-    """Return the facets of all ranks, as if there were one. Collective."""
-    size, facets = surface.owners.comm.size, np.arange(surface.count)
-    every = surface.sent(np.tile(facets, size), np.repeat(np.arange(size), surface.count))
-    return replace(every, owners=ALONE)
+def _acting(owners: Owners, entry: Entry, coupling: Coupling, lumped: Lumping, own: Array) -> Array:
+    """Return the stresses of all contact nodes on this rank's nodes of the other side, (m, k).
 
-
-def _acting(
-    problem: ContactProblem, entry: Entry, coupling: Coupling, lumped: Lumping, own: Array
-) -> Array:
-    """Return the stresses of all contact nodes on the other side, shape (m, k). Collective.
-
-    Those given are of this rank's nodes.
+    Those given are of this rank's nodes. Collective.
     """
-    on_nodes = np.zeros((lumped.nodes.size, own.shape[1]))
-    forces = entry.nodes.weight[:, None] * own
-    on_nodes[np.searchsorted(lumped.nodes, coupling.masters)] = coupling.other.T @ forces
-    problem.comm.Allreduce(MPI.IN_PLACE, on_nodes, op=MPI.SUM)
+    on_nodes: Array = np.zeros((lumped.nodes.size, own.shape[1]))
+    forces = coupling.other.T @ (entry.nodes.weight[:, None] * own)
+    nodes, sums = owners.sums(coupling.masters, forces)
+    on_nodes[np.searchsorted(lumped.nodes, nodes)] = sums
     if lumped.mixing is not None:
-        # Forces on coefficients S u, given those on u.
-        on_nodes = splu(lumped.mixing.own.T.tocsc()).solve(on_nodes)
-    some = lumped.weight > LEAST_AREA * lumped.weight.mean()
-    return np.where(some[:, None], on_nodes / np.where(some, lumped.weight, 1.0)[:, None], np.nan)
+        on_nodes = lumped.mixing.on_coefficients(owners, on_nodes)
+    weight = lumped.weight
+    area, count = owners.comm.allreduce(np.array([weight.sum(), weight.size]))
+    some = weight > LEAST_AREA * area / count
+    return np.where(some[:, None], on_nodes / np.where(some, weight, 1.0)[:, None], np.nan)
 
 
 def opposite_table(problem: ContactProblem, surface: Grid) -> Table:

@@ -31,7 +31,7 @@ from contact.linear.operator import Counters
 from contact.mesh.domain import Domain, from_mesh
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Outcome
-from contact.output import solved
+from contact.output import formats
 from contact.output.quantities import NODES, values_of
 from contact.output.solution import Solution
 from contact.output.surface import contact_surface
@@ -151,13 +151,13 @@ def held(problem: ContactProblem) -> int:
 
 def surface_bytes(problem: ContactProblem) -> dict[str, int]:
     """Return the bytes of the contact nodes that this rank writes, each in pieces. Collective."""
-    most, solved.TOGETHER = solved.TOGETHER, 0
+    most, formats.TOGETHER = formats.TOGETHER, 0
     try:
         state = problem.start()
         found = Solution(problem, state, Outcome(evaluate(problem, state), 0.0), *_NOTHING, {})
         listed, surface = values_of(NODES, found.listed_contact), contact_surface(found)
     finally:
-        solved.TOGETHER = most
+        formats.TOGETHER = most
     arrays = [surface.points, surface.cells, *surface.at_points.values(), *listed.values()]
     return {"held": _size(arrays)}
 

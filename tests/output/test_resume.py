@@ -6,7 +6,6 @@ import shutil
 import signal
 from pathlib import Path
 
-import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -16,7 +15,8 @@ from contact.cli.main import main
 from contact.errors import InputError
 from contact.methods.newton import Newton
 from contact.methods.report import IterationHistory
-from contact.output.checkpoint import Checkpoints, case_of, discard, read_steps
+from contact.output.checkpoint import Checkpoints, read_steps
+from contact.output.step_files import case_of, discard
 from tests.output.test_steps import case_of as steps_case
 from tests.problem.test_plasticity import block
 
@@ -89,8 +89,6 @@ def test_going_on(tmp_path, ended, count, elsewhere):
         for name, value in one.row.items():
             if name not in ("linear_solves", "factorizations", "kkt"):
                 assert two.row[name] == pytest.approx(value, rel=1e-9, abs=1e-12)
-        assert set(one.table) == set(two.table)
-        assert np.array_equal(one.table["status"], two.table["status"])
     assert len(list((out / "checkpoints").glob("0*.npz"))) == 5
     assert whole.warnings == solution.warnings
 
@@ -110,6 +108,41 @@ def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
     for one, two in zip(whole.steps, solution.steps, strict=True):
         assert one.state.near(two.state, rtol=1e-12, atol=0.0)
         assert one.state.history.near(two.state.history, rtol=1e-12, atol=0.0)
+
+
+@pytest.mark.parallel
+def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
+    """All ranks, one of them alone, and all again in one folder: each reads pieces of others."""
+    world, place = MPI.COMM_WORLD, shared_tmp_path / "checkpoints"
+    case = block("chaboche", cells=3)
+    whole = solve(case, comm=world)
+    for count, comm in ((2, world), (4, SELF), (None, world)):
+        restart = None if count == 2 else shared_tmp_path
+        if comm is world or world.rank == 0:
+            if count is None:
+                solution = solve(case, comm=comm, folder=shared_tmp_path, restart=restart)
+            else:
+                heal = ended(count)
+                with pytest.raises(Killed):
+                    solve(case, comm=comm, folder=shared_tmp_path, restart=restart)
+                heal()
+        world.barrier()
+    assert solution.converged and len(solution.steps) == len(whole.steps) == 6
+    for one, two in zip(whole.steps, solution.steps, strict=True):
+        assert one.state.near(two.state, rtol=1e-9, atol=1e-9)
+    listed = json.loads((place / "manifest.json").read_text())["files"]
+    assert {path.name for path in place.iterdir()} == {*listed, "manifest.json"}
+    ranks = [world.size] * 2 + [1] * 2 + [world.size] * 2
+    for k, size in enumerate(ranks, 1):
+        assert len([*place.glob(f"{k:05d}*.npz")]) == size
+    again = read_steps(shared_tmp_path, whole.problem)
+    assert [step.state.time for step in again] == [step.state.time for step in whole.steps]
+    world.barrier()
+    if world.size > 1 and world.rank == 0:
+        (place / f"00005.{world.size - 1:04d}.npz").write_bytes(b"damaged")
+    world.barrier()
+    if world.size > 1:
+        assert len(read_steps(shared_tmp_path, whole.problem)) == 4
 
 
 def test_a_new_run_leaves_the_earlier_checkpoints_until_its_first_step(tmp_path, monkeypatch):

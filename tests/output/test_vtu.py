@@ -10,10 +10,9 @@ from pyvista import UnstructuredGrid
 
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.mesh.cells import TRIANGLE, VTK
-from contact.output.field_files import write_share
 from contact.output.figures.run import read_grid
 from contact.output.files import write_outputs
-from contact.output.formats import Grid, gathered
+from contact.output.formats import Grid, gathered, write_share
 from contact.solving import solve
 from tests.problems.written import block, electric
 

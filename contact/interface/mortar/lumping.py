@@ -79,6 +79,21 @@ class Mixing:
         with np.errstate(invalid="ignore"):
             return np.asarray(self.own @ there)
 
+    def on_coefficients(self, owners: Owners, forces: Array) -> Array:
+        """Return the forces S^-T f on coefficients S u, given those on u, (n, m). Collective.
+
+        S is that of one side: mid-edge nodes, which alone have other columns, have those of
+        vertices, whose rows are of the identity.
+        """
+        at = np.searchsorted(self.slaves, self.nodes)
+        diagonal = self.own.data[self.own.indices == np.repeat(at, np.diff(self.own.indptr))]
+        found = forces / diagonal[:, None]
+        others = -(self.own.T @ found)
+        others[at] += forces
+        nodes, sums = owners.sums(self.slaves, others)
+        found[np.searchsorted(self.nodes, nodes)] += sums
+        return np.asarray(found)
+
 
 @dataclass(frozen=True)
 class Lumping:
