@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from contact.case.build import build_problem
@@ -13,6 +14,7 @@ from contact.case.mesh import Mesh
 from contact.errors import InputError
 from contact.interface.complementarity import project_half_line
 from contact.interface.multipliers import Multipliers
+from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
 from contact.mesh import grid
 from contact.mesh.transfer import carry
@@ -20,6 +22,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.ranks import neighbours
 from contact.typing import Array
 
 #: Tolerance on the coarser levels: their discretisation error is larger by far.
@@ -83,24 +86,29 @@ def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State
         x[coarse.dim :: body.block_size] *= before.phi_scale / body.phi_scale
     x = np.concatenate([x, before.motion(state.x)])
     forces = np.column_stack([state.forces.pressure, state.forces.friction])
-    points = coarse.nodes.gather(coarse.nodes.points)
-    values = _interpolate(points, coarse.nodes.gather(forces), fine.nodes.points)
+    values = _interpolate(coarse.nodes, forces, fine.nodes.points)
     multipliers = Multipliers.of(fine.nodes, project_half_line(values[:, 0]), values[:, 1:])
     return State(body.prescribe(x, fine.time), multipliers, fine.time, fine.history)
 
 
-def _interpolate(points: Array, values: Array, at: Array) -> Array:
-    """Interpolate between the d nearest points, weighted by the inverse of the distance.
+def _interpolate(nodes: ContactNodes, values: Array, at: Array) -> Array:
+    """Interpolate between the d nearest nodes, weighted by the inverse of the distance. Collective.
 
     On nested edges that is linear interpolation.
     """
-    if at.shape[0] == 0:
-        return np.zeros((0, values.shape[1]))
-    distance, near = cKDTree(points).query(at, k=min(at.shape[1], len(points)))
-    distance, near = distance.reshape(len(at), -1), near.reshape(len(at), -1)
+    rows, d = np.column_stack([nodes.points, values]), nodes.dim
+    nearest = np.arange(1, min(d, nodes.size) + 1)
+    reach = float(nodes.maximum(nodes.weight)) ** (1 / (d - 1))
+    # The nearest of all ranks are known where they are within reach.
+    known = False
+    while not known:
+        reach *= 2
+        near = neighbours(nodes.comm, nodes.points, rows, reach, asked=at)
+        distance, place = cKDTree(near[:, :d]).query(at, k=nearest)
+        known = nodes.comm.allreduce(bool(distance.max(initial=0.0) <= reach), op=MPI.LAND)
     weight = 1 / np.maximum(distance, 1e-9 * distance.max(initial=1e-300))
     weight /= weight.sum(axis=1)[:, None]
-    return np.asarray(np.einsum("nk,nkc->nc", weight, values[near]))
+    return np.asarray(np.einsum("nk,nkc->nc", weight, near[place, d:]))
 
 
 def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:

@@ -7,7 +7,6 @@ vertex fall into groups that these facets separate, as the materials do.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from dolfinx import la
@@ -20,6 +19,8 @@ from contact.body.pointwise import in_chunks
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cell_facets
+from contact.mesh.owners import Owners
+from contact.ranks import exchanged
 from contact.typing import Array
 
 
@@ -78,43 +79,45 @@ def _separated(
     """Return means and places with those of groups at the vertices of parts. Collective.
 
     Corners of two cells at a vertex are of one group where a facet joins the cells that has the
-    vertex and is in no part. Groups reach over ranks: few as they are, all are put together on
-    each.
+    vertex and is in no part. The rank that owns a vertex is sent all corners there, and returns
+    the mean of its group to each.
     """
     mesh, comm, d = domain.mesh, domain.comm, domain.dim
     shape = shape_of(mesh)
     mesh.topology.create_connectivity(d, d - 1)
     of_facets, of_nodes = mesh.topology.index_map(d - 1), mesh.geometry.index_map()
-
-    def every(rows: NDArray[Any]) -> NDArray[Any]:
-        """Return the rows of all ranks, one after the other."""
-        return np.concatenate(comm.allgather(rows))
-
+    facet_owners, owners = Owners.of(of_facets, comm), Owners.of(of_nodes, comm)
     own = np.unique(np.concatenate([domain.facets_anywhere(name) for name in apart]))
-    within = every(of_facets.local_to_global(own.astype(np.int32)))
-    facets = cell_facets(mesh)[cells]
-    facets = of_facets.local_to_global(facets.ravel()).reshape(facets.shape)
+    local = cell_facets(mesh)[cells]
+    facets = of_facets.local_to_global(local.ravel()).reshape(local.shape)
     nodes = of_nodes.local_to_global(places.ravel()).reshape(places.shape)
-    cut = np.isin(facets, within)
-    chosen = np.isin(nodes, every(nodes[:, shape.facet_corners][cut].ravel()))
+    within = facet_owners.named(of_facets.local_to_global(own.astype(np.int32)))
+    cut = np.isin(facets, facet_owners.among(within, facets.ravel()))
+    named = owners.named(nodes[:, shape.facet_corners][cut].ravel())
+    chosen = np.isin(nodes, owners.among(named, nodes.ravel()))
     joins = np.zeros((len(shape.facet_corners), shape.corners), dtype=bool)
     np.put_along_axis(joins, shape.facet_corners, True, axis=1)
     cell, facet, corner = np.nonzero(chosen[:, None] & joins & ~cut[:, :, None])
     before = comm.exscan(int(chosen.sum())) or 0
     number = before + np.cumsum(chosen).reshape(chosen.shape) - 1
+    ranks = owners.ranks(nodes[chosen])
+    around = values[chosen] if values.ndim == 3 else values[np.nonzero(chosen)[0]]
+    by, numbers, around = exchanged(comm, ranks, number[chosen], around)
     # A cell at a vertex is joined to those of its facets that are in no part.
-    joined = every(
-        np.column_stack([number[cell, corner], facets[cell, facet], nodes[cell, corner]])
-    )
-    values = every(values[chosen] if values.ndim == 3 else values[np.nonzero(chosen)[0]])
+    at = np.column_stack([number[cell, corner], facets[cell, facet], nodes[cell, corner]])
+    joined = exchanged(comm, owners.ranks(at[:, 2]), at)[1]
     _, meets = np.unique(joined[:, 1:], axis=0, return_inverse=True)
-    size = len(values) + len(joined)
-    links = np.ones(len(joined)), (joined[:, 0], len(values) + meets)
+    size = len(numbers) + len(joined)
+    links = np.ones(len(joined)), (np.searchsorted(numbers, joined[:, 0]), len(numbers) + meets)
     groups = connected_components(sparse.csr_array(links, shape=(size, size)), directed=False)[1]
-    _, group = np.unique(groups[: len(values)], return_inverse=True)
+    _, group = np.unique(groups[: len(numbers)], return_inverse=True)
     entries = np.ones(group.size), (group, np.arange(group.size))
     onto = sparse.csr_array(entries, shape=(group.max(initial=-1) + 1, group.size))
-    sums = onto @ np.column_stack([values, np.ones(group.size)])
+    sums = onto @ np.column_stack([around, np.ones(group.size)])
+    found = exchanged(comm, by, (sums[:, :-1] / sums[:, -1:])[group])[1]
+    # They come back in the order in which the corners went.
+    order = np.empty(ranks.size, dtype=np.intp)
+    order[np.argsort(ranks, kind="stable")] = np.arange(ranks.size)
     places = places.copy()
-    places[chosen] = len(means) + group[before : before + np.count_nonzero(chosen)]
-    return np.concatenate([means, sums[:, :-1] / sums[:, -1:]]), places
+    places[chosen] = len(means) + order
+    return np.concatenate([means, found]), places

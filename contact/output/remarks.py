@@ -237,14 +237,14 @@ def resolution(solution: Solution) -> Iterator[Remark]:
     count = int(nodes.comm.allreduce(int(np.count_nonzero(closed)), op=MPI.SUM))
     if count == 0 or count == nodes.size:
         return
-    points = nodes.gather(nodes.points[closed])
     if problem.dim == 3:
         # Of a round zone with that many nodes.
         across = float(np.sqrt(4 * count / np.pi))
         width = float(np.sqrt(4 * solution.contact_area / np.pi))
     elif problem.domain.revolved:
         # Both halves; the zone of one is known by its area, but for a ring.
-        on_axis = float(points[:, 0].min()) < 1e-9 * problem.domain.size
+        nearest = float(nodes.points[closed, 0].min(initial=np.inf))
+        on_axis = nodes.comm.allreduce(nearest, op=MPI.MIN) < 1e-9 * problem.domain.size
         across = 2 * count - 1 if on_axis else 2 * count
         width = float(2 * np.sqrt(solution.contact_area / np.pi))
     else:

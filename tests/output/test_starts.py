@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from contact import (
@@ -13,6 +14,8 @@ from contact import (
     load_case,
     solve,
 )
+from contact.interface.multipliers import Multipliers
+from contact.nesting import prolong
 from scripts.cases import CASES
 
 SMALL = ["mesh.cells=[16, 4]", "solver.method=newton"]
@@ -31,6 +34,20 @@ def test_a_solution_is_found_again_at_once(options):
     assert sum(r.inner for r in warm.history.records) < sum(r.inner for r in cold.history.records)
     assert warm.contact_force == pytest.approx(cold.contact_force, rel=1e-6)
     assert (cold.start, warm.start) == ("the zero initial guess", "the state that was given")
+
+
+@pytest.mark.parallel
+def test_a_coarse_state_is_linear_between_its_nodes_on_any_ranks():
+    """Pressures 1 + x at the coarse nodes, of whatever ranks these are, are so at all between."""
+    coarse, fine = (build_problem(bar(f"mesh.cells={cells}")) for cells in ("[16, 4]", "[64, 16]"))
+    x = coarse.nodes.points[:, 0]
+    ends = -coarse.nodes.maximum(-x, -np.inf), coarse.nodes.maximum(x)
+    forces = Multipliers.of(coarse.nodes, 1 + x, np.zeros((x.size, 2)))
+    found = prolong(coarse, replace(coarse.start(), forces=forces), fine).forces.pressure
+    at = fine.nodes.points[:, 0]
+    between = (at >= ends[0]) & (at <= ends[1])
+    assert fine.comm.allreduce(int(between.sum())) > 50
+    assert found[between] == pytest.approx(1 + at[between], abs=1e-6)
 
 
 def test_the_solution_of_a_case_starts_another():
