@@ -180,7 +180,7 @@ class UnconstrainedModes:
             return None
         further = found.columns @ (found.amounts - found.wanted)
         way = jump.maximum(np.linalg.norm(further, axis=1))
-        if not way**2 < 2 * found.depth**2:  # more than 45 degrees off the push
+        if not way**2 <= 2 * found.depth**2:  # more than 45 degrees off the push
             return None
         moved = np.zeros((state.x.size // jump.block_size, jump.block_size))
         moved[jump.nodes, : jump.dim] = found.columns @ found.amounts

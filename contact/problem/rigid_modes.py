@@ -294,13 +294,15 @@ def described(motions: Array, names: list[str]) -> str:
     contained = np.linalg.norm(motions, axis=1) > 1 - 1e-6
     found = [name for name, inside in zip(names, contained, strict=True) if inside]
     for axis in "xyz":
+        if f"translation along {axis}" in found:
+            continue
         # Of several together.
         all_along = np.array([f"translation along {axis}" in name for name in names], dtype=float)
         along = all_along * (np.linalg.norm(motions, axis=1) > 1e-6)
         size = float(np.linalg.norm(along))
         if size > 1 and np.linalg.norm(motions.T @ along) > (1 - 1e-6) * size:
             found.append(f"translation along {axis}, together")
-    return ", ".join(found) or "translation and rotation combined"
+    return ", ".join(dict.fromkeys(found)) or "translation and rotation combined"
 
 
 def _centre(problem: ContactProblem) -> Array:

@@ -75,7 +75,7 @@ def test_least_distance_by_another_method(seed):
     np.testing.assert_allclose(found, other.x, rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", (0, 2))
+@pytest.mark.parametrize("seed", range(3))
 def test_two_pads_that_are_lifted_off_stay_where_they_were(seed, tmp_path):
     """Nothing presses any more, and forces are rounding: one was returned as far as 1e10 away."""
     bodies = Bodies(np.random.default_rng(seed))
@@ -107,3 +107,4 @@ def test_two_pads_that_are_lifted_off_stay_where_they_were(seed, tmp_path):
     solution = solve(parse_case(case), comm=MPI.COMM_SELF)
     assert solution.converged
     assert np.abs(solution.state.x).max() < 0.01
+    assert solution.counters.contact_solves <= 150  # one took 6668, for steps that were halved
