@@ -257,6 +257,30 @@ def test_friction_has_no_part_along_directions_that_are_held(mu):
     assert len(notes) == (mu > 0)
 
 
+def test_the_node_that_is_held_alone_is_off():
+    """Sliding under a uniform stress: its pressure is p (1 + mu tan a) on all meshes.
+
+    The force is off by the friction that its share of the surface lacks, which falls with the mesh.
+    """
+    p, mu, slope = 1.0, 0.05, 0.4
+    stress = p * np.array([[2 * mu / slope - 1, mu], [mu, -1.0]])
+    exact = p * np.array([slope - mu, -1 - mu * slope])
+    off = []
+    for count in (4, 8, 16):
+        domain = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [count, count])
+        x = domain.mesh.geometry.x
+        x[:, 1] += slope * x[:, 0] * (1 - x[:, 1])
+        loads = [Load("left", [0.0, -stress[0, 1]])]
+        loads += [Load("top", list(stress[1])), Load("right", list(stress[0]))]
+        contact = Contact("bottom", 0.0, friction=Friction(ConstantCoefficient(mu)))
+        body = Body(Linear(1e3, 0.3), [Fixed("left", [0.0, None])], loads)
+        solution = solve(Problem(domain, body, contact), METHODS["dense"])
+        held = solution.problem.nodes.points[:, 0] < 1e-9
+        np.testing.assert_allclose(solution.pressure[held], p * (1 + mu * slope), rtol=1e-6)
+        off.append(np.linalg.norm(solution.contact_force - exact))
+    np.testing.assert_allclose(off, mu * p * (1 + slope**2) / np.array([8, 16, 32]), rtol=1e-6)
+
+
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_cone_under_a_cylinder(degree):
