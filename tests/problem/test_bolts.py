@@ -295,6 +295,54 @@ def test_cuts_that_cross_make_four_pieces():
         check_problem(build_problem(free, COMM))
 
 
+def frame(columns):
+    """Return two stiff plates that some of three columns join, the outer ones with cuts."""
+    n, cells = 6, []
+    for row in range(6):
+        for k in range(5):
+            if row in (0, 5) or k in (2 * column for column in columns):
+                first = row * n + k
+                cells.append([first, first + 1, first + n, first + n + 1])
+    used, quads = np.unique(np.array(cells, dtype=np.int64), return_inverse=True)
+    x = np.stack([used % n, used // n], axis=1).astype(float)
+    quads = quads.reshape(-1, 4)
+    if COMM.rank > 0:
+        x, quads = x[:0], quads[:0]
+    element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,), dtype=np.float64)
+    mesh = dmesh.create_mesh(COMM, cells=quads, x=x, e=ufl.Mesh(element))
+    outer = {"left": 0.5, "right": 4.5}
+    return from_mesh(
+        mesh,
+        {"foot": lambda x: np.isclose(x[1], 0), "head": lambda x: np.isclose(x[1], 6)},
+        inside={
+            name: (lambda x, at=at: np.isclose(x[1], 3) & (np.abs(x[0] - at) < 0.6))
+            for name, at in outer.items()
+        },
+    )
+
+
+@pytest.mark.parallel
+def test_two_bolts_beside_a_column_that_bears_them():
+    """Both cuts leave the body in one piece, and the column between has both forces."""
+    bolts = [Bolt("left", force=0.01), Bolt("right", force=0.01)]
+    body = Body(Linear(YOUNG, 0.0), Fixed("foot", [0.0, 0.0]), bolts=bolts)
+    solution = solve(Problem(frame((0, 1, 2)), body, Contact("head", gap=1.0)))
+    assert solution.converged
+    problem = solution.problem
+    fields = DerivedFields(problem.equilibrium, solution.state)
+    borne = []
+    for cells, values in fields.chunks():
+        middles = dmesh.compute_midpoints(problem.domain.mesh, 2, cells)
+        at = np.all(np.isclose(middles[:, :2], [2.5, 1.5]), axis=1)
+        borne += values[at][..., fields.columns["stress"]].reshape(-1, 3, 3)[:, 1, 1].tolist()
+    assert np.mean(np.concatenate(COMM.allgather(borne))) == pytest.approx(-0.02, rel=1e-8)
+    found = solution.movements["bolts"]
+    assert found["left"] == pytest.approx(found["right"], rel=1e-8)
+    alone = Problem(frame((0, 2)), body, Contact("head", gap=1.0))
+    with pytest.raises(InputError, match="or the force of a bolt one side of its cut"):
+        check_problem(alone)
+
+
 @pytest.mark.parallel
 def test_a_force_that_nothing_bears_is_refused():
     held = {"fixed": [{"on": "top", "displacement": [0.0, 0.0]}]}

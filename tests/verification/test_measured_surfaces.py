@@ -77,6 +77,18 @@ def test_distances_and_normals_of_heights():
     assert normal[0] == pytest.approx(np.array([0.0, 0.2, 1.0]) / np.hypot(0.2, 1.0))
 
 
+def test_places_without_heights():
+    """In 3-D, beside either axis; half a spacing beyond the last place is known."""
+    x, y = np.linspace(0.0, 2.0, 5), np.array([0.0, 0.1, 0.2, 0.8, 0.9, 1.0])
+    given = Heights((x, y), np.zeros((5, 6)))
+    known = [[-0.25, 0.0], [2.25, 1.05], [1.0, 0.25], [1.0, 0.75]]
+    unknown = [[-0.26, 0.0], [1.0, 1.06], [1.0, 0.26], [2.0, 0.5]]
+    points = np.column_stack([np.array(known + unknown), np.ones(8)])
+    assert given.unknown(points).tolist() == [False] * 4 + [True] * 4
+    few = Heights((np.array([0.0, 1.0]),), np.zeros(2))
+    assert few.unknown(np.array([[1.5, 0.0], [1.6, 0.0]])).tolist() == [False, True]
+
+
 @pytest.mark.parametrize("file", ["grid.csv", "grid.npy"])
 def test_arrays_and_columns_are_one_surface(tmp_path, file):
     """An image of heights with its spacing, and its rows in any order."""
