@@ -81,6 +81,9 @@ def test_axes_end_where_they_are_asked_to() -> None:
     assert draw_line(run, look).axes[0].get_xlim() == (0.5, 1.0)
     ax = draw_plane(picture(run, "von_mises"), look).axes[0]
     assert (ax.get_xlim(), ax.get_ylim()) == ((0.5, 1.0), (0.0, 0.4))
+    # The foundation below remains where the ends of the other axis alone are given.
+    low, high = draw_plane(picture(run, "von_mises"), Look(xlim=(0.5, 1.0))).axes[0].get_ylim()
+    assert low < 0 and high > 1
     body = r"beside the body, which is drawn from .*; accepted: ends that show some of it"
     for beside, words in (
         (Look(xlim=(5.0, 6.0)), f"--xlim 5,6: {body}"),

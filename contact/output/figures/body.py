@@ -172,7 +172,7 @@ def draw_plane(picture: Picture, look: Look) -> Figure:
     run, box, head = picture.run, picture.box.copy(), picture.title
     mirrored = look.mirror and run.axes == "rz"
     places = np.asarray(picture.skin.points)[:, :2]
-    cut = np.any(np.ptp(box, axis=0) < 0.99 * np.ptp(places, axis=0)) or look.xlim or look.ylim
+    cut = bool(np.any(np.ptp(box, axis=0) < 0.99 * np.ptp(places, axis=0)))
     box[0, 0] = -box[1, 0] if mirrored else box[0, 0]
     for k, (low, high) in enumerate(zip(places.min(axis=0), places.max(axis=0), strict=True)):
         low = -high if mirrored and k == 0 else low
@@ -201,8 +201,10 @@ def draw_plane(picture: Picture, look: Look) -> Figure:
     ax.use_sticky_edges = False
     ax.margins(0.02)
     ax.autoscale_view()
-    if cut:
-        ax.set(xlim=tuple(box[:, 0]), ylim=tuple(box[:, 1]))
+    if cut or look.xlim:
+        ax.set_xlim(tuple(box[:, 0]))
+    if cut or look.ylim:
+        ax.set_ylim(tuple(box[:, 1]))
     ax.set_xlabel(run.units.label(f"${run.axes[0]}$", "length"))
     ax.set_ylabel(run.units.label(f"${run.axes[1]}$", "length"))
     ax.set_title(head, fontsize="medium")
