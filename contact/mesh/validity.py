@@ -150,7 +150,11 @@ def check_model(model: Model) -> Cells:
     if not usable:
         entities = "curves" if dim == 2 else "surfaces"
         reason = next(iter(reasons.values()), None)
-        raise InputError(reason or f"it has no physical groups of {entities}: no part has a name")
+        raise InputError(
+            reason
+            or f"it has no physical groups of {entities}, nor sets or tags of facets or nodes: no "
+            "part has a name"
+        )
     notes += [
         reason if name in inside else f"ignored: {reason}" for name, reason in reasons.items()
     ]

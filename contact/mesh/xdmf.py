@@ -58,9 +58,6 @@ MIXED = {
     50: ("hexahedron", 27),
 }
 
-#: Numbers of nodes of first order.
-FIRST = dict(reversed([*MIXED.values()]))
-
 #: Those with the number of their nodes in front of these.
 COUNTED = (1, 2)
 
@@ -74,7 +71,7 @@ ACCEPTED = "accepted: one mesh, and tags of its cells and facets on the nodes of
 
 
 def read(file: Path) -> Any:
-    """Read an XDMF file as a mesh of meshio.
+    """Read an XDMF file as a mesh of meshio, whose cells have the names of those of first order.
 
     Raises
     ------
@@ -121,7 +118,7 @@ def read(file: Path) -> Any:
 
 def _among(mesh: list[tuple[str, Ints]], name: str, rows: Ints) -> Ints | None:
     """Return where cells are among those of the mesh, its first block; None if they are not."""
-    if not mesh or mesh[0][0] != name:
+    if not mesh or (mesh[0][0], mesh[0][1].shape[1]) != (name, rows.shape[1]):
         return None
     count = len(mesh[0][1])
     both = np.sort(np.concatenate([mesh[0][1], rows]), axis=1)
@@ -162,23 +159,18 @@ def _blocks(grid: Element, root: Element, file: Path) -> list[tuple[str, Ints]]:
     name = KINDS.get(given.split("_")[0].lower())
     if name is None or rows.ndim != 2:
         raise ValueError(f"a topology {given!r}, which is not known")
-    return [(_name(name, rows.shape[1]), rows)]
-
-
-def _name(kind: str, nodes: int) -> str:
-    """Return meshio's name of cells, which has the number of nodes behind it in second order."""
-    return kind if nodes == FIRST[kind] else f"{kind}{nodes}"
+    return [(name, rows)]
 
 
 def _mixed(data: Ints) -> list[tuple[str, Ints]]:
     """Return the cells of a mixed topology: number of a kind, nodes, and so on."""
-    runs: list[tuple[str, list[Ints]]] = []
+    runs: list[tuple[tuple[str, int], list[Ints]]] = []
     at = 0
     while at < len(data):
         number = int(data[at])
         if number not in MIXED:
             raise ValueError(f"cells of number {number} in a mixed topology, which are not known")
-        kind, nodes = MIXED[number]
+        nodes = MIXED[number][1]
         before = 1 + (number in COUNTED)
         width = before + nodes
         ahead = data[at : at + WINDOW * width]
@@ -187,11 +179,11 @@ def _mixed(data: Ints) -> list[tuple[str, Ints]]:
         count = len(alike) if alike.all() else int(alike.argmin())
         if not count or (before == 2 and np.any(ahead[:count, 1] != nodes)):
             raise ValueError("a mixed topology that is cut off, or lines of several points")
-        if not runs or runs[-1][0] != _name(kind, nodes):
-            runs.append((_name(kind, nodes), []))
+        if not runs or runs[-1][0] != MIXED[number]:
+            runs.append((MIXED[number], []))
         runs[-1][1].append(ahead[:count, before:])
         at += count * width
-    return [(name, np.concatenate(rows)) for name, rows in runs]
+    return [(name, np.concatenate(rows)) for (name, _), rows in runs]
 
 
 def _array(item: Element, root: Element, file: Path) -> Any:

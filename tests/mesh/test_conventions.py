@@ -177,6 +177,42 @@ def test_nodes_between_corners_are_where_the_manual_says(program, order, dim, tm
     assert len(domain.parts) == 1
 
 
+#: Edges of a prism in the order of VTK, Abaqus and MED, and of a pyramid in that of all.
+PRISM = [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)]
+PYRAMID = [*LOW, (0, 4), (1, 4), (2, 4), (3, 4)]
+
+#: Names of elements of 15 and 13 nodes.
+OTHERS = {
+    "Exodus": ("WEDGE15", "PYRAMID13"),
+    "Abaqus": ("C3D15", None),
+    "MED": ("P15", "P13"),
+}
+
+
+@pytest.mark.parametrize(("program", "names"), OTHERS.items(), ids=[*OTHERS])
+def test_prisms_and_pyramids_of_second_order_are_cut(program, names, tmp_path, monkeypatch):
+    """In whatever order the nodes between their corners are: these are left out, and it is said."""
+    shapes = (
+        ("Prism 15", CUBE[[0, 1, 2, 4, 5, 6]], PRISM, 0.5),
+        ("Pyramid 13", CUBE[:5], PYRAMID, 1 / 3),
+    )
+    for name, (kind, corners, edges, volume) in zip(names, shapes, strict=True):
+        if name is None:
+            continue
+        order = [*PRISM[:3], *PRISM[6:], *PRISM[3:6]] if name == "WEDGE15" else edges
+        points = np.concatenate([corners, [corners[list(ends)].mean(axis=0) for ends in order]])
+        row = np.arange(len(points))[None]
+        monkeypatch.setitem(NAMES[program], (len(points), 3), name)
+        monkeypatch.setattr("tests.mesh.test_conventions.cells", lambda *_, p=points, r=row: (p, r))
+        monkeypatch.setattr("tests.mesh.test_conventions.bent", lambda x: x)
+        path = tmp_path / f"{kind}{ENDINGS[program]}"
+        write(path, program, order, 3)
+        domain = from_file(MPI.COMM_SELF, path)
+        assert integral(domain, domain.dx) == pytest.approx(volume, rel=1e-12)
+        assert len(domain.parts) == 1 and domain.order == 1 and domain.space["degree"] == 2
+        assert f"its cells, '{kind}', become tetrahedra with straight edges" in domain.notes[0]
+
+
 @pytest.mark.parallel
 @pytest.mark.parametrize("cell", ["triangle", "hexahedron"])
 def test_tags_of_dolfinx_are_parts_and_regions(cell, shared_tmp_path):
@@ -208,6 +244,14 @@ def test_tags_of_dolfinx_are_parts_and_regions(cell, shared_tmp_path):
     assert domain.notes == ()
 
 
+def test_a_mesh_without_tags_names_them(shared_tmp_path):
+    path = shared_tmp_path / "bare.xdmf"
+    with io.XDMFFile(MPI.COMM_SELF, path, "w") as file:
+        file.write_mesh(unit_block(MPI.COMM_SELF, "triangle").mesh)
+    with pytest.raises(InputError, match="nor sets or tags of facets or nodes: no part has a name"):
+        from_file(MPI.COMM_SELF, path)
+
+
 def test_mixed_topologies_of_second_order(tmp_path):
     """As meshio writes cells beside their facets."""
     meshio = pytest.importorskip("meshio")
@@ -227,6 +271,20 @@ def test_mixed_topologies_of_second_order(tmp_path):
         (tmp_path / "other.xdmf").write_text(f"<Xdmf><Domain>{grids}</Domain></Xdmf>")
         with pytest.raises(InputError, match=f"the XDMF reader says of it: .*{accepted}"):
             from_file(MPI.COMM_SELF, tmp_path / "other.xdmf")
+
+
+def test_prisms_of_second_order_in_xdmf(tmp_path):
+    points = np.concatenate([CUBE[[0, 1, 2, 4, 5, 6]], np.zeros((9, 3))])
+    text = "<Xdmf><Domain><Grid><Geometry><DataItem Dimensions='15 3'>{}</DataItem></Geometry>"
+    text += "<Topology TopologyType='Wedge_15'><DataItem NumberType='Int' Dimensions='1 15'>{}"
+    text += "</DataItem></Topology><Attribute Name='low' Center='Node'><DataItem NumberType='Int' "
+    text += "Dimensions='15'>{}</DataItem></Attribute></Grid></Domain></Xdmf>"
+    mark = [1, 1, 1, *[0] * 12]
+    numbers = (" ".join(map(str, v)) for v in (points.ravel().tolist(), range(15), mark))
+    (tmp_path / "prism.xdmf").write_text(text.format(*numbers))
+    domain = from_file(MPI.COMM_SELF, tmp_path / "prism.xdmf")
+    assert integral(domain, domain.dx) == pytest.approx(0.5)
+    assert measures(domain) == pytest.approx({"low 1": 0.5})
 
 
 def test_long_runs_of_mixed_cells():
