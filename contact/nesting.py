@@ -98,7 +98,8 @@ def _interpolate(nodes: ContactNodes, values: Array, at: Array) -> Array:
     """
     rows, d = np.column_stack([nodes.points, values]), nodes.dim
     nearest = np.arange(1, min(d, nodes.size) + 1)
-    reach = float(nodes.maximum(nodes.weight)) ** (1 / (d - 1))
+    # No multiple of the spacing, at which rounding would choose the ranks that send a row of nodes.
+    reach = 0.75 * float(nodes.maximum(nodes.weight)) ** (1 / (d - 1))
     # The nearest of all ranks are known where they are within reach.
     known = False
     while not known:

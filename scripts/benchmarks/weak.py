@@ -15,7 +15,11 @@ import json
 import time
 import tracemalloc
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import Any, ClassVar
 
 import basix.ufl
@@ -31,13 +35,17 @@ from contact.linear.operator import Counters
 from contact.mesh.domain import Domain, from_mesh
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Outcome
+from contact.nesting import prolong
 from contact.output import formats
-from contact.output.quantities import NODES, values_of
-from contact.output.solution import Solution
-from contact.output.surface import contact_surface
+from contact.output.checkpoint import read_checkpoint
+from contact.output.files import write_outputs
+from contact.output.options import OutputOptions
+from contact.output.recovery import nodal_means
+from contact.output.solution import Solution, StepRecord
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
+from contact.ranks import on_root
 from forms.hencky import Linear
 from scripts.benchmarks.bench_one import rank_memory
 
@@ -124,7 +132,10 @@ def slices(comm: MPI.Intracomm, n: int, bodies: int) -> Domain:
     parts = {"bottom": at(0.0), "top": at(top)}
     if bodies == 2:
         parts |= {"lower": at(1.0), "upper": at(1 + GAP)}
-    return from_mesh(made, parts)
+    domain = from_mesh(made, parts)
+    facets = dmesh.locate_entities(made, 2, lambda x: np.abs(x[2] - (n // 2) / n) < GAP / 4)
+    owned = facets[facets < made.topology.index_map(2).size_local]
+    return replace(domain, inside={"middle": owned})
 
 
 def problem_of(comm: MPI.Intracomm, n: int, bodies: int) -> ContactProblem:
@@ -149,17 +160,40 @@ def held(problem: ContactProblem) -> int:
     return found
 
 
-def surface_bytes(problem: ContactProblem) -> dict[str, int]:
-    """Return the bytes of the contact nodes that this rank writes, each in pieces. Collective."""
-    most, formats.TOGETHER = formats.TOGETHER, 0
-    try:
-        state = problem.start()
-        found = Solution(problem, state, Outcome(evaluate(problem, state), 0.0), *_NOTHING, {})
-        listed, surface = values_of(NODES, found.listed_contact), contact_surface(found)
-    finally:
-        formats.TOGETHER = most
-    arrays = [surface.points, surface.cells, *surface.at_points.values(), *listed.values()]
-    return {"held": _size(arrays)}
+def outputs(problem: ContactProblem, n: int, bodies: int) -> dict[str, Callable[[], object]]:
+    """Return the actions on a problem that are counted one by one, by name. Collective.
+
+    All files are in pieces, of a step too, with a checkpoint, which is read again.
+    """
+    comm, state = problem.comm, problem.start()
+    files = OutputOptions(checkpoint=True)
+    found = Solution(
+        problem,
+        state,
+        Outcome(evaluate(problem, state), NewtonOptions().allowed),
+        *_NOTHING,
+        {"output": 0.0},
+    )
+    found.output, found.steps = files, [StepRecord(state, {"t": 0.0}, 0.0)]
+    folder = Path(comm.bcast(mkdtemp() if comm.rank == 0 else ""))
+    coarse = problem_of(comm, n // 2, bodies)
+    cells = np.arange(problem.domain.mesh.topology.index_map(3).size_local, dtype=np.int32)
+    values = np.ones((cells.size, 6))
+
+    def write() -> None:
+        most, formats.TOGETHER = formats.TOGETHER, 0
+        try:
+            write_outputs(found, folder)
+        finally:
+            formats.TOGETHER = most
+
+    return {
+        "written": write,
+        "read": lambda: read_checkpoint(folder / "checkpoint.npz", problem),
+        "nested": lambda: prolong(coarse, coarse.start(), problem),
+        "separated": lambda: nodal_means(problem.domain, cells, values, ["middle"]),
+        "": lambda: on_root(comm, lambda: rmtree(folder)),
+    }
 
 
 #: History, counters and method of a solution that is none.
@@ -178,10 +212,16 @@ def measure(comm: MPI.Intracomm, n: int, bodies: int, solving: bool = False) -> 
         made = time.perf_counter() - begin
         evaluate(problem, problem.start())
         peak = tracemalloc.get_traced_memory()[1]
-        before = Counted.received["bytes"]
-        written = surface_bytes(problem)
-        written["exchanged"] = Counted.received["bytes"] - before
-        Counted.received["bytes"] = before
+        received, calls = Counted.received["bytes"], Counted.received["calls"]
+        stages: dict[str, Any] = {}
+        for name, do in outputs(problem, n, bodies).items():
+            before, here = Counted.received["bytes"], tracemalloc.get_traced_memory()[0]
+            tracemalloc.reset_peak()
+            do()
+            most = comm.allreduce(tracemalloc.get_traced_memory()[1] - here, op=MPI.MAX)
+            gone = comm.allreduce(Counted.received["bytes"] - before, op=MPI.SUM)
+            if name:
+                stages |= {name: most, f"{name}, received": gone}
     finally:
         tracemalloc.stop()
         Domain.comm = whole  # type: ignore[method-assign]
@@ -191,10 +231,9 @@ def measure(comm: MPI.Intracomm, n: int, bodies: int, solving: bool = False) -> 
         "contact nodes": problem.nodes.size,
         "python": comm.allreduce(peak, op=MPI.MAX),
         "coupling": comm.allreduce(held(problem), op=MPI.MAX),
-        "received": comm.allreduce(Counted.received["bytes"], op=MPI.SUM),
-        "listed": comm.allreduce(written["held"], op=MPI.MAX),
-        "exchanged": comm.allreduce(written["exchanged"], op=MPI.SUM),
-        "calls": comm.allreduce(Counted.received["calls"], op=MPI.MAX),
+        "received": comm.allreduce(received, op=MPI.SUM),
+        "calls": comm.allreduce(calls, op=MPI.MAX),
+        **stages,
         "seconds": made,
     }
     if solving:
