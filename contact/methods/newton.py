@@ -66,7 +66,7 @@ from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
-from contact.problem.residuals import Residuals, evaluate, force_rounding, residual_forces
+from contact.problem.residuals import Residuals, evaluate, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -261,16 +261,11 @@ class Newton:
         if found is None:
             return iterate, outcome
         problem, state, body = self.problem, iterate.state, self.problem.equilibrium
-        known = force_rounding(problem, state, body.internal_forces(state))
         x = body.moved(state.x, -found[0])
         # Where nothing presses, forces by rounding alone are out of balance elsewhere.
         for forces in (Multipliers.zero(problem.interface.jump), state.forces):
             least = replace(iterate, state=replace(state, x=x, forces=forces))
             residuals = evaluate(problem, least.state)
-            left = body.sizes(body.unbalanced(residual_forces(problem, least.state)))
-            if np.all(left <= known.max(axis=1, keepdims=True)):
-                # By the rounding of the motion: where all forces are, there is no other measure.
-                residuals = replace(residuals, equilibrium=outcome.kkt.equilibrium)
             if not residuals.excess(self.options.allowed):
                 return least, replace(outcome, kkt=residuals)
         return iterate, outcome

@@ -34,7 +34,8 @@ class Residuals:
     ----------
     equilibrium
         |F(u) + contact forces| on free unknowns over the sum of the norms of loads, contact forces
-        and reactions; zero where nothing acts and all forces are rounding. Of bodies that nothing
+        and reactions; zero where nothing acts and all forces are rounding, and beside the forces of
+        the prescribed displacements on undeformed bodies where nothing acts. Of bodies that nothing
         connects the largest, each over the forces on itself. Of a piezoelectric body the larger one
         of forces and of charges, each over those of its own kind: to these belong the forces of the
         potential on the undeformed body, and the charges of the strain.
@@ -228,6 +229,10 @@ def evaluate(problem: Problem, state: State) -> Residuals:
         rounding = np.where(acted, np.minimum(rounding, most), largest)
         nothing = ~acted & (unbalanced <= rounding)
         unbalanced, rounding = (np.where(nothing, 0.0, sizes) for sizes in (unbalanced, rounding))
+        if not acted.any():
+            # Bodies that have moved freely: beside the forces that would have held them.
+            held = body.sizes(residual_forces(problem, problem.start()))
+            scale = scale + held.max(axis=1, keepdims=True)
     # Of a component on which nothing acts there is the rounding of the others, and of charges, in
     # units of forces by the scale of the potential, that of a body without a field.
     scale = np.maximum(scale, EPS * scale.max())

@@ -46,6 +46,27 @@ def test_the_least_of_all_places():
         np.testing.assert_allclose(nodes.apply(back), nodes.apply(state.x), rtol=0, atol=1e-9)
 
 
+@pytest.mark.parallel
+def test_a_ring_that_a_lid_pushes_aside():
+    """Without friction nothing presses: rounding was compared with none, 2e16 for a residual."""
+    tables = {
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [
+            {"on": "plate_bottom", "displacement": [0.0, 0.0]},
+            {"on": "lid_top", "displacement": [0.0, -0.002]},
+        ],
+        "contact": [
+            {"on": "plate_top", "against": "ring_outside"},
+            {"on": "ring_outside", "against": "lid_bottom"},
+        ],
+    }
+    case = parse_case(tables, without=("mesh",))
+    solution = solve(case, domain=between_plates(COMM, 1))
+    assert solution.converged, solution.outcome.reason
+    assert solution.problem.nodes.maximum(solution.forces.pressure) == 0
+    assert solution.outcome.kkt.equilibrium < 1e-12
+
+
 @pytest.mark.parametrize("seed", [1, 2, 6, 8])
 def test_a_loaded_ring_that_lies_on_a_plate(seed):
     """By friction at all nodes that may touch, it would hang between the plates at first."""
