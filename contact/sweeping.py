@@ -330,7 +330,7 @@ def _kept_rows(
 def _read(table: Path) -> list[dict[str, str]]:
     """Return the rows of a table that a sweep has left."""
     try:
-        with table.open(newline="", encoding="utf-8") as file:
+        with table.open(newline="", encoding="utf-8-sig") as file:
             header, *rows = csv.reader(file, strict=True)
         computed = [*itertools.dropwhile(lambda column: column != "converged", header)]
         found = [dict(zip(header, row, strict=True)) for row in rows]

@@ -90,7 +90,10 @@ def read_share(
 
     def contents(piece: Path) -> Arrays:
         with as_written(piece), np.load(io.BytesIO(read(piece)), allow_pickle=False) as arrays:
-            return dict(arrays)
+            found = dict(arrays)
+            if other := [name for name, array in found.items() if array.dtype.kind not in "biufU"]:
+                raise ValueError(f"{other[0]!r} holds neither real numbers nor words")
+            return found
 
     def begin() -> tuple[Arrays, Arrays]:
         arrays = contents(path)

@@ -1,5 +1,7 @@
 """Files of a user's own in a folder of results: nothing but what a manifest names is removed."""
 
+import hashlib
+import json
 import logging
 import os
 import shutil
@@ -218,6 +220,23 @@ def test_damaged_checkpoints_are_gone_on_from_before(
             assert message.startswith("contact: ")
             if name == "nodes.npz":  # a missing one was called a place to write to
                 assert "nodes.npz: no checkpoint, or a damaged one" in message
+
+
+@pytest.mark.parametrize("kind", [complex, object])
+def test_arrays_of_another_kind_are_no_state(kind: type, tmp_path: Path, cases: dict[str, Path],
+                                             caplog: pytest.LogCaptureFixture) -> None:  # fmt: skip
+    """Their checksum may be right; it was a traceback."""
+    solve(steps_case(), comm=SELF, folder=tmp_path)
+    path = tmp_path / "checkpoints" / "00003.npz"
+    arrays = dict(np.load(path))
+    np.savez(path, **arrays | {"x": arrays["x"].astype(kind)})
+    manifest = path.with_name("manifest.json")
+    said = json.loads(manifest.read_text())
+    said["files"][path.name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    manifest.write_text(json.dumps(said))
+    with caplog.at_level(logging.WARNING, "contact.steps"):
+        assert on_the_line("solve", "--restart", tmp_path) == 0
+    assert "going on from step 2" in caplog.text
 
 
 def test_a_summary_of_a_users_own_names_no_files_of_ours(tmp_path, cases):

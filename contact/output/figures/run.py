@@ -218,8 +218,11 @@ def _joined(pieces: Any) -> Any:
 
 def _columns(path: Path) -> dict[str, NDArray[Any]]:
     """Read a table: the columns by name."""
-    with path.open(newline="", encoding="utf-8") as file:
+    with path.open(newline="", encoding="utf-8-sig") as file:
         header, *rows = csv.reader(file)
+    for row in rows:
+        if len(row) != len(header):
+            raise ValueError(f"a row of {len(row)} values under {len(header)} columns")
     columns = {name: np.array(texts) for name, *texts in zip(header, *rows, strict=True)}
     return {k: v if k in ("status", "on") else v.astype(float) for k, v in columns.items()}
 

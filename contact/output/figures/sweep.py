@@ -84,7 +84,7 @@ def plot_sweep(
 def _read(path: Path) -> tuple[list[str], list[dict[str, str]]]:
     """Return the swept keys, and the rows."""
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.DictReader(file, strict=True))
         keys = [*itertools.takewhile(lambda name: name != "converged", rows[0])]
     except (OSError, ValueError, IndexError, csv.Error):
