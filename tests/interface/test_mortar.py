@@ -18,7 +18,7 @@ from contact.mesh.deviation import deviations
 from contact.mesh.grid import box, rectangle
 from forms.hencky import Linear
 from tests.problems.mechanics import constant
-from tests.problems.sides import FIRST, KINDS, NAMES, flat, oriented
+from tests.problems.sides import FIRST, KINDS, NAMES, bowed, flat, oriented
 
 UNLIKE = [
     ((TRIANGLE, 1), (QUADRILATERAL, 1)),
@@ -26,13 +26,15 @@ UNLIKE = [
     ((TRIANGLE, 2), (QUADRILATERAL, 2)),
     ((QUADRILATERAL, 2), (QUADRILATERAL, 1)),
 ]
+CURVED = [(TRIANGLE, 2), (QUADRILATERAL, 2)]
+CURVED_NAMES = ["triangle", "quadrilateral"]
 PAIRS = [*((kind, kind) for kind in KINDS), *UNLIKE]
 PAIR_NAMES = [f"{a.name}-{p}-{b.name}-{q}" for (a, p), (b, q) in PAIRS]
 
 
 def loads(side, nodes):
     """Return the nodal loads of a unit pressure."""
-    at, weights = rule(side.shape, 4)
+    at, weights = rule(side.shape, 8)
     share = side.measures(at, weights) @ side.shape.lagrange(side.degree, at)
     total = np.zeros(nodes.size)
     np.add.at(total, np.searchsorted(nodes, side.nodes), share)
@@ -59,14 +61,29 @@ def test_constant_pressure_and_linear_fields_pass(on, against, turned) -> None:
     """To rounding: a pressure's loads on both sides, and any linear field, on jittered meshes."""
     dim = on[0].dim + 1
     turn = rotation(dim) if turned else None
-    slave, x = flat(on, 5, 1.0, 1.0, 1, turn=turn)
-    master, y = flat(against, 7, 1.1, -1.0, 2, FIRST, turn)
+    check_a_pair(
+        flat(on, 5, 1.0, 1.0, 1, turn=turn),
+        flat(against, 7, 1.1, -1.0, 2, FIRST, turn),
+        rounding(on, against),
+    )
+
+
+@pytest.mark.parametrize("on", CURVED, ids=CURVED_NAMES)
+@pytest.mark.parametrize("against", CURVED, ids=CURVED_NAMES)
+def test_they_pass_where_edges_are_curved_in_the_plane(on, against) -> None:
+    check_a_pair(bowed(on, 2, 1.0, 1.0, 1), bowed(against, 3, 1.1, -1.0, 2, FIRST), 1e-12)
+
+
+def check_a_pair(one, other, close) -> None:
+    """Check loads of a pressure and the jumps of linear fields, given sides 0.1 apart."""
+    (slave, x), (master, y) = one, other
+    dim = x.shape[1]
     found = couple(slave, master, 1.0)
     assert found.nodes.size == len(x) and np.abs(found.covered - 1).max() < 1e-12
     np.testing.assert_allclose(found.gap, 0.1, atol=1e-14)
     np.testing.assert_allclose(found.normal, np.broadcast_to(slave.normal[0], x.shape), atol=1e-14)
     assert found.weight.min() > 0
-    forces, close = found.other.T @ found.weight, rounding(on, against)
+    forces = found.other.T @ found.weight
     np.testing.assert_allclose(forces, loads(master, found.masters), rtol=0, atol=close)
     on_slave = found.own.T @ found.weight
     np.testing.assert_allclose(on_slave, loads(slave, found.slaves), rtol=0, atol=close)
@@ -81,6 +98,16 @@ def test_constant_pressure_and_linear_fields_pass(on, against, turned) -> None:
 def test_matching_meshes_are_tied_node_by_node(kind) -> None:
     slave, _ = flat(kind, 5, 0.0, 1.0, 4)
     master, _ = flat(kind, 5, 0.0, -1.0, 4, FIRST)
+    found = couple(slave, master, 1.0)
+    np.testing.assert_array_equal(found.masters - FIRST, found.slaves)
+    np.testing.assert_allclose((found.own - found.other).toarray(), 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", CURVED, ids=CURVED_NAMES)
+def test_matching_curved_edges_are_those_of_both_sides(kind) -> None:
+    """A sliver on the edge of two facets goes to both in halves: else neighbours were tied too."""
+    slave, _ = bowed(kind, 2, 0.0, 1.0, 4)
+    master, _ = bowed(kind, 2, 0.0, -1.0, 4, FIRST)
     found = couple(slave, master, 1.0)
     np.testing.assert_array_equal(found.masters - FIRST, found.slaves)
     np.testing.assert_allclose((found.own - found.other).toarray(), 0, atol=1e-12)
@@ -153,6 +180,28 @@ def test_clipped_polygons_have_the_area_in_common(corners, others) -> None:
             height = heights(given, sample)
             inside &= np.all(height > 0, axis=1) | np.all(height < 0, axis=1)
         assert area == pytest.approx(16 * inside.mean(), abs=0.2)
+
+
+def test_a_corner_that_both_triangles_have_loses_no_other() -> None:
+    """By signs of rounding it was there three times, and the first corner had no place."""
+    common = [-0.07350519801354499, 1.0319861449927856]
+    one = np.array(
+        [[0.00229683581789203, 0.505898123991906], [0.4841500548336721, 0.5125995288725862], common]
+    )
+    other = np.array(
+        [
+            [0.11491038333489148, 0.5160783894000093],
+            [0.5128028168049572, 0.48591303931334495],
+            common,
+        ]
+    )
+    for first, second in ((one, other), (other, one)):
+        polygon, count = clipped(first[None], second[None])
+        x = polygon[0, : count[0]]
+        assert count[0] <= 6
+        after = np.roll(x, -1, axis=0)
+        area = np.sum(x[:, 0] * after[:, 1] - x[:, 1] * after[:, 0]) / 2
+        assert abs(area) == pytest.approx(0.0960959, rel=1e-6)
 
 
 @pytest.mark.parametrize("degree", [1, 2])

@@ -35,6 +35,9 @@ class Blocks:
         Between them.
     cell
         Shape of the cells; by default triangles or tetrahedra.
+    bow
+        How far nodes move along the faces, and those within also across: cells are then of second
+        order, and facets curved in their planes; 0 for straight cells.
     """
 
     dim: int = 2
@@ -45,6 +48,7 @@ class Blocks:
     turn: float = 0.0
     gap: float = 0.0
     cell: str = ""
+    bow: float = 0.0
 
     @property
     def shape(self) -> Shape:
@@ -54,9 +58,12 @@ class Blocks:
     def domain(self, comm: MPI.Intracomm) -> Domain:
         """Return the mesh with the parts `top`, `under`, `over`, `bottom` and sides."""
         points, cells = self._cells()
+        if self.bow > 0:
+            points, cells = self._bowed(points, cells)
+        order = self.shape.degree_of(cells.shape[1])
         name = self.shape.name
-        element = basix.ufl.element("Lagrange", name, 1, shape=(self.dim,), dtype=np.float64)
-        first = cells if comm.rank == 0 else np.zeros((0, self.shape.corners), dtype=np.int64)
+        element = basix.ufl.element("Lagrange", name, order, shape=(self.dim,), dtype=np.float64)
+        first = cells if comm.rank == 0 else np.zeros((0, cells.shape[1]), dtype=np.int64)
         x = points if comm.rank == 0 else np.zeros((0, self.dim))
         mesh = dmesh.create_mesh(comm, cells=first, x=x, e=ufl.Mesh(element))
         d = self.dim
@@ -117,6 +124,21 @@ class Blocks:
         c, s = np.cos(angle), np.sin(angle)
         axes[np.ix_([0, -1], [0, -1])] = [[c, -s], [s, c]]
         return axes
+
+    def _bowed(self, points, cells):
+        """Return nodes of second order, moved by waves, and the cells of these."""
+        every = self.shape.lagrange(1, self.shape.nodes(2)) @ points[cells]
+        up = (every[..., -1].mean(axis=1) > 1 + self.gap / 2)[:, None] * np.ones(every.shape[1])
+        known = np.column_stack([every.reshape(-1, self.dim), up.ravel()]).round(9)
+        _, first, number = np.unique(known, axis=0, return_index=True, return_inverse=True)
+        x, up = every.reshape(-1, self.dim)[first], up.ravel()[first]
+        height = x[:, -1] - up * (1 + self.gap)
+        inside = [*x[:, :-1].T, height]
+        moves = [
+            np.sin(np.pi * along) * np.cos(3.0 * other + k + 2.0 * up)
+            for k, (along, other) in enumerate(zip(inside, np.roll(x, 1, axis=1).T, strict=True))
+        ]
+        return x + self.bow * np.stack(moves, axis=1), number.reshape(every.shape[:2])
 
     def _cells(self):
         parts, cells, count = [], [], 0

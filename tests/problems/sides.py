@@ -1,5 +1,7 @@
 """Sides of bodies as plain facets, of all shapes and degrees, on jittered meshes."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from contact.interface.mortar.surface import Surface
@@ -54,6 +56,16 @@ def flat(kind, n, height, up, seed, first=0, turn=None, size=1.0):
     none = np.zeros((len(corners), len(shape.edges)))
     side = Surface(nodes + first, x[corners], out, none, degree)
     return side, every.reshape(-1, dim)[first_of]
+
+
+def bowed(kind, n, height, up, seed, first=0):
+    """Return the like of degree 2 whose edges are curved in the plane of the side, unit square."""
+    side, x = flat(kind, n, height, up, seed, first)
+    moves = np.random.default_rng(seed).uniform(-0.06, 0.06, x.shape) / n
+    moves[np.unique(side.nodes[:, : kind[0].corners] - first)] = 0.0
+    moves[:, -1] = 0.0
+    x = x + np.where((x > 1e-9) & (x < 1 - 1e-9), moves, 0.0)
+    return replace(side, points=x[side.nodes - first]), x
 
 
 def oriented(points, triangles, outwards):

@@ -4,7 +4,10 @@ Both facets are projected onto the average plane of the slave facet, along a dir
 slave facet has; their segments or convex polygons have a segment or a convex polygon in common.
 Its points are carried back onto both by the inverse of their maps: on straight simplices and
 parallelograms integrands are polynomials there, and the rules are exact. Curved facets are cut
-along straight lines between the nodes of their geometry.
+along straight lines between the nodes of their geometry, and the slivers between these and curved
+edges are added: to the facet that has them, and from its neighbour, whose functions go on beyond
+its edge. With both of each pair of facets the slivers of either side cancel on the other, so that
+constants, and linear fields, are integrated over the curved facets of both sides.
 
 References
 ----------
@@ -21,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contact.interface.mortar.surface import Surface
-from contact.mesh.cells import INTERVAL, LARGEST, TRIANGLE, rule
+from contact.mesh.cells import INTERVAL, LARGEST, QUADRILATERAL, TRIANGLE, rule
 from contact.mesh.geometry import across, determinant, inverse, jacobians
 from contact.tolerances import ROUNDING
 from contact.typing import Array
@@ -58,9 +61,15 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _cut(polygon: Array, count: NDArray[np.intp], height: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Keep the part of each polygon where a linear function, by its corners, is >= 0."""
+    """Keep the part of each polygon where a linear function, by its corners, is >= 0.
+
+    Signs of rounding would make several crossings of a corner on the line, one more than there is
+    room for, and another corner would be lost.
+    """
     n, most, _ = polygon.shape
     present = np.arange(most)[None, :] < count[:, None]
+    largest = np.abs(np.where(present, height, 0.0)).max(axis=1)[:, None]
+    height = np.where(np.abs(height) <= ROUNDING * largest, 0.0, height)
     following = np.where(
         np.arange(1, most + 1)[None, :] < count[:, None], np.arange(1, most + 1), 0
     )
@@ -128,9 +137,12 @@ def common_points(
     found: list[tuple[NDArray[np.intp], Array, Array]] = [none]
     for degree in np.unique(exact):
         chosen = np.flatnonzero(exact == degree)
-        sides = (_pieces(slave, own[chosen]), _pieces(master, other[chosen]))
-        pair, y, weight = _common(*sides, int(degree))
-        found.append((chosen[pair], y, weight))
+        one, two = _pieces(slave, own[chosen]), _pieces(master, other[chosen])
+        parts = [_common(one, two, int(degree))]
+        for side, nodes, pieces in ((slave, own, two), (master, other, one)):
+            if side.order > 1 and side.shape.dim > 1:
+                parts.append(_slivers(side, nodes[chosen], pieces, int(degree)))
+        found += [(chosen[pair], y, weight) for pair, y, weight in parts]
     pair, y, weight = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
     order = np.argsort(pair, kind="stable")
     pair, y, weight = pair[order], y[order], weight[order]
@@ -189,19 +201,17 @@ def _degrees(
 
     The inverse of a bilinear map is analytic up to where its determinant, 1 + w (eta, xi), is 0:
     beside a rule on [-1, 1] that is at 1/(2 b), the bend b being |w|/4, and errors fall with each
-    degree by the sum of the half axes of the ellipse through it.
+    degree by the sum of the half axes of the ellipse through it. That of a quadratic map, by which
+    the middle of an edge is b aside, ends at 1/(4 b) from there.
     """
-    total = sum(
-        side.degree * (1 if side.shape.simplex or side.order > 1 else 2) for side in (slave, master)
-    )
+    total = sum(side.degree * (1 if side.shape.simplex else 2) for side in (slave, master))
     bend = np.maximum(slave.bend[i], master.bend[j])
+    pole = 1 / np.clip(2 * bend, ROUNDING, 0.9)
     if slave.order > 1:
-        # Pieces of a facet, with the slope of its map beside the functions.
-        more = np.where(bend > 0, 2, 0)
-    else:
-        pole = 1 / np.clip(2 * bend, ROUNDING, 0.9)
-        fall = np.log(pole + np.sqrt(pole**2 - 1))
-        more = np.where(bend > 0, np.ceil(np.log(1 / ROUNDING) / fall), 0)
+        # From the middle of a piece, which is half as large as the facet.
+        pole = 1 + pole / 2
+    fall = np.log(pole + np.sqrt(pole**2 - 1))
+    more = np.where(bend > 0, np.ceil(np.log(1 / ROUNDING) / fall), 0)
     return np.minimum(total + slave.revolved + more, LARGEST).astype(np.intp)
 
 
@@ -244,6 +254,80 @@ def _common(own: Array, other: Array, degree: int) -> tuple[NDArray[np.intp], Ar
     y = shape.lagrange(1, at) @ part[large]
     weight = size[large][:, None] * weights
     return np.repeat(pair[large], weights.size), y.reshape(-1, shape.dim), weight.ravel()
+
+
+def _slivers(
+    side: Surface, nodes: Array, by: Array, degree: int
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return the points of a rule between curved edges of facets and their straight pieces.
+
+    Over the half of an edge from p along e, the nodes of which are in the middle of the edge by b
+    aside from its chord, these are p + t e + s t (1 - t) b, with the measure t (1 - t) |e x b|.
+    Weights are negative where the edge bends inwards.
+
+    Parameters
+    ----------
+    side, nodes
+        Whose facets, and the nodes of each pair's, on the plane, shape (n, nodes, d).
+    by
+        Convex pieces of the facets of the other side, shape (n, pieces, corners, 2).
+    degree
+        Of the rule.
+
+    Returns
+    -------
+    As of `_common`.
+    """
+    shape, flat = side.shape, nodes[..., :2]
+    first, second = np.array(shape.edges).T
+    half = flat[:, shape.corners : shape.corners + len(first)]
+    bow = half - (flat[:, first] + flat[:, second]) / 2
+    # Halves of all edges, and pieces of the other side: (n, edges, 2, pieces).
+    begin = np.stack([flat[:, first], half], axis=2)[:, :, :, None]
+    along = np.stack([half, flat[:, second]], axis=2)[:, :, :, None] - begin
+    inside = flat[:, : shape.corners].mean(axis=1)[:, None, None, None] - begin
+    size = -np.sign(_cross(along, inside)) * _cross(along, bow[:, :, None, None])
+    bowed, polygons = np.broadcast_to(np.abs(size) > ROUNDING, (*size.shape[:3], by.shape[1])), by
+    pair, edge, part, piece = np.nonzero(bowed)
+    begin, along, size = (x[pair, edge, part, 0] for x in (begin, along, size))
+    low, high, share = _within(begin, along, polygons[pair, piece])
+    met = np.flatnonzero(high - low > ROUNDING)
+    at, weights = rule(QUADRILATERAL, degree + 2)
+    t = low[met, None] + (high - low)[met, None] * at[:, 0]
+    rise = t * (1 - t)
+    y = begin[met, None] + t[..., None] * along[met, None]
+    y += (at[:, 1] * rise)[..., None] * bow[pair[met], edge[met]][:, None]
+    weight = (share * (high - low) * size)[met, None] * rise * weights
+    return np.repeat(pair[met], weights.size), y.reshape(-1, 2), weight.ravel()
+
+
+def _within(begin: Array, along: Array, polygons: Array) -> tuple[Array, Array, Array]:
+    """Return which part of segments is in convex polygons (Cyrus and Beck, Comput. Graph. 3, 1978).
+
+    Parameters
+    ----------
+    begin, along
+        One end, and the vector to the other one, shape (n, 2).
+    polygons
+        Corners in their order, either way round, shape (n, k, 2).
+
+    Returns
+    -------
+    Where it begins and ends, from 0 to 1, shape (n,), nothing where the end is not beyond the
+    beginning, and the share of the polygon in it: a half of a segment that is on its edge.
+    """
+    edges = np.roll(polygons, -1, axis=1) - polygons
+    turn = np.sign(_cross(edges[:, 0], edges[:, 1]))[:, None] / np.linalg.norm(edges, axis=2)
+    height = turn * _cross(edges, begin[:, None] - polygons)
+    slope = turn * _cross(edges, along[:, None])
+    level = np.abs(slope) <= ROUNDING
+    at = -height / np.where(level, 1.0, slope)
+    low = np.where(~level & (slope > 0), at, 0.0).max(axis=1)
+    high = np.where(~level & (slope < 0), at, 1.0).min(axis=1)
+    beyond = (level & (height < -ROUNDING)).any(axis=1)
+    on_edge = (level & (np.abs(height) <= ROUNDING)).any(axis=1)
+    zero = np.zeros(len(begin))
+    return np.maximum(low, zero), np.where(beyond, zero, np.minimum(high, 1.0)), 1 - 0.5 * on_edge
 
 
 def _turned(side: Surface, nodes: Array, at: Array) -> Array:
