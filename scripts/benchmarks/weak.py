@@ -2,8 +2,9 @@
 
 ``mpirun -n P python3 -m scripts.benchmarks.weak BODIES N [--solve]``: BODIES, 1 or 2, are bars of
 P x 1 x 1 that touch along their length, N the cells of a rank along each edge of its slice: N = 43
-makes 250,000 unknowns a rank of one body, N = 34 of two. Without ``--solve`` a problem is made and
-its residuals are evaluated; with it, it is solved. Each rank counts the bytes of the arrays of
+makes 250,000 unknowns a rank of one body, N = 34 of two. Without ``--solve`` a problem is made,
+its residuals are evaluated, and files are written; with it, it is solved, and with ``--length L``
+the bars are L x 1 x 1 on any number of ranks. Each rank counts the bytes of the arrays of
 Python at their peak (`tracemalloc`), those of the coupling, and those that it receives through the
 communicator; counts do not depend on the machine, or on how many cores it has.
 """
@@ -15,7 +16,7 @@ import json
 import time
 import tracemalloc
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from shutil import rmtree
@@ -26,10 +27,12 @@ import basix.ufl
 import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from contact import solve
 from contact._compat import destinations
 from contact.body.description import Body, Fixed
+from contact.interface import pairing
 from contact.interface.friction import Friction
 from contact.linear.operator import Counters
 from contact.mesh.domain import Domain, from_mesh
@@ -49,8 +52,8 @@ from contact.ranks import on_root
 from forms.hencky import Linear
 from scripts.benchmarks.bench_one import rank_memory
 
-#: Gap between the bars, in edges of their section.
-GAP = 1e-3
+#: Gap between the bars, in edges of their section; tolerance of forces that are compared.
+GAP, TIGHT = 1e-3, 1e-11
 
 
 class Counted(MPI.Intracomm):
@@ -88,42 +91,48 @@ def _size(values: Any) -> int:
     return int(getattr(values, "nbytes", 0 if values is None else 8))
 
 
-def slices(comm: MPI.Intracomm, n: int, bodies: int) -> Domain:
-    """Return bars of hexahedra that are divided in slices, one a rank; no rank has more.
-
-    Parts are ``top`` and ``bottom`` of the whole, and between the bars ``upper`` and ``lower``.
-    """
-    size, rank = comm.size, comm.rank
-    edges = [n, n + n // 7 + 1][:bodies]
-    last = rank == size - 1
+def _slice(
+    edges: Sequence[int], place: int, length: int
+) -> Iterator[tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]]:
+    """Yield points and cells of a slice of each bar, given their numbers along an edge."""
+    last = place == length - 1
     counts = [m * (m + 1) ** 2 for m in edges]
-    places, cells = [], []
     for k, m in enumerate(edges):
         planes = np.arange(m + last)
         g = np.arange(m + 1) / m
-        x, y, z = (v.ravel() for v in np.meshgrid(rank + planes / m, g, g, indexing="ij"))
-        places.append(np.column_stack([x, y, z + k * (1 + GAP)]))
+        x, y, z = (v.ravel() for v in np.meshgrid(place + planes / m, g, g, indexing="ij"))
         i = np.arange(m + 1)
         # Planes of the next slice have its numbers.
-        begin = np.full(m + 1, rank * sum(counts) + sum(counts[:k]))
+        begin = np.full(m + 1, place * sum(counts) + sum(counts[:k]))
         begin[:m] += np.arange(m) * (m + 1) ** 2
         begin[m] += m * (m + 1) ** 2
         if last:
             begin += sum((e + 1) ** 2 for e in edges[:k])
         else:
-            after = sum((e + 1) ** 2 for e in edges[:k]) if rank == size - 2 else 0
-            begin[m] = (rank + 1) * sum(counts) + sum(counts[:k]) + after
+            after = sum((e + 1) ** 2 for e in edges[:k]) if place == length - 2 else 0
+            begin[m] = (place + 1) * sum(counts) + sum(counts[:k]) + after
         numbers = begin[:, None, None] + (i[:, None] * (m + 1) + i)[None]
         ends = [slice(None, -1), slice(1, None)]
         around = [numbers[a, b, c].ravel() for c in ends for b in ends for a in ends]
-        cells.append(np.column_stack(around))
+        yield np.column_stack([x, y, z + k * (1 + GAP)]), np.column_stack(around)
+
+
+def slices(comm: MPI.Intracomm, n: int, bodies: int, length: int = 0) -> Domain:
+    """Return bars of hexahedra that are divided in slices, by default one a rank.
+
+    Parts are ``top`` and ``bottom`` of the whole, and between the bars ``upper`` and ``lower``.
+    """
+    edges, length = [n, n + n // 7 + 1][:bodies], length or comm.size
+    first, last = (length * (comm.rank + k) // comm.size for k in (0, 1))
+    found = [part for k in range(first, last) for part in _slice(edges, k, length)]
     element = basix.ufl.element("Lagrange", "hexahedron", 1, shape=(3,))
-    every = np.concatenate(cells).astype(np.int64)
+    every = np.concatenate([cells for _, cells in found]).astype(np.int64)
+    places = np.concatenate([points for points, _ in found])
 
     def stay(_comm: Any, _parts: int, *_given: Any) -> Any:
-        return destinations(np.full(len(every), rank, dtype=np.int32))
+        return destinations(np.full(len(every), comm.rank, dtype=np.int32))
 
-    made = dmesh.create_mesh(comm, every, x=np.concatenate(places), e=element, partitioner=stay)
+    made = dmesh.create_mesh(comm, every, x=places, e=element, partitioner=stay)
     top = bodies + (bodies - 1) * GAP
 
     def at(height: float) -> Any:
@@ -138,9 +147,9 @@ def slices(comm: MPI.Intracomm, n: int, bodies: int) -> Domain:
     return replace(domain, inside={"middle": owned})
 
 
-def problem_of(comm: MPI.Intracomm, n: int, bodies: int) -> ContactProblem:
+def problem_of(comm: MPI.Intracomm, n: int, bodies: int, length: int = 0) -> ContactProblem:
     """Return bars that are pressed and pushed, with friction."""
-    domain, friction = slices(comm, n, bodies), Friction(mu=0.3)
+    domain, friction = slices(comm, n, bodies, length), Friction(mu=0.3)
     fixed = [Fixed("top", [0.002, 0.0, -0.005])]
     if bodies == 2:
         fixed.append(Fixed("bottom", [0.0] * 3))
@@ -200,7 +209,7 @@ def outputs(problem: ContactProblem, n: int, bodies: int) -> dict[str, Callable[
 _NOTHING: tuple[IterationHistory, Counters, str] = (IterationHistory(), Counters(), "")
 
 
-def measure(comm: MPI.Intracomm, n: int, bodies: int, solving: bool = False) -> dict[str, Any]:
+def measure(comm: MPI.Intracomm, n: int, bodies: int) -> dict[str, Any]:
     """Return the counts: the most of any rank, but for bytes received, the sum. Collective."""
     whole = Domain.comm
     Domain.comm = property(lambda domain: Counted(whole.fget(domain)))  # type: ignore[assignment]
@@ -236,16 +245,43 @@ def measure(comm: MPI.Intracomm, n: int, bodies: int, solving: bool = False) -> 
         **stages,
         "seconds": made,
     }
-    if solving:
-        solution = solve(problem, NewtonOptions(linear="iterative"))
-        found |= {
-            "converged": solution.converged,
-            "forces": [*map(float, np.ravel(solution.contact_force))],
-            "iterations": solution.counters.linear_iterations,
-            "solves": solution.counters.linear_solves,
-        }
-        found["memory"] = comm.allreduce(rank_memory(), op=MPI.MAX)
     return found
+
+
+def timed(comm: MPI.Intracomm, n: int, bodies: int, length: int) -> dict[str, Any]:
+    """Return forces and costs of a solve; seconds are those of the pairing, and of a linear solve.
+
+    Collective.
+    """
+    spent, plain = [0.0], pairing.couple
+
+    def couple(*given: Any) -> Any:
+        begin = time.perf_counter()
+        found = plain(*given)
+        spent[0] += time.perf_counter() - begin
+        return found
+
+    pairing.couple = couple
+    PETSc.Log.begin()
+    problem = problem_of(comm, n, bodies, length)
+    pairing.couple = plain
+    solution = solve(problem, NewtonOptions(linear="iterative", tolerance=TIGHT))
+    events = [PETSc.Log.Event(name).getPerfInfo() for name in ("KSPSolve", "PCSetUp")]
+    seconds = sum(event["time"] for event in events)
+    counters = solution.counters
+    return {
+        "ranks": comm.size,
+        "unknowns": problem.equilibrium.layout.unknowns,
+        "contact nodes": problem.nodes.size,
+        "coupling": comm.allreduce(held(problem), op=MPI.MAX),
+        "converged": solution.converged,
+        "forces": [*map(float, np.ravel(solution.contact_force))],
+        "iterations": counters.linear_iterations,
+        "solves": counters.linear_solves,
+        "pairing": comm.allreduce(spent[0], op=MPI.MAX),
+        "a linear solve": comm.allreduce(seconds, op=MPI.MAX) / max(counters.linear_solves, 1),
+        "memory": comm.allreduce(rank_memory(), op=MPI.MAX),
+    }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -254,8 +290,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     made.add_argument("bodies", type=int, choices=(1, 2))
     made.add_argument("n", type=int)
     made.add_argument("--solve", action="store_true")
+    made.add_argument("--length", type=int, default=0)
     given = made.parse_args(arguments)
-    found = measure(MPI.COMM_WORLD, given.n, given.bodies, given.solve)
+    if given.solve:
+        found = timed(MPI.COMM_WORLD, given.n, given.bodies, given.length)
+    else:
+        found = measure(MPI.COMM_WORLD, given.n, given.bodies)
     if MPI.COMM_WORLD.rank == 0:
         print(json.dumps(found))
 
