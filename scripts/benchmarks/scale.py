@@ -61,6 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     made.add_argument("table", choices=TABLES)
     given = made.parse_args(arguments)
     rows, caption = TABLES[given.table][0](given.coarse), TABLES[given.table][1]
+    for row in rows:
+        row |= {k: " ".join(map(repr, v)) for k, v in row.items() if isinstance(v, list)}
     Report(given.out).table(f"scale-{given.table}", caption, columns(rows), "Bytes and seconds.")
 
 
