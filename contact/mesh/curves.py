@@ -91,7 +91,7 @@ def _heights(
         return nodes[:0, 0], normal[:0], np.zeros(0)
     index_map = mesh.geometry.index_map()
     names = index_map.local_to_global(nodes.ravel()).reshape(nodes.shape)
-    height = deviations(names, points, normal, Owners.of(index_map, coarse.comm)) / 4
+    height = deviations(names, points, normal, Owners.of(index_map, coarse.comm))[0] / 4
     ends = points[:, edges]
     middle, length = ends.mean(axis=2), np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
     row = np.searchsorted(part, parents)

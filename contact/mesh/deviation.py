@@ -46,8 +46,11 @@ def deviations(
     normal: Array,
     owners: Owners = ALONE,
     levels: int = 0,
-) -> Array:
-    """Return c of the edges of each facet, positive outwards, shape (f, edges). Collective.
+) -> tuple[Array, Array]:
+    """Return c of the edges of each facet, positive outwards, and how well it is known. Collective.
+
+    The second is by how much c would differ with the curvature one edge farther on, which circles
+    do not. Both have the shape (f, edges).
 
     Parameters
     ----------
@@ -62,7 +65,8 @@ def deviations(
         those of their ends at which the polygon turns.
     """
     count = len(names)
-    return _deviations(*_with_rings(names, corners, normal, owners), levels)[:count]
+    found, unknown = _deviations(*_with_rings(names, corners, normal, owners), levels)
+    return found[:count], unknown[:count]
 
 
 def _with_rings(
@@ -111,7 +115,9 @@ def _runs(
     return row, np.arange(row.size) + np.repeat(begin - np.cumsum(counts) + counts, counts)
 
 
-def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels: int) -> Array:
+def _deviations(
+    names: NDArray[np.int64], corners: Array, normal: Array, levels: int
+) -> tuple[Array, Array]:
     """Return them, given all facets on which they depend."""
     vertices, place = np.unique(names, return_inverse=True)
     place = place.reshape(names.shape)
@@ -129,14 +135,14 @@ def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels:
     curvature = _curvatures(points, own, pairs, np.where(near, 1.0, FAR))
     pairs = pairs[:, near & known[pairs[1]]]
     edges = facet_with(points.shape[1] - 1, names.shape[1]).edges
-    found = np.zeros((len(names), len(edges)))
+    found, unknown = np.zeros((2, len(names), len(edges)))
     for k, (i, j) in enumerate(edges):
         others = [c for c in range(names.shape[1]) if c not in (i, j)]
         around = place[:, [i, j, *others]]
         edge = points[around[:, 1]] - points[around[:, 0]]
         value = np.where(known[around], _sagitta(edge[:, None], curvature[around]), 0.0)
         if levels == 0:
-            flat = _between(points, curvature, pairs, around, known, edge, value)
+            flat, unknown[:, k] = _between(points, curvature, pairs, around, known, edge, value)
             # Of an arc of this curvature, for its parabola is off by the square of a quarter turn.
             turn = np.minimum(np.abs(flat) / np.linalg.norm(edge, axis=1), 1.0)
             found[:, k] = 2 * flat / (1 + np.sqrt(1 - turn**2))
@@ -144,7 +150,7 @@ def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels:
             # All of the turn of the first edges is at their ends.
             larger = np.argmax(np.abs(value), axis=1)[:, None]
             found[:, k] = 2.0**levels * np.take_along_axis(value, larger, axis=1)[:, 0]
-    return found
+    return found, unknown
 
 
 def _weights(corners: Array) -> Array:
@@ -213,17 +219,17 @@ def _between(
     known: NDArray[np.bool_],
     edge: Array,
     value: Array,
-) -> Array:
+) -> tuple[Array, Array]:
     """Return c of an edge of each facet, given that by each corner, its ends first, shape (f,).
 
-    Where the curvature jumps, as from a side to a rounded edge, the corner counts beyond which it
-    stays as it is.
+    Beside it, how much it differs beyond the corners that count. Where the curvature jumps, as from
+    a side to a rounded edge, the corner counts beyond which it stays as it is.
     """
     largest = np.abs(value).max(axis=1)
     largest[largest == 0] = 1.0
     begin = np.searchsorted(pairs[0], np.arange(len(points) + 1))
     middle = points[corners[:, :2]].mean(axis=1)
-    weights = np.zeros_like(value)
+    weights, jumps = np.zeros_like(value), np.zeros_like(value)
     for k in range(corners.shape[1]):
         corner = corners[:, k]
         # All neighbours of a corner, facet by facet, of which those beyond it count.
@@ -240,9 +246,9 @@ def _between(
         )
         other = value.max(axis=1) - value.min(axis=1)
         jump = np.where(total > 0, changed / np.where(total > 0, total, 1.0), other) / largest
-        weights[:, k] = known[corner] / (jump**2 + ALIKE**2) ** 2
+        weights[:, k], jumps[:, k] = known[corner] / (jump**2 + ALIKE**2) ** 2, jump * largest
     total = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
-    return np.asarray(np.sum(weights * value, axis=1) / total)
+    return np.sum(weights * value, axis=1) / total, np.sum(weights * jumps, axis=1) / total
 
 
 def _sagitta(edge: Array, curvature: Array) -> Array:

@@ -89,34 +89,38 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
             )
         return
     size = nodes.maximum(np.where(closed, np.abs(nodes.gap), 0.0))
-    unknown = size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size
-    if unknown and problem.equilibrium.degree == 2 and problem.domain.levels == 0:
-        yield (
-            f"straight edges tell a curved contact surface to about {nodes.deviation:.2g}, and "
-            f"contact closes gaps of at most {size:.3g}: pressures scatter by about that share; "
-            "take curved cells (mesh.order = 2), or a finer mesh"
-        )
-    elif unknown:
+    if problem.equilibrium.degree == 2 and problem.domain.levels == 0:
+        turn, waves = _of_edges(solution, nodes.points[closed])
+        pressed = nodes.maximum(solution.forces.pressure)
+        scatter = problem.scales.plane_modulus * np.pi / 4 * waves
+        if scatter > DEVIATION * pressed:
+            yield (
+                f"straight edges tell a curved contact surface to about {nodes.deviation:.2g}, and "
+                f"nodal pressures scatter by about {scatter:.2g}, {scatter / pressed:.0%} of the "
+                "largest; take curved cells (mesh.order = 2), or a finer mesh"
+            )
+        elif turn > DEVIATION:
+            yield (
+                f"straight edges of a curved contact surface turn by up to {turn:.2g} where it "
+                "touches, and displacements are those of their chords: nodal pressures scatter by "
+                f"about {turn / 4:.1%} of the stress there; take curved cells (mesh.order = 2), or "
+                "a finer mesh"
+            )
+    elif size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size:
         yield (
             f"straight facets deviate by up to {nodes.deviation:.3g} from a curved contact "
             f"surface, and contact closes gaps of at most {size:.3g}: pressures are off by about "
             "that share; make the mesh finer from the beginning, or take space.degree = 2"
         )
-    elif (turn := _turn(solution, nodes.points[closed])) > DEVIATION:
-        yield (
-            f"straight edges of a curved contact surface turn by up to {turn:.2g} where it "
-            "touches, and displacements are those of their chords: nodal pressures scatter by "
-            f"about {turn / 4:.1%} of the stress there; take curved cells (mesh.order = 2), or a "
-            "finer mesh"
-        )
 
 
-def _turn(solution: Solution, touching: Array) -> float:
-    """Return the largest turn of straight edges of degree 2 that touch. Collective.
+def _of_edges(solution: Solution, touching: Array) -> tuple[float, float]:
+    """Return the largest turn and waves of straight edges of degree 2 that touch. Collective.
 
-    In their middle, f = h^2/(8 R) below the curve, displacements are taken f eps_nn aside: to them
-    the surface is as stiff as under waves of the length 2 h, and pressures are off by
-    E eps_nn pi h/(16 R), a share of the stress that is of first order in h.
+    In the middle of an edge, f = h^2/(8 R) below the curve, displacements are taken f eps_nn aside:
+    to them the surface is as stiff as under waves of the length 2 h, and pressures are off by
+    E eps_nn pi h/(16 R), a share of the stress that is of first order in h. Where the curvature
+    varies f is known to some u, and waves of this height take pressures E pi u/(4 h).
 
     Parameters
     ----------
@@ -124,10 +128,12 @@ def _turn(solution: Solution, touching: Array) -> float:
         The solution, and the contact nodes of this rank that touch, shape (n, d).
     """
     domain, space = solution.problem.domain, solution.problem.equilibrium.space
-    found = 0.0
+    found: Array = np.zeros(2)
     for part in dict.fromkeys(p for c in solution.problem.contacts for p in (c.on, c.against) if p):
         side = surface_of(domain, space, part)
         if side.follows:
             near = nearest(domain.comm, side.centres, touching) <= side.radii
-            found = max(found, float(side.turns[near].max(initial=0.0)))
-    return domain.comm.allreduce(found, op=MPI.MAX)
+            here = (values[near].max(initial=0.0) for values in (side.turns, side.waves))
+            found = np.maximum(found, [*here])
+    domain.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
+    return float(found[0]), float(found[1])

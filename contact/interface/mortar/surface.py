@@ -59,6 +59,8 @@ class Surface:
     deviation
         Of the curved surface from straight facets (`contact.mesh.deviation`), shape
         (f, edges).
+    unknown
+        How much of it the vertices do not tell, shape (f, edges).
     degree
         Of the space.
     revolved
@@ -73,6 +75,7 @@ class Surface:
     points: Array
     normal: Array
     deviation: Array
+    unknown: Array
     degree: int
     revolved: bool = False
     refined: bool = False
@@ -133,10 +136,12 @@ class Surface:
 
     def sent(self, facets: NDArray[np.intp], ranks: NDArray[np.intp]) -> Surface:
         """Send facets of this rank to ranks, and return those that it is sent. Collective."""
-        arrays = (self.nodes, self.points, self.normal, self.deviation)
+        arrays = (self.nodes, self.points, self.normal, self.deviation, self.unknown)
         _, *found = exchanged(self.owners.comm, ranks, *(array[facets] for array in arrays))
-        nodes, points, normal, deviation = found
-        return replace(self, nodes=nodes, points=points, normal=normal, deviation=deviation)
+        nodes, points, normal, deviation, unknown = found
+        return replace(
+            self, nodes=nodes, points=points, normal=normal, deviation=deviation, unknown=unknown
+        )
 
     @property
     def largest_deviation(self) -> float:
@@ -152,12 +157,15 @@ class Surface:
     def unknown_deviation(self) -> float:
         """The largest part of the deviations that gaps do not have (length), on this rank.
 
-        Where gaps are those of the facets it is all; else as much as vertices leave open, of third
-        order in the size of facets: the deviation times the turn along half of the edge.
+        Where gaps are those of the facets it is all; else half of the part that vertices do not
+        tell.
         """
-        if not self.follows:
-            return self.largest_deviation
-        return float((self.deviation**2 / (4 * self._edges)).max(initial=0.0))
+        return float(self.unknown.max(initial=0.0)) / 8 if self.follows else self.largest_deviation
+
+    @property
+    def waves(self) -> Array:
+        """The largest slope of the unknown part, along an edge, shape (f,)."""
+        return np.asarray((self.unknown / (8 * self._edges)).max(axis=1, initial=0.0))
 
     @property
     def follows(self) -> bool:
@@ -278,6 +286,6 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     if order == 1:
         deviation = deviations(names[:, :corners], points, normal, owners, domain.levels)
     else:
-        deviation = np.zeros((len(names), len(shape.facet.edges)))
+        deviation = (np.zeros((len(names), len(shape.facet.edges))),) * 2
     refined = domain.levels > 0
-    return Surface(names, points, normal, deviation, degree, domain.revolved, refined, owners)
+    return Surface(names, points, normal, *deviation, degree, domain.revolved, refined, owners)
