@@ -37,7 +37,7 @@ def block(load, dim=2, law=None, domain=None):
 
 
 def resultant(*force, **more):
-    with pytest.warns(FutureWarning, match=r"until version 0\.1 .* traction"):
+    with pytest.warns(FutureWarning, match="before the first release, is traction"):
         return Load("top", force=force, **more)
 
 

@@ -25,6 +25,10 @@ def test_no_rank_has_more_where_there_are_more(bodies: int) -> None:
     for size, counts in found.items():
         assert counts["coupling"] <= 1.1 * found[1]["coupling"], size
         for stage in ("python", *STAGES):
-            assert counts[stage] <= 1.1 * found[1][stage], (stage, size)
+            # Small slices: a cut with its ghosts is a third of one, and a rank has two at most.
+            cut = max(0.0, found.get(2, found[1])[stage] / found[1][stage] - 1)
+            assert cut < 0.5, stage
+            most = 1.1 + cut * min(size - 1, 2)
+            assert counts[stage] <= most * found[1][stage], (stage, size)
         for stage in ("received", *(f"{stage}, received" for stage in STAGES)) if size > 1 else ():
             assert counts[stage] / (size - 1) <= 1.1 * found[2][stage], (stage, size)
