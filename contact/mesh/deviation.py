@@ -34,7 +34,7 @@ SMOOTH = 0.9
 FAR = 1e-3
 
 #: Relative differences of curvature up to which both ends of an edge count alike.
-ALIKE = 0.1
+ALIKE = 0.4
 
 #: Numbers of vertices.
 Numbers = NDArray[np.intp]
@@ -229,7 +229,7 @@ def _between(
     largest[largest == 0] = 1.0
     begin = np.searchsorted(pairs[0], np.arange(len(points) + 1))
     middle = points[corners[:, :2]].mean(axis=1)
-    weights, jumps = np.zeros_like(value), np.zeros_like(value)
+    weights, jumps, totals, changes = (np.zeros_like(value) for _ in range(4))
     for k in range(corners.shape[1]):
         corner = corners[:, k]
         # All neighbours of a corner, facet by facet, of which those beyond it count.
@@ -240,15 +240,23 @@ def _between(
         outward = points[corner] - middle
         way = np.einsum("pd,pd->p", points[beyond] - points[corner[of]], outward[of])
         share = np.maximum(way, 0.0)
-        change = share * np.abs(_sagitta(edge[of], curvature[beyond]) - value[of, k])
-        total, changed = (
-            np.bincount(of, given, minlength=len(corners)) for given in (share, change)
+        change = share * (_sagitta(edge[of], curvature[beyond]) - value[of, k])
+        total, changed, further = (
+            np.bincount(of, given, minlength=len(corners))
+            for given in (share, np.abs(change), change)
         )
         other = value.max(axis=1) - value.min(axis=1)
         jump = np.where(total > 0, changed / np.where(total > 0, total, 1.0), other) / largest
-        weights[:, k], jumps[:, k] = known[corner] / (jump**2 + ALIKE**2) ** 2, jump * largest
-    total = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
-    return np.sum(weights * value, axis=1) / total, np.sum(weights * jumps, axis=1) / total
+        weights[:, k], jumps[:, k] = known[corner] / (jump**2 + ALIKE**2) ** 4, jump * largest
+        totals[:, k] = total
+        changes[:, k] = further / np.where(total > 0, total, 1.0)
+    weight = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
+    found, unknown = (np.sum(weights * given, axis=1) / weight for given in (value, jumps))
+    for k, end in ((0, 1), (1, 0)):
+        # With no vertex beyond, the end of a side has the fit of its neighbour: half an edge off.
+        last = (totals[:, end] == 0) & (totals[:, k] > 0) & (jumps[:, k] < ALIKE * largest)
+        found -= np.where(last, 0.5 * changes[:, k], 0.0)
+    return found, unknown
 
 
 def _sagitta(edge: Array, curvature: Array) -> Array:
