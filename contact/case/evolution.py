@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -85,7 +84,7 @@ def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
     InputError
         If it cannot be read, or has no such rows.
     """
-    accepted = "a CSV file, rows of a time and a value, two at least"
+    accepted = "a CSV file, rows of a time and a value, two at least, with decimal points"
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -95,13 +94,14 @@ def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
     lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
     rows: list[tuple[float, float]] = []
     for number, line in enumerate(lines):
-        cells = re.split(r"\s*[,;]\s*|\s+", line.strip())
+        # A comma beside semicolons or blanks is that of decimals, which no number here has.
+        cells = line.split(next((mark for mark in ";," if mark in line), None))
         try:
             first, second = map(float, cells[:2])
             if not np.isfinite([first, second]).all():
                 raise ValueError
         except ValueError:
-            if number > 0:
+            if number > 0 or cells[0][:1].isdigit():
                 raise InputError(
                     f"{path}: no numbers in {line!r:.40}; accepted: {accepted}"
                 ) from None

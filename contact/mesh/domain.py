@@ -31,7 +31,9 @@ from contact.typing import Array
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
 
 #: Where facets inside of the body may be a part all the same.
-UNLESS = ", unless its displacement or potential is given, or it is an electrode"
+UNLESS = (
+    ", unless its displacement or potential is given, it is an electrode, or a bolt is cut there"
+)
 
 
 @dataclass(frozen=True)

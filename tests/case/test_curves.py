@@ -52,6 +52,9 @@ def test_an_amplitude_from_a_file(tmp_path, text):
         ("0,0\n1,1\n1,2\n3,1\n", "numbers that increase"),
         ("0,0\n1,1\n", "reach from 0 to 3"),
         ("0,0\n1,nan\n3,1\n", "no numbers in"),
+        # They were taken for rows of 1 and 5, or for names: a load 7.5 times as large.
+        ("0;0\n1,5;1\n3;0,5\n", "no numbers in '1,5;1'.*decimal points"),
+        ("0,5 1\n3 0\n", "no numbers in '0,5 1'"),
         (None, "No such file or directory; accepted: a CSV file"),
     ],
 )
