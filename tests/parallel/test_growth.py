@@ -14,7 +14,10 @@ STAGES = ("written", "read", "nested", "separated")
 @pytest.mark.parallel
 @pytest.mark.parametrize("bodies", [1, 2])
 def test_no_rank_has_more_where_there_are_more(bodies: int) -> None:
-    """Slices in a row, so that ranks exchange at the cuts: lists of all would be of each rank."""
+    """Slices in a row, so that ranks exchange at the cuts: lists of all would be of each rank.
+
+    Where all forms are known, arrays of 3, 4 and 5 ranks are equal to .1 %.
+    """
     found = {}
     for size in range(1, COMM.size + 1):
         some = COMM.Split(0 if COMM.rank < size else MPI.UNDEFINED, COMM.rank)
@@ -24,11 +27,10 @@ def test_no_rank_has_more_where_there_are_more(bodies: int) -> None:
     found = COMM.bcast(found)  # the first rank is in all of them
     for size, counts in found.items():
         assert counts["coupling"] <= 1.1 * found[1]["coupling"], size
-        for stage in ("python", *STAGES):
-            # Small slices: a cut with its ghosts is a third of one, and a rank has two at most.
-            cut = max(0.0, found.get(2, found[1])[stage] / found[1][stage] - 1)
-            assert cut < 0.5, stage
-            most = 1.1 + cut * min(size - 1, 2)
-            assert counts[stage] <= most * found[1][stage], (stage, size)
+        # Slices are small: ghosts of a cut are up to .37 of one, and a rank has two cuts at most.
+        most = 1 + 0.4 * min(size - 1, 2)
+        assert counts["python"] <= most * found[1]["python"], size
+        for stage in STAGES:
+            assert counts[stage] <= 1.1 * found[1][stage], (stage, size)
         for stage in ("received", *(f"{stage}, received" for stage in STAGES)) if size > 1 else ():
             assert counts[stage] / (size - 1) <= 1.1 * found[2][stage], (stage, size)
