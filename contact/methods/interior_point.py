@@ -236,7 +236,7 @@ class InteriorPoint:
         normal, tangent = jump.normal[near], jump.tangent[frictional]
         blocks[near, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
         blocks[frictional, :d, :d] += tangent @ across @ tangent
-        self._whole.assemble(replace(state, x=self._state.x), blocks / jump.weight[:, None, None])
+        self._whole.assemble(state, blocks / jump.weight[:, None, None])
 
         def solve(constants: tuple[Array, Array]) -> tuple[Array, Step]:
             force, friction = cones.reduced(constants)

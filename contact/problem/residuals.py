@@ -233,6 +233,7 @@ def evaluate(problem: Problem, state: State) -> Residuals:
             # Bodies that have moved freely: beside the forces that would have held them.
             held = body.sizes(residual_forces(problem, problem.start()))
             scale = scale + held.max(axis=1, keepdims=True)
+            body.internal_forces(state)  # laws with history keep their last response
     # Of a component on which nothing acts there is the rounding of the others, and of charges, in
     # units of forces by the scale of the potential, that of a body without a field.
     scale = np.maximum(scale, EPS * scale.max())
