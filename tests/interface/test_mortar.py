@@ -94,13 +94,18 @@ def check_a_pair(one, other, close) -> None:
     np.testing.assert_allclose(jump, np.broadcast_to(apart, jump.shape), atol=1e-13)
 
 
+def check_tied(slave, master) -> None:
+    """Each node is tied to the one at its place."""
+    found = couple(slave, master, 1.0)
+    np.testing.assert_array_equal(found.masters - FIRST, found.slaves)
+    np.testing.assert_allclose((found.own - found.other).toarray(), 0, atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_matching_meshes_are_tied_node_by_node(kind) -> None:
     slave, _ = flat(kind, 5, 0.0, 1.0, 4)
     master, _ = flat(kind, 5, 0.0, -1.0, 4, FIRST)
-    found = couple(slave, master, 1.0)
-    np.testing.assert_array_equal(found.masters - FIRST, found.slaves)
-    np.testing.assert_allclose((found.own - found.other).toarray(), 0, atol=1e-12)
+    check_tied(slave, master)
 
 
 @pytest.mark.parametrize("kind", CURVED, ids=CURVED_NAMES)
@@ -108,9 +113,7 @@ def test_matching_curved_edges_are_those_of_both_sides(kind) -> None:
     """A sliver on the edge of two facets goes to both in halves: else neighbours were tied too."""
     slave, _ = bowed(kind, 2, 0.0, 1.0, 4)
     master, _ = bowed(kind, 2, 0.0, -1.0, 4, FIRST)
-    found = couple(slave, master, 1.0)
-    np.testing.assert_array_equal(found.masters - FIRST, found.slaves)
-    np.testing.assert_allclose((found.own - found.other).toarray(), 0, atol=1e-12)
+    check_tied(slave, master)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
