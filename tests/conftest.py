@@ -1,14 +1,20 @@
 """What all tests share: figures without a display, temporary folders, and ranks in step."""
 
+import importlib.metadata
 import io
 import os
 import sys
 from collections.abc import Iterator
+from functools import cache
+from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
+import basix.ufl
 import ffcx.codegeneration.jit
 import pytest
+import ufl
 from hypothesis import HealthCheck, settings
 from mpi4py import MPI
 
@@ -25,20 +31,42 @@ settings.load_profile("contact")
 # messages of the hooks below must not meet those of a test that failed half way
 _comm = MPI.COMM_WORLD.Dup()
 
-# FFCx lists its whole cache folder each time that it looks for a form: once a process is enough.
+# FFCx lists its whole cache folder, of thousands of files, each time that it looks for a form:
+# a compiled one is loaded by its path, and once a process.
 _look_up, _known = ffcx.codegeneration.jit.get_cached_module, {}
 
 
-def _look_up_once(name: str, objects: list[str], *rest: Any) -> tuple[Any, Any]:
+def _look_up_once(name: str, objects: list[str], folder: str | Path, *rest: Any) -> tuple[Any, Any]:
     """Return a form's compiled objects and their module; two None where it is to be compiled."""
     key = (name, *objects)
-    found = _known.get(key) or _look_up(name, objects, *rest)
-    if found[1] is not None:
+    if key not in _known:
+        found = _load(name, objects, Path(folder)) or _look_up(name, objects, folder, *rest)
+        if found[1] is None:
+            return found
         _known[key] = found
-    return found
+    return _known[key]
+
+
+def _load(name: str, objects: list[str], folder: Path) -> tuple[Any, Any] | None:
+    """Return the same from the cache folder; None where it has no finished one."""
+    if not (folder / f"{name}.c.cached").exists():
+        return None
+    path = str(folder / f"{name}{EXTENSION_SUFFIXES[0]}")
+    module = module_from_spec(spec := spec_from_file_location(name, path))
+    spec.loader.exec_module(module)
+    return [getattr(module.lib, one) for one in objects], module
 
 
 ffcx.codegeneration.jit.get_cached_module = _look_up_once
+
+# For each form that is compiled, setuptools reads the names of all installed packages several
+# times, which takes as long as the compiler.
+importlib.metadata.entry_points = cache(importlib.metadata.entry_points)
+
+# UFL makes a cell with all of its faces and edges anew each time that an element is asked for it,
+# a tenth of the time to set a problem up; cells do not change.
+_cell = cache(ufl.Cell)
+basix.ufl._ElementBase.cell = property(lambda element: _cell(element.cell_type.name))
 
 
 @pytest.fixture(autouse=True)
