@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -17,6 +15,7 @@ from contact.case.build import build_problem
 from contact.case.checks import growing
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
+from contact.cli.acting import acting
 from contact.cli.geometry import parts, regions
 from contact.cli.main import CONVERGED
 from contact.mesh.cells import Shape, shape_of
@@ -26,9 +25,7 @@ from contact.nesting import coarser_cases
 from contact.output import environment
 from contact.output.bodies import passing
 from contact.output.foundations import fitting, without_heights
-from contact.problem.checks import expected_displacements
 from contact.problem.problem import ContactProblem
-from contact.problem.residuals import residual_forces
 from contact.ranks import on_root
 from contact.typing import Array
 from forms.elasticity import Anisotropic
@@ -39,11 +36,6 @@ THIN = 0.1
 INCOMPRESSIBLE = 0.475
 #: Stiffness of a crystal's strain over that of another one, from which on check warns, too.
 STIFFER = 100.0
-#: Displacements above this share of the body are not small.
-LARGE = 0.05
-#: Loads over the contact part and Young's modulus from which on units are asked for: sharp
-#: indenters come to a tenth.
-SOFT = 0.25
 #: Most steps of an evolution whose loads are looked at.
 LOOKS = 20
 
@@ -118,7 +110,7 @@ def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> li
         }.items()
         for text in remarks
     ]
-    return [*_quality(problem), *_given(problem, times), *_locking(problem), *warnings]
+    return [*_quality(problem), *acting(problem, times), *_locking(problem), *warnings]
 
 
 def _locking(problem: ContactProblem) -> list[str]:
@@ -182,76 +174,3 @@ def _quality(problem: ContactProblem) -> list[str]:
             "iterative solvers slow"
         )
     return lines
-
-
-def _given(problem: ContactProblem, times: Sequence[float]) -> list[str]:
-    """Say which loads, prescribed values and gaps there are, and where they are all nothing."""
-    comm, size = problem.comm, problem.domain.size
-    gap = problem.nodes.gap
-    gap = np.where(np.abs(gap) < 1e-12 * size, 0.0, gap)  # rounding is no gap
-    least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
-    largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
-    found = [_Acting.of(problem.at(time)) for time in times]
-    if least >= 0 and all(acting.nothing for acting in found):
-        return ["# warning: nothing is loaded or moved: all results will be 0"]
-    moved, pressed = (max(getattr(a, name) for a in found) for name in ("moved", "pressed"))
-    when = f" at t = {times[-1]:g}" if len(times) > 1 else ""
-    total = ", ".join(f"{force:.4g}" for force in found[-1].resultant)
-    lines = [
-        f"# given: loads on the body with the resultant ({total}){when}; prescribed displacements "
-        f"of up to {moved:.3g}; gap {least:.3g} to {largest:.3g}"
-    ]
-    if moved > LARGE * size:
-        lines.append(
-            f"# warning: displacements of {moved / size:.0%} of the body are prescribed, and "
-            "strains are taken as small"
-        )
-    if pressed > SOFT:
-        lines.append(
-            f"# warning: the loads over the area of the contact part are {pressed:.0%} of Young's "
-            "modulus, and strains are taken as small; are both in the same units?"
-        )
-    if least > 10 * moved and not any(acting.forces for acting in found):
-        lines.append("# warning: the gap is far larger: the body may not touch at all")
-    return lines
-
-
-class _Acting(NamedTuple):
-    """Loads and prescribed values at a time.
-
-    Attributes
-    ----------
-    nothing, forces
-        Whether the undeformed body is the solution; whether loads, charges or fields act.
-    moved
-        The largest component of a prescribed displacement.
-    pressed
-        Sum of the absolute loads, over the area of the contact part and Young's modulus.
-    resultant
-        Of the loads on the body, shape (d,).
-    """
-
-    nothing: bool
-    forces: bool
-    moved: float
-    pressed: float
-    resultant: Array
-
-    @staticmethod
-    def of(problem: ContactProblem) -> _Acting:
-        """Look at a problem at its time. Collective."""
-        body, comm = problem.equilibrium, problem.comm
-        start, loads = problem.start(), body.external(problem.time)
-        pressed, moved = expected_displacements(problem, loads, start.x)
-        acting = residual_forces(problem, replace(start, x=body.rest()))
-        potentials = body.nodal(start.x)[:, body.dim :]
-        conductors = [c.conductor for c in problem.contacts if c.conductor is not None]
-        # One that conducts in contact alone draws nothing before there is some.
-        foundations = [np.asarray(found.at(problem.time).phi_f) for found in conductors]
-        parts = (acting, potentials, *foundations)
-        here = [float(np.abs(part).max(initial=0.0)) for part in parts]
-        forces = comm.allreduce(max(here), op=MPI.MAX) > 0
-        total = comm.allreduce(body.nodal(loads)[:, : body.dim].sum(axis=0), op=MPI.SUM)
-        resultant = problem.domain.resultant(total)
-        size = problem.domain.size
-        return _Acting(not forces and moved == 0, forces, moved, pressed / size, resultant)

@@ -45,19 +45,19 @@ def parts(domain: Domain) -> list[str]:
         centroid, mean = np.reshape(rest, (2, d)) / area
         length = float(np.linalg.norm(mean))
         faces = 1 if length >= FLAT else plane_faces(domain, name, count)
-        across = f"normal {_vector(mean)}"
+        across = f"normal {vector(mean)}"
         if length < CLOSED:
             across = "normals that cancel"
         elif length < FLAT:
-            across = f"mean normal {_vector(mean / length)}"
+            across = f"mean normal {vector(mean / length)}"
         if faces != 1:
             across = f"{f'plane faces in {faces} directions' if faces else 'curved'}, {across}"
-        place = f"centroid {_vector(domain.resultant(centroid))}"
+        place = f"centroid {vector(domain.resultant(centroid))}"
         rows.append([name, f"{count} facets", f"{_extent(domain)} {area:.6g}", place, across])
-    inside = [*_table([_inside(domain, name) for name in sorted(domain.inside)])]
+    inside = [*table([_inside(domain, name) for name in sorted(domain.inside)])]
     return [
         "# parts of its boundary:",
-        *_table(rows),
+        *table(rows),
         *(["# parts inside of it:"] if inside else []),
         *inside,
     ]
@@ -98,7 +98,7 @@ def _inside(domain: Domain, name: str) -> list[str]:
     points = np.einsum("qk,fkd->fqd", shape.facet.lagrange(order, at), nodes)
     local = np.array([facets.size, areas.sum(), *np.einsum("fq,fqd->d", areas, points)])
     count, area, *moment = domain.comm.allreduce(local, op=MPI.SUM)
-    centroid = _vector(domain.resultant(np.array(moment) / area if area > 0 else np.zeros(d)))
+    centroid = vector(domain.resultant(np.array(moment) / area if area > 0 else np.zeros(d)))
     return [name, f"{count:.0f} facets", f"{_extent(domain)} {area:.6g}", f"centroid {centroid}"]
 
 
@@ -112,7 +112,7 @@ def regions(domain: Domain) -> list[str]:
         count = domain.comm.allreduce(cells.size, op=MPI.SUM)
         word = "volume" if domain.dim == 3 or domain.revolved else "area"
         rows.append([name, f"{count} cells", f"{word} {volume:.6g}"])
-    return ["# regions:", *_table(rows)]
+    return ["# regions:", *table(rows)]
 
 
 def _integrals(domain: Domain, values: Sequence[Any], measure: ufl.Measure) -> Array:
@@ -137,13 +137,13 @@ def _extent(domain: Domain) -> str:
     return "area" if domain.dim == 3 or domain.revolved else "length"
 
 
-def _vector(values: Array) -> str:
+def vector(values: Array) -> str:
     """Return a vector, without the rounding of its zeros."""
     values = np.where(np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0), 0.0, values)
     return f"({', '.join(f'{value:.6g}' for value in values)})"
 
 
-def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """Give the rows with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:

@@ -1,6 +1,7 @@
 """`contact check` says of loads, gaps and the mesh what is so."""
 
 from dataclasses import replace
+from itertools import takewhile
 
 import numpy as np
 import pytest
@@ -29,6 +30,13 @@ PIEZO = {
 
 def said(data):
     return "\n".join(expectations(build_problem(parse_case(data))))
+
+
+def rows(text):
+    """Return the lines on what acts: by thing its values."""
+    lines = text.split("# acting:\n")[1].splitlines()
+    table = takewhile(lambda line: line.startswith("#   "), lines)
+    return {line[4:].split("  ")[0]: " ".join(line[4:].split("  ")[1:]).strip() for line in table}
 
 
 def with_voltage(volts):
@@ -81,14 +89,15 @@ def test_a_load_between_times_at_which_it_is_zero_is_seen():
     case = parse_case(data)
     text = describe(case, build_problem(case))
     assert NOTHING not in text
-    assert "resultant (0, 0) at t = 2; prescribed displacements of up to 0;" in text
+    assert rows(text)["loads"] == "resultant (0, -0.01) at t = 1"
+    assert "supports" not in rows(text)
 
 
 def test_displacements_are_not_guessed():
     """A cantilever bends by 1e-3 or more, and a block of its size is compressed by 3e-6."""
     text = said(changed(mesh__size=[40.0, 1.0], mesh__parts=None, load__0__on="top"))
     assert "expected" not in text and "some" not in text
-    assert "resultant (0, -0.2); prescribed displacements of up to 0; gap 0 to 0" in text
+    assert rows(text) == {"loads": "resultant (0, -0.2)", "gap": "0 to 0"}
 
 
 def test_charges_of_electrodes_are_no_forces():
@@ -159,3 +168,75 @@ def test_a_part_of_plane_faces_is_not_called_curved(slope, words):
     made = replace(domain, parts={"roof": np.unique(np.concatenate(two))})
     (text,) = geometry.parts(made)[1:]
     assert words in text and "curved" not in text
+
+
+LID = {"on": "top", "displacement": [0.0, "free"], "force": [0.0, -2.0]}
+
+
+def block(**more):
+    return {
+        "mesh": MESH,
+        "material": {"young": 1e3, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, "free"]}],
+        "contact": {"on": "bottom"},
+        **more,
+    }
+
+
+def above(**rigid):
+    plane = {"shape": "plane", "point": [0.0, -0.1], "normal": [0.0, 1.0]}
+    contact = {"on": "bottom", "foundation": plane, "rigid": rigid}
+    return block(contact=contact, fixed=[{"on": "top", "displacement": [0.0, 0.0]}])
+
+
+@pytest.mark.parametrize(
+    ("data", "found"),
+    [
+        (block(rigid=[LID]), {"rigid part 'top'": "force (0, -2)", "gap": "0 to 0"}),
+        (
+            block(rigid=[LID | {"displacement": [0.1, -0.01], "force": None}], fixed=[]),
+            {"rigid part 'top'": "displacement (0.1, -0.01)", "gap": "0 to 0"},
+        ),
+        (
+            above(displacement=[0.0, "free"], force=[0.0, 3.0]),
+            {"foundation of 'bottom'": "force (0, 3)", "gap": "0.1 to 0.1"},
+        ),
+        (
+            above(displacement=[0.0, 0.2]),
+            {"foundation of 'bottom'": "displacement (0, 0.2)", "gap": "0.1 to 0.1"},
+        ),
+        (with_voltage(5.0), {"supports": "potentials of up to 5", "gap": "0 to 0"}),
+        (
+            {
+                **PIEZO,
+                "fixed": PIEZO["fixed"][:1],
+                "electrode": [{"on": "right", "charge": 1e-3}],
+                "load": [{"on": "top", "charge": 1e-6}],
+            },
+            {"electrode 'right'": "charge 0.001", "charges": "2e-06 in all", "gap": "0 to 0"},
+        ),
+        (ACTING["a conductive foundation"], {"foundation of 'bottom'": "potential 0.001"}),
+        (
+            block(load=[{"on": ["left", "right"], "pressure": 3.0}]),
+            {"loads": "forces of 6 in all, which balance", "gap": "0 to 0"},
+        ),
+        (ACTING["a layer that is thicker than the gap"], {"layers": "resultant (0, "}),
+        (ACTING["a press fit"], {"gap": "-0.001 to -0.001 (below 0: an overlap"}),
+    ],
+)
+@pytest.mark.parallel
+def test_all_that_acts_is_told_and_nothing_else(data, found):
+    told = rows(said(data))
+    assert set(told) == {*found, "gap"}
+    for name, words in found.items():
+        assert told[name].startswith(words)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("given", [{"force": 500.0}, {"shortening": 0.25}])
+def test_bolts_are_told(given):
+    mesh = {**MESH, "inside": {"section": "abs(x - 1) < 1e-6"}}
+    (key, value), *_ = given.items()
+    fixed = [{"on": ["left", "right"], "displacement": [0.0, "free"]}]
+    told = rows(said(block(mesh=mesh, fixed=fixed, bolt=[{"on": "section", **given}])))
+    assert told == {"bolt 'section'": f"{key} {value:g}", "gap": "0 to 0"}
