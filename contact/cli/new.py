@@ -141,13 +141,16 @@ foundation = {{ shape = "plane", point = {ground}, normal = {_along(d, 1.0)} }}
 
 def _pairs(pairs: Sequence[tuple[str, str]]) -> str:
     """Return the contacts between bodies."""
+    sides: dict[str, list[str]] = {}  # contacts share no nodes: one for each `on`
+    for on, against in pairs:
+        sides.setdefault(on, []).append(against)
     text = "".join(
         f"""
 [[contact]]
 on = {literal(on)}
-against = {literal(against)}
+against = {literal(against if len(against) > 1 else against[0])}
 """
-        for on, against in pairs
+        for on, against in sides.items()
     )
     return f"""\
 # Bodies of this mesh that can touch each other. Friction and current can be given for each; `on`

@@ -193,3 +193,24 @@ def test_what_is_said_of_a_small_contact_part(capsys: pytest.CaptureFixture) -> 
     printed = capsys.readouterr().out
     assert "displacements of up to 0.000188;" in printed
     assert "# warning" not in printed
+
+
+def test_a_part_that_faces_two_bodies_is_one_contact(tmp_path: Path) -> None:
+    """Two blocks on a base with smaller facets, whose side would be that of two contacts."""
+    corners = [(x / 2, y) for y in (0.0, 1.0) for x in range(5)]
+    corners += [(x, y) for left in (0.0, 1.1) for y in (1.0, 2.0) for x in (left, left + 0.9)]
+    cells = [(i, i + 1, i + 6, i + 5) for i in range(1, 5)] + [(11, 12, 14, 13), (15, 16, 18, 17)]
+    sets = {"low": range(1, 6), "face": range(6, 11), "one": (11, 12), "two": (15, 16)}
+    sets["lids"] = (13, 14, 17, 18)
+    lines = [f"{i},{x},{y}" for i, (x, y) in enumerate(corners, 1)]
+    lines = ["*NODE", *lines, "*ELEMENT, TYPE=CPE4"]
+    lines += [f"{i},{','.join(map(str, cell))}" for i, cell in enumerate(cells, 1)]
+    for name, nodes in sets.items():
+        lines += [f"*NSET, NSET={name}", ",".join(map(str, nodes))]
+    (tmp_path / "base.inp").write_text("\n".join(lines) + "\n")
+    assert main(["new", str(tmp_path / "base.inp")]) == CONVERGED
+    path = tmp_path / "base.toml"
+    (contact,) = load_case(path).contact
+    assert (contact.on, contact.against) == ("face", "one, two")
+    assert main(["check", str(path)]) == CONVERGED
+    assert main(["solve", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == CONVERGED
