@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from scipy.optimize import minimize_scalar
 
+from contact import Body, Contact, Fixed, InputError, Linear, Problem
 from contact.interface.obstacle import (
     Cone,
     Cylinder,
+    Heights,
     Level,
     Paraboloid,
     Plane,
     Punch,
+    Shape,
     Sphere,
+    Triangles,
 )
+from contact.mesh.grid import rectangle
 
 TILT = np.array([0.3, -0.5, 0.8])
 UP = TILT / np.linalg.norm(TILT)
@@ -163,3 +169,71 @@ def test_a_ray_passes_by_no_side_of_a_body_that_is_not_convex():
     found = Level(distance).ray(points, rays)
     assert np.array_equal(np.isfinite(found), met)
     assert np.all((found[met] <= first[met]) & (found[met] > first[met] - 0.0021))
+
+
+class Turned(Shape):
+    """A cylinder about z, or its like in 2-D, whose normals are turned and longer."""
+
+    def __init__(self, degrees=0.0, length=1.0):
+        super().__init__()
+        turn = np.deg2rad(degrees)
+        rotation = [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+        object.__setattr__(self, "matrix", length * np.array(rotation))
+
+    def distance(self, points):
+        size = np.linalg.norm(points[:, :2], axis=1)
+        normal = np.zeros_like(points)
+        normal[:, :2] = points[:, :2] @ self.matrix / size[:, None]
+        return size - 0.5, normal
+
+
+@pytest.mark.parametrize(
+    ("shape", "fits"),
+    [
+        (Turned(), True),
+        (Turned(5.0), False),
+        (Turned(180.0), False),
+        (Turned(length=1.1), False),
+        (Turned(length=0.0), False),
+    ],
+)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_normals_that_are_not_the_slope_of_the_distance_are_refused(shape, fits, dim):
+    if fits:
+        shape.check_normals(POINTS[:, :dim])
+        return
+    with pytest.raises(InputError, match=r"Turned: distance: the normal .* the slope of"):
+        shape.check_normals(POINTS[:, :dim])
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_normals_are_the_slope_of_the_distance(name):
+    """Also beside edges and tips, where there are several slopes."""
+    SHAPES[name][0].check_normals(POINTS)
+    SHAPES[name][0].check_normals(1e-3 * POINTS + np.array(TIP))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_normals_of_other_shapes_are_believed(scale):
+    """A function whose slope is not 1, a rough profile, and one of few triangles."""
+    random = np.random.default_rng(3)
+    x = np.linspace(-3, 3, 400)
+    rough = np.cumsum(random.normal(size=x.size)) * 2e-3
+    points = scale * POINTS[:, :2]
+    Level(lambda x: 7 * (x[:, 1] / scale + (x[:, 0] / scale) ** 2)).check_normals(points)
+    Heights((scale * x,), scale * rough).check_normals(points)
+    grid = (x[::40], x[::40])
+    Heights(tuple(scale * a for a in grid), scale * random.normal(size=(10, 10))).check_normals(
+        scale * POINTS
+    )
+    corners = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0.3], [0, 1, 0]]])
+    Triangles(scale * corners.astype(float)).check_normals(scale * POINTS)
+
+
+@pytest.mark.parallel
+def test_a_problem_names_the_shape():
+    domain = rectangle(MPI.COMM_WORLD, (-0.2, 0.6), (0.4, 0.2), (8, 4))
+    body = Body(Linear(1.0, 0.3), Fixed("top", [0.0, -0.01]))
+    Problem(domain, body, Contact("bottom", Turned()))
+    with pytest.raises(InputError, match=r"contact\.foundation: Turned: distance"):
+        Problem(domain, body, Contact("bottom", Turned(10.0)))

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Protocol
 import numpy as np
 from mpi4py import MPI
 
-from contact.arguments import expect, naming, real
+from contact.arguments import LEAST, OFF, SHARE, SMOOTH, STEP, expect, naming, real
 from contact.body.fields import Given, field
 from contact.errors import InputError
 from contact.ranks import on_all_ranks
@@ -22,6 +22,9 @@ GRAZING = 1e-6
 
 #: Most steps along a ray.
 STEPS = 200
+
+#: Most points at which normals are checked, and steps of Newton's method from these to the surface.
+CHECKED, TOWARDS = 50, 5
 
 
 class Obstacle(Protocol):
@@ -107,6 +110,53 @@ class Shape(ABC):
             expect(f"{name}: {key}", given, f"{dim} numbers in {dim}-D", fits)
             direction = key in ("normal", "axis", "along")
             expect(f"{name}: {key}", given, "a direction, not 0", not direction or vector.any())
+
+    @np.errstate(all="ignore")
+    def check_normals(self, points: Array) -> None:
+        """Refuse normals that are not the slopes of the distances, by differences.
+
+        They are compared on the surface that some of the points lead to, for elsewhere a distance
+        may be an approximation, as that of a `Level` is; but not at its edges.
+
+        Parameters
+        ----------
+        points
+            Places from which it is seen, shape (n, d).
+
+        Raises
+        ------
+        InputError
+            If they are off.
+        """
+        x = points[:: len(points) // CHECKED + 1]
+        gaps = np.nan_to_num(self.distance(x)[0], posinf=0.0, neginf=0.0)
+        h = STEP * max(np.ptp(points, axis=0).max(), np.abs(gaps).max()) if len(x) else 0.0
+        if h == 0:
+            return
+        for step in range(TOWARDS + 1):
+            value, normal = self.distance(x)
+            ahead, behind = (
+                np.column_stack([self.distance(x + to)[0] for to in side * h * np.eye(x.shape[1])])
+                for side in (1, -1)
+            )
+            slope = (ahead - behind) / (2 * h)
+            if step < TOWARDS:
+                size = (slope**2).sum(axis=1, keepdims=True)
+                x = x - np.nan_to_num(value[:, None] * slope / np.where(size > 0.5, size, np.inf))
+        bend = np.abs(ahead + behind - 2 * value[:, None]).max(axis=1) / h
+        smooth = (np.abs(value) <= h) & (bend <= SMOOTH) & np.isfinite(normal).all(axis=1)
+        off = np.where(smooth, np.linalg.norm(normal - slope, axis=1), 0.0)
+        if np.count_nonzero(off > OFF) >= max(LEAST, SHARE * np.count_nonzero(smooth)):
+            worst = off.argmax()
+            given, there, place = (
+                f"({', '.join(f'{a:.4g}' for a in np.round(vector, 9) + 0.0)})"
+                for vector in (normal[worst], slope[worst], x[worst])
+            )
+            raise InputError(
+                f"{type(self).__name__}: distance: the normal {given} at {place}, where "
+                f"differences of the distances are {there}; accepted: unit normals out of the "
+                "foundation, the slope of the signed distance"
+            )
 
     @abstractmethod
     def distance(self, points: Array) -> tuple[Array, Array]:
@@ -202,14 +252,20 @@ def measured(
     InputError
         On all ranks, if the obstacle is none in this space, or a function of it fails on one.
     """
-    label = f"{key}.{'foundation' if obstacle.is_shape else 'gap'}"
-    if isinstance(obstacle, Shape):
+    label, gap_shape = f"{key}.{'foundation' if obstacle.is_shape else 'gap'}", points.shape[:1]
+    shape = obstacle if isinstance(obstacle, Shape) else None
+    with on_all_ranks(comm):
         try:
-            obstacle.check(points.shape[1])
+            if shape is not None:
+                shape.check(points.shape[1])
+            with naming(label):
+                direction, gap = obstacle.measure(points, normal)
+                # NaN is refused by those who know whether the value is needed.
+                accepted = "a direction and a gap for each of the points"
+                found = real(direction, points.shape, accepted), real(gap, gap_shape, accepted)
+                if shape is not None:
+                    shape.check_normals(points)
         except InputError as error:
-            raise InputError(f"{label}: {error}") from None
-    with on_all_ranks(comm), naming(label):
-        direction, gap = obstacle.measure(points, normal)
-        # NaN is refused by those who know whether the value is needed.
-        accepted = "a direction and a gap for each of the points"
-        return real(direction, points.shape, accepted), real(gap, points.shape[:1], accepted)
+            text = str(error)
+            raise InputError(text if text.startswith(label) else f"{label}: {text}") from None
+    return found
