@@ -28,6 +28,7 @@ from contact.interface.layer import Layer as Layer
 from contact.interface.obstacle import Cone as Cone
 from contact.interface.obstacle import Cylinder as Cylinder
 from contact.interface.obstacle import GapFunction as GapFunction
+from contact.interface.obstacle import Heights as Heights
 from contact.interface.obstacle import Level as Level
 from contact.interface.obstacle import Paraboloid as Paraboloid
 from contact.interface.obstacle import Plane as Plane

@@ -133,7 +133,8 @@ class Anisotropic:
         if np.abs(c[3:5][:, [0, 1, 2, 5]]).max() > 1e-10 * np.abs(c).max():
             raise ValueError(
                 "the crystal couples strains in the plane with shear out of it: plane strain "
-                "does not hold; turn the crystal or solve in 3-D"
+                "does not hold; accepted: law.in_plane() or law.rotated(...) by which it does, "
+                "or 3-D"
             )
 
 

@@ -97,15 +97,12 @@ class Piezo:
             acts on it at all.
         """
         e = np.asarray(self.e, dtype=float)
-        if np.abs(e[:2]).max() <= 1e-10 * np.abs(e).max() and np.abs(e).max() > 0:
+        nothing = np.abs(e[:2]).max() <= 1e-10 * np.abs(e).max() and np.abs(e).max() > 0
+        if nothing or np.abs(e[:2, :2, 2]).max() > 1e-10 * np.abs(e).max():
             raise ValueError(
-                "the crystal is poled out of the plane, and no field in it acts on it; accepted: "
-                "piezo.in_plane(), poled along y"
-            )
-        if np.abs(e[:2, :2, 2]).max() > 1e-10 * np.abs(e).max():
-            raise ValueError(
-                "the crystal couples fields in the plane with shear out of it: plane strain "
-                "does not hold; turn the crystal or solve in 3-D"
+                "the crystal is poled out of the plane, or aslant to it: a field in the "
+                "plane shears the body out of it, or does not act on it; accepted: "
+                "piezo.in_plane(), poled along y, or 3-D"
             )
 
     def in_plane(self) -> Piezo:

@@ -280,7 +280,11 @@ class Material:
         object.__setattr__(self, "factor", field(factor))
         names = several("on", self.on, str, "the name of a region, or a list of names")
         object.__setattr__(self, "on", names)
-        expect("law", self.law, "Linear(young, poisson), Log, UserLaw, ...", is_law(self.law))
+        accepted = (
+            "Linear(young, poisson), Log, UserLaw, forms.elasticity.Anisotropic(stiffness), of a "
+            "crystal in 2-D with .in_plane(), ..."
+        )
+        expect("law", self.law, accepted, is_law(self.law))
         fits = isinstance(self.piezo, Piezo | None)
         expect("piezo", self.piezo, "Piezo(...), or None", fits)
         fits = self.factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))

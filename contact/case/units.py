@@ -114,10 +114,13 @@ def check_units(case: Case) -> None:
                 f"{_shown(material)} has {own.labels[quantity]} for {quantity}, and "
                 f'case.units.{quantity} = "{labels[quantity]}"'
             )
-            found = systems.fitting(labels, quantities)
-            accepted = listed(map(shown, found)) or (
-                "a table { length, force, potential } and labels of one system: stress = force / "
-                "length^2, charge = force length / potential"
+            found = [*map(shown, systems.fitting(labels, quantities))]
+            table = systems.table(labels, quantities)
+            if not found and table is not None:
+                pairs = (f"{key} = {shown(unit)}" for key, unit in table.items())
+                found = [f"{{ {', '.join(pairs)} }}"]
+            accepted = listed(found) or (
+                "labels of one system: stress = force / length^2, charge = force length / potential"
             )
             raise fault(f"{path}.units", words, accepted)
         if first is None:

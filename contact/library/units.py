@@ -140,6 +140,17 @@ def fitting(labels: Mapping[str, str], quantities: Collection[str]) -> list[str]
     return [k for k in SYSTEMS if contradiction(named(k, labels), labels, quantities) is None]
 
 
+def table(labels: Mapping[str, str], quantities: Collection[str]) -> dict[str, str] | None:
+    """Return the units of length, force and potential that labels ask for; None if none do."""
+    length, potential = labels.get("length", "m"), labels.get("potential", "V")
+    force = force_of(labels.get("stress", "Pa"), length)
+    if force is None or size(force, "force") is None or size(potential, "potential") is None:
+        return None
+    found = {"length": length, "force": force, "potential": potential}
+    fits = contradiction(system((length, force, potential)), labels, quantities) is None
+    return found if fits else None
+
+
 def force_of(stress: str, length: str) -> str | None:
     """Return the name of the unit of force that goes with two units; None where it has none."""
     pressure, side = size(stress, "stress"), size(length, "length")

@@ -127,6 +127,7 @@ class Domain:
         names: Mapping[str, int | Sequence[int]],
         cell_tags: dmesh.MeshTags | None = None,
         regions: Mapping[str, int | Sequence[int]] | None = None,
+        inside: Mapping[str, int | Sequence[int]] | None = None,
     ) -> Domain:
         """Name parts of a dolfinx mesh by its tags. Collective.
 
@@ -140,17 +141,20 @@ class Domain:
             Name of a part -> its tag, or several.
         cell_tags, regions
             Likewise of the regions; by default there is one, ``body``.
+        inside
+            As `names`, of facets inside of the body: cuts of bolts, electrodes, supports.
 
         Raises
         ------
         InputError
             As `contact.mesh.domain.from_mesh`, which takes functions of position instead.
         """
-        parts = {name: _tagged(facet_tags, tag) for name, tag in names.items()}
-        if cell_tags is None or regions is None:
-            return from_mesh(mesh, parts)
-        cells = {name: _tagged(cell_tags, tag) for name, tag in regions.items()}
-        return from_mesh(mesh, parts, regions=cells)
+        cells = {} if cell_tags is None else regions
+        parts, within, chosen = (
+            {name: _tagged(tags, tag) for name, tag in (given or {}).items()}
+            for tags, given in ((facet_tags, names), (facet_tags, inside), (cell_tags, cells))
+        )
+        return from_mesh(mesh, parts, regions=chosen, inside=within)
 
     @property
     def comm(self) -> MPI.Intracomm:

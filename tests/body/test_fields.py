@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from contact import (
     Body,
+    Bolt,
     Contact,
     Domain,
     Fixed,
@@ -78,6 +79,34 @@ def test_numbers_by_other_names() -> None:
     moved = vector(ufl.as_vector([0.1 * x[0], -0.3]))
     assert moved is not None
     assert np.all(moved[1].numpy(inside) == -0.3)
+
+
+@pytest.mark.parallel
+def test_tags_name_parts_inside_of_the_body() -> None:
+    """A bolt that is cut in the middle, with tags of facets and cells."""
+    mesh = dmesh.create_unit_square(MPI.COMM_WORLD, 4, 4)
+    chosen = {3: (1, 0.0), 7: (1, 1.0), 5: (1, 0.5), 9: (0, 0.0)}
+    facets = {
+        tag: dmesh.locate_entities(mesh, 1, lambda x, i=i, at=at: np.isclose(x[i], at))
+        for tag, (i, at) in chosen.items()
+    }
+    indices = np.concatenate([*facets.values()])
+    values = np.repeat([*facets], [len(found) for found in facets.values()]).astype(np.int32)
+    order = np.argsort(indices)
+    tags = dmesh.meshtags(mesh, 1, indices[order], values[order])
+    every = np.arange(mesh.topology.index_map(2).size_local, dtype=np.int32)
+    cells = dmesh.meshtags(mesh, 2, every, np.full(every.size, 2, dtype=np.int32))
+    domain = Domain.from_mesh(
+        mesh, tags, {"low": 3, "top": 7, "left": 9}, cells, {"all": 2}, inside={"cut": 5}
+    )
+    assert [*domain.inside] == ["cut"] and [*domain.regions] == ["all"]
+    body = Body(
+        Linear(10.0, 0.0),
+        [Fixed(side, [0.0, 0.0]) for side in ("low", "top")],
+        bolts=[Bolt("cut", shortening=0.01)],
+    )
+    solution = solve(Problem(domain, body, Contact("left", 1.0)))
+    assert solution.movements["bolts"]["cut"]["force"] == pytest.approx(0.1, rel=1e-8)
 
 
 def problem(mesh: dmesh.Mesh, tags: dmesh.MeshTags, given: Any) -> Problem:

@@ -119,6 +119,16 @@ MM = {"length": "mm", "stress": "MPa"}
             {"units": "N-mm-MPa", "labels": MM | {"charge": "C"}, "name": "PZT-4"},
             "has mC for charge",
         ),
+        (
+            {"units": "GPa", "labels": {"length": "mm", "stress": "GPa", "potential": "GV"}}
+            | {"name": "PZT-4"},
+            'accepted: { length = "mm", force = "kN", potential = "GV" }$',
+        ),
+        (
+            {"units": "GPa", "labels": {"length": "mm", "stress": "GPa", "charge": "nC"}}
+            | {"name": "PZT-4"},
+            "accepted: labels of one system",
+        ),
     ],
 )
 def test_contradictions_are_refused(arguments, words):

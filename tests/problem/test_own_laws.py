@@ -166,6 +166,14 @@ WRONG = {
         lambda: problem(piezo=piezo_of(**(COUPLING | {"e15": 0.0}))),
         r"piezo\.in_plane\(\)",
     ),
+    "a coupling that shears the body out of the plane": (
+        lambda: problem(piezo=piezo_of(**COUPLING)),
+        r"piezo\.in_plane\(\)",
+    ),
+    "a matrix in place of a law": (
+        lambda: problem(law=hexagonal(**STIFF)),
+        r"Anisotropic\(stiffness\), of a crystal in 2-D with \.in_plane\(\)",
+    ),
 }
 
 
