@@ -30,6 +30,9 @@ from contact.typing import Array
 #: Least cosine between the normals of a surface and of its facets; corners of bodies have less.
 SMOOTH = 0.9
 
+#: That between normals at both ends of an edge, which differ by its turn, twice as much.
+ALIKE_NORMALS = 2 * SMOOTH**2 - 1
+
 #: Weight of the neighbours of neighbours, which decide only where there are too few neighbours.
 FAR = 1e-3
 
@@ -49,8 +52,9 @@ def deviations(
 ) -> tuple[Array, Array]:
     """Return c of the edges of each facet, positive outwards, and how well it is known. Collective.
 
-    The second is by how much c would differ with the curvature one edge farther on, which circles
-    do not. Both have the shape (f, edges).
+    The second is how much the fits that count differ, which near a jump of the curvature are those
+    of both sides, and a quarter of how much c would differ with the curvature one edge farther on,
+    as it is seen on ellipses and waves. Circles have none of them. Both have the shape (f, edges).
 
     Parameters
     ----------
@@ -130,7 +134,7 @@ def _deviations(
     known = np.ones(vertices.size, dtype=bool)
     np.logical_and.at(known, place, np.einsum("fcd,fd->fc", own[place], normal) > SMOOTH)
     pairs, near = _around(place, vertices.size)
-    alike = np.einsum("pd,pd->p", own[pairs[0]], own[pairs[1]]) > SMOOTH
+    alike = np.einsum("pd,pd->p", own[pairs[0]], own[pairs[1]]) > ALIKE_NORMALS
     pairs, near = pairs[:, alike & known[pairs[0]]], near[alike & known[pairs[0]]]
     curvature = _curvatures(points, own, pairs, np.where(near, 1.0, FAR))
     pairs = pairs[:, near & known[pairs[1]]]
@@ -222,7 +226,7 @@ def _between(
 ) -> tuple[Array, Array]:
     """Return c of an edge of each facet, given that by each corner, its ends first, shape (f,).
 
-    Beside it, how much it differs beyond the corners that count. Where the curvature jumps, as from
+    Beside it, how well it is known (`deviations`). Where the curvature jumps, as from
     a side to a rounded edge, the corner counts beyond which it stays as it is.
     """
     largest = np.abs(value).max(axis=1)
@@ -251,7 +255,10 @@ def _between(
         totals[:, k] = total
         changes[:, k] = further / np.where(total > 0, total, 1.0)
     weight = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
-    found, unknown = (np.sum(weights * given, axis=1) / weight for given in (value, jumps))
+    found, further = (np.sum(weights * given, axis=1) / weight for given in (value, jumps))
+    # Beside a jump, a corner beyond which nothing changes differs from the mean with the others.
+    unlike = np.maximum(np.abs(value - found[:, None]) - jumps, 0.0)
+    unknown = 2 * np.sum(weights * unlike, axis=1) / weight + further / 4
     for k, end in ((0, 1), (1, 0)):
         # With no vertex beyond, the end of a side has the fit of its neighbour: half an edge off.
         last = (totals[:, end] == 0) & (totals[:, k] > 0) & (jumps[:, k] < ALIKE * largest)

@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.body.elements import MEAN_DILATATION, unlocked
 from contact.interface.mortar.search import nearest
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import shape_of
+from contact.mesh.deviation import ALIKE_NORMALS
 from contact.output.solution import Remark, Solution
 from contact.typing import Array
 
@@ -90,9 +92,15 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
         return
     size = nodes.maximum(np.where(closed, np.abs(nodes.gap), 0.0))
     if problem.equilibrium.degree == 2 and problem.domain.levels == 0:
-        turn, waves = _of_edges(solution, nodes.points[closed])
+        turn, waves, least = _of_edges(solution, closed)
         pressed = nodes.maximum(solution.forces.pressure)
         scatter = problem.scales.plane_modulus * np.pi / 4 * waves
+        if least < ALIKE_NORMALS:
+            yield (
+                f"contact directions turn by {np.arccos(least):.2g} along a straight edge that "
+                "touches: its ends count as corners, and pressures may be many times those of a "
+                "curve; take more edges, or curved cells (mesh.order = 2)"
+            )
         if scatter > DEVIATION * pressed:
             yield (
                 f"straight edges tell a curved contact surface to about {nodes.deviation:.2g}, and "
@@ -114,8 +122,10 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
         )
 
 
-def _of_edges(solution: Solution, touching: Array) -> tuple[float, float]:
+def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, float, float]:
     """Return the largest turn and waves of straight edges of degree 2 that touch. Collective.
+
+    Beside them, the least cosine between contact directions at the ends of an edge.
 
     In the middle of an edge, f = h^2/(8 R) below the curve, displacements are taken f eps_nn aside:
     to them the surface is as stiff as under waves of the length 2 h, and pressures are off by
@@ -124,16 +134,28 @@ def _of_edges(solution: Solution, touching: Array) -> tuple[float, float]:
 
     Parameters
     ----------
-    solution, touching
-        The solution, and the contact nodes of this rank that touch, shape (n, d).
+    solution, closed
+        The solution, and which contact nodes of this rank touch, shape (n,).
     """
     domain, space = solution.problem.domain, solution.problem.equilibrium.space
-    found: Array = np.zeros(2)
+    nodes = solution.problem.nodes
+    touching, numbers = nodes.points[closed], nodes.nodes + space.dofmap.index_map.local_range[0]
+
+    def directions(asked: NDArray[np.int64]) -> Array:
+        found = np.full((asked.size, domain.dim), np.nan)
+        _, of, at = np.intersect1d(asked, numbers, return_indices=True)
+        found[of] = nodes.normal[at]
+        return found
+
+    found: Array = np.array([0.0, 0.0, -1.0])
     for part in dict.fromkeys(p for c in solution.problem.contacts for p in (c.on, c.against) if p):
         side = surface_of(domain, space, part)
         if side.follows:
             near = nearest(domain.comm, side.centres, touching) <= side.radii
+            ends = side.owners.values(side.nodes[:, np.array(side.shape.edges)].ravel(), directions)
+            ends = ends.reshape(side.count, len(side.shape.edges), 2, domain.dim)[near]
+            cosine = np.einsum("fed,fed->fe", ends[:, :, 0], ends[:, :, 1])
             here = (values[near].max(initial=0.0) for values in (side.turns, side.waves))
-            found = np.maximum(found, [*here])
+            found = np.fmax(found, [*here, np.fmax.reduce(-cosine, axis=None, initial=-1.0)])
     domain.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
-    return float(found[0]), float(found[1])
+    return float(found[0]), float(found[1]), float(-found[2])

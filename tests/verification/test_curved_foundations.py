@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, Linear, Problem, Sphere, parse_case, solve
+from contact.mesh import deviation
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
 from scripts.studies import curved_foundations as study
@@ -51,12 +52,33 @@ def test_hydrostatic_pressure_in_space(name, degree, monkeypatch):
     check(study.hydrostatic(name, 0.1, degree, "3-D"), 0.007, 0.1)
 
 
-def test_nodes_at_a_punch_edge_are_right_where_the_edges_are():
-    """By the vertices alone nodes beside the jump of the curvature are between 0 and 2.03."""
+def test_nodes_at_a_punch_edge_are_right_where_the_edges_are(monkeypatch):
+    """By the vertices alone nodes beside the jump of the curvature are 0 to 2.2 times: it is said.
+
+    None of the fits to the corners of a facet would do: 10 % are a gap of 0.0025 h^2.
+    """
     check(study.hydrostatic("punch edge", 0.1, 2, "3-D", order=2), 0.002, 0.04)
+    seen, fits, between = [], [], deviation._between
+
+    def noted(*given):
+        points, *_, corners, _, _, value = given
+        middle = points[corners[:, :2]].mean(axis=1)
+        r = np.hypot(middle[:, 0], middle[:, 1])
+        exact = np.where(r < 0.5, 0, 4 * (np.hypot(r - 0.5, middle[:, 2]) - 1))
+        fits.append(np.abs(value - exact[:, None]).min(axis=1).max() / 4)
+        return between(*given)
+
+    monkeypatch.setattr(deviation, "_between", noted)
+    ratios = study.ratios
+    monkeypatch.setattr(study, "ratios", lambda *given: seen.append(given) or ratios(*given))
     vertices, w = study.hydrostatic("punch edge", 0.1, 2, "3-D")
+    assert 0.005 < max(fits) / 0.1**2 < 0.015
     off = np.abs(vertices - 1) > 0.1
     assert 0.03 < w[off].sum() / w.sum() < 0.08
+    solution, exact = seen[0]
+    (found,) = warnings(solution)
+    said = float(re.search(r"nodal pressures scatter by about (\S+),", found)[1])
+    assert 0.5 < said / (np.abs(vertices - 1).max() * exact) < 2
 
 
 @pytest.mark.parametrize("kind", ["2-D", "revolution", "3-D"])
@@ -100,7 +122,7 @@ def test_a_curvature_that_varies():
 
     At the ends a side alone tells the curvature. On coarse meshes it is said by how much.
     """
-    for cells, most, count in ((24, 0.3, 1), (32, 0.13, 0)):
+    for cells, most, count in ((24, 0.3, 1), (32, 0.13, 1), (48, 0.1, 0)):
         domain = rectangle(COMM, [-0.8, -1.0], [1.6, 1.0], [cells, 20])
         x = domain.mesh.geometry.x
         x[:, 1] += (1 + x[:, 1]) * x[:, 0] ** 2 / 1.2
@@ -118,7 +140,7 @@ def test_a_curvature_that_varies():
         }  # fmt: skip
         solution = solve(parse_case(case, without=("mesh",)), domain=domain)
         nodes, exact = solution.problem.nodes, 1e-3 * 1000 / (1.3 * 0.4)
-        inside = np.abs(nodes.points[:, 0]) < (0.6 if count else 1)
+        inside = np.abs(nodes.points[:, 0]) < (0.6 if cells == 24 else 1)
         off = nodes.maximum(np.abs(solution.forces.pressure / exact - 1) * inside)
         found = warnings(solution)
         assert off < most
@@ -162,6 +184,31 @@ def test_straight_edges_that_turn_much_are_warned_of():
         assert len(found) == count
         if count:
             assert "turn by up to 0.2 where it touches" in found[0]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(("count", "node"), [(8, 0.13), (10, 0.1), (12, 0.08), (6, None)])
+def test_pins_of_few_edges(count, node):
+    """A body around half a pin: vertices counted as corners have 20 times the pressure.
+
+    Six edges are a hexagon, which is said.
+    """
+    domain = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [count // 2, 8])
+    x = domain.mesh.geometry.x
+    angle, radius = np.pi * x[:, 0], 0.8 - 0.6 * x[:, 1]
+    x[:, 0], x[:, 1] = -radius * np.cos(angle), -radius * np.sin(angle)
+    given = [lambda x: -1e-3 * x[0], lambda x: -1e-3 * x[1]]
+    fixed = [Fixed(side, given) for side in ("left", "right", "bottom")]
+    pin = Contact("top", Sphere(centre=(0.0, 0.0), radius=0.1998), press=True)
+    solution = solve(Problem(domain, Body(Linear(1e3, 0.3), fixed), pin, degree=2))
+    p = solution.pressure / (1e-3 * 1e3 / (1.3 * 0.4))
+    said = [text for text in solution.warnings if "contact directions turn by" in text]
+    if node is None:
+        assert solution.problem.nodes.maximum(p) > 10
+        assert "contact directions turn by 1 along" in said[0]
+    else:
+        assert solution.problem.nodes.maximum(np.abs(p - 1)) < node
+        assert not said
 
 
 def test_chords_that_hide_a_contact_are_named():

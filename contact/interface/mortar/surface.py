@@ -157,15 +157,14 @@ class Surface:
     def unknown_deviation(self) -> float:
         """The largest part of the deviations that gaps do not have (length), on this rank.
 
-        Where gaps are those of the facets it is all; else a quarter of the part that vertices do
-        not tell, as it is seen on ellipses and waves.
+        Where gaps are those of the facets it is all; else the part that vertices do not tell.
         """
-        return float(self.unknown.max(initial=0.0)) / 16 if self.follows else self.largest_deviation
+        return float(self.unknown.max(initial=0.0)) / 4 if self.follows else self.largest_deviation
 
     @property
     def waves(self) -> Array:
         """The largest slope of the unknown part, along an edge, shape (f,)."""
-        return np.asarray((self.unknown / (16 * self._edges)).max(axis=1, initial=0.0))
+        return np.asarray((self.unknown / (4 * self._edges)).max(axis=1, initial=0.0))
 
     @property
     def follows(self) -> bool:
