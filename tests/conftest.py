@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -98,14 +99,36 @@ def pytest_report_header() -> str:
     return f"contact: {len(files)} files, {lines} lines"
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out tests that are for another number of ranks."""
+    """Leave out tests that are for another number of ranks.
+
+    On more than 2 ranks, those stay that have each value of each parameter: all combinations run
+    on 1 and 2, and which rank has nothing, or two neighbours, depends on none.
+    """
     marks = [item.get_closest_marker("parallel") for item in items]
-    kept = [mark is None or _comm.size in (1, *(mark.args or (_comm.size,))) for mark in marks]
-    config.hook.pytest_deselected(
-        items=[x for x, keep in zip(items, kept, strict=True) if not keep]
-    )
-    items[:] = [x for x, keep in zip(items, kept, strict=True) if keep]
+    kept = {
+        item
+        for item, mark in zip(items, marks, strict=True)
+        if mark is None or _comm.size in (1, *(mark.args or (_comm.size,)))
+    }
+    if _comm.size > 2:
+        groups = groupby(filter(kept.__contains__, items), key=lambda x: x.nodeid.split("[")[0])
+        kept = {item for _, group in groups for item in _covering(list(group))}
+    config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+    items[:] = [item for item in items if item in kept]
+
+
+def _covering(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Return the few of a test's items that have each value of each parameter."""
+    specs = [getattr(item, "callspec", None) for item in items]
+    values = [set(spec.indices.items()) if spec else {("", 0)} for spec in specs]
+    missing, kept = set().union(*values), []
+    while missing:
+        best = max(range(len(items)), key=lambda k: len(missing & values[k]))
+        kept.append(items[best])
+        missing -= values[best]
+    return kept
 
 
 @pytest.hookimpl(wrapper=True)
