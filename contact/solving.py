@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from contact._compat import destroy_unused
 from contact.adapting import adapted
 from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, build_problem, named, replaced_by
@@ -326,6 +327,7 @@ def run_schedule(
     critical = critical_factor(here, state, body) if outcome.converged else np.inf
     # The review needs the memory that the method's operators take.
     del method, body
+    destroy_unused(problem.comm, problem.domain.mesh.comm)
     check_potential(here, state)
     solution = Solution(
         problem=here,

@@ -17,8 +17,10 @@ def command(script: str) -> list[str]:
     return [sys.executable, "-m", f"scripts.benchmarks.{script}"]
 
 
-def started(words: Sequence[str], ranks: int = 1, limit: float | None = None) -> str:
-    """Return the output of a process, within a limit (seconds).
+def started(
+    words: Sequence[str], ranks: int = 1, limit: float | None = None, options: str = ""
+) -> str:
+    """Return the output of a process, within a limit (seconds), with options of PETSc.
 
     Raises
     ------
@@ -26,6 +28,7 @@ def started(words: Sequence[str], ranks: int = 1, limit: float | None = None) ->
         If it fails.
     """
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+    environment["PETSC_OPTIONS"] = f"{environment.get('PETSC_OPTIONS', '')} {options}".strip()
     parallel = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
     done = subprocess.run(
         [*parallel, *words], env=environment, capture_output=True, text=True, timeout=limit
@@ -35,9 +38,11 @@ def started(words: Sequence[str], ranks: int = 1, limit: float | None = None) ->
     return done.stdout
 
 
-def measured(words: Sequence[str], ranks: int = 1, limit: float | None = None) -> Run:
+def measured(
+    words: Sequence[str], ranks: int = 1, limit: float | None = None, options: str = ""
+) -> Run:
     """Return the JSON in the last line of a process's output."""
-    found: Run = json.loads(started(words, ranks, limit).strip().splitlines()[-1])
+    found: Run = json.loads(started(words, ranks, limit, options).strip().splitlines()[-1])
     return found
 
 
