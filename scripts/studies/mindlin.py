@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "Two balls: area of the loop, and dissipation, over the closed form",
         rows,
         "a/h: elements in Hertz's a where the contact slips; sectors: of the half turn. Twelve "
-        "steps a turn, of which the trapezoidal rule for the area loses 3 %. The closed form is "
+        "steps per cycle, of which the trapezoidal rule for the area loses 3 %. The closed form is "
         "that of half spaces (a/R = 0), and takes all friction to act along x, which is exact for "
         "nu = 0.",
     )
@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             plane["dissipation"].append(turn_of_cylinders(elements, 3, degree))
     report.table(
         "mindlin-plane",
-        "Two cylinders: dissipation of a turn, over the closed form",
+        "Two cylinders: dissipation of a cycle, over the closed form",
         plane,
         "In twelve steps; with 24 of them it is the same to 1e-4.",
     )

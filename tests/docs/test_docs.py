@@ -63,12 +63,21 @@ def run_bar(folder: Path) -> int:
     return main(["solve", case, "--out", str(folder / "results"), *coarse])
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
+def anchors(page: Path) -> set[str]:
+    """Return the headings of a page as the ends of links, in GitHub's spelling."""
+    prose = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.M | re.S)
+    words = [re.sub(r"[^\w\- ]", "", x).lower() for x in re.findall(r"^#+ (.*)$", prose, re.M)]
+    return {heading.replace(" ", "-") for heading in words}
+
+
+@pytest.mark.parametrize("page", [*sorted(DOCS.glob("*.md")), ROOT / "README.md"], ids=str)
 def test_links_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text()):
-        assert (page.parent / target).exists(), target
+    for target, anchor in re.findall(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)", page.read_text()):
+        there = page.parent / target if target else page
+        assert there.exists(), target
         if target.endswith(".png"):  # a whole one
-            assert (page.parent / target).read_bytes()[-8:-4] == b"IEND", target
+            assert there.read_bytes()[-8:-4] == b"IEND", target
+        assert not anchor or anchor in anchors(there), f"{target}#{anchor}"
 
 
 def listed(page: str) -> list[str]:
