@@ -27,7 +27,7 @@ INTRODUCTION = f"""\
 
 <!-- Made by `python3 -m scripts.case_page`; edit the models in contact/case/ instead. -->
 
-A case file is a TOML file that says all about a problem and how it is solved:
+A case file is a TOML file with a problem and its method:
 
 ```
 python3 -m contact check CASE.toml
@@ -39,8 +39,8 @@ volume of its regions, the number of unknowns, and the resultant of the loads. E
 a value of the file: its path is dotted, entries of lists are numbered from 0
 (`--set load.0.traction='[0, -0.05]'`), its value is TOML, and a bare word is a text.
 
-Lengths, forces and charges are in any consistent system of units; no key has a unit built in.
-An unknown key is an error. `contact schema` prints a JSON schema of the file, by which
+Any consistent system of [units](model.md#units) may be used. An unknown key is an error.
+`contact schema` prints a JSON schema of the file, by which
 [editors](install.md#an-editor-that-completes-case-files) complete and check it.
 
 **Formulas.** Where a number *or a formula* is accepted, a formula is a text of
@@ -145,7 +145,7 @@ def _default(field: FieldInfo) -> str:
 
 def _generators() -> Iterator[str]:
     yield from ("", "### Parametric mesh generators", "")
-    yield "Further values of `generator`, meshed by Gmsh. Their parameters stand in `[mesh]`."
+    yield "Further values of `generator`, meshed by Gmsh. Their parameters are keys of `[mesh]`."
     yield from ("", "| generator | body and parts | parameters and defaults |", "|---|---|---|")
     for name, generator in meshes.GENERATORS.items():
         summary = " ".join((inspect.getdoc(generator) or "").split("\n\n")[0].split())

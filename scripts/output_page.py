@@ -22,48 +22,48 @@ INTRODUCTION = """\
 
 <!-- Made by `python3 -m scripts.output_page`; edit contact/output/quantities.py instead. -->
 
-`contact solve CASE.toml --out DIR` leaves in DIR:
+`contact solve CASE.toml --out DIR` writes into DIR:
 
 | file | contents |
 |---|---|
 | `summary.json` | the numbers of the run as a whole |
-| `contact.csv` | one row a contact node |
-| `history.csv` | one row an outer iteration |
-| `steps.csv` | of an evolution: one row a step |
+| `contact.csv` | one row per contact node |
+| `history.csv` | one row per outer iteration |
+| `steps.csv` | of an evolution: one row per step |
 | `contact-steps.csv` | likewise: `contact.csv` of all steps, with a first column `t` |
 | `fields.vtu` | all fields of the body, for ParaView, pyvista and meshio |
 | `contact.vtu` | the contact part alone, a surface (in the plane a line) |
-| `contact-against.csv`, `.vtu` | between bodies: the other side, with the stresses there |
+| `contact-against.csv`, `.vtu` | between bodies: the master side, with its stresses |
 | `fields.pvd`, `contact.pvd` | of an evolution: steps of body and contact part, for ParaView |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
-| `checkpoint.npz` | with `output.checkpoint = true`; on several ranks a piece of each |
+| `checkpoint.npz` | with `output.checkpoint = true`; on several ranks a file of each |
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
-Of more than 100,000 contact nodes on several ranks, each rank writes its own: `contact.0000.csv`,
+With more than 100,000 contact nodes on several ranks, each rank writes its own: `contact.0000.csv`,
 `contact.0001.csv` and so on, by x, y and z, and the pieces of `contact.pvtu`, which ParaView and
-pyvista open as one; a `row` there is that in the file of the rank that has the node. So it does
-with `contact-steps` and `contact-against`, and with a body of more nodes: `fields.pvtu`.
-`node` numbers the points of all pieces, for those on two of them are in both. Figures are drawn of
-a body in pieces, and not of contact nodes in pieces.
+pyvista open as one; `row` is the row in the file of the rank that has the node. The same holds
+for `contact-steps` and `contact-against`, and for a body with as many nodes, `fields.pvtu`.
+`node` numbers the points of all pieces, for a point on two of them is in both. Figures of the body
+are drawn from pieces, those of the contact are not.
 
-They replace those of an earlier run all together, once they are complete; other files in DIR are
-left alone. Results of another problem are replaced with `--overwrite` only: the same one may be
-solved again by another method, to another tolerance, with other outputs.
+The files replace those of an earlier run together, once they are complete; other files in DIR are
+not touched. Results of another problem are replaced with `--overwrite` only; the same problem may
+be solved again by another method, to another tolerance, with other outputs.
 
-`contact sweep` leaves `sweep.csv`, one row a case, and `sweep.toml`, the case that was swept.
+`contact sweep` writes `sweep.csv`, one row per case, and `sweep.toml`, the case that was swept.
 
-**Units.** All is in the units of the case: with millimetres and newtons, stresses are in MPa. In
-the plane, forces and charges are those of a unit of depth; of bodies of revolution they are those
-of the full turn, in which those along r cancel: resultants have 0 there.
+**Units** are those of the case: with millimetres and newtons, stresses are in MPa. In 2-D forces
+and charges are per unit of depth; of bodies of revolution they are those of the full turn, and
+resultants along r are 0.
 
 **Signs.** ν points out of the body, to the foundation. Pressure is positive; contact forces and
-friction stresses act from the body *on the foundation*, reactions from the supports *on the
-body*. Stresses in the body are positive in tension. In the plane tangential numbers
-count along ν turned counter-clockwise by 90 degrees: at the bottom of a body, where ν points down,
-along x. Charges of surfaces are D·ν, the opposite of the free charge of an electrode there: a
-positive `charge` lowers the potential, where a positive `body_charge` raises it.
+friction stresses are those of the body *on the foundation*, reactions those of the supports *on
+the body*. Stresses in the body are positive in tension. In 2-D tangential components are along ν
+rotated counter-clockwise by 90 degrees: at the bottom of a body, where ν points down, along x.
+Charges of surfaces are D·ν, the opposite of the free charge of an electrode there: a positive
+`charge` lowers the potential, while a positive `body_charge` raises it.
 
 ## Opening them
 
@@ -89,7 +89,7 @@ print(surface["pressure"][touching].mean())
 the deformed body; `meshio.read` reads the same files. In ParaView: open, Apply, and the filter
 *Warp By Vector*.
 
-Figures are drawn again from these files, without a solve, in other formats and of other fields:
+`contact plot` draws figures from these files in other formats and of other fields:
 
 ```sh
 contact plot results --format pdf --width 85mm
@@ -107,9 +107,9 @@ SECTIONS: Mapping[str, str] = {
     q.STEPS: "",
     q.SWEEP: "",
     q.BODY: "At the nodes. All but displacement and potential are averages of the cells around a "
-    "node, weighted by volume, in each region for itself: a node between regions is a point of "
-    "each. As they are, they stand in the cells under NAME`_cell`.",
-    q.SURFACE: "At the nodes; `nan` where a node is held and hence no contact node.",
+    "node, weighted by volume, within each region: a node between regions is a point of "
+    "each. NAME`_cell` has the values of the cells.",
+    q.SURFACE: "At the nodes; `nan` where a node is held and therefore not a contact node.",
     q.OPPOSITE: "",
 }
 

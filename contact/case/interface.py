@@ -240,11 +240,10 @@ class Electric(Section):
     """`[electric]`: a conductive foundation, D.nu = psi(u_nu - rho) phi_L(phi - phi_f)."""
 
     law: Literal["shifted", "perfect", "ramp"] = "shifted"
-    """psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e in contact, (1.33);
-    `ramp`, (1.34) as printed, zero where u_nu <= rho. `shifted` gives up (h~5)(d), psi = 0 for
-    u_nu <= rho, with which no contact conducts."""
+    """psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e in contact; `ramp`, as
+    the thesis has it, zero where u_nu <= rho, with which no contact conducts."""
     k_e: NonNegative
-    """k_e of the foundation: a capacitance an area, for D.nu is a charge and has no memory."""
+    """k_e of the foundation: a capacitance per area, for D.nu is a charge and has no memory."""
     phi_f: TimeFormula = Expression(0.0)
     """Potential phi_F of the foundation."""
     amplitude: AmplitudeName | None = None
@@ -318,13 +317,13 @@ class Contact(Section):
         float, Field(ge=0, allow_inf_nan=True), COMPLIANT, Accepted("a number >= 0, or inf")
     ] = 0.0
     """Thickness of the layer: first touch at gap - layer; one thicker than the gap presses on the
-    undeformed body. `inf`: no rigid part, first touch at gap, law (1.27)."""
+    undeformed body. `inf`: no rigid part, first touch at gap."""
     stiffness: Annotated[NonNegative, COMPLIANT] = 10.0
     """c_nu."""
     limit: Annotated[
         float, Field(gt=0, allow_inf_nan=True), COMPLIANT, Accepted("a number > 0, or inf")
     ] = 0.1
-    """n_nu: depth at which the layer's pressure saturates; `inf`: never, (1.28)."""
+    """n_nu: depth at which the layer's pressure saturates; `inf`: never."""
     potential_factor: Annotated[float, Field(ge=1), COMPLIANT, Accepted("a number >= 1")] = 2.0
     """alpha_nu: growth of the layer's stiffness with the potential difference; 1: none."""
     potential_range: Annotated[Positive, COMPLIANT] = 128.0

@@ -180,8 +180,8 @@ class Material(Section):
     """
 
     on: Names | None = None
-    """Regions of the mesh (its named groups of cells) that consist of it. Default: the whole
-    mesh, where this is the only material."""
+    """Its regions of the mesh (named groups of cells). Default: the whole mesh, where this is the
+    only material."""
     name: Text | None = None
     """Name of a material of the library, with its coupling."""
     units: Annotated[SystemOfUnits | None, ReadWith("name")] = None
@@ -194,9 +194,9 @@ class Material(Section):
     """With `name`: a library of one's own (TOML), relative to the case file. Default: that of the
     package."""
     law: LawName | None = None
-    """`linear`: g = mu1; `log`: (7.8), g = mu1 (s/t)(ln(t/s) + 1) for t above the yield strain s;
-    `j2`: plastic strain that remains (von Mises, flow theory), step by step of `[evolution]`;
-    `anisotropic`: sigma = C eps. Default: `linear`."""
+    """`linear`: g = mu1; `log`: g = mu1 (s/t)(ln(t/s) + 1) for t = |dev eps| above the yield strain
+    s; `j2`: flow theory (von Mises), with plastic strain that remains; `anisotropic`:
+    sigma = C eps. Default: `linear`."""
     young: Annotated[Positive | None, ISOTROPIC] = None
     """Young's modulus E (force/area)."""
     poisson: Annotated[
@@ -221,12 +221,12 @@ class Material(Section):
     c44: Annotated[Number | None, CRYSTAL] = None
     """c44 = c55."""
     poling: Poling | None = None
-    """Where X3 of a crystal points, its coupling's as well: angle (degrees) from x in 2-D, a
-    vector in 3-D. Default: y in 2-D, z in 3-D."""
+    """Direction of X3 of a crystal, and of its coupling: angle (degrees) from x in 2-D, a vector
+    in 3-D. Default: y in 2-D, z in 3-D."""
     yield_strain: Positive | None = None
     """Yield strain xi_0, a limit on |dev eps|. Required by `log`, of no effect on `linear`."""
     argument: Annotated[Literal["norm", "square"], LOG] = "norm"
-    """Argument of g: |dev eps|, or its square as printed in (7.8), which softens beyond e xi_0."""
+    """Argument of g: |dev eps|, or its square as the thesis has it, which softens beyond e xi_0."""
     g_min: Annotated[NonNegative, LOG] = 0.0
     """Floor of g (force/area); 0: none."""
     yield_stress: Annotated[Positive | None, J2] = None

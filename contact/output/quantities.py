@@ -106,9 +106,9 @@ _RUN = (
     ),
     Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(
-        "reactions", "force", "Force of the support of each part on the body, a vector a part. A "
-        "node of two parts counts for the one that stands first in the case. With the loads and "
-        "minus `contact_force` they add up to nothing; forces between bodies are no part of that.",
+        "reactions", "force", "Force of the support of each part on the body, a vector per part. "
+        "A node of two parts counts for the first of them in the case. The sum with the loads and "
+        "minus `contact_force`, without forces between bodies, is zero.",
         lambda r: {part: held.force for part, held in r.supports.items()},
     ),
     Quantity(
@@ -239,7 +239,8 @@ _RUN = (
     ),
     Quantity(
         "rigid", "", "The foundation that moves: its `displacement` and `rotation` (degrees), and "
-        "the `force` and `moment` on it from outside, given or held. Of several, one entry a part.",
+        "the `force` and `moment` on it from outside, given or reactions. Of several, one entry "
+        "per part.",
         lambda r: r.movements.get("rigid"),
     ),
     Quantity(
@@ -327,7 +328,7 @@ _NODES = (
     ),
     Quantity("x", "length", "Reference place of the node.", lambda n: n.points, (NODES,), "{axis}"),
     Quantity(
-        "weight", "area", "Area that the node stands for; sums with it are integrals over Γ₃.",
+        "weight", "area", "Tributary area of the node; sums with it are integrals over Γ₃.",
         files=(NODES, SURFACE),
     ),
     Quantity(
@@ -427,13 +428,13 @@ _HISTORY = (
 _AGAINST = (
     Quantity("on", "", "Part of the node: one that is `against` in a contact.", files=(AGAINST,)),
     Quantity("x", "length", "Reference place of the node.", None, (AGAINST,), "{axis}"),
-    Quantity("weight", "area", "Area that the node stands for.", files=(AGAINST, OPPOSITE)),
+    Quantity("weight", "area", "Tributary area of the node.", files=(AGAINST, OPPOSITE)),
     Quantity(
-        "pressure", "stress", "Forces of the contact on the node, over its area: the pressure.",
+        "pressure", "stress", "Normal contact force on the node over its area.",
         files=(AGAINST, OPPOSITE),
     ),
     Quantity(
-        "traction", "stress", "Of all of the force: the stress of the body with `on`.",
+        "traction", "stress", "Whole contact force on the node over its area, a vector.",
         None, (AGAINST, OPPOSITE), _VECTOR,
     ),
     Quantity(

@@ -142,10 +142,10 @@ def unloading(solution: Solution) -> Iterator[Remark]:
 
 
 def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remark]:
-    """Check (h1) on the strains that the solution has in each material."""
+    """Check strong monotonicity on the strains that the solution has in each material."""
     dim = 3 if solution.problem.domain.revolved else solution.problem.dim
     for material, strain in zip(solution.problem.body.materials, strains, strict=True):
-        # (h1) speaks of Hencky's laws; a crystal's stiffness is positive definite, or refused.
+        # That is asked of Hencky's laws; a crystal's stiffness is positive definite, or refused.
         law, place = material.law, f" in {', '.join(material.on)}" if material.on else ""
         if not np.isfinite(strain) or isinstance(law, Anisotropic | HistoryLaw):
             continue
@@ -161,7 +161,7 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
 
 
 def _monotonicity(law: Hencky, place: str, strain: float, dim: int) -> Remark:
-    """Say whether (h1) holds: where g exceeds (d/2) k_0 alone the operator is still monotone."""
+    """Say whether it is met: where g exceeds (d/2) k_0 alone the operator is still monotone."""
     report = check_monotonicity(law, strain, dim=dim)
     said = [] if report.holds else [f"the theory does not cover the material{place}"]
     if not report.hardens:
@@ -175,7 +175,7 @@ def _monotonicity(law: Hencky, place: str, strain: float, dim: int) -> Remark:
             f"{least:.3g}"
         )
     said.append(
-        f"assumption (h1) {'holds' if report.holds else 'does not hold'} on the strains of this "
+        f"strong monotonicity is {'met' if report.holds else 'not met'} on the strains of this "
         f"solution, |dev eps| <= {strain:.4g}: g_0 = {report.g_0:.4g} <= g <= "
         f"{report.largest:.4g}, (d/2) k_0 = {report.ceiling:.4g}, alpha = {report.alpha:.4g}, "
         f"beta = {report.beta:.4g}"
@@ -380,7 +380,7 @@ def _conductor(solution: Solution) -> Conductor | None:
 
 
 def conductivity(solution: Solution) -> Iterator[Remark]:
-    """Say which parts of (h~5) each conductivity gives up."""
+    """Say which assumptions of the existence theory each conductivity gives up."""
     if _conductor(solution) is None:
         return
     conductors = (contact.conductor for contact in solution.problem.contacts)
@@ -393,17 +393,17 @@ def conductivity(solution: Solution) -> Iterator[Remark]:
         )
     if PerfectConductivity in laws:
         yield (
-            'the current jumps as the gap closes, electric.law = "perfect": (h~5)(e) fails, and no '
-            "theorem says that there is a solution or only one: where contact ends within the "
-            'part, its edge is not determined; "shifted" with a large delta decides'
+            'the charge jumps as the gap closes, electric.law = "perfect": no theorem gives '
+            "existence or uniqueness of a solution; where contact ends inside a part, the edge is "
+            'not determined; "shifted" with a large delta determines it'
         )
 
 
 def ramp(solution: Solution) -> Iterator[Remark]:
-    """Set the ramp of psi beside the mesh, the effect of the current beside the stiffness.
+    """Set the ramp of psi beside the mesh, the effect of the charge beside the stiffness.
 
     Of a column of height H with the stiffness C, coupling e and permittivity beta, the potential
-    follows a change of the current by the share Bi/(1 + Bi) of phi - phi_F, Bi = k_e H/beta, and
+    follows a change of the charge by the share Bi/(1 + Bi) of phi - phi_F, Bi = k_e H/beta, and
     presses with e/H. A gap that opens by less than 1/delta thus opens itself further where
     delta |phi - phi_F| (e/C) Bi/(1 + Bi) exceeds 1: several solutions may then exist.
     """
@@ -429,7 +429,7 @@ def ramp(solution: Solution) -> Iterator[Remark]:
     if number >= 1:
         yield (
             f"several solutions may exist, and this is one reached from {solution.start}: the "
-            f"current changes within 1/delta = {width:.3g} of the gap by so much that it opens or "
+            f"charge changes within 1/delta = {width:.3g} of the gap by so much that it opens or "
             f"closes gaps by itself (a column asks for a number below 1, and it is {number:.3g}); "
             "a smaller delta has fewer of them"
         )

@@ -288,14 +288,14 @@ class ContactProblem:
         taken = bool(global_unknowns.tied[found.nodes, -1].any())
         if self.comm.allreduce(taken, op=MPI.LOR):
             raise InputError(
-                f"{key}.on: part {contact.on!r}, through which current flows, shares nodes with an "
+                f"{key}.on: part {contact.on!r}, which carries charge, shares nodes with an "
                 "electrode of unknown potential; accepted: parts apart, or an insulated foundation"
             )
         moves = global_unknowns.member(contact.on) is not None
         if held.size > 0 and moves:
             raise InputError(
-                f"{key}.rigid: supports hold nodes of part {contact.on!r}, through which current "
-                "flows as the foundation comes near; accepted: a part that can move everywhere"
+                f"{key}.rigid: supports hold nodes of part {contact.on!r}, which carry charge as "
+                "the foundation comes near; accepted: a part that can move everywhere"
             )
         return held
 

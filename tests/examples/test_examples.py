@@ -51,7 +51,7 @@ def test_example_7_2(
 
 
 def test_warning_and_review(tmp_path: Path) -> None:
-    """The uniqueness estimate of the slip law and (h1) are told, in the summary too."""
+    """The uniqueness estimate of the slip law and monotonicity are told, in the summary too."""
     path = str(CASES / "bar-large.toml")
     arguments = ["solve", path, "--out", str(tmp_path), "--quiet", "--set", "mesh.cells=[64, 16]"]
     assert main(arguments) == CONVERGED
@@ -59,7 +59,7 @@ def test_warning_and_review(tmp_path: Path) -> None:
     (warning,) = [text for text in summary["warnings"] if "friction falls" in text]
     assert "L_mu = 5000/length" in warning
     assert "several solutions may exist" in warning
-    assert any("(h1) holds" in note for note in summary["notes"])
+    assert any("strong monotonicity is met" in note for note in summary["notes"])
     assert summary["max_dev_strain"] > 0.05
 
 
