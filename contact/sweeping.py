@@ -1,4 +1,4 @@
-"""Sweeps: a case for each of several values of some of its keys, one row a value.
+"""Sweeps: a case for each of several values of some of its keys, one row per value.
 
 Each solve has the solution before it as warm start; where loads and friction alone change, the
 factorisation is kept. Rows that are there already are not computed again, provided that they were
@@ -116,7 +116,7 @@ def _spread(text: str, whole: str) -> str:
 
 
 def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float]:
-    """Return keys of the summary as columns, a vector one a component. Collective.
+    """Return keys of the summary as columns, a vector one per component. Collective.
 
     Parameters
     ----------

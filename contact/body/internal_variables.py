@@ -489,7 +489,7 @@ def _check(
         if given != accepted:
             raise InputError(
                 f"{type(law).__name__}: respond: {name}: given the shape {given}; accepted: "
-                f"{accepted}, a row a point"
+                f"{accepted}, a row per point"
             )
 
 

@@ -85,11 +85,13 @@ class HeightMap(Section):
     a NumPy array of heights, an image for instance. Relative to the case file. A warning tells the
     share of the contact that lies beyond them, or in a hole."""
     spacing: Annotated[
-        list[Positive] | None, Accepted("distances > 0, one a direction of the array")
+        list[Positive] | None, Accepted("distances > 0, one per direction of the array")
     ] = None
     """Distances of the points of an array: along its first axis, which is x, and in 3-D along its
     second, y. Required for an array."""
-    origin: Annotated[list[float] | None, Accepted("numbers, one a direction of the array")] = None
+    origin: Annotated[list[float] | None, Accepted("numbers, one per direction of the array")] = (
+        None
+    )
     """Place of the first point of an array. Default: zeros."""
     above: Switch = False
     """Whether the rigid body lies above the heights, and the elastic one below."""
@@ -118,7 +120,7 @@ class HeightMap(Section):
         except (OSError, ValueError, EOFError) as error:
             raise InputError(f"{self.file}: {error}; accepted: a NumPy array of heights") from None
         spacing, origin = self.spacing or [], self.origin or [0.0] * heights.ndim
-        one = f"{heights.ndim} numbers, one a direction of the array"
+        one = f"{heights.ndim} numbers, one per direction of the array"
         for key, given in (("spacing", spacing), ("origin", origin)):
             expect(f"foundation.{key}", given, one, len(given) == heights.ndim)
         steps = zip(origin, spacing, heights.shape, strict=True)

@@ -216,7 +216,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
     )
     yield (
         "sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]",
-        "solve a case for several values of some keys: sweep.csv, one row a value",
+        "solve a case for several values of some keys: sweep.csv, one row per value",
         files_help("sweep.csv"),
         {
             "case": case,

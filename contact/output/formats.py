@@ -43,7 +43,7 @@ class Grid:
     shape
         Of the cells.
     at_points, in_cells
-        Fields by name, one row a node or cell.
+        Fields by name, one row per node or cell.
     """
 
     points: Array

@@ -13,7 +13,7 @@ SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
 ADAPT = "adapt.csv"
 NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
 BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
-#: Tables with a row a solution; the others have columns of arrays.
+#: Tables with a row per solution; the others have columns of arrays.
 ROWS = (STEPS, SWEEP, ADAPT)
 #: Status of a node -> its number in ``contact.vtu``.
 STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
@@ -33,7 +33,7 @@ class Quantity:
         A function of `solution.Solution`; in ``history.csv`` of `methods.report.Record`, in
         ``contact.csv`` and ``contact.vtu`` of `surface.ContactResult`, in ``fields.vtu`` of
         `fields.Point`, on master sides of a mapping. By default the attribute, or entry, of the
-        quantity's name. A mapping has several columns, a vector one a component; None stands for a
+        quantity's name. A mapping has several columns, a vector one per component; None is for a
         quantity that a problem does not have, which has no key, column or field then.
     files
         Where it stands; the first has the description.

@@ -146,7 +146,7 @@ def test_heights_that_are_none(tmp_path, name):
     [
         ({"spacing": [0.1]}, r"contact.foundation.spacing: given .0.1.*; accepted: that of a .npy"),
         ({"origin": [0.1]}, r"contact.foundation.origin: given .0.1.*; accepted: that of a .npy"),
-        ({"origin": {"x": 0.1}}, "origin: given a table; accepted: numbers, one a direction"),
+        ({"origin": {"x": 0.1}}, "origin: given a table; accepted: numbers, one per direction"),
     ],
 )
 def test_places_of_an_array_alone(more, message):
