@@ -49,8 +49,8 @@ from forms.piezo import coupling_number, hexagonal, saddle_form, symmetrised_for
 # %% [markdown]
 # ## Printing a form
 #
-# An abstract triangle mesh is enough to write forms down. $B(u; v, w)$ of section 3.4 is linear
-# in $v$ and $w$; its modulus is frozen at $u$.
+# An abstract triangle mesh is enough to write forms down. $B(u; v, w)$ is linear in $v$ and $w$;
+# its modulus is frozen at $u$. Sections and equations here are those of the thesis.
 
 # %%
 cell = "triangle"
@@ -115,8 +115,8 @@ hessian = matrix(ufl.derivative(ufl.derivative(energy, u, w), u, v))
 assert np.linalg.norm(hessian - tangent) < 1e-12
 
 # %% [markdown]
-# The tangent is softer than the secant in the plastic range. This is why the first Newton step from
-# a state near zero goes too far, and Kacanov's does not.
+# The tangent is softer than the secant in the plastic range. Therefore the first Newton step from
+# a state near zero is too long, and Kacanov's is not.
 
 # %%
 plastic = np.sort(np.linalg.eigvalsh(tangent))[3:]  # without the rigid motions
@@ -162,9 +162,9 @@ print(f"its derivative:   asymmetry {asymmetry(matrix(friction)):.2f}")
 assert asymmetry(fixed_bound) < 1e-14
 
 # %% [markdown]
-# The layer $j_1$ of section 6.2 presses the harder the further the potential is from that of the
-# foundation; the current $l$ of (5.11) flows where the gap is nearly closed. Far in contact the
-# charge is that of a plate: $k_e (\varphi - \varphi_F)$ times the area.
+# The pressure of the layer $j_1$ of section 6.2 grows with the potential difference to the
+# foundation; the charge $l$ of (5.11) is there where the gap is nearly closed. Far in contact it
+# is that of a plate capacitor: $k_e (\varphi - \varphi_F)$ times the area.
 
 # %%
 layer, grows = Compliance(0.5), PotentialFactor(1.0, 2.0, 0.6)
@@ -218,7 +218,7 @@ assert np.linalg.eigvalsh(saddle + saddle.T).min() > -1e-9
 # ## The laws
 #
 # Hencky's law (7.8): the modulus falls in the plastic range while the stress keeps rising, which is
-# assumption (h1). Read with the *square* of the norm as its argument, it softens.
+# strong monotonicity. Taken with the *square* of the norm as its argument, it softens.
 
 # %%
 t = np.linspace(0, 0.4, 401)

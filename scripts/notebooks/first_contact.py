@@ -7,8 +7,8 @@
 # %% [markdown]
 # # First contact
 #
-# A block of rubber is pressed on a rigid table and pushed aside. Where does it stick, where does it
-# slide? A problem in ten lines of Python, its solution, and a check by hand.
+# A block of rubber is pressed on a rigid table and pushed sideways. Where does it stick, where does
+# it slide? A problem in ten lines of Python, its solution, and a check by hand.
 
 # %%
 import matplotlib.pyplot as plt
@@ -22,8 +22,8 @@ domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (32, 16))
 sorted(domain.parts)
 
 # %% [markdown]
-# The top is moved down by 0.005 and aside by 0.002; the bottom lies on the table, with Coulomb's
-# friction.
+# The top is moved by 0.005 down and by 0.002 to the side; the bottom lies on the table, with
+# Coulomb friction.
 
 # %%
 rubber = Linear(10.0, 0.3)
@@ -50,8 +50,8 @@ plt.legend()
 plt.show()
 
 # %% [markdown]
-# By hand: the forces on the block balance, and without any friction the block would be compressed
-# by its imposed strain 0.005 with nothing sideways, E/(1 - ν²) in plane strain.
+# By hand: the forces on the block balance, and without friction the strain is 0.005 and the modulus
+# that of plane strain, E/(1 - ν²).
 
 # %%
 np.testing.assert_allclose(solution.reaction("top"), solution.contact_force, rtol=1e-7)
@@ -63,7 +63,7 @@ print(-smooth.contact_force[1], by_hand)
 assert np.isclose(-smooth.contact_force[1], by_hand, rtol=1e-8)
 
 # %% [markdown]
-# How much of it slides as the coefficient grows:
+# The share that slides falls as the coefficient grows:
 
 # %%
 coefficients = (0.1, 0.2, 0.3, 0.5, 0.8)

@@ -7,9 +7,9 @@
 # %% [markdown]
 # # Fretting: press, then back and forth
 #
-# Friction depends on its history: the slip of one step is not undone in the next. A block is
-# pressed on a foundation, then moved back and forth; its ends slip, its middle sticks, and the
-# force over the displacement makes a loop whose area is the heat of a cycle.
+# Friction depends on the loading path. A block is pressed on a foundation, then moved back and
+# forth; its ends slip, its middle sticks, and the force over the displacement is a loop whose area
+# is the dissipation of a cycle.
 
 # %%
 import matplotlib.pyplot as plt
@@ -36,7 +36,7 @@ plt.ylabel("force that drives it")
 plt.show()
 
 # %% [markdown]
-# The area of the loop is the dissipation of friction in a cycle, up to the size of the steps:
+# The area of the loop equals the dissipation up to an error of the order of the steps:
 
 # %%
 dissipated = np.array([row["dissipation"] for row in rows])

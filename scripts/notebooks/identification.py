@@ -7,8 +7,8 @@
 # %% [markdown]
 # # Parameters from measurements, and a shape for a wanted pressure
 #
-# A solution of a contact problem knows its derivatives: the consistent Newton matrix is factorised
-# at the solution, and each derivative costs a few more back-substitutions. Here they find friction
+# With the consistent Newton matrix factorised at the solution of a contact problem, each derivative
+# of a result costs a few more back-substitutions. Here derivatives find friction
 # and modulus from a noisy loop, piezoelectric constants from two indentations, and the shape of a
 # foundation with 500 parameters. See [Sensitivities](../derivatives.md).
 
@@ -80,10 +80,10 @@ plt.show()
 # %% [markdown]
 # ## Constants of PZT-4 from two indentations
 #
-# The force on a ball depends otherwise on the constants where the ball is grounded than where it
-# insulates: $\partial\ln P/\partial\ln c_{33}$ is .89 and .63, by $e_{33}$ -.07 and .18. Both force
-# curves together give two constants, if the others are known. One curve alone does not tell them
-# apart: the correlation would be 1.
+# Under a grounded ball the force depends on the constants otherwise than under an insulating one:
+# $\partial\ln P/\partial\ln c_{33}$ is .89 and .63, by $e_{33}$ -.07 and .18. Both force
+# curves together give two constants, if the others are known. One curve alone does not: the
+# correlation would be 1.
 
 # %%
 ball = [
@@ -156,9 +156,9 @@ class Misfit:
 
 
 # %% [markdown]
-# Pressure is about a derivative of the height: waves of the foundation count by their number. With
-# their coefficients times 1 + k as unknowns a quasi-Newton method (L-BFGS) needs few iterations.
-# A node that has lost contact has no derivative any more: those at the ends stay open.
+# Pressure is like a derivative of the height: the effect of a wave of the foundation grows with its
+# wave number k. With the coefficients times 1 + k as unknowns a quasi-Newton method (L-BFGS) needs
+# few iterations. An open node has no derivative: those at the ends stay open.
 
 # %%
 scale, misfit = 0.01 / (1 + np.arange(count)), Misfit()

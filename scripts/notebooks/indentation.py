@@ -8,8 +8,8 @@
 # # Indentation: a sphere presses on a half space
 #
 # A body of revolution is solved on its half plane, x the radius and y the axis. A rigid sphere,
-# free to move along the axis, is pressed on it by a force; how deep it goes, and how large the
-# contact becomes, Hertz knew for a half space.
+# free to move along the axis, is pressed on it by a force. Depth and contact radius are compared
+# with Hertz's for a half space.
 
 # %%
 import matplotlib.pyplot as plt
@@ -65,7 +65,7 @@ print(
 )
 
 # %% [markdown]
-# The area in contact is a ring's sum of node weights, π a² but for half a cell. Over the force:
+# The contact area, the sum of tributary areas, is π a² up to half a cell. Over the force:
 
 # %%
 forces = np.array([30.0, 100.0, 300.0])

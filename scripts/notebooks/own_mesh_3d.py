@@ -37,7 +37,7 @@ occ.fragment([(3, part)], [(2, washer)])
 occ.synchronize()
 
 # %% [markdown]
-# Faces get their names by where they lie. The disk has cut the washer's seat out of the foot's top.
+# Faces get their names by their positions. The disk cuts the washer's seat out of the foot's top.
 
 # %%
 faces = {"bottom": [], "washer": [], "tip": []}
@@ -65,7 +65,7 @@ with TemporaryDirectory() as folder:
 print({name: len(domain.facets(name)) for name in domain.parts}, "facets")
 
 # %% [markdown]
-# The screw's force, 5 kN, is spread over the washer; it also holds the foot sideways. The tip is
+# The screw's force, 5 kN, is distributed over the washer, which is also fixed sideways. The tip is
 # pulled by 5 MPa, away from the foot.
 
 # %%
@@ -87,8 +87,8 @@ print(f"{solution.contact_area:.0f} of {contact.weight.sum():.0f} mm2 touch")
 solution.plot()
 
 # %% [markdown]
-# Heel and washer bear; in between the foot lifts off. Is the balance right? The table bears the
-# screw's force, but for the polygons that stand for its circles:
+# Heel and washer press; in between the foot lifts off. The table bears the screw's force, up to the
+# error of polygons in place of circles:
 
 # %%
 table_force = solution.contact_force

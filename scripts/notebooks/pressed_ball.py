@@ -8,8 +8,8 @@
 # # A ball pressed into steel, and lifted off
 #
 # A rigid ball of radius 10 mm is pressed into steel that yields at 250 MPa, to ten times the depth
-# of first yield, and lifted. With `law = "j2"` plastic strain has a history: a mark, a rim and
-# residual stress remain.
+# of first yield, and lifted. With `law = "j2"` plastic strain remains, and with it an impression, a
+# rim and residual stress.
 
 # %%
 import matplotlib.pyplot as plt
@@ -26,7 +26,7 @@ print(solution.outcome.reason)
 print(f"largest equivalent plastic strain {solution.equivalent_plastic_strain:.4f}")
 
 # %% [markdown]
-# The force goes up on a curve, and comes down on another one: it is gone before the ball is back.
+# Loading and unloading are different curves: the force is zero before the ball is back.
 
 # %%
 depth = 1e3 * np.array([0.0, *(-step.row["rigid_y"] for step in solution.steps)])
@@ -41,7 +41,7 @@ print(f"{plastic:.2e} N mm are lost to plastic flow")
 assert force[-1] == 0 and plastic > 0
 
 # %% [markdown]
-# The surface after the ball has gone: the mark, and the rim around it.
+# The surface after the ball is lifted: the impression, and the rim around it.
 
 # %%
 nodes, body = solution.problem.nodes, solution.problem.equilibrium
@@ -58,8 +58,8 @@ print(f"mark {-height.min():.3f} µm deep, rim {height.max():.3f} µm high")
 assert height.min() < -0.1
 
 # %% [markdown]
-# And the residual stress: compressive across the axis below the mark, where the elastic rest of the
-# body presses the plastic zone together.
+# The residual stress is compressive across the axis below the impression, where the elastic part of
+# the body compresses the plastic zone.
 
 # %%
 fields = DerivedFields(body, solution.state).nodes()

@@ -8,8 +8,8 @@
 # # A contact sensor
 #
 # A piezoelectric body between an electrode and a table with friction: the charge of the
-# short-circuited electrode, or the potential of the open one, says how large the load is. How
-# linear is it? `scripts/examples/sensor.py` makes this curve for any case file.
+# short-circuited electrode, or the potential of the open one, measures the load. How linear is
+# it? `scripts/examples/sensor.py` makes this curve for any case file.
 
 # %%
 import matplotlib.pyplot as plt
@@ -42,7 +42,7 @@ for factor, charge in zip(factors, charges, strict=True):
     print(f"load x {factor}: charge per load {charge / factor:.5g}")
 
 # %% [markdown]
-# A single reading, step by step: build, solve, read.
+# A single reading in three steps: build, solve, read.
 
 # %%
 problem = build_problem(case).at(1.0)

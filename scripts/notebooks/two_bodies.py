@@ -7,8 +7,8 @@
 # %% [markdown]
 # # Two bodies: a steel cylinder on a block of aluminium
 #
-# Parts of one mesh may touch each other: `[contact] against = ...`. A mortar method in between lets
-# their meshes be as they are. The example is NAFEMS's R0094-1, half of it by symmetry.
+# Parts of one mesh may touch each other: `[contact] against = ...`. By the mortar method their
+# meshes need not match. The example is NAFEMS's R0094-1, half of it by symmetry.
 
 # %%
 from tempfile import TemporaryDirectory
@@ -28,8 +28,8 @@ print(solution.outcome.reason)
 solution.plot()
 
 # %% [markdown]
-# Both sides where they meet, deformed, each with its own nodes: beneath the cylinder they are one
-# line, beyond they part.
+# Both sides, deformed, each with its own nodes: beneath the cylinder they are one line, beyond it
+# they separate.
 
 # %%
 with TemporaryDirectory() as folder:
@@ -50,7 +50,7 @@ plt.legend()
 plt.show()
 
 # %% [markdown]
-# Hertz's line contact, of both moduli together: the half width a and the largest pressure.
+# Hertz's line contact with the modulus of both bodies: half width a and largest pressure.
 
 # %%
 force, radius = 35e3, 50.0  # N a millimetre of the whole cylinder, mm
