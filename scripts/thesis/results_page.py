@@ -31,52 +31,62 @@ INTRODUCTION = """\
 
 The models and Algorithms 1 to 9 are from {cite:t}`mandyly2020`. Each of its tables and figures has
 its counterpart here. The solutions agree with independent codes to their digits. Counts of
-iterations agree in some tables and not in others; a count that agrees only for a constant that the
-thesis does not print is no evidence, and the remarks say which these are.
+iterations agree in some tables and differ in others. Some agree only for a constant that the thesis
+does not print, which is no evidence; the remarks name these.
 """
 
 READING = """\
 ## How the thesis was read
 
 Every run reports its residuals, computed from scratch after the solve: *residual* is the largest of
-equilibrium, contact and friction, and 0 where forces balance to their rounding. A penalty solution
-is judged by the residual of the penalised problem (PV_eps) instead. A script stops if a run does
-not converge, so that no table holds numbers of one that has not, unless it says so. A dash, —,
-stands for a value that is not defined or was not reached; dashed and dotted lines are bounds,
-limits and references. The numbers behind every picture are in the CSV file of the same name.
+equilibrium, contact and friction, and 0 where forces balance to their rounding. The residual of a
+penalty solution is that of the penalised problem (PV_eps). A script stops if a run does not
+converge, so that tables have converged runs alone, unless they say so. A dash, —, marks a value
+that is not defined or was not reached; dashed and dotted lines are bounds, limits and references.
+The numbers behind every picture are in the CSV file of the same name.
 
-**Read again.** The printed numbers of chapter 8 in SI units (E = 58.7 GPa, loads of 10 to 120
-N/m^2, a gap of 0.5 m, phi_F = 32 V) cannot touch the foundation, nor yield. They are consistent in
-GPa, m, C/m^2 and GV: E = 58.7102, loads and phi_F as printed, permittivities times 1e9. All
-examples of chapter 8 are in these units, and their strains are then of the order of 1, in cells at
-corners more, the finer the more, and det(I + grad u) is negative in some of these. Small strain is
-a formal model there, and the program warns of it. The thesis's rho = 0.5 of Examples 8.3 and 8.4 is
-the gap, varrho elsewhere. The decay rho of (7.16) it prints for chapter 7 alone: here it is 1 in
-Examples 8.1 and 8.2, see *Sensitivity*. The thesis's delta "is small": here psi rises within
-1/delta, a tenth of the body's volume over the area of its contact part, 0.4 in Examples 8.1 and 8.2
-and 0.3 in 8.4, which meshes resolve; earlier versions took a thousandth of its size, with the
-effect shown beside. c_nu = 10, alpha_nu = 2 and n_nu = 0.1 are not printed either.
+**Units and constants**
 
-Formulas too: (1.13) has g of |dev eps|^2, and (7.8) by the letter would yield where that is xi_0.
-Such a material softens beyond |dev eps|^2 = e xi_0, against (h1)(b), and in Example 7.2 next to
-nothing would yield. xi_0 is taken for a limit of |dev eps| itself, for which d(g t)/dt = mu_1
-xi_0/t > 0; `argument = "square"` takes the letter. psi of (1.34) rises behind the gap, where (1.26)
-allows nothing: as printed no foundation conducts. Here it has risen where the gap closes
-(`shifted`), and (h~5)(d), psi = 0 for u_nu <= rho, does not hold. For the same reason p_nu(u_nu -
-rho) of (1.29) and (6.9) is never more than 0; Examples 8.3 and 8.4 are computed as printed, and
-with a layer of thickness 0.1 before the rigid part. f_2 = 1600 of Example 7.1, a force per area in
-its text, is a line load in its formulas for p and b, and so it is here; its u_tau = 0 on the line
-of symmetry would hold the cylinder up, and is u_x = 0 here. sigma_zz, which Remark 7.1 has as 0, is
-(k_0 - 2 g/3) tr eps in plane strain, and part of von Mises stresses. Section 8.1 lays the axis of
-poling along X_1, its matrix (8.2) along X_3: so it is here. R = identity, with which the thesis
-computes, is no R of (h3): existence is proved for smoothed pressures (*Non-local friction at
-work*).
+- The printed numbers of chapter 8 in SI units (E = 58.7 GPa, loads of 10 to 120 N/m^2, a gap of
+  0.5 m, phi_F = 32 V) cause neither contact nor yielding. They are consistent in GPa, m, C/m^2 and
+  GV: E = 58.7102, loads and phi_F as printed, permittivities times 1e9. All examples of chapter 8
+  are in these units.
+- Their strains are of the order of 1, larger in cells at corners the finer the mesh is, and
+  det(I + grad u) is negative in some of these. Small strain is a formal model there, and the
+  program warns of it.
+- The thesis's rho = 0.5 of Examples 8.3 and 8.4 is the gap, varrho elsewhere. The decay rho of
+  (7.16) is printed for chapter 7 alone: here it is 1 in Examples 8.1 and 8.2, see *Sensitivity*.
+- The thesis's delta "is small": here psi rises within 1/delta, a tenth of the body's volume over
+  the area of its contact part, 0.4 in Examples 8.1 and 8.2 and 0.3 in 8.4, which meshes resolve.
+  A thousandth of the body's size is compared with it.
+- c_nu = 10, alpha_nu = 2 and n_nu = 0.1 are not printed either.
 
-**How iterations are ended.** (3.45), (3.46) and (4.38) are as printed. (5.38) and (6.40) add u and
-phi in L2(Omega); the program measures phi in its own unit, sqrt(mu_1/beta) of the body, in which
-both are comparable whatever the units, and the thesis adds them as they are. As the thesis has it
-Example 8.3 takes as many iterations where inner loops are solved, and 10 for 8, with a layer 6 for
-5, where they are not.
+**Formulas**
+
+- In (1.13) g is a function of |dev eps|^2, and by (7.8) yielding would begin where that is xi_0.
+  Such a material softens beyond |dev eps|^2 = e xi_0, against (h1)(b), and in Example 7.2 hardly
+  any of the body would yield. Here xi_0 is a limit of |dev eps|, for which d(g t)/dt =
+  mu_1 xi_0/t > 0; `argument = "square"` is the printed form.
+- psi of (1.34) rises behind the gap, which (1.26) excludes: as printed no foundation conducts. Here
+  it has risen where the gap closes (`shifted`), and (h~5)(d), psi = 0 for u_nu <= rho, is not met.
+  For the same reason p_nu(u_nu - rho) of (1.29) and (6.9) is never more than 0; Examples 8.3 and
+  8.4 are computed as printed, and with a layer of thickness 0.1 before the rigid part.
+- f_2 = 1600 of Example 7.1, a force per area in its text, is a line load in its formulas for p and
+  b, and so it is here. Its u_tau = 0 on the line of symmetry would support the cylinder, and is
+  u_x = 0 here.
+- sigma_zz, which Remark 7.1 has as 0, is (k_0 - 2 g/3) tr eps in plane strain, and part of von
+  Mises stresses.
+- The axis of poling is along X_1 in section 8.1, and along X_3 in its matrix (8.2), as here.
+- R = identity, with which the thesis computes, does not satisfy (h3): existence is proved for
+  smoothed pressures (*Non-local friction at work*).
+
+**Stopping rules**
+
+- (3.45), (3.46) and (4.38) are as printed.
+- (5.38) and (6.40) add u and phi in L2(Omega). The program measures phi in the unit
+  sqrt(mu_1/beta) of the body, in which both are comparable whatever the units; the thesis adds the
+  numbers. With the thesis's sum Example 8.3 takes as many iterations where inner loops are solved;
+  where they are not, 10 for 8, and with a layer 6 for 5.
 """
 
 CONTENTS = """\
