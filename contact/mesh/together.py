@@ -15,7 +15,7 @@ ACCEPTED = "the name of a part, or a list of names"
 
 
 class Together(str):
-    """The name of several parts together: their names, with commas between.
+    """The name of several parts together: their names with + between, one word in tables.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Together(str):
     def __new__(cls, members: Iterable[str]) -> Together:
         """Join names."""
         names = tuple(members)
-        made = super().__new__(cls, ", ".join(names))
+        made = super().__new__(cls, "+".join(names))
         made.members = names
         return made
 

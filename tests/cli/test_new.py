@@ -211,6 +211,6 @@ def test_a_part_that_faces_two_bodies_is_one_contact(tmp_path: Path) -> None:
     assert main(["new", str(tmp_path / "base.inp")]) == CONVERGED
     path = tmp_path / "base.toml"
     (contact,) = load_case(path).contact
-    assert (contact.on, contact.against) == ("face", "one, two")
+    assert (contact.on, contact.against) == ("face", "one+two")
     assert main(["check", str(path)]) == CONVERGED
     assert main(["solve", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == CONVERGED

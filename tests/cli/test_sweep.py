@@ -305,3 +305,13 @@ def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
     (tmp_path / "out" / "sweep.csv").write_text("nothing")
     assert main(["plot", out]) == 2
     assert "damaged" in capsys.readouterr().err
+
+
+def test_the_forces_of_several_parts_together_are_a_column(sweep):
+    """An elastic support on a list of parts has one name, without the comma between columns."""
+    elastic = ("--set", "elastic=[{ on = ['left', 'right'], stiffness = [0.0, 0.01] }]")
+    given = ("--over", "load.0.traction=[0.0, -0.005]", *elastic, "--set", "contact.gap=1.0")
+    columns = ("--columns", "reactions.left+right,contact_area")
+    status, rows = sweep(*given, "--set", "fixed.0.displacement=[0.0, 'free']", *columns)
+    assert status == 0
+    assert float(rows[0]["reactions.left+right_y"]) == pytest.approx(0.01, rel=1e-6)
