@@ -243,12 +243,15 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
                 "NAME",
                 "colour the body by this field of fields.vtu, von_mises, displacement, "
                 "displacement_y, stress_xy, potential, ..., and draw this figure alone; of a "
-                "sweep, draw this column",
+                "sweep, draw this column, as figure-sweep-NAME",
             ),
             "--format": _value("pdf,png", "formats of the files: png, pdf, svg", default="png"),
             "--width": _value("85mm", "width of the figures, in mm, cm or in"),
-            "--xlim": _value("A,B", "ends of the x axis of places in 2-D figures"),
-            "--ylim": _value("A,B", "ends of the y axis of places in 2-D figures"),
+            "--xlim": _value(
+                "A,B",
+                "show places with x (r) between these alone, coordinates of the mesh",
+            ),
+            "--ylim": _value("A,B", "likewise y (z); of bodies in 3-D neither is read"),
             "--mirror": _flag("show both halves of a body of revolution"),
             "--animate": _flag(
                 "draw animation-FIELD.gif instead, the deformed body over the steps of an evolution"

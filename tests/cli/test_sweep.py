@@ -12,6 +12,9 @@ import pytest
 from contact.cli.main import main
 from contact.errors import InputError
 from contact.methods.signals import Interrupted
+from contact.output.figures.sweep import DRAWN
+from contact.output.figures.sweep import _figure as sweep_figure
+from contact.output.figures.sweep import _read as read_sweep
 from contact.sweeping import Axis
 from tests.cli.running import MESH
 from tests.problems.bar import BAR
@@ -297,7 +300,11 @@ def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
     assert main(["plot", out, "--format", "png,pdf"]) == 0
     assert (tmp_path / "out" / "figure-sweep.png").stat().st_size > 10_000
     assert (tmp_path / "out" / "figure-sweep.pdf").exists()
-    assert main(["plot", out, "--field", "contact_area"]) == 0
+    whole = (tmp_path / "out" / "figure-sweep.png").read_bytes()
+    assert main(["plot", out, "--field", "contact_area", "--field", "max_pressure"]) == 0
+    assert (tmp_path / "out" / "figure-sweep.png").read_bytes() == whole
+    drawn = {path.name for path in (tmp_path / "out").glob("figure-sweep-*")}
+    assert drawn == {"figure-sweep-contact_area.png", "figure-sweep-max_pressure.png"}
     assert main(["plot", out, "--field", "area"]) == 2
     assert "no such column of sweep.csv; accepted: converged" in capsys.readouterr().err
     assert main(["plot", out, "--xlim", "-0.5,1"]) == 2
@@ -315,3 +322,28 @@ def test_the_forces_of_several_parts_together_are_a_column(sweep):
     status, rows = sweep(*given, "--set", "fixed.0.displacement=[0.0, 'free']", *columns)
     assert status == 0
     assert float(rows[0]["reactions.left+right_y"]) == pytest.approx(0.01, rel=1e-6)
+
+
+def test_labels_of_a_sweep_have_words_and_units(tmp_path):
+    """A vector of which a component varies is drawn over it; rounding is no panel."""
+    keys, columns = "friction.mu,load.0.traction", "contact_force_x,contact_force_y,max_pressure"
+    rows = '0.1,"[0.0, -1.0]",True,{},-2.0,3.0\n0.1,"[0.0, -4.0]",True,{},-8.0,9.0\n'
+    case = '[case.units]\nlength = "mm"\nstress = "MPa"\n[space]\nkinematics = "{}"\n'
+    (tmp_path / "sweep.csv").write_text(
+        f"{keys},converged,{columns}\n" + rows.format("1e-15", "-3e-15")
+    )
+    for kinematics, unit in (("plane_strain", "N/mm"), ("axisymmetric", "N")):
+        (tmp_path / "sweep.toml").write_text('title = "Bars"\n' + case.format(kinematics))
+        swept = read_sweep(tmp_path)
+        assert [name for name in DRAWN if swept.varies(name)] == ["contact_force_y", "max_pressure"]
+        figure = sweep_figure(swept, ["contact_force_y", "max_pressure"])
+        force, pressure = figure.axes
+        assert force.get_ylabel() == f"contact force, $y$ ({unit})"
+        assert pressure.get_ylabel() == "largest pressure (MPa)"
+        assert force.get_xlabel() == "load 0: traction, $y$ (MPa)"
+        assert list(force.lines[0].get_xdata()) == [-4.0, -1.0]
+        assert force.lines[0].get_label() == r"friction: $\mu$ = 0.1"
+        assert figure.get_suptitle() == "Bars"
+    (tmp_path / "sweep.toml").unlink()
+    with pytest.raises(InputError, match=r"sweep\.toml: missing or damaged"):
+        read_sweep(tmp_path)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from contact.cli.arguments import parse
 from contact.errors import InputError
-from contact.output.figures.body import draw_plane, picture
+from contact.output.figures.body import draw_plane, magnification, picture
 from contact.output.figures.contact import draw_line
 from contact.output.figures.figures import draw
 from contact.output.figures.run import Run
@@ -111,14 +112,98 @@ def moved(**columns: list[float]) -> Run:
     return replace(run, steps=course | {k: np.array(v) for k, v in columns.items()})
 
 
-def test_the_loop_is_along_the_direction_that_moves() -> None:
-    """Where it goes back, by more than the others tremble; else where it goes farthest."""
-    loop = moved(rigid_x=[1.0, 0.0, -1.0, 0.0], rigid_y=[0.5, 0.49, 0.5, 0.49])
-    assert "u_x" in draw_loop(loop, "rigid").axes[0].get_xlabel()
-    along = moved(rigid_x=[0.1, 0.3, 0.1, 0.3], rigid_y=[0.3, 0.6, 0.9, 1.2])
-    assert "u_x" in draw_loop(along, "rigid").axes[0].get_xlabel()
-    far = moved(rigid_x=[0.1, 0.2, 0.3, 0.4], rigid_y=[0.3, 0.6, 0.9, 1.2])
-    assert "u_y" in draw_loop(far, "rigid").axes[0].get_xlabel()
+@pytest.mark.parametrize(
+    ("columns", "drawn"),
+    [
+        ({"rigid_x": [0.0, 0.01, -0.01, 0.01], "rigid_y": [-1.0, -1.0, -1.0, -1.0]}, "xy"),
+        ({"rigid_x": [1.0, 0.0, -1.0, 0.0], "rigid_y": [1e-9, -1e-9, 1e-9, 0.0]}, "x"),
+        ({"rigid_y": [0.3, 0.6, 0.9, 1.2]}, "y"),
+    ],
+)
+def test_a_loop_is_drawn_for_each_direction_that_moves(
+    columns: dict[str, list[float]], drawn: str
+) -> None:
+    """The load line and the loop of shear, which is far shorter; not rounding."""
+    axes = draw_loop(moved(**columns), "rigid").axes
+    assert [ax.get_xlabel() for ax in axes] == [f"displacement $u_{axis}$" for axis in drawn]
+    for ax, axis in zip(axes, drawn, strict=True):
+        assert ax.lines[0].get_xdata()[1:] == pytest.approx(columns[f"rigid_{axis}"])
+
+
+def curved(nodes: int = 9, **columns: Any) -> Run:
+    """Return the run of a block whose contact part is taken for a quarter of a circle."""
+    run = run_of(solve(block(2)))
+    angle = np.linspace(0.0, np.pi / 2, len(run.table["x"]))
+    places = {"x": 3 - np.cos(angle), "y": np.sin(angle), "gap": 0 * angle}
+    table = {k: v[:nodes] for k, v in (run.table | places | columns).items()}
+    surface = run.surface.copy()
+    surface["row"][:] = 0  # nothing is held
+    return replace(run, table=table, surface=surface)
+
+
+def test_ends_of_axes_are_coordinates_on_curved_parts_too() -> None:
+    run = curved()
+    whole = draw_line(run, Look()).axes[-1]
+    assert whole.get_xlabel() == r"$\ell$ along $\Gamma_3$, from (2, 0)"
+    assert whole.get_xlim() == pytest.approx((0.0, np.pi / 2), rel=0.01)
+    # x < 2.3 is an angle below arccos(0.7), y > 0.5 one above 30 degrees.
+    room = run.table["weight"].max() / 2 + np.pi / 16
+    low, high = draw_line(run, Look(xlim=(0.0, 2.3), ylim=(0.5, 5.0))).axes[0].get_xlim()
+    assert abs(low - np.pi / 6) < room and abs(high - np.arccos(0.7)) < room
+    beside = "--xlim 0,1.9: beside the contact part, which has x from 2 to 3; accepted: coordinates"
+    with pytest.raises(InputError, match=beside):
+        draw_line(run, Look(xlim=(0.0, 1.9)))
+
+
+def test_a_contact_beside_the_ends_is_left_out() -> None:
+    """Not the figure: another one is within them."""
+    run = run_of(solve(block(2)))
+    table = {k: np.concatenate([v, v]) for k, v in run.table.items()}
+    count = len(run.table["x"])
+    table["entry"] = np.repeat([0, 1], count)
+    table["on"] = np.repeat(["one", "two"], count)
+    table["x"] = np.where(table["entry"] == 1, table["x"] + 10.0, table["x"])
+    both = replace(run, table=table)
+    assert len(draw_line(both, Look()).axes) == 2 * len(draw_line(run, Look()).axes)
+    axes = draw_line(both, Look(xlim=(10.5, 11.0))).axes
+    assert len(axes) == len(draw_line(run, Look()).axes)
+    assert axes[0].get_xlim() == (10.5, 11.0)
+
+
+def test_a_contact_of_one_node_has_the_width_of_its_share() -> None:
+    run = curved(nodes=1)
+    ax = draw_line(run, Look()).axes[0]
+    low, high = ax.get_xlim()
+    assert (low + high) / 2 == pytest.approx(run.table["x"][0])
+    assert high - low == pytest.approx(run.table["weight"][0])
+    assert ax.lines[0].get_marker() == "o"
+
+
+def test_rows_may_run_against_the_axis() -> None:
+    """The axis ends at a node that is held beside the first row, which lies right."""
+    run = run_of(solve(block(2)))
+    table = {k: v[::-1][:-1] for k, v in run.table.items()}
+    held = run.surface.copy()
+    held["row"][np.argmin(np.abs(held.points[:, 0]) + np.abs(held.points[:, 1]))] = -1
+    ax = draw_line(replace(run, table=table, surface=held), Look()).axes[0]
+    assert ax.get_xlim() == pytest.approx((0.0, 2.0))
+
+
+def test_magnified_bodies_do_not_overlap() -> None:
+    """A gap that small displacements close: bodies would overlap by 19 times of it."""
+    run = run_of(solve(block(2)))
+    large = run.displacement * 1e-3 * run.diameter / np.abs(run.displacement).max()
+    run.body.point_data["displacement"] = large
+    count = len(run.table["x"])
+    table = run.table | {"u_n": np.full(count, 1e-3), "gap": np.full(count, 1e-3)}
+    rigid, bodies = (
+        replace(run, table=table | {"rigid": np.full(count, flag)}) for flag in (True, False)
+    )
+    assert magnification(run.diameter, rigid) == 20.0
+    scale = magnification(run.diameter, bodies)
+    assert scale == 5.0 and scale * 1e-3 - 1e-3 <= 0.002 * run.diameter
+    table["gap"][:] = 1.0
+    assert magnification(run.diameter, bodies) == 20.0
 
 
 @pytest.mark.parametrize("width", [85 / 25.4, 6.3])

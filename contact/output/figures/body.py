@@ -39,6 +39,8 @@ logger = logging.getLogger("contact.plots")
 
 #: Contact zones below this part of the body are drawn with their vicinity, of so many zones.
 SMALL, VICINITY = 0.04, 3.0
+#: Overlap of two bodies, over the diameter, that is not seen.
+UNSEEN = 0.002
 #: Scaled gaps up to this part of Gamma_3 are drawn.
 FAR = 0.2
 
@@ -46,12 +48,19 @@ FAR = 0.2
 def magnification(diameter: float, *runs: Run) -> float:
     """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of a diameter.
 
-    Displacements that are visible anyway are drawn as they are.
+    Displacements that are visible anyway are drawn as they are, and bodies that touch do not
+    overlap: a gap that a displacement closes would be closed many times over.
     """
     largest = max(float(np.linalg.norm(run.displacement, axis=1).max()) for run in runs)
     if not 0 < largest < 0.02 * diameter:
         return 1.0
     wanted = 0.05 * diameter / largest
+    for table in (run.table for run in runs):
+        closing = (table["u_n"] > 0) & ~table["rigid"]
+        room = np.maximum(table["gap"][closing], 0.0) + UNSEEN * diameter
+        wanted = min(wanted, float((room / table["u_n"][closing]).min(initial=np.inf)))
+    if wanted < 1:
+        return 1.0
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(power * max(k for k in (1, 2, 5) if k * power <= wanted))
 

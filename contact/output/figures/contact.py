@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from contact.errors import InputError
 from contact.output.figures.run import Run
 from contact.output.figures.style import (
     BLUE,
@@ -41,18 +43,85 @@ def position(table: Table, run: Run) -> tuple[Array, str, tuple[float, float]]:
 
     That is a coordinate where Gamma_3 lies along an axis, and the arc length elsewhere.
     """
-    points = np.column_stack([table["x"], table["y"]])
+    points, outer = np.column_stack([table["x"], table["y"]]), ends(table, run.held)
     extent = np.ptp(points, axis=0)
-    first, last = np.linalg.norm(ends(table, run.held) - points[[0, -1]], axis=1)
     for axis in (0, 1):
         if extent[1 - axis] <= 1e-9 * extent[axis]:
-            where, name = points[:, axis], run.axes[axis]
+            where, name, borders = points[:, axis], run.axes[axis], outer[:, axis]
             break
     else:
+        first, last = np.linalg.norm(outer - points[[0, -1]], axis=1)
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         where, name = first + np.concatenate([[0.0], np.cumsum(steps)]), r"\ell"
-    # The rows begin where x, then y is smaller, and so does the axis.
-    return where, name, (where.min() - first, where.max() + last)
+        borders = np.array([0.0, where[-1] + last])
+    # A single node has its share.
+    room = float(table["weight"].max()) / 2 if np.ptp([*where, *borders]) == 0 else 0.0
+    every = np.concatenate([where, borders])
+    return where, name, (float(every.min()) - room, float(every.max()) + room)
+
+
+def along(table: Table, run: Run) -> str:
+    """Return the label of the axis along Gamma_3; an arc length begins at a place."""
+    name = position(table, run)[1]
+    start = ", ".join(f"{x:.4g}" for x in ends(table, run.held)[0] + 0.0)
+    begin = "" if name in run.axes else f", from ({start})"
+    return run.units.label(f"${name}$ along $\\Gamma_3${begin}", "length")
+
+
+def shown(
+    tables: Sequence[Table], run: Run, look: Look, touching: Sequence[NDArray[np.bool_]]
+) -> list[tuple[float, float] | None]:
+    """Return the ends of the axes along Gamma_3 of some contacts; None for one beside `look`.
+
+    They are the coordinates that are asked for, of an arc length that of the nodes within; else
+    they show all, or the vicinity of a small contact zone.
+
+    Parameters
+    ----------
+    tables, run, look
+        The contacts, their run and the choices.
+    touching
+        Which nodes of each are in contact.
+
+    Raises
+    ------
+    InputError
+        If there are coordinates beside all of them.
+    """
+    asked = {k: given for k, given in enumerate((look.xlim, look.ylim)) if given is not None}
+    found: list[tuple[float, float] | None] = []
+    for table, there in zip(tables, touching, strict=True):
+        where, name, whole = position(table, run)
+        straight = [k for k in (0, 1) if run.axes[k] == name]
+        chosen = {k: asked[k] for k in straight or (0, 1) if k in asked}
+        inside = np.ones(len(where), dtype=bool)
+        for k, (low, high) in chosen.items():
+            inside &= (table["xy"[k]] >= low) & (table["xy"[k]] <= high)
+        if not chosen:
+            (low,), (high,) = window(where[:, None], there, 0.0)
+            cut = low > where.min() or high < where.max()
+            found.append(tuple(np.clip([low, high], *whole)) if cut else whole)
+        elif straight:
+            low, high = chosen[straight[0]]
+            found.append((low, high) if low < whole[1] and whole[0] < high else None)
+        elif inside.any():
+            room = table["weight"][inside].max() / 2
+            low, high = where[inside].min() - room, where[inside].max() + room
+            found.append(tuple(np.clip([low, high], *whole)))
+        else:
+            found.append(None)
+    if all(each is None for each in found):
+        given = " ".join(f"--{'xy'[k]}lim {low:g},{high:g}" for k, (low, high) in asked.items())
+        lies = " and ".join(
+            f"{run.axes[k]} from {min(t['xy'[k]].min() for t in tables):.4g} to "
+            f"{max(t['xy'[k]].max() for t in tables):.4g}"
+            for k in asked
+        )
+        raise InputError(
+            f"{given}: beside the contact part, which has {lies}; accepted: coordinates of the "
+            "mesh that show some of it, or --field for the body alone"
+        )
+    return found
 
 
 def ends(table: Table, held: Array) -> Array:
@@ -130,14 +199,17 @@ def contact_figure(run: Run, look: Look) -> Figure:
 
 def draw_line(run: Run, look: Look) -> Figure:
     """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane."""
-    parts = run.contacts
+    touching = [part["status"] != "open" for part in run.contacts]
+    ends_of = shown(run.contacts, run, look, touching)
+    pairs = [(p, e) for p, e in zip(run.contacts, ends_of, strict=True) if e is not None]
+    parts = [part for part, _ in pairs]
     frictional = bool(np.any(run.table["bound"] > 0))
     narrow = page_width() <= NARROW
     figure = sheet((0.8 if frictional else 0.48) * (1.5 if narrow else 1.0))
     size = (2 if frictional else 1, len(parts))
     grid = figure.subplots(*size, sharex="col", sharey="row", squeeze=False)
-    for rows, part in zip(grid.T, parts, strict=True):
-        _draw_rows(rows, part, run, look)
+    for rows, (part, limits) in zip(grid.T, pairs, strict=True):
+        _draw_rows(rows, part, run, limits)
     for ax in grid[:, 1:].ravel():
         ax.set_ylabel("")
     for ax, part in zip(grid[0] if len(parts) > 1 else [], parts, strict=False):
@@ -150,9 +222,10 @@ def draw_line(run: Run, look: Look) -> Figure:
     return figure
 
 
-def _draw_rows(rows: Any, table: Table, run: Run, look: Look) -> None:
+def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -> None:
     """Draw one contact: pressure, and below it friction, if there is a second row."""
-    where, name, whole = position(table, run)
+    where, _, whole = position(table, run)
+    mark = "o" if len(where) == 1 else ""  # a line of one point is not seen
     bound, tau, units = table["bound"], table["tau"], run.units
     frictional = len(rows) > 1
     for ax in rows:
@@ -161,11 +234,13 @@ def _draw_rows(rows: Any, table: Table, run: Run, look: Look) -> None:
         if np.any(table["status"] == zone):
             words = label if frictional or zone == "open" else "in contact"
             rows[0].fill_between([], [], color=colour, lw=0, label=words)
-    rows[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
+    rows[0].plot(where, table["pressure"], color=BLUE, marker=mark, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
     _focus(rows[0], table["pressure"], 0.0)
     if frictional:
-        rows[1].plot(where, tau, color=ORANGE, label=r"tangential stress $-\sigma_\tau\cdot t$")
+        rows[1].plot(
+            where, tau, color=ORANGE, marker=mark, label=r"tangential stress $-\sigma_\tau\cdot t$"
+        )
         rows[1].plot(where, bound, "--", color=GREY, lw=0.8, label=r"friction bound $\pm s$")
         rows[1].plot(where, -bound, "--", color=GREY, lw=0.8)
         rows[1].axhline(0.0, color="black", lw=0.4)
@@ -173,17 +248,14 @@ def _draw_rows(rows: Any, table: Table, run: Run, look: Look) -> None:
         _focus(rows[1], bound, -1.0)
     if run.opposite is not None:
         _draw_opposite(rows[0], table, where, run.opposite)
-    rows[-1].set_xlabel(units.label(f"${name}$ along $\\Gamma_3$", "length"))
-    (low,), (high,) = window(where[:, None], table["status"] != "open", 0.0)
-    cut = low > where.min() or high < where.max()
-    given = look.ends(int(name == run.axes[1]), *whole, "the contact part")
-    rows[0].set_xlim(given or (tuple(np.clip([low, high], *whole)) if cut else whole))
+    rows[-1].set_xlabel(along(table, run))
+    rows[0].set_xlim(limits)
 
 
 def _draw_opposite(ax: Axes, table: Table, where: Array, opposite: Any) -> None:
     """Draw the pressure on the other side where its nodes are opposite of those of a contact."""
     own = opposite["entry"] == table["entry"][0]
-    if not own.any():
+    if not own.any() or len(where) == 1:
         return
     points = np.column_stack([table["x"], table["y"]])
     places = opposite.points[own][:, :2]
@@ -221,8 +293,9 @@ def draw_surface(run: Run, look: Look) -> Figure:
     places = surface.points[:, view]
     low, high = window(places, touching, 0.13)  # room for the arrows
     for k in (0, 1):
-        given = look.ends(k, places[:, k].min(), places[:, k].max(), "the contact part")
-        low[k], high[k] = given or (low[k], high[k])
+        if view[k] < 2:
+            given = look.ends(view[k], places[:, k].min(), places[:, k].max(), "the contact part")
+            low[k], high[k] = given or (low[k], high[k])
     stacked = page_width() < NARROW
     rows, columns = (len(panels), 1) if stacked else (1, len(panels))
     aspect = float(np.clip((high - low)[1] / (high - low)[0], 0.25, 0.8 if stacked else 1.25))

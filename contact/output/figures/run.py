@@ -276,4 +276,4 @@ def _moved(table: Table, step: Table, body: Any) -> Table:
     places = np.column_stack([table.get(axis, np.zeros(len(normal))) for axis in "xyz"])
     nodes = KDTree(body.points).query(places)[1]
     along = np.einsum("ni,ni->n", body.point_data["displacement"][nodes], normal)
-    return {**table, "moved": along - step["u_n"]}
+    return {**table, "u_n": step["u_n"], "moved": along - step["u_n"]}

@@ -7,8 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from contact.library.units import force_of
-from contact.output.figures.contact import position, window, zones
+from contact.output.figures.contact import along, position, shown, zones
 from contact.output.figures.run import Run
 from contact.output.figures.style import (
     BLUE,
@@ -22,14 +21,15 @@ from contact.output.figures.style import (
     fitted,
     page_width,
     sheet,
+    unit_of,
 )
 from contact.typing import Array
 
 #: Parts that move, as the columns of ``steps.csv`` begin; labels of their displacement, and names.
 DRIVEN = {"driven": ("mean displacement", "part"), "rigid": ("displacement", "rigid body")}
 
-#: Share of the largest motion from which on a part moves along an axis, and goes back.
-MOVES = 0.1
+#: Share of the largest motion from which on a part moves along an axis.
+MOVES = 1e-3
 
 
 def steps_figures(run: Run, look: Look) -> dict[str, Figure]:
@@ -55,38 +55,27 @@ def _course(run: Run, name: str) -> Array:
     return np.concatenate([[0.0], run.steps[name]])
 
 
-def _unit(run: Run, power: int) -> str:
-    """Return the unit of stress times area (1) or volume (2), if stress and length are named.
-
-    Forces of plane bodies are those of a unit of thickness.
-    """
-    stress, length = run.units.stress, run.units.length
-    if not stress or not length:
-        return ""
-    force = force_of(stress, length)
-    if power == 1 and force is not None:
-        return f" ({force}{f'/{length}' if run.axes == 'xy' else ''})"
-    power += run.axes != "xy"
-    return f" ({stress} {length}{f'$^{power}$' if power > 1 else ''})"
-
-
 def draw_loop(run: Run, moves: str) -> Figure:
-    """Draw the force on the part that moves over its displacement, from the origin on."""
+    """Draw the force on the part that moves over its displacement, along each axis that it moves.
+
+    From the origin on: the load line, and loops of shear.
+    """
     names = "xyz"[: len(run.axes)]
     ways = [_course(run, f"{moves}_{axis}") for axis in names]
     sizes = np.array([np.ptp(way) for way in ways])
-    back = np.array([np.abs(np.diff(way)).sum() for way in ways]) - sizes
-    back[(sizes <= MOVES * sizes.max()) | (back <= MOVES * sizes.max())] = 0.0
-    # Where the part goes back farthest; else where it goes farthest.
-    k = int(np.lexsort((sizes, back))[-1])
-    words, part = DRIVEN[moves]
-    figure = sheet(0.85 if page_width() < NARROW else 0.66)
-    ax = figure.subplots()
-    ax.plot(ways[k], _course(run, f"{moves}_force_{names[k]}"), "-o", color=BLUE, markersize=2.5)
-    ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    ax.set_xlabel(run.units.label(f"{words} $u_{run.axes[k]}$", "length"))
-    ax.set_ylabel(f"force on the {part} along ${run.axes[k]}${_unit(run, 1)}")
-    ax.grid(alpha=0.25)
+    chosen = np.flatnonzero(sizes >= MOVES * sizes.max())
+    (words, part), count = DRIVEN[moves], chosen.size
+    narrow = page_width() < NARROW
+    figure = sheet(0.85 * count if narrow else 0.66 if count == 1 else 0.47)
+    panels = figure.subplots(*((count, 1) if narrow else (1, count)), squeeze=False).ravel()
+    unit = unit_of("force", run.units, run.axes == "xy")
+    for ax, k in zip(panels, chosen, strict=True):
+        force = _course(run, f"{moves}_force_{names[k]}")
+        ax.plot(ways[k], force, "-o", color=BLUE, markersize=2.5)
+        ax.xaxis.set_major_locator(MaxNLocator(5 - (count > 1), steps=[1, 2, 5, 10]))
+        ax.set_xlabel(run.units.label(f"{words} $u_{run.axes[k]}$", "length"))
+        ax.set_ylabel(f"force on the {part} along ${run.axes[k]}${unit}")
+        ax.grid(alpha=0.25)
     return figure
 
 
@@ -107,7 +96,7 @@ def draw_energies(run: Run) -> Figure:
     if flows:
         ax.plot(time, plastic, color=SKY, label="dissipated by plastic flow")
     ax.set_xlabel("time")
-    ax.set_ylabel(f"energy{_unit(run, 2)}")
+    ax.set_ylabel(f"energy{unit_of('work', run.units, run.axes == 'xy')}")
     figure.legend(ncols=1 if narrow else 3, loc="outside lower center")
     ax.grid(alpha=0.25)
     return figure
@@ -115,17 +104,15 @@ def draw_energies(run: Run) -> Figure:
 
 def draw_zones(run: Run, look: Look) -> Figure:
     """Draw the status of each node at the end of each step, over its position and the time."""
-    where, name, whole = position(run.tables[0], run)
+    where, _, whole = position(run.tables[0], run)
     status = np.array([table["status"] for table in run.tables])
     figure = sheet(0.7)
     ax = figure.subplots()
     zones(ax, where, whole, status, _course(run, "t"))
-    (low,), (high,) = window(where[:, None], (status != "open").any(axis=0), 0.0)
-    given = look.ends(int(name == run.axes[1]), *whole, "the contact part")
-    if given or low > where.min() or high < where.max():
-        ax.set_xlim(given or tuple(np.clip([low, high], *whole)))
+    (ends,) = shown([run.tables[0]], run, look, [(status != "open").any(axis=0)])
+    ax.set_xlim(ends)
     handles = [Patch(color=colour, label=words) for colour, words in ZONES.values()]
     ax.legend(handles=handles, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
-    ax.set_xlabel(run.units.label(f"${name}$ along $\\Gamma_3$", "length"))
+    ax.set_xlabel(along(run.tables[0], run))
     ax.set_ylabel("time")
     return figure

@@ -12,6 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from contact.errors import InputError
+from contact.library.units import force_of
 from contact.output.options import Quantity, Units
 from contact.typing import Array
 
@@ -65,7 +66,7 @@ class Look:
     mirror
         Whether both halves of a body of revolution are drawn.
     xlim, ylim
-        Ends of the axes that show places; None for those that suit the figure.
+        Ends of the coordinates x (r) and y (z) of the mesh; None for those that suit the figure.
     """
 
     width: float | None = None
@@ -140,6 +141,37 @@ def named(field: str, units: Units) -> tuple[str, str]:
         return name, words if quantity is None else units.label(words, quantity)
     words, base = field.replace("_", " "), field.partition("_")[0]
     return field, units.label(words, QUANTITIES[base]) if base in QUANTITIES else words
+
+
+#: Quantities whose unit is a power of that of length, for stresses in them times that of stress.
+POWERS = {"area": (2, False), "volume": (3, False), "force": (2, True), "work": (3, True)}
+
+
+def unit_of(quantity: str, units: Units, plane: bool) -> str:
+    """Return the unit of a quantity in brackets, after a blank; nothing where it has no name.
+
+    Parameters
+    ----------
+    quantity
+        "length", "stress", ..., or one of `POWERS`.
+    units
+        The names of units.
+    plane
+        Whether the body is plane, of which all is that of a unit of thickness.
+    """
+    length, stress = units.length, units.stress
+    if quantity not in POWERS:
+        name = getattr(units, quantity, None)
+        return f" ({name})" if name else ""
+    power, stressed = POWERS[quantity]
+    if not length or (stressed and not stress):
+        return ""
+    force = force_of(stress, length) if stress and quantity == "force" else None
+    if force is not None:
+        return f" ({force}/{length})" if plane else f" ({force})"
+    power -= plane
+    side = f"{length}$^{power}$" if power > 1 else length
+    return f" ({stress} {side})" if stressed else f" ({side})"
 
 
 def widened(low: float, high: float) -> tuple[float, float]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import itertools
 import os
+import tomllib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -25,16 +26,31 @@ from contact.output.figures.style import (
     ORANGE,
     SKY,
     Look,
+    fitted,
+    heading,
     page_width,
     sheet,
+    unit_of,
 )
+from contact.output.options import Units
+from contact.output.quantities import SUMMARY, SWEEP, quantities
 from contact.ranks import refused
+from contact.typing import Array
 
 #: Columns that are drawn by default, as far as they vary.
 DRAWN = (
     *(f"contact_force_{axis}" for axis in "xyz"),
     *("max_pressure", "contact_area", "max_displacement", "max_von_mises", "dissipation"),
 )
+#: Variation over the size of a vector, or number, that is rounding and the tolerance of solves.
+ROUNDING = 1e-6
+#: Quantities that keys of the case file give, as far as they have a unit, and symbols of others.
+KEYS = {
+    **dict.fromkeys(("displacement", "normal", "gap", "shortening", "layer"), "length"),
+    **dict.fromkeys(("traction", "pressure", "young", "yield_stress"), "stress"),
+    **{"force": "force", "potential": "potential", "phi_f": "potential", "charge": "charge"},
+}
+SYMBOLS = {"mu": r"$\mu$"}
 #: Lines, by turns.
 LINES = [*itertools.product(("-", "--", ":"), (BLUE, ORANGE, GREEN, SKY, GREY))]
 
@@ -42,14 +58,16 @@ LINES = [*itertools.product(("-", "--", ":"), (BLUE, ORANGE, GREEN, SKY, GREY))]
 def plot_sweep(
     folder: Path, columns: Sequence[str], formats: Sequence[str], look: Look
 ) -> list[Path]:
-    """Draw ``figure-sweep`` from the ``sweep.csv`` of a folder; return the files. On one rank.
+    """Draw ``figure-sweep``, or ``figure-sweep-COLUMN``, from the tables of a sweep; return files.
+
+    On one rank.
 
     Parameters
     ----------
     folder
         Of the sweep.
     columns
-        To draw; by default those of `DRAWN` that vary.
+        To draw, a figure each; by default those of `DRAWN` that vary, in one.
     formats, look
         Endings of the files, and choices for the figure.
 
@@ -58,31 +76,104 @@ def plot_sweep(
     InputError
         If the table is damaged, or has no such column.
     """
-    keys, rows = _read(folder / "sweep.csv")
-    found = [name for name in rows[0] if name not in keys]
+    swept = _read(folder)
     for name in columns:
-        if name not in found:
-            accepted = ", ".join(column for column in found if column != "input")
+        if name not in swept.columns:
+            accepted = ", ".join(column for column in swept.columns if column != "input")
             raise InputError(f"--field {name}: no such column of sweep.csv; accepted: {accepted}")
-    drawn = list(columns) or [n for n in DRAWN if n in found and len({r[n] for r in rows}) > 1]
-    if not drawn:
+    drawn = [name for name in DRAWN if swept.varies(name)]
+    if not columns and not drawn:
         raise InputError(f"{folder}: no result of the sweep varies; accepted: --field COLUMN")
+    figures = {f"-{name}": [name] for name in columns} or {"": drawn}
     files = []
     with matplotlib.rc_context(look.style):
-        figure = _figure(keys, rows, drawn)
-        for ending in formats:
-            files.append(folder / f"figure-sweep.{ending}")
-            draft = folder / f".contact-figure-sweep.{ending}"
-            try:
-                draft.write_bytes(image(figure, ending))
-                os.replace(draft, files[-1])
-            except OSError as error:
-                raise refused(error) from None
+        for ending, chosen in figures.items():
+            figure = _figure(swept, chosen)
+            for kind in formats:
+                files.append(folder / f"figure-sweep{ending}.{kind}")
+                draft = folder / f".contact-figure-sweep.{kind}"
+                try:
+                    draft.write_bytes(image(figure, kind))
+                    os.replace(draft, files[-1])
+                except OSError as error:
+                    raise refused(error) from None
     return files
 
 
-def _read(path: Path) -> tuple[list[str], list[dict[str, str]]]:
-    """Return the swept keys, and the rows."""
+@dataclass(frozen=True)
+class Swept:
+    """A sweep, as its figures see it.
+
+    Attributes
+    ----------
+    title, units, kinematics
+        Of the case.
+    keys, rows
+        The swept keys, and the rows of the table as texts.
+    """
+
+    title: str
+    units: Units
+    kinematics: str
+    keys: list[str]
+    rows: list[dict[str, str]]
+
+    @property
+    def columns(self) -> list[str]:
+        """The columns of results."""
+        return [name for name in self.rows[0] if name not in self.keys]
+
+    @property
+    def plane(self) -> bool:
+        """Whether the body is plane."""
+        return self.kinematics != "axisymmetric" and "contact_force_z" not in self.columns
+
+    def varies(self, name: str) -> bool:
+        """Tell whether a column is there and varies, by more than rounding of its vector."""
+        base = _parts(name)[0]
+        whole = [column for column in self.columns if _parts(column)[0] == base]
+        if name not in self.columns:
+            return False
+        size = max(np.abs(self.values(column)).max() for column in whole)
+        return bool(np.ptp(self.values(name)) > ROUNDING * size)
+
+    def values(self, name: str) -> Array:
+        """Return a column of numbers."""
+        try:
+            return np.array([float(row[name]) for row in self.rows])
+        except ValueError:
+            raise InputError(f"--field {name}: no numbers; accepted: a column of numbers") from None
+
+    def label(self, name: str) -> str:
+        """Return a column in words, with its unit: a component by its axis."""
+        base, axis = _parts(name)
+        top = base.partition(".")[0]
+        known = {quantity.name: quantity.unit for quantity in quantities(SWEEP)}
+        known |= {quantity.name: quantity.unit for quantity in quantities(SUMMARY)}
+        words = base.replace(".", ": ").replace("_", " ").replace("von mises", "von Mises stress")
+        words = f"largest {words.removeprefix('max ')}" if base.startswith("max_") else words
+        unit = unit_of(known.get(top, ""), self.units, self.plane)
+        return f"{words}{f', ${axis}$' if axis else ''}{unit}"
+
+    def key(self, key: str, axis: str = "") -> str:
+        """Return a swept key in words, with its unit: ``fixed.0.normal`` is fixed 0: normal."""
+        *section, last = key.split(".")
+        if last.isdigit() and int(last) < 3:
+            axis, last = "xyz"[int(last)], section.pop()
+        unit = unit_of(KEYS.get(last, ""), self.units, self.plane)
+        of = " ".join(section).replace("_", " ")
+        words = SYMBOLS.get(last, last.replace("_", " "))
+        return f"{f'{of}: ' if of else ''}{words}{f', ${axis}$' if axis else ''}{unit}"
+
+
+def _parts(column: str) -> tuple[str, str]:
+    """Return the name of a column, and the axis of a component."""
+    return (column[:-2], column[-1]) if column[-2:] in ("_x", "_y", "_z") else (column, "")
+
+
+def _read(folder: Path) -> Swept:
+    """Read the table of a sweep, and the case beside it."""
+    path = folder / SWEEP
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.DictReader(file, strict=True))
@@ -91,25 +182,60 @@ def _read(path: Path) -> tuple[list[str], list[dict[str, str]]]:
         keys = []
     if not keys or any(None in row.values() for row in rows):
         raise InputError(f"{path}: damaged, or no table of a sweep; accepted: a sweep's folder")
-    return keys, rows
+    try:
+        case = tomllib.loads(path.with_suffix(".toml").read_text("utf-8"))
+        about = case.get("case", {})
+        title, units = heading(str(case.get("title", ""))), Units(**about.get("units", {}))
+        return Swept(title, units, str(case["space"]["kinematics"]), keys, rows)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        accepted = "the case that a sweep has left beside its table"
+        raise InputError(
+            f"{path.with_suffix('.toml')}: missing or damaged; accepted: {accepted}"
+        ) from None
 
 
-def _figure(keys: Sequence[str], rows: Sequence[dict[str, str]], drawn: Sequence[str]) -> Figure:
+def _places(texts: Sequence[str]) -> tuple[Array, str] | None:
+    """Return the numbers of a key, or of the only component that varies, and its axis.
+
+    None for texts, and vectors of which several vary.
+    """
+    try:
+        found = [tomllib.loads(f"value = {text}")["value"] for text in texts]
+        numbers = np.array(found, dtype=float)
+    except ValueError:
+        return None
+    if numbers.ndim == 2:
+        moving = np.flatnonzero(np.ptp(numbers, axis=0))
+        return (numbers[:, moving[0]], "xyz"[moving[0]]) if moving.size == 1 else None
+    return (numbers, "") if numbers.ndim == 1 and bool not in map(type, found) else None
+
+
+def _figure(swept: Swept, drawn: Sequence[str]) -> Figure:
     """Return the figure: a panel for each column."""
-    *others, last = keys
-    lines = list(dict.fromkeys(tuple(row[key] for key in others) for row in rows))
+    *others, last = swept.keys
+    given = [tuple(row[key] for key in others) for row in swept.rows]
+    lines = list(dict.fromkeys(given))
     across = 2 if len(drawn) > 1 else 1
     down = -(-len(drawn) // across)
     tall = 0.5 if page_width() < NARROW else 0.4
-    figure = sheet((tall if across > 1 else 0.66) * down + (0.1 if len(lines) > 1 else 0.0))
+    more = 0.1 * (len(lines) > 1) + 0.06 * bool(swept.title)
+    figure = sheet((tall if across > 1 else 0.66) * down + more)
     panels = np.ravel(figure.subplots(down, across, squeeze=False))
+    texts = [row[last] for row in swept.rows]
+    places, axis = _places(texts) or (np.array(texts), "")
     for panel, name in zip(panels, drawn, strict=False):
+        values = swept.values(name)
         for line, (style, colour) in zip(lines, itertools.cycle(LINES), strict=False):
-            own = [row for row in rows if tuple(row[key] for key in others) == line]
-            words = ", ".join(f"{k} = {_short(v)}" for k, v in zip(others, line, strict=True))
-            _line(panel, last, name, own, linestyle=style, color=colour, label=words)
-        panel.set_xlabel(last)
-        panel.set_ylabel(_label(name))
+            own = np.flatnonzero([each == line for each in given])
+            if places.dtype.kind == "f":  # texts stand in their own order
+                own = own[np.argsort(places[own], kind="stable")]
+                panel.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+            pairs = zip(others, line, strict=True)
+            words = ", ".join(f"{swept.key(k)} = {_short(v)}" for k, v in pairs)
+            look: dict[str, Any] = {"linestyle": style, "color": colour, "label": words}
+            panel.plot(places[own], values[own], marker="o", markersize=3, **look)
+        panel.set_xlabel(swept.key(last, axis))
+        panel.set_ylabel(swept.label(name))
         panel.yaxis.set_major_locator(MaxNLocator(5))
         panel.grid(alpha=0.25)
     figure.align_ylabels()
@@ -117,16 +243,10 @@ def _figure(keys: Sequence[str], rows: Sequence[dict[str, str]], drawn: Sequence
         panel.axis("off")
     if len(lines) > 1:
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=2)
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    if swept.title:
+        figure.suptitle(fitted(swept.title), fontsize="large")
     return figure
-
-
-def _label(name: str) -> str:
-    """Return a column in words: a component by its axis."""
-    words = name.removeprefix("max_").replace("_", " ").replace("von mises", "von Mises stress")
-    if words[-2:] in (" x", " y", " z"):
-        words = f"{words[:-2]}, ${words[-1]}$"
-    return f"largest {words}" if name.startswith("max_") else words
 
 
 def _short(text: str) -> str:
@@ -135,19 +255,3 @@ def _short(text: str) -> str:
         return f"{float(text):.6g}"
     except ValueError:
         return text
-
-
-def _line(panel: Axes, key: str, name: str, rows: Sequence[dict[str, str]], **look: Any) -> None:
-    """Draw a line, over numbers in their order, or over texts one after the other."""
-    try:
-        values = np.array([float(row[name]) for row in rows])
-    except ValueError:
-        raise InputError(f"--field {name}: no numbers; accepted: a column of numbers") from None
-    try:
-        places = np.array([float(row[key]) for row in rows])
-    except ValueError:
-        panel.plot([row[key] for row in rows], values, marker="o", markersize=3, **look)
-        return
-    order = np.argsort(places)
-    panel.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    panel.plot(places[order], values[order], marker="o", markersize=3, **look)
