@@ -229,6 +229,9 @@ def _take(
         kind = options.get("TYPE", "ELEMENT").upper()
         if "NAME" not in options:
             raise ValueError("*SURFACE without a name")
+        if "COMBINE" in options:
+            word = f"*SURFACE, COMBINE={options['COMBINE']}"
+            raise ValueError(f"{word}: no surfaces are made of others; accepted: faces of elements")
         found.surfaces[found.name(options["NAME"])] = (kind, rows)
     elif keyword == "INSTANCE":
         part = options.get("PART", "").strip('"').upper()

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from contact.errors import InputError
-from contact.mesh.cells import SHAPES, Shape, rule
+from contact.mesh.cells import SHAPES, Shape, proper, rule
 from contact.mesh.domain import UNLESS
 from contact.mesh.entities import combinations
 from contact.mesh.extraction import BODY, Ints, Model
@@ -367,6 +367,12 @@ def _check_cells(
     longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=-1).max(axis=(1, 2))
     volume = determinant(jacobians(shape, x, shape.nodes(1)))
     flat = ~(np.abs(volume).min(axis=1) > FLAT * longest ** points.shape[1])
+    collapsed = flat & ~proper(cells)
+    if not shape.simplex and np.any(collapsed):
+        raise InputError(
+            f"it has {collapsed.sum()} cell(s) with one node at several corners, the first near "
+            f"{_first(collapsed, x * unit)}; accepted: {shape.plural} with nodes of their own"
+        )
     if np.any(flat):
         where = _first(flat, x * unit)
         raise InputError(f"it has {flat.sum()} cell(s) of zero volume, the first near {where}")

@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.cli.main import CONVERGED, main
+from contact.errors import InputError
 from contact.mesh.reader import from_file
 from tests.problems.sizes import integral, measures
 
@@ -64,6 +65,13 @@ def test_edges_of_shells_are_no_facets_of_solids(tmp_path):
     domain = read(tmp_path, block() + SHELLS + edges)
     assert measures(domain) == pytest.approx({"both": 0.25, "shell": 1.0})
     assert "'rim' has no facets" in domain.unusable["rim"]
+
+
+def test_surfaces_made_of_others_are_refused_by_name(tmp_path):
+    text = "*SURFACE, NAME=low\n1, S1\n*SURFACE, NAME=high\n8, S2\n"
+    text += "*SURFACE, NAME=both, COMBINE=UNION\nlow, high\n"
+    with pytest.raises(InputError, match=r"\*SURFACE, COMBINE=UNION: no surfaces are made of"):
+        read(tmp_path, block() + text)
 
 
 def test_free_sides_of_plane_elements(tmp_path):

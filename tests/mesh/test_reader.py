@@ -49,6 +49,7 @@ BAD = {
     "degenerate.msh": r"1 cell\(s\) of zero volume, the first near \(0.5, 0\)",
     "folded.msh": "cells overlap",
     "arrow.msh": r"1 cell\(s\) with a corner of 180 degrees or more",
+    "collapsed.msh": r"1 cell\(s\) with one node at several corners, the first near",
     "curled.msh": r"1 cell\(s\) that are folded by their curved edges, the first near \(0\.333",
     "surface.msh": "surface in 3-D",
     "text.msh": "no Gmsh .msh file",
