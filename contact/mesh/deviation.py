@@ -3,8 +3,8 @@
 At each vertex a quadratic surface is fitted to the vertices around it. An edge e is the chord of
 an arc that is, to second order, lambda_i lambda_j c_ij above it, c = -e.K e/2 with the curvature K
 of the fits at its ends, and c/4 in its middle; so is a triangle with the sum over its edges, in
-barycentric coordinates. Circles are reproduced, spheres to third order, and a flat side has no
-deviation.
+barycentric coordinates. Circles are reproduced, spheres and cylinders to third order, and a flat
+side has no deviation.
 
 References
 ----------
@@ -15,6 +15,7 @@ Comput. Aided Geom. Design 22 (2005) 121 (fits of vertices); Jiang and Shu, J. C
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -192,27 +193,52 @@ def _curvatures(points: Array, normal: Array, pairs: Numbers, weight: Array) -> 
     scale = longest[at]
     along = np.einsum("pid,pd->pi", tangent[at], offset) / scale[:, None]
     z = np.einsum("pd,pd->p", normal[at], offset) / scale
-    # A part of z^2 beside the squares makes spheres exact.
     mixed = list(combinations(range(d - 1), 2))
     products = [along[:, i] * along[:, j] for i, j in mixed]
-    squares = [0.5 * (along[:, i] ** 2 + z**2 / (d - 1)) for i in range(d - 1)]
-    columns = np.column_stack([along, *squares, *products])
+    columns = np.column_stack([along, 0.5 * along**2, *products])
+    # A part of z^2 beside the squares makes spheres exact, and the curvature along the normal of
+    # the first fit cylinders too.
+    shared = columns.copy()
+    shared[:, d - 1 : 2 * (d - 1)] += 0.5 * (z**2 / (d - 1))[:, None]
+    form = _form(_fits(at, count, weight, shared, z), mixed)
+    fit = _fits(at, count, weight, columns, z - 0.5 * _along_normal(form)[at] * z**2)
+    slope = np.sqrt(1 + np.sum(fit[:, : d - 1] ** 2, axis=1))
+    form = _form(fit / np.where(longest > 0, longest * slope, 1.0)[:, None], mixed)
+    tensor = np.einsum("via,vij,vjb->vab", tangent, form, tangent)
+    beside = normal[:, :, None] * normal[:, None, :]
+    return np.asarray(tensor + _along_normal(form)[:, None, None] * beside)
+
+
+def _form(fit: Array, mixed: Sequence[tuple[int, int]]) -> Array:
+    """Return the second derivatives of fits, shape (v, d - 1, d - 1)."""
+    count, k = fit.shape[0], (fit.shape[1] - len(mixed)) // 2
+    form = np.zeros((count, k, k))
+    diagonal = np.arange(k)
+    form[:, diagonal, diagonal] = fit[:, k : 2 * k]
+    for number, (i, j) in enumerate(mixed, 2 * k):
+        form[:, i, j] = form[:, j, i] = fit[:, number]
+    return form
+
+
+def _along_normal(form: Array) -> Array:
+    """Return the curvature K:K/tr K along the normal of second derivatives K, shape (v,).
+
+    With it the tensor of a sphere is a multiple of the identity, and that of a cylinder one across
+    the axis: how far the normal is off then does not matter.
+    """
+    trace, size = np.trace(form, axis1=1, axis2=2), np.linalg.norm(form, axis=(1, 2))
+    return np.asarray(np.clip(size**2 / np.where(trace == 0, np.inf, trace), -size, size))
+
+
+def _fits(at: Numbers, count: int, weight: Array, columns: Array, right: Array) -> Array:
+    """Return the coefficients of columns by weighted least squares at each vertex, (count, k)."""
     k = columns.shape[1]
     weighted = weight[:, None] * columns
-    matrix, right = np.zeros((count, k, k)), np.zeros((count, k))
+    matrix, vector = np.zeros((count, k, k)), np.zeros((count, k))
     np.add.at(matrix, at, weighted[:, :, None] * columns[:, None, :])
-    np.add.at(right, at, weighted * z[:, None])
-    fit = np.einsum("vij,vj->vi", np.linalg.pinv(matrix, rcond=1e-10, hermitian=True), right)
-    slope = np.sqrt(1 + np.sum(fit[:, : d - 1] ** 2, axis=1))
-    fit /= np.where(longest > 0, longest * slope, 1.0)[:, None]
-    form = np.zeros((count, d - 1, d - 1))
-    diagonal = np.arange(d - 1)
-    form[:, diagonal, diagonal] = fit[:, d - 1 : 2 * (d - 1)]
-    for number, (i, j) in enumerate(mixed, 2 * (d - 1)):
-        form[:, i, j] = form[:, j, i] = fit[:, number]
-    mean = np.trace(form, axis1=1, axis2=2) / (d - 1)
-    tensor = np.einsum("via,vij,vjb->vab", tangent, form, tangent)
-    return np.asarray(tensor + mean[:, None, None] * normal[:, :, None] * normal[:, None, :])
+    np.add.at(vector, at, weighted * right[:, None])
+    inverse = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True)
+    return np.asarray(np.einsum("vij,vj->vi", inverse, vector))
 
 
 def _between(

@@ -280,6 +280,20 @@ def test_deviations() -> None:
     np.testing.assert_array_equal(deviations(triangles, corners, normal), 0)
 
 
+def test_deviations_of_a_quarter_of_a_cylinder() -> None:
+    """They are those of its circles at the ends of it too, and none along its axis."""
+    turn, z = (v.ravel() for v in np.meshgrid(np.linspace(0, np.pi / 2, 9), np.linspace(0, 1, 4)))
+    triangles = Delaunay(np.column_stack([turn, z])).simplices.astype(np.int64)
+    corners, normal, edges = oriented(
+        np.column_stack([np.cos(turn), np.sin(turn), z]), triangles, np.array([1.0, 1.0, 0.0])
+    )
+    found = deviations(triangles, corners, normal)[0] / 4
+    around, along = np.abs(edges[..., 2]) < 1e-9, np.linalg.norm(edges[..., :2], axis=2) < 1e-9
+    depth = 1 - np.cos(np.pi / 32)
+    np.testing.assert_allclose(found[around], depth, rtol=2e-4)
+    np.testing.assert_allclose(found[along], 0, atol=1e-4 * depth)
+
+
 def test_surfaces_that_do_not_face_each_other_have_nothing_in_common() -> None:
     slave, _ = flat((TRIANGLE, 1), 3, 0.0, 1.0, 1)
     for master in (
