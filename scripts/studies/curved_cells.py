@@ -16,7 +16,7 @@ from contact import Body, Contact, Cylinder, Domain, Fixed, Linear, Load, Sphere
 from contact.mesh.cells import SHAPES
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import Report, append, options
+from scripts.reporting import Report, append, observed_orders, options
 from scripts.studies import cell_orders, round_bodies
 from scripts.studies.lame_rings import Lame, error, rings
 
@@ -26,6 +26,13 @@ NOTE = (
     "pressed on a rigid shaft. two rings: cut at the radius 1.5 into two bodies whose meshes do "
     "not match, under a pressure inside. Errors in L2, relative; the order is that between this "
     "mesh and the one before; pressure: the largest error of a nodal pressure, relative."
+)
+
+RIM = (
+    "Tetrahedra of second order on a shaft, and under the same pressure as a load",
+    "The ring of the table before, degree 2 on curved tetrahedra. shaft: pressed on it. load: the "
+    "pressure is given, the discretisation of the body alone. Errors in L2, relative; orders are "
+    "those between this mesh and the one before.",
 )
 
 LAME = Lame()
@@ -57,6 +64,12 @@ def on_a_shaft(domain: Domain, degree: int) -> ContactProblem:
     return ContactProblem(domain, Body(LAW, supports(dim)), contact, degree=degree)
 
 
+def under_pressure(domain: Domain, degree: int) -> ContactProblem:
+    """Give a ring the pressure of the shaft as a load; nothing is in its reach."""
+    body = Body(LAW, supports(domain.dim), [Load("inner0", pressure=LAME.pressure)])
+    return ContactProblem(domain, body, Contact("outer0", 1.0), degree=degree)
+
+
 def two_rings(domain: Domain, degree: int, on: str = "outer0") -> ContactProblem:
     """Put two rings about each other, as one, under a pressure inside."""
     against = {"outer0": "inner1", "inner1": "outer0"}[on]
@@ -77,6 +90,25 @@ def problem_of(kind: str, cell: str, order: int, degree: int, n: int) -> Contact
         return on_a_shaft(rings(MPI.COMM_WORLD, cell, order, (1.0, 2.0), (n,)), degree)
     domain = rings(MPI.COMM_WORLD, cell, order, (1.0, 1.5, 2.0), (n // 2, n // 2 + 1))
     return two_rings(domain, degree)
+
+
+def rim(report: Report, coarse: bool) -> dict[str, float]:
+    """Make the table of tetrahedra on a shaft; return the last orders."""
+    columns: dict[str, list[float]] = {"across": [], "unknowns": []}
+    last = {}
+    for n in (2, 4) if coarse else (4, 8, 12):
+        domain = rings(MPI.COMM_WORLD, "tetrahedron", 2, (1.0, 2.0), (n,))
+        columns["across"].append(n)
+        for kind, make in (("shaft", on_a_shaft), ("load", under_pressure)):
+            problem = make(domain, 2)
+            columns.setdefault(kind, []).append(solved(problem)[0])
+        columns["unknowns"].append(3 * problem.equilibrium.layout.index_map.size_global)
+    for kind in ("shaft", "load"):
+        sizes = 1 / np.array(columns["across"])
+        columns[f"order, {kind}"] = observed_orders(sizes, columns[kind])
+        last[kind] = columns[f"order, {kind}"][-1]
+    report.table("rim-of-tetrahedra", RIM[0], columns, RIM[1])
+    return last
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, int], float]:
@@ -107,6 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, in
                         orders[kind, shape.name, order, degree] = rate
     report = Report(chosen.out)
     report.table("curved-cells", CAPTION, columns, NOTE)
+    rim(report, chosen.coarse)
     round_bodies.orders(report, chosen.coarse)
     cell_orders.orders(report, chosen.coarse)
     cell_orders.times(report, chosen.coarse)

@@ -222,6 +222,7 @@ def test_quadrilaterals_need_fewer_unknowns_than_triangles(tmp_path, monkeypatch
 
 def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(curved_cells, "SHAPES", SHAPES[:1])
+    monkeypatch.setattr(curved_cells, "rim", lambda *_: {})
     monkeypatch.setattr(cell_orders, "orders", lambda *_: {})
     monkeypatch.setattr(round_bodies, "orders", lambda *_: {})
     monkeypatch.setattr(cell_orders, "times", lambda *_: {})
@@ -229,6 +230,11 @@ def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
     for kind in ("shaft", "two rings"):
         assert orders[kind, "triangle", 2, 2] > 2.8 > 2.3 > orders[kind, "triangle", 1, 2]
     assert (tmp_path / "curved-cells.md").exists()
+
+
+def test_tetrahedra_on_a_shaft_are_of_order_2_by_their_forces_alone(tmp_path) -> None:
+    found = curved_cells.rim(Report(tmp_path), coarse=True)
+    assert found["load"] > 3 > 2.5 > found["shaft"] > 1.9
 
 
 def test_a_disc_on_a_plane_converges_on_straight_and_on_curved_cells(tmp_path, monkeypatch) -> None:
