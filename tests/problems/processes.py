@@ -41,6 +41,7 @@ def _launch(ranks: int) -> list[str]:
 SERVER = """
 import shlex, sys
 from mpi4py import MPI
+{before}
 from contact.cli.main import main
 comm = MPI.COMM_WORLD
 while line := comm.bcast(sys.stdin.readline() if comm.rank == 0 else None):
@@ -52,14 +53,17 @@ while line := comm.bcast(sys.stdin.readline() if comm.rank == 0 else None):
 
 
 @contextmanager
-def served(ranks: int = 1, seconds: float = 300) -> Iterator[Callable[..., tuple[int, str]]]:
-    """Start processes that run one command line after the other.
+def served(
+    ranks: int = 1, seconds: float = 300, before: str = ""
+) -> Iterator[Callable[..., tuple[int, str]]]:
+    """Start processes that run one command line after the other, after some Python.
 
     Yields a function that runs one and returns its status and what it said. One that ends its
     process gives the status of this, and the next fails. After so many seconds all are killed.
     """
     process = subprocess.Popen(
-        [*_launch(ranks), sys.executable, "-c", SERVER], env=environment(), text=True,
+        [*_launch(ranks), sys.executable, "-c", SERVER.format(before=before)],
+        env=environment(), text=True,
         stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
     )  # fmt: skip
     assert process.stdin is not None and process.stderr is not None
