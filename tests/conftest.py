@@ -101,7 +101,7 @@ def pytest_report_header() -> str:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out tests that are for another number of ranks.
+    """Leave out tests that are for another number of ranks, or compare one rank with itself.
 
     On more than 2 ranks, those stay that have each value of each parameter: all combinations run
     on 1 and 2, and which rank has nothing, or two neighbours, depends on none.
@@ -110,13 +110,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     kept = {
         item
         for item, mark in zip(items, marks, strict=True)
-        if mark is None or _comm.size in (1, *(mark.args or (_comm.size,)))
+        if mark is None or _comm.size in _sizes(mark)
     }
     if _comm.size > 2:
         groups = groupby(filter(kept.__contains__, items), key=lambda x: x.nodeid.split("[")[0])
         kept = {item for _, group in groups for item in _covering(list(group))}
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = [item for item in items if item in kept]
+
+
+def _sizes(mark: pytest.Mark) -> set[int]:
+    """Return the numbers of ranks that a test is for."""
+    if _comm.size == 1:
+        return {int(mark.kwargs.get("alone", True))}
+    return set(mark.args or (_comm.size,))
 
 
 def _covering(items: list[pytest.Item]) -> list[pytest.Item]:

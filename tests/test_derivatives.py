@@ -163,7 +163,7 @@ def test_a_law_without_a_differential_of_its_own(kinematic):
     assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("family", ["two bodies", "ball under a force", "evolution", *FURTHER])
 def test_ranks(family):
     seed = COUNT + FURTHER.index(family) if family in FURTHER else FAMILIES.index(family)
@@ -324,7 +324,7 @@ def test_a_node_at_its_bound_is_named_and_the_derivative_is_one_sided():
     assert min(abs(one - side) for side in sides) < 1e-3 * abs(sides[1])
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("family", ["evolution, j2", "evolution, slip", "two bodies", "piezo"])
 def test_gradient_by_a_field_adds_up(family):
     key = "material.0.young" if family == "two bodies" else "material.young"

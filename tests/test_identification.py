@@ -1,5 +1,7 @@
 """Parameters from synthetic measurements of a block that is pressed, sheared and sheared back."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -20,9 +22,15 @@ def case():
     return parse_case(problem(FAMILIES.index("evolution"))[1])
 
 
+@cache
+def solved():
+    """Return the run of the case, which no test changes."""
+    return solve(case(), comm=SELF)
+
+
 def measured(noise=0.0, seed=0):
     """Return t and the columns of a run, with noise relative to the largest value of each."""
-    rows = [record.row for record in solve(case(), comm=SELF).steps]
+    rows = [record.row for record in solved().steps]
     rng, data = np.random.default_rng(seed), {"t": np.array([row["t"] for row in rows])}
     for name in COLUMNS:
         values = np.array([row[name] for row in rows])
@@ -119,7 +127,7 @@ def test_bad_input_ends_the_command_with_one_line(tmp_path, capsys, text, more, 
 
 def test_intervals_contain_the_parameters_as_often_as_they_say():
     # of a linear model, in ten thousand repetitions
-    shares = coverage(solve(case(), comm=SELF), COLUMNS)
+    shares = coverage(solved(), COLUMNS)
     assert shares == pytest.approx([0.95, 0.95], abs=0.01)
 
 

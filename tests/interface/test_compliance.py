@@ -190,7 +190,7 @@ def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, r
     assert np.abs(nodal[:, 0] - slip).max() < 1e-10
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 def test_ranks_agree_on_a_layer_in_space(comm):
     # Held at the left, pressed and pushed on top, on a layer with a rigid part behind.
     def problem(comm):

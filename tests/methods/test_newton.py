@@ -204,7 +204,7 @@ def test_more_than_friction_can_hold_is_refused():
         build_problem(parse_case(pushed_block(0.04)), SELF)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 def test_ranks_agree():
     world = MPI.COMM_WORLD
     shared, alone = mechanics.leaning_block(world), mechanics.leaning_block(SELF)

@@ -275,7 +275,7 @@ def test_the_share_of_contact_is_never_negative():
     assert found.squares.min() >= 0
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("degree", [1, 2])
 def test_ranks_agree(degree):
     """A gap that is closed in a part, whose nodes belong to several ranks."""

@@ -41,6 +41,9 @@ def test_plastic_flow_locks_in_few_steps_and_in_many(cell):
         assert -locked.supports["punch"].force[1] > 1.3 * (2 + np.pi) / np.sqrt(3)
         assert says(locked)
     assert many.error.stiffness_ratio == pytest.approx(few.error.stiffness_ratio, rel=0.1)
+
+
+def test_plastic_flow_does_not_lock_where_the_dilatation_is_its_mean():
     assert not says(pressed("triangle", 2, "mean_dilatation"))
 
 

@@ -11,7 +11,7 @@ COMM = MPI.COMM_WORLD
 STAGES = ("written", "read", "nested", "separated")
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(3, alone=False)  # which measures 1 and 2 as well
 @pytest.mark.parametrize("bodies", [1, 2])
 def test_no_rank_has_more_where_there_are_more(bodies: int) -> None:
     """Slices in a row, so that ranks exchange at the cuts: lists of all would be of each rank.

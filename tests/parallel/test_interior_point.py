@@ -8,7 +8,7 @@ from contact.case.file import parse_case
 from contact.methods.options import NewtonOptions
 from contact.solving import solve
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(alone=False)
 
 
 def plate(mu: float) -> dict:

@@ -29,7 +29,7 @@ from tests.problems.mechanics import (
 )
 from tests.problems.revolution import pressed_cylinder
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(alone=False)
 
 TOLERANCE = 1e-8
 

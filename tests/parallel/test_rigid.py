@@ -6,7 +6,7 @@ from mpi4py import MPI
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from tests.problems.rigid import column, indented, plate, solved
 
-pytestmark = pytest.mark.parallel
+pytestmark = pytest.mark.parallel(alone=False)
 
 
 def alike(case, settings, tolerance):

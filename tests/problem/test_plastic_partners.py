@@ -148,7 +148,7 @@ def test_a_bimorph_marks_its_stop():
     assert lost[2] > 0 and lost[5:].sum() < 0.2 * lost[:4].sum()
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("degree", [1, 2])
 def test_ranks_without_cells_of_a_metal(degree):
     """Volumes were first asked for where there are cells, by some of the ranks; others waited."""

@@ -60,7 +60,7 @@ def test_confined_block_on_a_smooth_foundation():
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("hardening", list(HARDENING))
+@pytest.mark.parametrize("hardening", [*HARDENING][-1 if MPI.COMM_WORLD.size > 2 else 0 :])
 def test_a_restart_goes_on_with_the_same_history(tmp_path, hardening):
     comm = MPI.COMM_WORLD
     tmp_path = comm.bcast(tmp_path)

@@ -102,7 +102,7 @@ def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
     assert not outcome.converged and "moved to where nothing constrains it" in outcome.ended
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("condense", [True, False])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_ranks_agree(comm, dim, condense):

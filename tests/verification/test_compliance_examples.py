@@ -213,7 +213,7 @@ def test_scripts_on_coarse_meshes(script, made, tmp_path):
         assert (tmp_path / name).stat().st_size > 0
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("name", ["8-3-layer", "8-4-layer"])
 def test_ranks_agree(name):
     changes = ["friction.mu=0.068", "electric.k_e=0.068"] if "8-4" in name else []

@@ -50,7 +50,7 @@ INDEPENDENT = {
 }
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(2)
 @pytest.mark.parametrize("mu", INDEPENDENT)
 def test_independent_values(mu):
     """Another code, 64 x 32 cells, load -10x, insulated: to the digits given."""
@@ -126,7 +126,7 @@ def test_units_do_not_matter(law):
     assert runs[0][1] == runs[1][1]
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("law", [None, hencky()], ids=["8.1", "8.2"])
 def test_ranks_agree(law):
     """All ranks together find what one finds alone, to 1e-8."""
