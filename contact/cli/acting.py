@@ -23,6 +23,10 @@ LARGE = 0.05
 SOFT = 0.25
 
 
+#: Words for components that have no displacement given, or no force.
+WORDS = {True: "free", False: "held"}
+
+
 class Row(NamedTuple):
     """One thing that acts, or would if its size were not 0.
 
@@ -119,7 +123,9 @@ def _forces(where: str, nodal: Array, problem: ContactProblem) -> Row:
     size = float(problem.comm.allreduce(float(np.abs(nodal).sum()), op=MPI.SUM))
     total = problem.domain.resultant(total)
     balanced = np.abs(total).max() <= NEGLIGIBLE * size
-    text = f"forces of {size:.4g} in all, which balance" if balanced else _few("resultant", total)
+    text = (
+        f"forces of {size:.4g} in all, which balance" if balanced else f"resultant {vector(total)}"
+    )
     return Row(where, text, size)
 
 
@@ -135,11 +141,17 @@ def _member(member: Member, time: float) -> list[Row]:
     d = len(given.motion.displacement) if isinstance(given, Rigid) else 1
     values = [member.given(time) * member.units, member.forces(time) / member.units]
     values[0][d:] = np.rad2deg(values[0][d:])
-    return [
-        Row(where, _few(name, own, degrees=name == "rotation"), np.abs(own).max(), moves)
-        for moves, kinds, every in zip((True, False), names, values, strict=True)
-        for name, own in zip(kinds, np.split(every, [d])[: len(kinds)], strict=True)
-    ]
+    rows = []
+    for moves, kinds, every in zip((True, False), names, values, strict=True):
+        told = [f"{value:.4g}" for value in every]
+        told = [t if f != moves else WORDS[moves] for t, f in zip(told, member.free, strict=True)]
+        for name, own, texts in zip(
+            kinds, np.split(every, [d]), (told[:d], told[d:]), strict=False
+        ):
+            one = texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
+            text = f"{name} {one}{' degrees' if name == 'rotation' else ''}"
+            rows.append(Row(where, text, np.abs(own).max(), moves))
+    return rows
 
 
 def _foundations(problem: ContactProblem) -> list[Row]:
@@ -156,9 +168,3 @@ def _foundations(problem: ContactProblem) -> list[Row]:
         _forces("layers", -body.nodal(forces)[:, : problem.dim], problem),
         *(Row(f"foundation of {on!r}", f"potential {phi:.4g}", phi) for on, phi in found),
     ]
-
-
-def _few(name: str, values: Array, *, degrees: bool = False) -> str:
-    """Return a number or a vector with its name."""
-    one = f"{values[0]:.4g}" if values.size == 1 else vector(values)
-    return f"{name} {one}{' degrees' if degrees else ''}"

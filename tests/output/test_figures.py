@@ -130,6 +130,21 @@ def test_a_loop_is_drawn_for_each_direction_that_moves(
         assert ax.lines[0].get_xdata()[1:] == pytest.approx(columns[f"rigid_{axis}"])
 
 
+def test_the_loops_of_several_rigid_parts() -> None:
+    """Each where it moves; forces of one that is free along an axis are not left out."""
+    columns = {
+        "rigid_x_left+right": [0.0, 0.1, -0.1, 0.0],
+        "rigid_y_left+right": [0.0, 0.0, 0.0, 0.0],
+        "rigid_x_lid": [0.0, 0.0, 0.0, 0.0],
+        "rigid_y_lid": [-0.5, -1.0, -1.5, -2.0],
+    }
+    columns |= {name.replace("_", "_force_", 1): [1.0] * 4 for name in columns}
+    run = replace(run_of(solve(block(2))), steps={k: np.array(v) for k, v in columns.items()})
+    figure = draw_loop(run, "rigid")
+    named = [[line.get_label() for line in ax.lines] for ax in figure.axes]
+    assert named == [["left+right"], ["lid"]]
+
+
 def curved(nodes: int = 9, **columns: Any) -> Run:
     """Return the run of a block whose contact part is taken for a quarter of a circle."""
     run = run_of(solve(block(2)))

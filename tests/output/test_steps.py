@@ -239,4 +239,4 @@ def test_the_loop_is_drawn_along_the_way_of_a_rigid_part_with_units_of_force(tmp
     write_outputs(solve(case, comm=SELF), tmp_path / "out")
     axes = draw_loop(read_run(tmp_path / "out"), "rigid").axes[0]
     assert axes.get_xlabel() == "displacement $u_x$ (mm)"
-    assert axes.get_ylabel() == "force on the rigid body along $x$ (N/mm)"
+    assert axes.get_ylabel() == "force along $x$ (N/mm)"

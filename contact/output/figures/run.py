@@ -247,10 +247,8 @@ def _nodes(path: Path) -> dict[str, NDArray[Any]]:
 def _steps(path: Path) -> dict[str, NDArray[Any]]:
     """Read ``steps.csv`` with the columns that figures ask for."""
     columns = _columns(path)
-    forces = re.findall(r"\b(?:driven|rigid)_force_[xyz]\b", " ".join(columns))
-    moved = re.findall(r"\b(?:driven|rigid)_[xyz]\b", " ".join(columns))
-    names = [force.replace("_force", "") for force in forces]
-    names += [way.replace("_", "_force_") for way in moved]
+    found = [re.fullmatch(r"(driven|rigid)_(force_)?([xyz](?:_.*)?)", name) for name in columns]
+    names = [f"{m[1]}_{'' if m[2] else 'force_'}{m[3]}" for m in found if m is not None]
     return _with(columns, "t", "work", "energy", "dissipation", *names)
 
 

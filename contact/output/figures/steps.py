@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -25,8 +27,11 @@ from contact.output.figures.style import (
 )
 from contact.typing import Array
 
-#: Parts that move, as the columns of ``steps.csv`` begin; labels of their displacement, and names.
-DRIVEN = {"driven": ("mean displacement", "part"), "rigid": ("displacement", "rigid body")}
+#: Parts that move, as the columns of ``steps.csv`` begin, and labels of their displacement.
+DRIVEN = {"driven": "mean displacement", "rigid": "displacement"}
+
+#: Colours of several parts that move, by turns.
+COLOURS = BLUE, ORANGE, GREEN, SKY, GREY
 
 #: Share of the largest motion from which on a part moves along an axis.
 MOVES = 1e-3
@@ -39,7 +44,7 @@ def steps_figures(run: Run, look: Look) -> dict[str, Figure]:
     """
     assert run.steps is not None
     found = {"energy": draw_energies(run)}
-    moves = next((moves for moves in DRIVEN if f"{moves}_x" in run.steps), None)
+    moves = next((m for m in DRIVEN if any(k.startswith(f"{m}_x") for k in run.steps)), None)
     if moves is not None:
         found["loop"] = draw_loop(run, moves)
     if run.plane and len(run.tables) > 1 and "on" not in run.tables[0]:
@@ -56,26 +61,36 @@ def _course(run: Run, name: str) -> Array:
 
 
 def draw_loop(run: Run, moves: str) -> Figure:
-    """Draw the force on the part that moves over its displacement, along each axis that it moves.
+    """Draw the forces on the parts that move over their displacements, along each axis of these.
 
-    From the origin on: the load line, and loops of shear.
+    From the origin on: load lines, and loops of shear.
     """
+    assert run.steps is not None
     names = "xyz"[: len(run.axes)]
-    ways = [_course(run, f"{moves}_{axis}") for axis in names]
-    sizes = np.array([np.ptp(way) for way in ways])
-    chosen = np.flatnonzero(sizes >= MOVES * sizes.max())
-    (words, part), count = DRIVEN[moves], chosen.size
+    bodies = [
+        name.removeprefix(f"{moves}_x") for name in run.steps if name.startswith(f"{moves}_x")
+    ]
+    ways = [[_course(run, f"{moves}_{axis}{body}") for axis in names] for body in bodies]
+    sizes = np.ptp(np.array(ways), axis=2)
+    seen = sizes >= MOVES * sizes.max()
+    chosen = np.flatnonzero(seen.any(axis=0))
+    words, count = DRIVEN[moves], chosen.size
     narrow = page_width() < NARROW
     figure = sheet(0.85 * count if narrow else 0.66 if count == 1 else 0.47)
     panels = figure.subplots(*((count, 1) if narrow else (1, count)), squeeze=False).ravel()
     unit = unit_of("force", run.units, run.axes == "xy")
     for ax, k in zip(panels, chosen, strict=True):
-        force = _course(run, f"{moves}_force_{names[k]}")
-        ax.plot(ways[k], force, "-o", color=BLUE, markersize=2.5)
+        for i, (body, colour) in enumerate(zip(bodies, cycle(COLOURS), strict=False)):
+            if seen[i, k]:
+                force = _course(run, f"{moves}_force_{names[k]}{body}")
+                label = body.removeprefix("_") or "foundation"
+                ax.plot(ways[i][k], force, "-o", color=colour, markersize=2.5, label=label)
         ax.xaxis.set_major_locator(MaxNLocator(5 - (count > 1), steps=[1, 2, 5, 10]))
         ax.set_xlabel(run.units.label(f"{words} $u_{run.axes[k]}$", "length"))
-        ax.set_ylabel(f"force on the {part} along ${run.axes[k]}${unit}")
+        ax.set_ylabel(f"force along ${run.axes[k]}${unit}")
         ax.grid(alpha=0.25)
+        if len(bodies) > 1:
+            ax.legend()
     return figure
 
 
