@@ -116,12 +116,12 @@ def solve(
     times: Sequence[float] | None = None,
     **replacements: Any,
 ) -> Solution:
-    """Build and solve a case, in steps if it says so. Collective.
+    """Build and solve a case, in load steps where it has them. Collective.
 
     Parameters
     ----------
     case
-        A case, the name of a case file, or a problem that is built already.
+        A case, the name of a case file, or a problem.
     settings
         Method and tolerances; those of the case by default.
     monitor
@@ -135,8 +135,8 @@ def solve(
     start
         An earlier solution on the same mesh, or its state, as initial guess; zero by default.
     times
-        Of a problem that is built already: the ends of load steps, as of `evolve`. The solution's
-        `steps` then hold the results of each.
+        For a problem: the ends of load steps, as in `evolve`. The solution's `steps` have the
+        results of each.
     replacements
         Objects that take the place of parts of the case; see `build.build_problem`.
 

@@ -54,6 +54,7 @@ html_css_files = ["custom.css"]
 html_show_copyright = False
 html_show_sphinx = False
 autodoc_typehints = "description"
+python_use_unqualified_type_names = True
 autodoc_typehints_description_target = "documented"
 autodoc_member_order = "bysource"
 napoleon_numpy_docstring = True
@@ -75,9 +76,18 @@ if MATHJAX.is_dir():
     }
 
 
-def _bars(_: Any, __: str, ___: str, ____: Any, _____: Any, lines: list[str]) -> None:
-    """Let |x| be what it says in docstrings, and no substitution; several attributes one field."""
+def _bars(_: Any, __: str, ___: str, made: Any, ____: Any, lines: list[str]) -> None:
+    """Let |x| be that in docstrings, several attributes one field, and results have their type."""
     section = ""
+    result = getattr(getattr(made, "fget", made), "__annotations__", {}).get("return")
+    if result and "Returns" in lines:
+        first = lines.index("Returns") + 2
+        rest = lines[first:]
+        ends = [i - 1 for i, line in enumerate(rest) if re.fullmatch("-{3,}", line)]
+        text = rest[: ends[0] if ends else len(rest)]
+        if not any(line.startswith(" ") for line in text):  # prose alone
+            name = result.__name__ if isinstance(result, type) else str(result)
+            lines[first : first + len(text)] = [name, *(f"    {x}".rstrip() for x in text)]
     for i, line in enumerate(lines):
         if lines[i + 1 : i + 2] and re.fullmatch("-{3,}", lines[i + 1]):
             section = line

@@ -320,21 +320,20 @@ def _leading(materials: Sequence[Material]) -> tuple[Law, Piezo | None]:
 
 @dataclass(frozen=True)
 class Body:
-    """Material and supports.
+    """A body, or several: materials, supports and loads.
 
     Attributes
     ----------
     law
-        Law of the stress; or a `Material`, or several of them with their regions. It then becomes
-        the law of the softest one, which gives its constants to the scales: where a stiff and a
-        soft part press on each other, that one yields.
+        Law of the stress, a `Material`, or several of them with their regions; the attribute is
+        then the law of the softest one, which determines the scales of the problem.
     fixed, loads
         Supports and loads, one or several.
     piezo
         Piezoelectric tensors in the body's axes, or None; of several materials those of the first
-        that has some, which give the permittivity to the unit of the potential.
+        that has some, whose permittivity determines the unit of the potential.
     regions
-        The materials, where `law` was given as such; else none.
+        The materials that were given as `law`; else none.
     rigid, electrodes
         Rigid parts, foundations included, and parts of one unknown potential.
     elastic

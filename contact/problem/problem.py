@@ -86,7 +86,7 @@ SLIP = "slip"
 
 
 class ContactProblem:
-    """A body in front of rigid foundations.
+    """A contact problem: bodies, and their contacts with foundations and with each other.
 
     Parameters
     ----------
@@ -100,9 +100,10 @@ class ContactProblem:
         Friction law of contacts that have none of their own; none by default.
     conductor
         Electric contact, likewise; None for an insulated foundation.
-    degree, element
-        Degree of the Lagrange elements, 1 or 2, and which of `contact.body.elements`: "standard",
-        or "mean_dilatation" of degree 2.
+    degree
+        Degree of the Lagrange elements, 1 or 2.
+    element
+        "standard" or "mean_dilatation", see `contact.body.elements`.
 
     Attributes
     ----------
@@ -111,23 +112,23 @@ class ContactProblem:
     equilibrium
         The body: its space, forms, forces and operators.
     entries
-        The contacts with their nodes, which stand one after the other in the interface.
+        The contacts with their nodes, in the order of the interface.
     interface
         Gamma_3 with its laws.
     scales
         Sizes of the body and its stiffness.
     time
-        When its loads and prescribed values act: 1, unless `at` has made it another step.
+        Time of its loads and prescribed values: 1, or that of the load step of `at`.
     since
-        When that step begins; None where nothing has acted before.
+        Time at the beginning of that step; None in the first one.
     history
-        That at its beginning: of friction and of the material.
+        History at its beginning, of friction and of the material.
 
     Raises
     ------
     InputError
-        If a part is missing, a vector has the wrong length, nothing can touch, or the laws of
-        the layer are none.
+        If a part is missing, a vector has the wrong length, nothing can touch, or a law of the
+        layer is not one.
     """
 
     def __init__(
