@@ -103,18 +103,17 @@ def pytest_report_header() -> str:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out tests that are for another number of ranks, or compare one rank with itself.
 
-    On more than 2 ranks, those stay that have each value of each parameter: all combinations run
-    on 1 and 2, and which rank has nothing, or two neighbours, depends on none.
+    On several ranks, those stay that have each value of each parameter: all combinations run on
+    one, or on 2 where a test is not for one. Which rank has nothing, or two neighbours, depends on
+    no combination.
     """
-    marks = [item.get_closest_marker("parallel") for item in items]
-    kept = {
-        item
-        for item, mark in zip(items, marks, strict=True)
-        if mark is None or _comm.size in _sizes(mark)
-    }
-    if _comm.size > 2:
-        groups = groupby(filter(kept.__contains__, items), key=lambda x: x.nodeid.split("[")[0])
-        kept = {item for _, group in groups for item in _covering(list(group))}
+    kept = set()
+    for _, group in groupby(items, key=lambda item: item.nodeid.split("[")[0]):
+        some = list(group)
+        mark = some[0].get_closest_marker("parallel")
+        if mark is None or _comm.size in _sizes(mark):
+            everything = _comm.size == (1 if mark is None or mark.kwargs.get("alone", True) else 2)
+            kept |= set(some if everything else _covering(some))
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = [item for item in items if item in kept]
 
