@@ -5,7 +5,7 @@ of pressures that are not known yet: the linear system would be singular. The no
 are taken for sticking.
 
 Where nothing constrains a mode at a solution, a rigid motion costs nothing: of all solutions the
-one is taken whose displacements at the contact nodes are the least.
+one is taken whose displacements have the least norm in L2.
 
 References
 ----------
@@ -25,6 +25,7 @@ from scipy.optimize import nnls
 
 from contact.linear.operator import Operator
 from contact.mesh.entities import component_sums
+from contact.mesh.geometry import volumes
 from contact.problem.condensed import CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
@@ -201,11 +202,17 @@ class UnconstrainedModes:
                 motions.append(group.moved @ free)
         if not motions:
             return None
-        moved = np.concatenate(columns, axis=2)
-        weight, displacement = jump.weight, nodal[:, : jump.dim]
-        products = np.einsum("n,nik,nil->kl", weight, moved, moved)
-        sides = np.einsum("n,nik,ni->k", weight, moved, displacement)
-        products, sides = (jump.comm.allreduce(part, op=MPI.SUM) for part in (products, sides))
+        moved, whole = np.concatenate(columns, axis=2), np.hstack(motions)
+        if isinstance(problem, ContactProblem):
+            body = problem.equilibrium
+            vectors = [*(body.local(column) for column in whole.T), state.x]
+            rows = np.stack([_by_volume(problem, x) for x in vectors], axis=1)
+        else:  # of a condensed body the displacements at contact nodes, relative to the other side
+            values = np.concatenate([moved, nodal[:, : jump.dim, None]], axis=2)
+            values *= np.sqrt(jump.weight)[:, None, None]
+            rows = values.reshape(-1, values.shape[2])
+        gram = jump.comm.allreduce(rows.T @ rows, op=MPI.SUM)
+        products, sides = gram[:-1, :-1], gram[:-1, -1]
         wanted = amounts = np.linalg.lstsq(products, sides, rcond=EPS)[0]
         near, opening = np.isfinite(jump.gap), interface.opening(nodal)
         rising = np.einsum("ni,nik->nk", jump.normal, moved)
@@ -218,7 +225,7 @@ class UnconstrainedModes:
             parts = jump.comm.allgather((rising[near], room[near]))
             cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))
             amounts = _least_distance(products, wanted, cone, -room)
-        return _RigidMotion(np.hstack(motions), moved, wanted, amounts, depth, limited)
+        return _RigidMotion(whole, moved, wanted, amounts, depth, limited)
 
     def pushed_aside(self, problem: Problem, state: State) -> bool:
         """Tell whether contact has pushed a body to where nothing holds it. Collective.
@@ -229,6 +236,21 @@ class UnconstrainedModes:
             return False
         found = self.minimal_motion(problem, state)
         return found is not None and found[1]
+
+
+def _by_volume(problem: ContactProblem, x: Array) -> Array:
+    """Return displacements of local unknowns times the roots of the nodes' volumes on this rank.
+
+    Cells share theirs equally among their nodes; foundations that move count once.
+    """
+    body = problem.equilibrium
+    nodal, cells, size = body.nodal(x), body.space.dofmap.list, volumes(body.domain)
+    count = cells.shape[1]
+    share = np.bincount(
+        cells[: size.size].ravel(), np.repeat(size / count, count), minlength=len(nodal)
+    )
+    own = np.sqrt(size.sum()) * body.motion(x)
+    return np.append((np.sqrt(share)[:, None] * nodal[:, : body.dim]).ravel(), own)
 
 
 def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -> Array:

@@ -180,8 +180,7 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
                 f"nothing holds {name} against "
                 f"{f'rigid motions ({words})' if several else f'a rigid motion ({words})'}, which "
                 f"{'cost' if several else 'costs'} nothing: "
-                "of all places the one with the least displacements at the contact nodes, relative "
-                "to the other side, is given; "
+                "of all places the one with the least displacements is given; "
                 f"friction, or supports against {'those motions' if several else 'that motion'}, "
                 "hold it"
             )

@@ -44,6 +44,11 @@ def test_the_least_of_all_places():
         assert not limited
         back = body.moved(elsewhere.x, -motion)
         np.testing.assert_allclose(nodes.apply(back), nodes.apply(state.x), rtol=0, atol=1e-9)
+    # Relative to the lid that were half of its way.
+    lifted = body.nodal(state.x)[: group.component.size]
+    assert (
+        nodes.comm.allreduce(np.abs(lifted[group.component == ring]).max(initial=0), MPI.MAX) < 1e-9
+    )
 
 
 @pytest.mark.parallel
