@@ -16,6 +16,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
     Group,
+    UnilateralSupport,
     constrained_by_supports,
     described,
     groups,
@@ -211,6 +212,44 @@ def _named(group: Group, motions: Array) -> str:
         if problem.comm.allreduce(bool(inside), op=MPI.LOR):
             found.append(name)
     return ", ".join(found)
+
+
+def not_held(solution: Solution) -> Iterator[Remark]:
+    """Say which bodies contact has not held where a method fails. Collective.
+
+    A block between two jaws that touch it aslant gets out of their way and falls: no solution.
+    """
+    problem = solution.problem
+    if solution.converged:
+        return
+    contact = "friction" if problem.frictional else "contact"
+    for group in groups(problem):
+        support = UnilateralSupport.of(group, solution.status != "open")
+        if support is None:
+            continue
+        motion = support.lost(solution.state.time)
+        why = "the nodes that touch at last, pressed by whatever force, do not balance its loads"
+        if motion is None:
+            motion = _drift(group, support.free, solution.state)
+            why = "it has moved by more than the size of the bodies"
+            if _reach(group, motion) <= problem.domain.size:
+                continue
+        large = np.abs(motion) > 0.1 * np.abs(motion).max()
+        words = ", ".join(dict.fromkeys(np.array(group.names)[large].tolist()))
+        yield (
+            f"{contact} cannot hold {_named(group, motion[:, None])} ({words}) where the method has "
+            f"left it: {why}; supports, more friction, or a load that presses it where it "
+            "touches hold it"
+        )
+
+
+def _drift(group: Group, free: Array, state: State) -> Array:
+    """Return the free motion nearest to the displacements of a state, shape (m,). Collective."""
+    body, comm = group.problem.equilibrium, group.problem.comm
+    rows = group.moved[: body.owned] @ free
+    x = state.x[: body.owned]
+    gram, side = (comm.allreduce(rows.T @ of, op=MPI.SUM) for of in (rows, x))
+    return np.asarray(free @ np.linalg.lstsq(gram, side, rcond=EPS)[0])
 
 
 def adrift(solution: Solution) -> Iterator[Remark]:

@@ -113,6 +113,7 @@ def review(solution: Solution) -> None:
         "passing-bodies": bodies.passing(solution.problem),
         "one-material": bodies.regions(solution),
         "unresisted-motion": bodies.unresisted_motions(solution),
+        "not-held": bodies.not_held(solution),
         "free-motion": bodies.adrift(solution),
         "penalty": giving_way(solution),
     }.items():

@@ -359,11 +359,16 @@ class UnilateralSupport:
     cone: Array
 
     @staticmethod
-    def of(group: Group) -> UnilateralSupport | None:
+    def of(group: Group, at: NDArray[np.bool_] | slice = slice(None)) -> UnilateralSupport | None:
         """Return that of bodies; None if supports hold them, or no bound is known. Collective.
 
         A given friction bound, and a smoothed pressure, are not bounded by the pressure at the
         node: such problems are left to the solver.
+
+        Parameters
+        ----------
+        group, at
+            The bodies, and the contact nodes of this rank that may press, all by default.
         """
         problem, free = group.problem, null_space(group.supports)
         friction, comm = problem.interface.friction, problem.comm
@@ -378,14 +383,15 @@ class UnilateralSupport:
         ]
         rows = [normal + sign * part for part in across for sign in (-1, 1)]
         return UnilateralSupport(
-            group, free, np.concatenate([problem.nodes.gather(row) for row in rows])
+            group, free, np.concatenate([problem.nodes.gather(row[at]) for row in rows])
         )
 
-    def bears(self, time: float) -> bool:
-        """Tell whether contact forces can balance the loads of a time. Collective.
+    def lost(self, time: float) -> Array | None:
+        """Return the rigid motion by which the loads of a time take the bodies off. Collective.
 
-        They cannot where the loads do work on a rigid motion m on which no admissible contact
-        force does any against them: m.nu <= -mu |m_tau| at every node (Farkas).
+        Shape (m,); None where contact forces can balance them. They cannot where the loads do work
+        on a rigid motion m on which no admissible contact force does any against them:
+        m.nu <= -mu |m_tau| at every node (Farkas).
         """
         problem, moved = self.group.problem, self.group.moved
         body, comm = problem.equilibrium, problem.comm
@@ -395,17 +401,19 @@ class UnilateralSupport:
         work = comm.allreduce(moved[: body.owned].T @ own, op=MPI.SUM)
         work = (work + moved[body.owned :].T @ on_masters) @ self.free
         scale = comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM) + np.abs(on_masters).sum()
-        return on_root(comm, lambda: self._balances(work, scale))
+        return on_root(comm, lambda: self._lost(work, scale))
 
-    def _balances(self, work: Array, scale: float) -> bool:
-        """Tell whether contact can balance a work of loads, on the rank that has the cone."""
+    def _lost(self, work: Array, scale: float) -> Array | None:
+        """Return the motion on which loads do most work, on the rank that has the cone."""
         if np.abs(work).max() <= NEGLIGIBLE * scale:
-            return True
+            return None
         from scipy.optimize import linprog  # takes a while to load
 
         bounds = [(-1, 1)] * work.size
         motion = linprog(-work, self.cone, np.zeros(len(self.cone)), bounds=bounds)
-        return bool(motion.status != 0 or -motion.fun <= 1e-6 * scale)
+        if motion.status != 0 or -motion.fun <= 1e-6 * scale:
+            return None
+        return np.asarray(self.free @ motion.x)
 
     @property
     def besides(self) -> str:
@@ -433,11 +441,11 @@ def released(held_by: Sequence[UnilateralSupport], begin: float, end: float) -> 
         A time at which contact can hold it, and one that is asked for.
     """
     for support in held_by:
-        if support.bears(end):
+        if support.lost(end) is None:
             continue
         for _ in range(BISECTIONS):
             middle = (begin + end) / 2
-            begin, end = (middle, end) if support.bears(middle) else (begin, middle)
+            begin, end = (middle, end) if support.lost(middle) is None else (begin, middle)
         return f"from t = {end:g} on the loads pull the body off the foundation{support.besides}"
     return ""
 

@@ -134,3 +134,36 @@ def test_two_pads_that_are_lifted_off_stay_where_they_were(seed, tmp_path):
     assert solution.converged
     assert np.abs(solution.state.x).max() < 0.01
     assert solution.counters.contact_solves <= 150  # one took 6668, for steps that were halved
+
+
+@pytest.mark.parametrize("weight", [1e-5, 1e-3])
+def test_a_block_that_jaws_touch_aslant_is_said_to_fall(weight, tmp_path):
+    """It turns out of their way: the end was "not converged" after 350 solves, and no more."""
+    bodies = Bodies(np.random.default_rng(0))
+    turn = np.array([[np.cos(0.05), np.sin(0.05)], [-np.sin(0.05), np.cos(0.05)]])
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) @ turn
+    x = float(square[:, 0].max())
+    bodies.block("a", [[-2.0, -0.6], [-x, -0.6], [-x, 0.6], [-2.0, 0.6]], 0.25)
+    bodies.block("m", square.tolist(), 0.2)
+    bodies.block("z", [[x, -0.6], [2.0, -0.6], [2.0, 0.6], [x, 0.6]], 0.25)
+    write_msh(bodies.mesh(), tmp_path / "row.msh")
+    friction = {"law": "coulomb", "mu": 0.2}
+    case = {
+        "mesh": {"file": str(tmp_path / "row.msh")},
+        "material": {"young": 1.0, "poisson": 0.1},
+        "fixed": [
+            {"on": "a_left", "displacement": [0.0015, 0.0]},
+            {"on": "z_right", "displacement": [-0.0015, 0.0]},
+        ],
+        "load": [{"everywhere": True, "body_force": [0.0, -weight]}],
+        "contact": [
+            {"on": "m_left", "against": "a_right", "friction": friction},
+            {"on": "m_right", "against": "z_left", "friction": friction},
+        ],
+        "solver": {"max_outer": 60},
+    }
+    solution = solve(parse_case(case), comm=MPI.COMM_SELF)
+    assert not solution.converged
+    (said,) = [text for text in solution.warnings if "[not-held]" in text]
+    assert "friction cannot hold m (" in said
+    assert "translation along y" in said
