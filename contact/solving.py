@@ -37,7 +37,7 @@ from contact.output.checkpoint import Checkpoints, read_steps
 from contact.output.remarks import announce
 from contact.output.solution import Solution, StepRecord
 from contact.output.steps import StepRecorder
-from contact.output.uniqueness import critical_factor
+from contact.output.uniqueness import uniqueness
 from contact.problem.checks import check_potential, check_problem, check_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
@@ -324,7 +324,7 @@ def run_schedule(
             history.records += method.history.records
     counters = method.counters
     body = method.condensation if isinstance(method, Newton) else None
-    critical = critical_factor(here, state, body) if outcome.converged else np.inf
+    critical, jammed = uniqueness(here, state, body) if outcome.converged else (np.inf, False)
     # The review needs the memory that the method's operators take.
     del method, body
     destroy_unused(problem.comm, problem.domain.mesh.comm)
@@ -341,6 +341,7 @@ def run_schedule(
         steps=records,
         extra_steps=sum(record.state.time not in schedule.times for record in records),
         critical_factor=critical,
+        jammed=jammed,
     )
     if reviewed:
         announce(solution)

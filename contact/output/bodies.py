@@ -237,8 +237,8 @@ def not_held(solution: Solution) -> Iterator[Remark]:
         large = np.abs(motion) > 0.1 * np.abs(motion).max()
         words = ", ".join(dict.fromkeys(np.array(group.names)[large].tolist()))
         yield (
-            f"{contact} cannot hold {_named(group, motion[:, None])} ({words}) where the method has "
-            f"left it: {why}; supports, more friction, or a load that presses it where it "
+            f"{contact} cannot hold {_named(group, motion[:, None])} ({words}) where the method "
+            f"has left it: {why}; supports, more friction, or a load that presses it where it "
             "touches hold it"
         )
 

@@ -360,7 +360,14 @@ def strong_friction(solution: Solution) -> Iterator[Remark]:
     factor = solution.critical_factor
     if np.isnan(factor):
         yield Note(f"with more than {MOST} contact nodes, a critical friction is not looked for")
-    if factor <= 1:
+    if solution.jammed:
+        yield (
+            f"there are several solutions, and this is one reached from {solution.start}: friction "
+            "alone jams the bodies, which without any contact force are in balance where they do "
+            "not meet; load steps choose one by the way of loading, a support against the motion "
+            "away, or no friction, leaves one"
+        )
+    elif factor <= 1:
         law, nodes = solution.problem.interface.friction.law, solution.problem.nodes
         own = law.maximum if law is not None and nodes.nodes.size else 0.0
         largest = solution.problem.comm.allreduce(own, op=MPI.MAX)

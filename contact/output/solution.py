@@ -109,6 +109,8 @@ class Solution(Solved):
     critical_factor
         The factor of mu from which on there may be several solutions, as far as that is known;
         infinity for none, NaN where it is not looked for (`contact.output.uniqueness`).
+    jammed
+        Whether friction alone keeps bodies in contact: without contact forces there is a solution.
     case
         The case as `contact check` prints it, empty where there is none.
     source
@@ -141,6 +143,7 @@ class Solution(Solved):
     intervals: Intervals | None = None
     start: str = "zero slip"
     critical_factor: float = np.inf
+    jammed: bool = False
     case: str = ""
     source: Any = None
     energies: Balance | None = None

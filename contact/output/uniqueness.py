@@ -7,6 +7,9 @@ real eigenvalues (Hassani, Hild, Ionescu and Sakki 2003). A body that no support
 like a rigid one against next to nothing, so that the pencil, and the body, are looked at without
 that: such slips say nothing about its deformation.
 
+Where the bodies, without any contact force, can be in balance where they do not meet, that is a
+solution too, whatever the friction: rings in a row, which roll out of a pinch or are jammed in it.
+
 References
 ----------
 Hassani, Hild, Ionescu and Sakki, A mixed finite element method and solution multiplicity for
@@ -28,28 +31,32 @@ from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import groups, null_space
 from contact.problem.state import State
 from contact.ranks import on_root
-from contact.tolerances import EPS
+from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 
 #: Contact nodes up to which eigenvalues take no time to speak of.
 MOST = 300
+
+#: Relative accuracy of the balance, and of displacements, without contact forces.
+BALANCED = 1e-6
 
 #: Energy of rigid sliding over that of the next mode, which deforms: below this. On curved surfaces
 #: their normals' tilt resists it, by 2e-3 and less; the first modes of slender bodies differ by 16.
 RIGID = 1e-2
 
 
-def critical_factor(
+def uniqueness(
     problem: ContactProblem, state: State, condensation: Condensation | None = None
-) -> float:
+) -> tuple[float, bool]:
     """Return the least factor of mu from which on the Jacobian at a solution may be singular.
 
-    Below 1 the friction that is there is enough for several solutions. The touching nodes slide in
-    the directions of their friction stresses, or all in one direction, or in the opposite ones; of
-    a body that touches nothing those that touch in the reference configuration. Infinity without
-    such a factor, and where nothing is known: with a layer, a potential, or a smoothed pressure,
-    and of slips against which the bodies do not deform. NaN with more than `MOST` contact nodes,
-    where it is not looked for. Collective.
+    Beside it, whether friction alone keeps the bodies in contact: the state without contact forces
+    is a solution too. Below 1 the friction that is there is enough for several solutions. The
+    touching nodes slide in the directions of their friction stresses, or all in one direction, or
+    in the opposite ones; of a body that touches nothing those that touch in the reference
+    configuration. Infinity without such a factor, and where nothing is known: with a layer, a
+    potential, or a smoothed pressure, and of slips against which the bodies do not deform. NaN with
+    more than `MOST` contact nodes, where it is not looked for. Collective.
 
     Parameters
     ----------
@@ -63,11 +70,11 @@ def critical_factor(
     known = friction.acts and friction.local and not interface.law.active
     known = known and not problem.piezoelectric and interface.coupled.size == jump.nodes.size
     if not known or jump.size == 0:
-        return np.inf
+        return np.inf, False
     if jump.size > MOST:
-        return np.nan
+        return np.nan, False
     if condensation is None and not (condensable(problem, "auto") and pays(problem, "auto")):
-        return np.inf
+        return np.inf, False
     nodal = jump.apply(state.x)
     pressure = interface.pressure(nodal, state.forces)
     rounding = interface.negligible(nodal, pressure)
@@ -78,21 +85,77 @@ def critical_factor(
     condensation = condensation or Condensation(problem, Counters())
     stiffness = condensation.stiffness(state)
     if stiffness is None:
-        return np.inf
-    rigid = sum([null_space(group.supports).shape[1] for group in groups(problem)])
-    ranks = jump.comm.gather((jump.lift, jump.tangent, state.forces.friction, closed, mu))
+        return np.inf, False
+    columns = [
+        (group.normal[:, None, :] * jump.lift[:, :, None] + group.tangential)
+        @ null_space(group.supports)
+        for group in groups(problem)
+    ]
+    motions = np.concatenate(columns, axis=2)
+    pressed = jump.maximum(pressure) > interface.rounding(nodal)
+    ranks = jump.comm.gather(
+        (
+            *(jump.lift, jump.tangent, state.forces.friction, closed, mu, motions),
+            jump.weight[:, None] * state.forces.vectors(jump),
+            interface.opening(nodal),
+        )
+    )
 
-    def factor() -> float:
-        normal, tangent, force, touches, rates = (
+    def found() -> tuple[float, bool]:
+        normal, tangent, force, touches, rates, moved, forces, opening = (
             np.concatenate(part) for part in zip(*ranks, strict=True)
         )
         if not np.any(touches & (rates > 0)):
-            return np.inf
+            return np.inf, False
         along = _directions(normal, tangent, None)
         own = _directions(normal, tangent, force)
-        return min(_factor(stiffness, normal, t, touches, rates, rigid) for t in (along, own))
+        rigid = motions.shape[2]
+        factor = min(_factor(stiffness, normal, t, touches, rates, rigid) for t in (along, own))
+        if not pressed:
+            return factor, False
+        size = problem.domain.size
+        return factor, _free_of_contact(stiffness, normal, moved, forces, opening, size)
 
-    return on_root(jump.comm, factor)
+    return on_root(jump.comm, found)
+
+
+def _free_of_contact(
+    stiffness: Array, normal: Array, motions: Array, forces: Array, opening: Array, size: float
+) -> bool:
+    """Tell whether bodies can be in balance, and nowhere meet, without these contact forces.
+
+    Free motions, shape (n, d, m), may be as large as the bodies.
+    """
+    count, dim, many = motions.shape
+    used = np.diag(stiffness) > 0
+    basis = motions.reshape(count * dim, many)[used]
+    free, sizes, _ = np.linalg.svd(basis, full_matrices=False)
+    free = free[:, sizes > NEGLIGIBLE * sizes.max(initial=0.0)]
+    matrix = stiffness[np.ix_(used, used)] + np.abs(stiffness).max() * free @ free.T
+    load, change = forces.ravel()[used], np.zeros(count * dim)
+    try:
+        change[used] = cho_solve(cho_factor(matrix), load)
+    except LinAlgError:
+        return False
+    # Loads on a body that contact alone holds need contact forces.
+    if np.linalg.norm(free.T @ load) > BALANCED * np.linalg.norm(load):
+        return False
+    way = change.reshape(count, dim)
+    met = np.isfinite(opening)
+    allowed = BALANCED * np.linalg.norm(way, axis=1).max()
+    room = (opening - np.einsum("nd,nd->n", normal, way))[met] + allowed
+    if room.min() >= 0 or free.shape[1] == 0:
+        return bool(room.min() >= 0)
+    from scipy.optimize import linprog  # takes a while to load
+
+    columns = np.zeros((count * dim, free.shape[1]))
+    columns[used] = free / np.abs(free).max(axis=0)
+    rising = np.einsum("nd,ndm->nm", normal, columns.reshape(count, dim, -1))[met]
+    scale = -room.min()
+    found = linprog(
+        np.zeros(rising.shape[1]), rising, room / scale, bounds=(-size / scale, size / scale)
+    )
+    return bool(found.status == 0)
 
 
 def _directions(normal: Array, tangent: Array, force: Array | None) -> Array:

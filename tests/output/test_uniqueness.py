@@ -6,9 +6,12 @@ from mpi4py import MPI
 
 from contact import build_problem, solve
 from contact.case.file import parse_case
-from contact.output.uniqueness import critical_factor
+from contact.output.uniqueness import uniqueness
+from contact.problem.residuals import evaluate
 from scripts.studies.fresh_check import Mesh, write_msh
+from scripts.studies.fresh_families import Bodies
 from scripts.studies.sweep import problems
+from tests.problems.rings import between_plates, squeezed
 
 SAID = "several solutions may exist"
 
@@ -110,6 +113,7 @@ def test_single_solutions_are_not_warned_of(hard):
             continue
         solution = solve(problem)
         assert not solution.critical_factor <= 1, case.source  # NaN beyond 300 nodes
+        assert not solution.jammed, case.source
         seen += 1
     assert seen >= 2
 
@@ -129,7 +133,8 @@ def test_any_number_of_ranks():
     assert np.isfinite(alone.critical_factor)
     assert shared.critical_factor == pytest.approx(alone.critical_factor, rel=1e-8)
     # Another method has no condensed body: it is made for this.
-    again = critical_factor(shared.problem, shared.state)
+    again, jams = uniqueness(shared.problem, shared.state)
+    assert not jams
     assert again == pytest.approx(alone.critical_factor, rel=1e-8)
 
 
@@ -148,3 +153,43 @@ def test_a_critical_friction_that_is_not_looked_for_is_told(monkeypatch):
     assert np.isnan(solution.critical_factor)
     (said,) = [note for note in solution.notes if "critical" in note]
     assert said.startswith("with more than 3 contact nodes") and said.endswith("[strong-friction]")
+
+
+def rhombus(folder, mu):
+    """Return a body between two jaws that touch its corners a tenth above and below its middle."""
+    bodies = Bodies(np.random.default_rng(0))
+    bodies.block("left", [[-2.0, -0.6], [-0.5, -0.6], [-0.5, 0.6], [-2.0, 0.6]], 0.125)
+    bodies.block("body", [[0.0, -0.5], [0.5, 0.1], [0.0, 0.5], [-0.5, -0.1]], 0.125)
+    bodies.block("right", [[0.5, -0.6], [2.0, -0.6], [2.0, 0.6], [0.5, 0.6]], 0.125)
+    write_msh(bodies.mesh(), folder / "rhombus.msh")
+    return parse_case({
+        "mesh": {"file": str(folder / "rhombus.msh")},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [
+            {"on": "left_left", "displacement": [0.0015, 0.0]},
+            {"on": "right_right", "displacement": [-0.0015, 0.0]},
+        ],
+        "contact": [
+            {"on": "left_right", "against": "body_left"},
+            {"on": "right_left", "against": "body_right"},
+        ],
+        "friction": {"law": "coulomb", "mu": mu},
+    })  # fmt: skip
+
+
+def test_a_body_that_friction_alone_jams(tmp_path):
+    """With less friction it turns out of the way, and nothing presses: a solution with more too."""
+    free, jammed = (solve(rhombus(tmp_path, mu), comm=MPI.COMM_SELF) for mu in (0.05, 0.5))
+    assert free.converged and jammed.converged
+    assert free.pressure.max() == 0 < jammed.pressure.max()
+    assert evaluate(jammed.problem, free.state).largest < 1e-8
+    assert jammed.jammed and not free.jammed
+    said = "friction alone jams the bodies"
+    assert [said in "".join(each.warnings) for each in (free, jammed)] == [False, True]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("seed", range(3))
+def test_a_ring_that_is_squeezed_without_friction_too(seed):
+    held = solve(squeezed("newton"), domain=between_plates(MPI.COMM_WORLD, seed))
+    assert held.converged and held.problem.frictional and not held.jammed
