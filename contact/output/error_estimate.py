@@ -182,11 +182,16 @@ def _acting_inside(problem: ContactProblem) -> list[str]:
 
 
 def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
-    """Return the energy of strains that a rigid motion leaves by rounding. Collective."""
-    body, comm = problem.equilibrium, problem.comm
+    """Return the energy of strains that a rigid motion leaves by rounding. Collective.
+
+    They are differences of displacements over the size of a cell, in all directions.
+    """
+    body, comm, topology = problem.equilibrium, problem.comm, problem.domain.mesh.topology
     moved = float(np.abs(body.nodal(state.x)[:, : body.dim]).max(initial=0.0))
-    strain = ROUNDING * comm.allreduce(moved, op=MPI.MAX) / body.domain.size
-    return body.layout.stiffness * strain**2 * comm.allreduce(volume, op=MPI.SUM)
+    size = body.domain.size / topology.index_map(body.dim).size_global ** (1 / body.dim)
+    strain = ROUNDING * comm.allreduce(moved, op=MPI.MAX) / size
+    energy = body.layout.stiffness * (body.dim * strain) ** 2
+    return energy * comm.allreduce(volume, op=MPI.SUM)
 
 
 def sampled(fields: DerivedFields) -> tuple[Array, Array]:
