@@ -21,6 +21,14 @@ REFERENCE = [
 ]
 
 
+#: Of meshes that have no number of cells.
+COARSE = {
+    "bracket": ["mesh.size=16.0", "mesh.contact_size=6.0"],
+    "ball-in-steel": ["mesh.contact_size=0.012", "mesh.edge_size=0.012"],
+    "indent-punch-tilted": ["mesh.contact_size=0.6", "mesh.edge_size=0.1"],
+}
+
+
 @pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
 def test_case_converges(path: Path) -> None:
     """A coarse version of each case file converges by the file's own method."""
@@ -29,8 +37,7 @@ def test_case_converges(path: Path) -> None:
     if case.mesh.cells is not None:
         coarse = ", ".join(str(max(n // 4, 2)) for n in case.mesh.cells)
         case = load_case(path, [f"mesh.cells=[{coarse}]"])
-    if path.stem == "bracket":
-        case = load_case(path, ["mesh.size=16.0", "mesh.contact_size=6.0"])
+    case = load_case(path, COARSE[path.stem]) if path.stem in COARSE else case
     solution = solve(case)
     assert solution.converged, solution.outcome.reason
     assert solution.outcome.kkt.largest <= case.solver.tolerance
