@@ -1,5 +1,7 @@
 """What fails on one rank alone is raised on all: they would wait for it for ever."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -8,6 +10,7 @@ from contact.history import BodyState
 from contact.linear.dense import DenseOperator
 from contact.linear.operator import Counters
 from contact.ranks import on_all_ranks, on_root
+from tests.conftest import _covering
 
 COMM = MPI.COMM_WORLD
 
@@ -42,3 +45,17 @@ def test_a_dense_factorisation_without_room(monkeypatch):
     monkeypatch.setattr(DenseOperator, "_factorise", lambda *_: fails())
     with pytest.raises(MemoryError, match="no room"):
         operator.update("tangent", BodyState(np.zeros(2)), np.ones((1, 2, 2)))
+
+
+def test_on_several_ranks_each_value_of_each_parameter_stays():
+    """Not each combination; of a test without parameters itself."""
+    found = [
+        SimpleNamespace(callspec=SimpleNamespace(indices={"a": a, "b": b}))
+        for a in range(3)
+        for b in range(2)
+    ]
+    kept = _covering(found)
+    assert len(kept) == 3
+    assert {item.callspec.indices["a"] for item in kept} == {0, 1, 2}
+    assert {item.callspec.indices["b"] for item in kept} == {0, 1}
+    assert _covering([single := SimpleNamespace()]) == [single]
