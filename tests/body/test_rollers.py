@@ -245,7 +245,7 @@ WRONG = {
     ),
     "no number": ({"normal": "log(-1 - x)"}, r"fixed\.0\.normal: .*(finite|number)"),
     "no part": ({"on": "base"}, r"fixed\.0\.on: given .base."),
-    "an edge": ({"on": ["left", "top"]}, r"fixed\.0\.normal: left, top has an edge"),
+    "an edge": ({"on": ["left", "top"]}, r"fixed\.0\.normal: left\+top has an edge"),
 }
 
 
