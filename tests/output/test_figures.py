@@ -222,20 +222,29 @@ def test_magnified_bodies_do_not_overlap() -> None:
 
 
 @pytest.mark.parametrize("width", [85 / 25.4, 6.3])
-def test_labels_of_a_loop_are_apart(width: float) -> None:
+@pytest.mark.parametrize("axes", ["x", "xy", "xyz"])
+def test_labels_of_a_loop_are_apart(width: float, axes: str) -> None:
     look = Look(width)
-    run = moved(rigid_x=[0.005, 0.01, 0.015, 0.02], rigid_force_x=[0.2, 0.4, 0.6, 0.9])
+    forward, back = [0.0005, 0.001, 0.0015, 0.0017], [-0.0005, -0.001, -0.0015, -0.002]
+    columns = {f"rigid_{axis}": forward if axis == "x" else back for axis in axes}
+    columns |= {f"rigid_force_{axis}": [0.2, 0.4, 0.6, 0.9] for axis in axes}
+    run = replace(moved(**columns), axes="xyz" if axes == "xyz" else "xy")
     with rc_context(look.style):
         figure = draw_loop(run, "rigid")
+        figure.suptitle("A title")
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
-        renderer, ax = canvas.get_renderer(), figure.axes[0]
-        boxes = [label.get_window_extent(renderer) for label in ax.get_xticklabels()]
-        inside = [box for box in boxes if ax.bbox.x0 - 1 <= (box.x0 + box.x1) / 2 <= ax.bbox.x1 + 1]
-        assert len(inside) >= 3
-        assert all(one.x1 + 3 < two.x0 for one, two in pairwise(inside))
-        name = ax.yaxis.label.get_window_extent(renderer)
-        assert 0 <= name.y0 and name.y1 <= figure.bbox.height
+        renderer = canvas.get_renderer()
+        top = figure._suptitle.get_window_extent(renderer).y0  # type: ignore[attr-defined]
+        assert len(figure.axes) == len(axes)
+        for ax in figure.axes:
+            left, right = ax.bbox.x0 - 1, ax.bbox.x1 + 1
+            boxes = [label.get_window_extent(renderer) for label in ax.get_xticklabels()]
+            inside = [box for box in boxes if left <= (box.x0 + box.x1) / 2 <= right]
+            assert len(inside) >= 2
+            assert all(one.x1 + 3 < two.x0 for one, two in pairwise(inside))
+            name = ax.yaxis.label.get_window_extent(renderer)
+            assert 0 <= name.y0 and name.y1 <= top
 
 
 def test_ends_below_zero_are_values_of_an_option() -> None:

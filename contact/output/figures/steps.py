@@ -85,7 +85,9 @@ def draw_loop(run: Run, moves: str) -> Figure:
                 force = _course(run, f"{moves}_force_{names[k]}{body}")
                 label = body.removeprefix("_") or "foundation"
                 ax.plot(ways[i][k], force, "-o", color=colour, markersize=2.5, label=label)
-        ax.xaxis.set_major_locator(MaxNLocator(5 - (count > 1), steps=[1, 2, 5, 10]))
+        ax.xaxis.set_major_locator(MaxNLocator(6 - count, steps=[1, 2, 5, 10]))
+        if count > 1:  # long numbers would meet
+            ax.ticklabel_format(axis="x", scilimits=(-2, 4))
         ax.set_xlabel(run.units.label(f"{words} $u_{run.axes[k]}$", "length"))
         ax.set_ylabel(f"force along ${run.axes[k]}${unit}")
         ax.grid(alpha=0.25)

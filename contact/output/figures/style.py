@@ -99,6 +99,8 @@ class Look:
         """
         given = (self.xlim, self.ylim)[axis]
         if given is not None and not (given[0] < high and low < given[1]):
+            least = 1e-9 * (high - low)  # less is rounding
+            low, high = (0.0 if abs(end) < least else end for end in (low, high))
             raise InputError(
                 f"--{'xy'[axis]}lim {given[0]:g},{given[1]:g}: beside {shown}, which is drawn from "
                 f"{low:.4g} to {high:.4g}; accepted: ends that show some of it"
