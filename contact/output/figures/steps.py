@@ -76,18 +76,20 @@ def draw_loop(run: Run, moves: str) -> Figure:
     chosen = np.flatnonzero(seen.any(axis=0))
     words, count = DRIVEN[moves], chosen.size
     narrow = page_width() < NARROW
-    figure = sheet(0.85 * count if narrow else 0.66 if count == 1 else 0.47)
-    panels = figure.subplots(*((count, 1) if narrow else (1, count)), squeeze=False).ravel()
+    across = 1 if narrow else min(count, 2)
+    down = -(-count // across)
+    figure = sheet(down * (0.85 if narrow else 0.66 if across == 1 else 0.47))
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    for spare in panels[count:]:
+        spare.axis("off")
     unit = unit_of("force", run.units, run.axes == "xy")
-    for ax, k in zip(panels, chosen, strict=True):
+    for ax, k in zip(panels, chosen, strict=False):
         for i, (body, colour) in enumerate(zip(bodies, cycle(COLOURS), strict=False)):
             if seen[i, k]:
                 force = _course(run, f"{moves}_force_{names[k]}{body}")
                 label = body.removeprefix("_") or "foundation"
                 ax.plot(ways[i][k], force, "-o", color=colour, markersize=2.5, label=label)
-        ax.xaxis.set_major_locator(MaxNLocator(6 - count, steps=[1, 2, 5, 10]))
-        if count > 1:  # long numbers would meet
-            ax.ticklabel_format(axis="x", scilimits=(-2, 4))
+        ax.xaxis.set_major_locator(MaxNLocator(6 - across, steps=[1, 2, 5, 10]))
         ax.set_xlabel(run.units.label(f"{words} $u_{run.axes[k]}$", "length"))
         ax.set_ylabel(f"force along ${run.axes[k]}${unit}")
         ax.grid(alpha=0.25)
