@@ -114,7 +114,12 @@ def interface_residuals(
     closing = interface.stiffness * interface.norms(
         np.minimum(np.minimum(np.abs(opening), way), interface.size)
     )
-    scale = np.maximum(interface.norms(interface.pressure(nodal, forces)), 1e-4 * closing)
+    pressed = interface.norms(interface.pressure(nodal, forces))
+    # Where nothing presses, nodes may have moved until they just touch: gaps are rounding too.
+    moved = interface.norms(np.full_like(way, interface.rounding(nodal)))
+    covered = interface.stiffness * interface.norms(np.minimum(way, interface.size))
+    closing = np.where(pressed <= moved, np.maximum(closing, covered), closing)
+    scale = np.maximum(pressed, 1e-4 * closing)
     scale = np.maximum(scale, EPS * scale.max())
     norms = np.array([interface.norms(contact), interface.norms(friction)])
     size = np.where(scale > 0, scale, 1.0)

@@ -17,6 +17,7 @@ from contact.linear.operator import Counters
 from contact.methods.method import Method
 from contact.methods.report import IterationHistory, Outcome
 from contact.methods.signals import Interrupted
+from contact.methods.unconstrained_modes import with_least_displacements
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate
 from contact.problem.rigid_modes import released, unilateral_supports
@@ -147,13 +148,17 @@ class Evolution:
 def solve_step(
     problem: ContactProblem, method: Method, start: State | None, linearised_at: Array | None = None
 ) -> tuple[State, Outcome]:
-    """Solve by a method, and evaluate the residuals once more. Collective."""
+    """Solve by a method, and evaluate the residuals once more. Collective.
+
+    Of solutions that differ by a free rigid motion the one with the least displacements is taken.
+    """
     try:
         state, outcome = method.solve(start, linearised_at)
     except Interrupted as interrupt:
         state = method.state
         outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
-    return measured(problem, state, replace(outcome, allowed=method.options.allowed))
+    found = measured(problem, state, replace(outcome, allowed=method.options.allowed))
+    return with_least_displacements(problem, *found)
 
 
 def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:

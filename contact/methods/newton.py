@@ -225,8 +225,6 @@ class Newton:
         elif not self._pays and self.modes.pushed_aside(self.problem, iterate.state):
             found = self._fall_back(iterate, outcome)
             iterate, outcome = found if found[1].converged else (iterate, outcome)
-        if outcome.converged and isinstance(self.problem, ContactProblem):
-            iterate, outcome = self._minimal_motion(iterate, outcome)
         if not outcome.converged and iteration.best.found is not None:
             iterate = iteration.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
@@ -251,24 +249,6 @@ class Newton:
         if residuals.excess(self.options.allowed):
             return None
         return Iterate(state), Outcome(residuals, self.options.allowed, "")
-
-    def _minimal_motion(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
-        """Take a rigid motion off a solution that costs nothing. Collective."""
-        assert self.modes is not None
-        if self.modes.constrained_by_supports:
-            return iterate, outcome
-        found = self.modes.minimal_motion(self.problem, iterate.state)
-        if found is None:
-            return iterate, outcome
-        problem, state, body = self.problem, iterate.state, self.problem.equilibrium
-        x = body.moved(state.x, -found[0])
-        # Where nothing presses, forces by rounding alone are out of balance elsewhere.
-        for forces in (Multipliers.zero(problem.interface.jump), state.forces):
-            least = replace(iterate, state=replace(state, x=x, forces=forces))
-            residuals = evaluate(problem, least.state)
-            if not residuals.excess(self.options.allowed):
-                return least, replace(outcome, kkt=residuals)
-        return iterate, outcome
 
     def _iterate(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Take Newton's steps, with the body condensed where that pays."""

@@ -23,13 +23,16 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Operator
+from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import component_sums
-from contact.mesh.geometry import volumes
+from contact.mesh.geometry import geometry_nodes, measures
+from contact.methods.report import Outcome
 from contact.problem.condensed import CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
-from contact.problem.residuals import residual_forces
+from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.rigid_modes import (
     Group,
     constrained_by_friction,
@@ -239,18 +242,52 @@ class UnconstrainedModes:
 
 
 def _by_volume(problem: ContactProblem, x: Array) -> Array:
-    """Return displacements of local unknowns times the roots of the nodes' volumes on this rank.
+    """Return displacements at points of this rank's cells times the roots of these points' volumes.
 
-    Cells share theirs equally among their nodes; foundations that move count once.
+    Of local unknowns; products are those in L2. Foundations that move count as the whole body.
     """
-    body = problem.equilibrium
-    nodal, cells, size = body.nodal(x), body.space.dofmap.list, volumes(body.domain)
-    count = cells.shape[1]
-    share = np.bincount(
-        cells[: size.size].ravel(), np.repeat(size / count, count), minlength=len(nodal)
-    )
+    body, domain = problem.equilibrium, problem.domain
+    shape, nodes = shape_of(domain.mesh), geometry_nodes(domain)
+    straight = shape.simplex and domain.order == 1
+    points, weights = rule(shape, 2 * body.degree + (1 if straight else 3 * domain.order))
+    size = measures(domain.revolved, shape, nodes, points, weights)
+    values = body.nodal(x)[body.space.dofmap.list[: len(size)], : body.dim]
+    at = np.einsum("qk,nkd->nqd", shape.lagrange(body.degree, points), values)
     own = np.sqrt(size.sum()) * body.motion(x)
-    return np.append((np.sqrt(share)[:, None] * nodal[:, : body.dim]).ravel(), own)
+    return np.append((np.sqrt(size)[:, :, None] * at).ravel(), own)
+
+
+def with_least_displacements(
+    problem: ContactProblem, state: State, outcome: Outcome
+) -> tuple[State, Outcome]:
+    """Take a rigid motion that costs nothing off a solution, whatever found it. Collective.
+
+    Parameters
+    ----------
+    problem
+        The whole problem.
+    state, outcome
+        Where a method has ended; nothing is changed without convergence.
+
+    Returns
+    -------
+    The solution with the least displacements in L2, and its residuals; those given where nothing is
+    free.
+    """
+    modes, body = UnconstrainedModes(problem), problem.equilibrium
+    if not outcome.converged or modes.constrained_by_supports:
+        return state, outcome
+    found = modes.minimal_motion(problem, state)
+    if found is None:
+        return state, outcome
+    x = body.moved(state.x, -found[0])
+    # Where nothing presses, forces by rounding alone are out of balance elsewhere.
+    for forces in (Multipliers.zero(problem.interface.jump), state.forces):
+        least = replace(state, x=x, forces=forces)
+        residuals = evaluate(problem, least)
+        if not residuals.excess(outcome.allowed):
+            return least, replace(outcome, kkt=residuals)
+    return state, outcome
 
 
 def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -> Array:

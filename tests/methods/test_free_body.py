@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem
 from mpi4py import MPI
 from scipy.optimize import minimize
 
@@ -169,3 +171,77 @@ def test_a_block_that_jaws_touch_aslant_is_said_to_fall(weight, tmp_path):
     (said,) = [text for text in solution.warnings if "[not-held]" in text]
     assert "friction cannot hold m (" in said
     assert "translation along y" in said
+
+
+def boxes(folder, **blocks):
+    """Write a mesh of rectangles, name=(left, right, low, high, size), and return its file."""
+    bodies = Bodies(np.random.default_rng(0))
+    for name, (left, right, low, high, size) in blocks.items():
+        bodies.block(name, [[left, low], [right, low], [right, high], [left, high]], size)
+    write_msh(bodies.mesh(), folder / "boxes.msh")
+    return {"file": str(folder / "boxes.msh")}
+
+
+@pytest.mark.parametrize("method", ["newton", "uzawa", "penalty"])
+def test_two_pads_that_a_lid_pushes_go_no_farther_than_they_must(method, tmp_path):
+    """By 0.02 and 0.03 downwards: they had turned, since where they just touch gaps are rounding.
+
+    The contact residual there was 453, that of rounding over the rounding of pressures.
+    """
+    case = {
+        "mesh": boxes(tmp_path, base=(-2.0, 2.0, -1.0, 0.0, 0.5), low=(-1.0, 0.2, 0.05, 0.55, 0.25),
+                      high=(-0.8, 0.9, 0.56, 1.0, 0.25), lid=(-2.0, 2.0, 1.02, 1.5, 0.5)),
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [
+            {"on": "base_bottom", "displacement": [0.0, 0.0]},
+            {"on": "lid_top", "displacement": [0.01, -0.05]},
+        ],
+        "contact": [
+            {"on": "low_bottom", "against": "base_top"},
+            {"on": "low_top", "against": "high_bottom"},
+            {"on": "high_top", "against": "lid_bottom"},
+        ],
+        "friction": {"law": "coulomb", "mu": 0.3},
+        "solver": {"method": method},
+    }  # fmt: skip
+    solution = solve(parse_case(case), comm=MPI.COMM_SELF)
+    assert solution.converged, solution.outcome.reason
+    body = solution.problem.equilibrium
+    heights, moved = body.space.tabulate_dof_coordinates()[:, 1], body.nodal(solution.state.x)
+    for low, high, way in ((0.04, 0.555, -0.02), (0.555, 1.01, -0.03)):
+        own = moved[(heights > low) & (heights < high), :2]
+        np.testing.assert_allclose(own, np.broadcast_to([0.0, way], own.shape), atol=1e-8)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_least_displacements_are_orthogonal_to_rigid_motions(degree, tmp_path):
+    """In L2, by UFL: of degree 2 they were off by up to 1e-2 of the displacements."""
+    case = {
+        "mesh": boxes(
+            tmp_path, base=(-2.0, 2.0, -1.0, 0.0, 0.5), free=(-1.0, 0.2, 0.05, 0.75, 0.3)
+        ),
+        "space": {"degree": degree},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "base_bottom", "displacement": [0.0, 0.0]}],
+        "load": [
+            {"on": "free_left", "traction": ["-0.02*(y - 0.4)**3", 0.0]},
+            {"on": "free_right", "traction": ["0.02*(y - 0.4)**3", 0.0]},
+        ],
+        "contact": [{"on": "free_bottom", "against": "base_top"}],
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    solution = solve(parse_case(case), comm=MPI.COMM_SELF)
+    body = solution.problem.equilibrium
+    u = fem.Function(body.space)
+    u.x.array[:] = solution.state.x[: u.x.array.size]
+    x = ufl.SpatialCoordinate(body.space.mesh)
+    free = ufl.conditional(ufl.gt(x[1], 0.02), 1.0, 0.0)
+
+    def product(first, second):
+        return fem.assemble_scalar(fem.form(free * ufl.inner(first, second) * ufl.dx))
+
+    motions = [ufl.as_vector([1.0, 0.0]), ufl.as_vector([0.0, 1.0]), ufl.as_vector([-x[1], x[0]])]
+    assert solution.converged and product(u, u) > 0
+    for motion in motions:
+        size = np.sqrt(product(u, u) * product(motion, motion))
+        assert abs(product(u, motion)) < 1e-9 * size
