@@ -202,8 +202,8 @@ def make_global_unknowns(
     members: list[Member] = []
     described: list[Rigid | Electrode | Bolt] = [*body.rigid, *body.electrodes, *body.bolts]
     for given in described:
-        if domain.revolved and isinstance(given, Rigid):
-            _check_revolved(given)
+        if isinstance(given, Rigid):
+            _check_motion(given, domain)
         begin = members[-1].columns.stop if members else 0
         scale = body.phi_scale if isinstance(given, Electrode) else domain.size
         scale = 1.0 if isinstance(given, Bolt) else scale
@@ -218,8 +218,15 @@ def make_global_unknowns(
     return GlobalUnknowns(domain.comm, tuple(members), unknown, ties, tied)
 
 
-def _check_revolved(rigid: Rigid) -> None:
-    """Refuse motions that a body of revolution has not."""
+def _check_motion(rigid: Rigid, domain: Domain) -> None:
+    """Refuse motions of another dimension, and those that a body of revolution has not."""
+    if (size := len(rigid.motion.displacement)) != domain.dim:
+        raise InputError(
+            f"{rigid.name} on {rigid.on!r}: the motion has {size} components, the body has "
+            f"{domain.dim}"
+        )
+    if not domain.revolved:
+        return
     radial, _, turn = rigid.values
     if any(value is None or callable(value) or value != 0 for value in (radial, turn)):
         raise InputError(

@@ -32,43 +32,113 @@ def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) ->
     return factor * np.array(numbers)
 
 
+def _listed(given: Any) -> tuple[Any, ...]:
+    """Return a vector's components, or the one component."""
+    return tuple(given) if isinstance(given, list | tuple | np.ndarray) else (given,)
+
+
+def _components(name: str, given: Any, size: int, free: bool = False) -> tuple[Any, ...]:
+    """Return components, None for those that are free, and 0 where none are given."""
+    found: list[Timed | None] = []
+    accepted = "a number" if size == 1 else f"a list of {size}: numbers"
+    accepted += ' or functions of time, or None or "free"' if free else " or functions of time"
+    every = _listed(given)
+    for value in every:
+        unset = value is None or (isinstance(value, str) and value == "free")
+        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        fits = number and np.isfinite(value)
+        expect(name, given, accepted, (unset and free) or fits or callable(value))
+        key = f"{name}.{len(found)}"
+        found.append(None if unset else float(value) if number else _timed(key, value))
+    expect(name, given, accepted, len(every) in (0, size))
+    return tuple(found) or (0.0,) * size
+
+
 @dataclass(frozen=True)
 class Motion:
-    """The motion of a rigid body; a component that is None is free.
+    """The motion of a rigid body: each component is given, or free under a given force.
 
-    Attributes
+    A plate that sinks in under a force, and does not turn: ``Motion([0.0, None], force=[0.0,
+    -3.0])``; one that tilts about (1, 1) as well: ``Motion([0.0, None], None, force=[0.0, -3.0],
+    centre=[1.0, 1.0])``.
+
+    Parameters
     ----------
     displacement
-        Components of the displacement, length d.
+        A list with a value a component (length), each a number or a function of time; None or
+        "free" for one that its force determines. Default: 0.
     rotation
-        Rotation about the centre (radians): one angle in 2-D, three in 3-D.
+        Rotation about the centre (radians), likewise: one angle in 2-D, a list of three in 3-D.
     force, moment
-        Those of the free components, as long as the two above.
+        Those on the free components, as long as the two above. Default: 0.
     centre
-        Centre of rotation, about which moments are taken.
+        Centre of rotation, about which moments are taken; required where something turns.
     amplitude
         Function of time that multiplies all of them; by default
         numbers grow from 0 at time 0 to all at time 1, and stay; "constant": they always act.
+
+    Raises
+    ------
+    InputError
+        If a value is nothing of these, a force acts on a component that is not free, or the
+        centre is missing.
     """
 
-    displacement: Sequence[Timed | None]
-    rotation: Sequence[Timed | None]
-    force: Sequence[Timed]
-    moment: Sequence[Timed]
-    centre: Sequence[float]
+    displacement: Any = ()
+    rotation: Any = ()
+    force: Any = ()
+    moment: Any = ()
+    centre: Any = ()
     amplitude: Amplitude | None = None
 
     def __post_init__(self) -> None:
-        """Let functions of time be named where they fail."""
-        for name in ("displacement", "rotation", "force", "moment"):
-            values = [_timed(f"Motion: {name}.{i}", v) for i, v in enumerate(getattr(self, name))]
-            object.__setattr__(self, name, tuple(values))
+        """Make components of the given values, and let functions of time be named."""
+        d = self._dimension()
+        for name, size in self._sizes(d).items():
+            free = name in ("displacement", "rotation")
+            given = _components(f"Motion: {name}", getattr(self, name), size, free)
+            object.__setattr__(self, name, given)
+        for key, name in (("force", "displacement"), ("moment", "rotation")):
+            for force, move in zip(getattr(self, key), getattr(self, name), strict=True):
+                fits = move is None or force == 0.0
+                expect(f"Motion: {key}", getattr(self, key), f"a {key} where {name} is None", fits)
+        turns = any(turn != 0.0 for turn in self.rotation)
+        accepted = f"a point about which it turns, a list of {d} numbers"
+        fixed = not any(callable(x) or x is None for x in _listed(self.centre))
+        expect("Motion: centre", self.centre, accepted, fixed and (len(self.centre) or not turns))
+        object.__setattr__(self, "centre", _components("Motion: centre", self.centre, d))
         object.__setattr__(self, "amplitude", own_amplitude("Motion", self.amplitude))
+
+    @staticmethod
+    def _sizes(d: int) -> dict[str, int]:
+        """Return the numbers of components in d dimensions."""
+        return {"displacement": d, "rotation": 2 * d - 3, "force": d, "moment": 2 * d - 3}
+
+    def _dimension(self) -> int:
+        """Return the dimension of the vectors that are given."""
+        for name in ("displacement", "force", "centre"):
+            given = getattr(self, name)
+            size = len(_listed(given))
+            accepted = "a list with an entry a component, 2 in 2-D and 3 in 3-D"
+            expect(f"Motion: {name}", given, accepted, size in (0, 2, 3))
+            if size:
+                return size
+        sizes = [len(_listed(given)) for given in (self.rotation, self.moment)]
+        expect("Motion", "nothing", "a displacement, a rotation or a force", any(sizes))
+        return 3 if 3 in sizes else 2
 
 
 @dataclass(frozen=True)
 class Rigid:
-    """A part that moves as a rigid body, or a list of parts, or a foundation in front of it."""
+    """A part that moves as a rigid body, or a list of parts, or a foundation in front of it.
+
+    A plate on the top of a body, under a force:
+
+    >>> plate = Rigid("top", Motion([0.0, None], force=[0.0, -3.0]))
+
+    It is given to the body by ``Body(law, fixed, rigid=plate)``; ``Rigid("bottom", motion,
+    foundation=True)`` is the foundation in front of the contact part ``bottom``.
+    """
 
     on: Any
     motion: Motion

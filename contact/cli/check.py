@@ -25,6 +25,7 @@ from contact.nesting import coarser_cases
 from contact.output import environment
 from contact.output.bodies import passing
 from contact.output.foundations import fitting, without_heights
+from contact.problem.checks import meeting_supports
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.typing import Array
@@ -106,6 +107,7 @@ def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> li
         for identifier, remarks in {
             "own-shape": fitting(problem),
             "no-heights": without_heights(problem),
+            "meeting-supports": meeting_supports(problem, times),
             "passing-bodies": passing(problem),
         }.items()
         for text in remarks

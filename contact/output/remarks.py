@@ -15,6 +15,7 @@ from contact.output.error_estimate import estimated
 from contact.output.fields import DerivedFields, deformation, unloaded
 from contact.output.solution import Note, Remark, Solution
 from contact.output.uniqueness import MOST
+from contact.problem.checks import meeting_supports
 from contact.problem.residuals import left_as_pressures, residual_forces
 from contact.tolerances import EPS, LARGEST_VIOLATION
 from forms.elasticity import Anisotropic
@@ -110,6 +111,7 @@ def review(solution: Solution) -> None:
         "conductivity": conductivity(solution),
         "conductivity-ramp": ramp(solution),
         "two-bodies": bodies.choices(solution),
+        "meeting-supports": meeting_supports(solution.problem, _times(solution)),
         "passing-bodies": bodies.passing(solution.problem),
         "one-material": bodies.regions(solution),
         "unresisted-motion": bodies.unresisted_motions(solution),
@@ -120,6 +122,11 @@ def review(solution: Solution) -> None:
         for text in remarks:
             listed = solution.notes if isinstance(text, Note) else solution.warnings
             listed.append(f"{text} [{identifier}]")
+
+
+def _times(solution: Solution) -> list[float]:
+    """Return the ends of the steps, or the time of the only one."""
+    return [record.state.time for record in solution.steps] or [solution.problem.time]
 
 
 def halved(solution: Solution) -> Iterator[Remark]:

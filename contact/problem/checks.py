@@ -5,6 +5,7 @@ Cases and problems that are put together in Python are checked here alike.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import combinations, product
 from typing import Any
 
@@ -135,43 +136,90 @@ def _check_sizes(problem: ContactProblem) -> None:
 def check_supports(problem: ContactProblem) -> None:
     """Refuse different values for one component on a part of two supports. Collective.
 
-    Where parts meet at an edge values may differ: there the last one counts.
-
     Raises
     ------
     InputError
         If they differ at the time of the problem by more than rounding.
     """
-    d, space, time = problem.dim, problem.equilibrium.space, problem.time
-    for (i, first), (j, last) in combinations(enumerate(problem.body.fixed), 2):
-        one, other = _prescribed(first), _prescribed(last)
-        names = one.keys() & other.keys()
+    space, time = problem.equilibrium.space, problem.time
+    for i, j in combinations(range(len(problem.body.fixed)), 2):
+        first, last = problem.body.fixed[i], problem.body.fixed[j]
         facets, shared = _shared(problem, first.on, last.on)
         if not shared:
             continue
-        nodes = fem.locate_dofs_topological(space, d - 1, facets)
-        points = space.tabulate_dof_coordinates()[nodes, :d]
-        for name in sorted(names):
-            values = np.column_stack(
-                [
-                    fixed.factor(time)
-                    * values_at(given[name], points, time, f"fixed.{n}.{name}", problem.comm)
-                    for n, fixed, given in ((i, first, one), (j, last, other))
-                ]
-            )
-            size = float(np.abs(values).max(initial=0.0))
-            size = problem.comm.allreduce(size, op=MPI.MAX)
-            # Rounding of a zero, such as sin(pi), is no value.
-            unit = problem.equilibrium.phi_scale if name == "potential" else 1.0
-            allowed = NEGLIGIBLE * size + EPS * unit * problem.domain.size
-            differ = np.ptp(values, axis=1) > allowed
-            found = np.concatenate(problem.comm.allgather(values[differ][:1])) + 0.0  # no -0
-            if found.size > 0:
+        nodes = fem.locate_dofs_topological(space, problem.dim - 1, facets)
+        for name in sorted(_prescribed(first).keys() & _prescribed(last).keys()):
+            found = _differing(problem, (i, j), name, nodes)
+            if found is not None:
                 when = "" if time == 1.0 else f" at t = {time:g}"
                 raise InputError(
-                    f"fixed.{j}.{name}: {found[0, 1]:g} on {last.on}; accepted: {found[0, 0]:g}, "
+                    f"fixed.{j}.{name}: {found[1]:g} on {last.on}; accepted: {found[0]:g}, "
                     f"as fixed.{i} has there{when}"
                 )
+
+
+def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterator[str]:
+    """Say where parts of two supports meet with different values of one component. Collective.
+
+    Of displacements along normals, which differ at an edge, `Rollers` looks at the values.
+    """
+    d, space = problem.dim, problem.equilibrium.space
+    for i, j in combinations(range(len(problem.body.fixed)), 2):
+        first, last = problem.body.fixed[i], problem.body.fixed[j]
+        names = sorted(_prescribed(first).keys() & _prescribed(last).keys() - {"normal"})
+        if not names or _shared(problem, first.on, last.on)[1]:
+            continue
+        sides = (problem.domain.facets_anywhere(fixed.on) for fixed in (first, last))
+        nodes = np.intersect1d(*(fem.locate_dofs_topological(space, d - 1, f) for f in sides))
+        for name in names:
+            for time in times:
+                found = _differing(problem.at(time), (i, j), name, nodes)
+                if found is None:
+                    continue
+                when = "" if time == 1.0 else f" at t = {time:g}"
+                place = ", ".join(f"{x:.4g}" for x in found[2:])
+                yield (
+                    f"fixed.{i} and fixed.{j}: {first.on} and {last.on} meet at ({place}), where "
+                    f"{name} is {found[0]:g} of the first and {found[1]:g} of the second{when}: "
+                    "the second counts at their common nodes, and fields beside them grow with "
+                    "each refinement"
+                )
+                break
+
+
+def _differing(
+    problem: ContactProblem, pair: tuple[int, int], name: str, nodes: NDArray[np.int32]
+) -> Array | None:
+    """Return the values of two supports at a node where they differ. Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem, at its time.
+    pair, name
+        The numbers of the supports, and the component.
+    nodes
+        Nodes of both, those of this rank.
+
+    Returns
+    -------
+    The two values and the place, shape (2 + d,); None where they agree.
+    """
+    points = problem.equilibrium.space.tabulate_dof_coordinates()[nodes, : problem.dim]
+    values = np.zeros((len(points), 2))
+    for k, number in enumerate(pair):
+        fixed, key = problem.body.fixed[number], f"fixed.{number}.{name}"
+        given = values_at(fixed.given[name], points, problem.time, key, problem.comm)
+        values[:, k] = fixed.factor(problem.time) * given
+    size = problem.comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX)
+    # Rounding of a zero, such as sin(pi), is no value.
+    unit = problem.equilibrium.phi_scale if name == "potential" else 1.0
+    rounding = EPS * problem.domain.size
+    differ = np.ptp(values, axis=1) > NEGLIGIBLE * size + unit * rounding
+    points = np.where(np.abs(points) < rounding, 0.0, points)
+    some = np.column_stack([values, points])[differ][:1]
+    found = np.concatenate(problem.comm.allgather(some)) + 0.0  # no -0
+    return found[0] if found.size > 0 else None
 
 
 def _prescribed(fixed: Fixed) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """What is put together in Python is refused as a case is, in one message that names the place."""
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -20,9 +21,11 @@ from contact import (
     Linear,
     Load,
     Material,
+    Motion,
     Plane,
     Problem,
     Punch,
+    Rigid,
     Sphere,
     UserLaw,
     build_problem,
@@ -31,6 +34,7 @@ from contact import (
     parse_case,
     solve,
 )
+from contact.problem.checks import meeting_supports
 from tests.problems.put_together import LAW, TOP, block, problem
 
 
@@ -54,7 +58,7 @@ WRONG = {
     ),
     "two supports on a list": (
         solved(TOP, Fixed(["left", "top"], [lambda x: 0.1 * x[1], None])),
-        r"fixed\.1\.displacement\.0: 0\.1 on left, top; accepted: 0",
+        r"fixed\.1\.displacement\.0: 0\.1 on left\+top; accepted: 0",
     ),
     "two supports in steps": (
         lambda: next(
@@ -96,7 +100,7 @@ WRONG = {
     ),
     "a load on the contact part": (
         solved(loads=Load(["right", "bottom"], [0, 1e-3])),
-        r"load\.0\.on: right, bottom shares facets with the contact part bottom",
+        r"load\.0\.on: right\+bottom shares facets with the contact part bottom",
     ),
     "a load in free directions": (lambda: Load("right", ["free", 1.0]), "0 where nothing acts"),
     "a load of nothing": (lambda: Load("right"), "Load: nothing is given"),
@@ -113,6 +117,30 @@ WRONG = {
     "an amplitude": (
         lambda: Fixed("top", [0, 0], amplitude=2),
         "Fixed on 'top': amplitude: given 2",
+    ),
+    "no motion": (lambda: Motion(), "Motion: given 'nothing'; accepted: a displacement"),
+    "a motion as a number": (lambda: Motion(0.1), r"Motion: displacement: given 0\.1; .*a comp"),
+    "a motion in words": (
+        lambda: Motion([0.0, "up"]),
+        r"Motion: displacement: given \[0\.0, 'up'\]; accepted: a list of 2: numbers or functions",
+    ),
+    "an angle in a list": (
+        lambda: Motion([0.0, None], [0.1, 0.0, 0.0]),
+        r"Motion: rotation: given \[0\.1, 0\.0, 0\.0\]; accepted: a number",
+    ),
+    "a free force": (lambda: Motion([0.0, None], force=[0.0, None]), "Motion: force: .*a list of"),
+    "a force in vain": (
+        lambda: Motion([0.0, 0.0], force=[0.0, -3.0]),
+        r"Motion: force: given \(0\.0, -3\.0\); accepted: a force where displacement is None",
+    ),
+    "no centre": (
+        lambda: Motion([0.0, None], 0.1),
+        r"Motion: centre: given \(\); accepted: a point about which it turns, a list of 2",
+    ),
+    "a moving centre": (lambda: Motion([0.0, None], 0.1, centre=[0.0, None]), "Motion: centre: "),
+    "a rigid part in space": (
+        lambda: problem(rigid=Rigid("right", Motion([0.0, 0.0, 0.0]))),
+        "rigid on 'right': the motion has 3 components, the body has 2",
     ),
     "a negative gap": (on(-0.001), r"contact\.gap: -0\.001 at a node"),
     "a gap and a shape": (on(Plane((0, 0), (0, 1)), gap=0.1), "Contact: foundation: "),
@@ -236,3 +264,23 @@ def test_what_agrees_is_accepted() -> None:
     start = solve(problem(), start=plain)
     assert len(start.history.records) <= len(plain.history.records)
     assert start.contact_force == pytest.approx(plain.contact_force)
+
+
+@pytest.mark.parallel(2)
+def test_supports_that_meet_with_different_values_are_warned_of() -> None:
+    left, moving = Fixed("left", [0, 0]), Fixed("left", [None, -0.005], amplitude=lambda t: t**2)
+    pzt = make_material(2, name="PZT-4")
+    electrodes = [Fixed("top", [0, -0.005], potential=0.0), Fixed("left", potential=1.0)]
+    for given, law, times, words in (
+        ((left, TOP), LAW, [1.0], r"\.1 is 0 of the first and -0\.005 of the second: "),
+        ((TOP, left), LAW, [1.0], r"\.1 is -0\.005 of the first and 0 of the second: "),
+        ((TOP, moving), LAW, [0.5, 1.0], r"-0\.0025 of .* -0\.00125 of the second at t = 0\.5:"),
+        (electrodes, pzt, [1.0], r"meet at \(0, 1\), where potential is 0 of the first and 1"),
+    ):
+        (said,) = meeting_supports(problem(*given, law=law), times)
+        assert re.search(words, said), said
+    assert not [*meeting_supports(problem(TOP, moving), [1.0])]
+    again = Fixed("right", [lambda x: 0.0 * x[0], lambda x: -0.005 * x[1]])
+    assert not [*meeting_supports(problem(TOP, again), [0.5, 1.0])]
+    (said,) = (text for text in solve(problem(TOP, left)).warnings if "meet" in text)
+    assert said.startswith("fixed.0 and fixed.1: top and left meet at (0, 1), where")

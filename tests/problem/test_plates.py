@@ -1,12 +1,16 @@
 """Parts that move as rigid bodies, and electrodes of unknown potential."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import Motion, Rigid, build_problem, solve
 from contact.case.file import parse_case
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.resultants import charge_balance
+from contact.output.resultants import charge_balance, movements
+from contact.problem.problem import ContactProblem
 from tests.problems.rigid import PIEZO, column, plate, solved
 
 SELF = MPI.COMM_SELF
@@ -36,6 +40,31 @@ def test_columns_under_a_plate_shorten_as_hooke_says():
     solution, moved = solved(parse_case(data), SELF)
     assert moved["rigid_parts"]["top"]["displacement"] == pytest.approx([0.0, -0.01], abs=1e-12)
     assert solution.pressure == pytest.approx(0.01, rel=1e-10)
+
+
+def test_a_plate_in_python_is_that_of_a_case():
+    """Components that are not given are 0, one angle is a number, and None leaves it free."""
+    case = plate(rigid=[{"on": "top", "displacement": [0.0, "free"], "force": [0.0, -0.02]}])
+    held = Motion([0.0, None], force=[0.0, -0.02])
+    assert (held.rotation, held.moment, held.centre) == ((0.0,), (0.0,), (0.0, 0.0))
+    assert Motion(rotation=[0.0, 0.0, 0.1], centre=[1.0, 0.0, 0.0]).displacement == (0.0, 0.0, 0.0)
+    solution = solved(case, SELF)[0]
+    same = solve(built_of(case, Rigid("top", held)), NewtonOptions(tolerance=1e-10))
+    assert same.pressure == pytest.approx(solution.pressure, rel=1e-12)
+    for angle in (None, "free"):
+        tilting = Motion([0.0, "free"], angle, [0.0, -0.02], 0.002, [1.0, 1.0])
+        assert tilting.rotation == (None,) and tilting.displacement == (0.0, None)
+        free = solve(built_of(case, Rigid("top", tilting)), NewtonOptions(tolerance=1e-10))
+        part = movements(free.problem, free.state)["rigid_parts"]["top"]
+        assert part["moment"] == pytest.approx(0.002, rel=1e-10)
+        assert abs(part["rotation"]) > 1e-4
+
+
+def built_of(case, rigid):
+    """Return the problem of a case with other rigid parts."""
+    problem = build_problem(case, SELF)
+    body = replace(problem.body, rigid=(rigid,))
+    return ContactProblem(problem.domain, body, problem.contacts)
 
 
 def beside_the_contact_part(degree, *, rigid=(), fixed=()):
