@@ -244,13 +244,11 @@ def _side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
         return first
     together: dict[str, Any] = {
         name: np.concatenate([getattr(nodes, name) for nodes in pieces])
-        for name in ("nodes", "points", "weight", "normal", "lift", "tangent", "gap")
+        for name in ("nodes", "points", "weight", "normal", "lift", "tangent", "gap", "deviation")
     }
     if first.motion is not None:
         together["motion"] = np.concatenate([nodes.motion for nodes in pieces])
-    for name in ("cut", "deviation"):
-        together[name] = max(getattr(nodes, name) for nodes in pieces)
-    return replace(first, **together)
+    return replace(first, cut=max(nodes.cut for nodes in pieces), **together)
 
 
 def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFriction:

@@ -64,6 +64,8 @@ class ContactNodes:
         Projector onto the free tangential directions, shape (n, d, d).
     gap
         Distance to the foundation along the contact direction, shape (n,).
+    deviation
+        Of a curved surface from its facets, as far as the gaps do not have it, shape (n,) (length).
     block_size
         Unknowns a node: d, or d + 1 with the potential.
     motion
@@ -72,8 +74,6 @@ class ContactNodes:
     cut
         Largest depth in the foundation, undeformed, of a node on a straight facet of a curved
         part; the gap of these nodes is 0 (length).
-    deviation
-        Largest deviation of a curved surface from its facets that the gaps do not have (length).
     revolved
         Whether the nodes stand for the rings through them, about the axis x = 0.
     carried
@@ -93,9 +93,9 @@ class ContactNodes:
     lift: Array
     tangent: Array
     gap: Array
+    deviation: Array
     block_size: int
     cut: float = 0.0
-    deviation: float = 0.0
     revolved: bool = False
     motion: Array | None = None
     carried: Array | None = None

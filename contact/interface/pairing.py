@@ -79,7 +79,7 @@ def find_pair(
     _, added = measured(distance, points, normal, body.comm, key)
     check_gap(body.domain, added, key, press)
     sides = (side.unknown_deviation for side in (slave, master))
-    unknown = max(sides, default=0.0)
+    unknown = body.comm.allreduce(max(sides, default=0.0), op=MPI.MAX)
     nodes = ContactNodes(
         body.comm,
         local,
@@ -88,9 +88,9 @@ def find_pair(
         normal,
         *free_directions(normal, body.movable(local)),
         gap + added,
+        np.full(local.size, unknown),
         body.block_size,
         cut,
-        body.comm.allreduce(unknown, op=MPI.MAX),
         body.domain.revolved,
         body.global_unknowns.still(local.size, body.block_size),
     )

@@ -16,7 +16,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.rollers import APART
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Lumping, Mixing
-from contact.interface.mortar.surface import surface_of
+from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, free_directions
 from contact.interface.obstacle import Obstacle, Shape
 from contact.interface.obstacle.protocol import measured
@@ -34,6 +34,8 @@ class Candidates:
 
     Attributes
     ----------
+    numbers
+        Global numbers of the nodes, ascending, shape (n,).
     nodes, points, weight, normal
         As in `ContactNodes`, whatever is fixed there.
     surface
@@ -47,8 +49,11 @@ class Candidates:
         The owners of the nodes.
     mixing
         The jumps, where these are no nodal values.
+    facets
+        The facets of the part, as far as this rank owns them.
     """
 
+    numbers: NDArray[np.int64]
     nodes: NDArray[np.int32]
     points: Array
     weight: Array
@@ -58,6 +63,7 @@ class Candidates:
     unknown: float
     owners: Owners
     mixing: Mixing | None
+    facets: Surface
 
     def jumps(self, values: Array) -> Array:
         """Return the jumps of values at these nodes, shape (n, m). Collective."""
@@ -68,6 +74,23 @@ class Candidates:
     def in_front_of(self, obstacle: Obstacle) -> Array:
         """Return the points from which gaps are measured: given gaps are those of the nodes."""
         return self.surface if obstacle.is_shape else self.points
+
+    def to_curve(self, gap: Array) -> tuple[Array, Array]:
+        """Return gaps to a shape from the curve through the corners, and how far they are unknown.
+
+        Collective. In the middle of straight edges gaps at the corners tell that too: where a body
+        lies on a shape of its own form, they are right although its curvature varies or jumps.
+        """
+        if not self.facets.follows:
+            return gap, np.full_like(gap, self.unknown)
+        corners = self.facets.nodes[:, : self.facets.shape.corners]
+        values = self.owners.values(
+            corners.ravel(), lambda given: gap[np.searchsorted(self.numbers, given)]
+        )
+        own, found = self.facets.told_by(values.reshape(corners.shape))
+        told, weight, unknown = found[np.searchsorted(own, self.numbers)].T
+        with np.errstate(invalid="ignore"):
+            return np.where(weight > 0, (1 - weight) * gap + weight * told, gap), unknown
 
     def along(self, direction: Array, gap: Array) -> Array:
         """Return the gaps of the jumps, given directions and gaps at the nodes. Collective.
@@ -95,6 +118,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
     exact = facets.degree == 1 and not facets.refined
     return Candidates(
+        lumped.nodes,
         nodes,
         points,
         np.where(light, 0.0, lumped.weight),
@@ -104,6 +128,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
         comm.allreduce(0.0 if exact else facets.unknown_deviation, op=MPI.MAX),
         facets.owners,
         lumped.mixing,
+        facets,
     )
 
 
@@ -131,7 +156,7 @@ def _place(
     direction: Array,
     gap: Array,
     press: bool,
-) -> tuple[Array, float]:
+) -> tuple[Array, Array, float]:
     """Refuse a foundation behind or around the contact part, or one that the body cuts already.
 
     Nodes that face away are not looked at: all of a disc may be the contact part. Nodes on
@@ -141,7 +166,8 @@ def _place(
 
     Returns
     -------
-    The gap, and the largest depth that was taken for 0.
+    The gap from the curve and the part of it that is unknown, as of `Candidates.to_curve`, and the
+    largest depth that was taken for 0.
     """
     facing = np.einsum("ni,ni->n", direction, found.normal)
     # Where no ray meets the foundation the gap is infinite, and `find_nodes` has its message.
@@ -155,8 +181,9 @@ def _place(
         )
     rounding = 1e-5 * domain.size  # that of mesh files
     _refuse_within(domain, obstacle, found.surface[facing > 0], gap[facing > 0], rounding)
+    gap, unknown = found.to_curve(gap)
     if press:
-        return gap, 0.0
+        return gap, unknown, 0.0
     tolerance = np.full_like(gap, rounding)
     depth = np.where(facing > 0, -gap, 0.0)
     # The contact direction may be the body's, a little aside.
@@ -172,7 +199,7 @@ def _place(
             f">= 0 but for {rounding:.1g} (rounding), and the deviation of straight facets from a "
             'curve, or overlap = "press"'
         )
-    return np.where(facing > 0, np.maximum(gap, 0.0), gap), float(cut)
+    return np.where(facing > 0, np.maximum(gap, 0.0), gap), unknown, float(cut)
 
 
 def _refuse_within(
@@ -248,10 +275,10 @@ def find_nodes(
             f"{key}.foundation: a contact node has no contact direction (it is the sphere's "
             "centre, on the axis of a cylinder, or where a formula has no value or no slope)"
         )
-    cut = 0.0
+    unknown, cut = np.zeros_like(gap), 0.0
     if obstacle.is_shape:
         with _naming(key):
-            gap, cut = _place(domain, space, obstacle, found, direction, gap, press)
+            gap, unknown, cut = _place(domain, space, obstacle, found, direction, gap, press)
     else:
         check_gap(domain, gap, key, press)
     gap = found.along(direction, gap)
@@ -274,9 +301,9 @@ def find_nodes(
         direction,
         *free_directions(direction, movable[keep]),
         gap[keep],
+        unknown[keep],
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
-        found.unknown if obstacle.is_shape else 0.0,
         domain.revolved,
         _motion(body, part, points),
     )
@@ -314,6 +341,9 @@ def held_nodes(
         The contact nodes.
     """
     direction, gap = obstacle.measure(found.in_front_of(obstacle), found.normal)
+    unknown = np.zeros_like(gap)
+    if obstacle.is_shape:
+        gap, unknown = found.to_curve(gap)
     gap = found.along(direction, gap)
     keep = ~np.isin(found.nodes, jump.nodes) & free[found.nodes, -1] & np.isfinite(gap)
     keep &= found.weight > 0
@@ -326,5 +356,6 @@ def held_nodes(
         lift=direction[keep],
         tangent=np.zeros((np.count_nonzero(keep), jump.dim, jump.dim)),
         gap=gap[keep],
+        deviation=unknown[keep],
         motion=None,
     )

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,7 @@ def deviations(
     normal: Array,
     owners: Owners = ALONE,
     levels: int = 0,
+    values: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return c of the edges of each facet, positive outwards, and how well it is known. Collective.
 
@@ -68,27 +70,30 @@ def deviations(
     levels
         How often straight edges have been cut in two: c is then that of the edges at first, beside
         those of their ends at which the polygon turns.
+    values
+        Of a function at the corners, shape (f, c), infinite where it has none: c is then how far
+        it is above that interpolated between the ends of an edge.
     """
     count = len(names)
-    found, unknown = _deviations(*_with_rings(names, corners, normal, owners), levels)
+    arrays = (names, corners, normal, *([] if values is None else [values]))
+    found, unknown = _deviations(levels, *_with_rings(owners, *arrays))
     return found[:count], unknown[:count]
 
 
-def _with_rings(
-    names: NDArray[np.int64], corners: Array, normal: Array, owners: Owners
-) -> tuple[NDArray[np.int64], Array, Array]:
+def _with_rings(owners: Owners, *arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     """Return facets, and behind them those of other ranks in the rings around them. Collective.
 
-    The owner of a vertex knows which ranks have facets there.
+    The first array has the numbers of their corners. The owner of a vertex knows which ranks have
+    facets there.
     """
-    comm, own = owners.comm, names
+    comm, own = owners.comm, arrays[0]
     vertices = np.unique(own)
     holder, held = exchanged(comm, owners.ranks(vertices), vertices)
     order = np.argsort(held, kind="stable")
     holder, held = holder[order], held[order]
     by_vertex = np.argsort(own.ravel(), kind="stable")
     at = own.ravel()[by_vertex]
-    every, asked = [(names, corners, normal)], np.zeros(0, dtype=np.int64)
+    every, asked = [arrays], np.zeros(0, dtype=np.int64)
     sent = np.zeros((0, 2), dtype=np.intp)
     # A fit takes vertices two edges away with their normals, and an edge those of its ends'
     # neighbours.
@@ -105,9 +110,8 @@ def _with_rings(
         before = len(sent)
         whole, first = np.unique(np.concatenate([sent, pairs]), axis=0, return_index=True)
         sent, new = np.concatenate([sent, whole[first >= before]]), whole[first >= before]
-        arrays = (array[new[:, 1]] for array in (names, corners, normal))
-        every.append(exchanged(comm, new[:, 0], *arrays)[1:])  # type: ignore[arg-type]
-    return tuple(np.concatenate(arrays) for arrays in zip(*every, strict=True))  # type: ignore[return-value]
+        every.append(tuple(exchanged(comm, new[:, 0], *(array[new[:, 1]] for array in arrays))[1:]))
+    return tuple(np.concatenate(parts) for parts in zip(*every, strict=True))
 
 
 def _runs(
@@ -121,7 +125,11 @@ def _runs(
 
 
 def _deviations(
-    names: NDArray[np.int64], corners: Array, normal: Array, levels: int
+    levels: int,
+    names: NDArray[np.int64],
+    corners: Array,
+    normal: Array,
+    values: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return them, given all facets on which they depend."""
     vertices, place = np.unique(names, return_inverse=True)
@@ -134,10 +142,16 @@ def _deviations(
     # An edge or a corner of the body has no normal.
     known = np.ones(vertices.size, dtype=bool)
     np.logical_and.at(known, place, np.einsum("fcd,fd->fc", own[place], normal) > SMOOTH)
+    heights = None
+    if values is not None:
+        heights = np.zeros(vertices.size)
+        heights[place] = np.where(np.isfinite(values), values, 0.0)
+        np.logical_and.at(known, place, np.isfinite(values))
     pairs, near = _around(place, vertices.size)
     alike = np.einsum("pd,pd->p", own[pairs[0]], own[pairs[1]]) > ALIKE_NORMALS
-    pairs, near = pairs[:, alike & known[pairs[0]]], near[alike & known[pairs[0]]]
-    curvature = _curvatures(points, own, pairs, np.where(near, 1.0, FAR))
+    alike &= known[pairs[0]] & (known[pairs[1]] | (values is None))
+    pairs, near = pairs[:, alike], near[alike]
+    curvature = _curvatures(points, own, pairs, np.where(near, 1.0, FAR), heights)
     pairs = pairs[:, near & known[pairs[1]]]
     edges = facet_with(points.shape[1] - 1, names.shape[1]).edges
     found, unknown = np.zeros((2, len(names), len(edges)))
@@ -148,6 +162,9 @@ def _deviations(
         value = np.where(known[around], _sagitta(edge[:, None], curvature[around]), 0.0)
         if levels == 0:
             flat, unknown[:, k] = _between(points, curvature, pairs, around, known, edge, value)
+            if values is not None:
+                found[:, k] = flat
+                continue
             # Of an arc of this curvature, for its parabola is off by the square of a quarter turn.
             turn = np.minimum(np.abs(flat) / np.linalg.norm(edge, axis=1), 1.0)
             found[:, k] = 2 * flat / (1 + np.sqrt(1 - turn**2))
@@ -181,8 +198,13 @@ def _around(place: Numbers, count: int) -> tuple[Numbers, NDArray[np.bool_]]:
     return np.stack([both.row[apart], both.col[apart]]).astype(np.intp), both.data[apart] >= 1e6
 
 
-def _curvatures(points: Array, normal: Array, pairs: Numbers, weight: Array) -> Array:
-    """Return the curvature tensors at vertices, negative where convex, shape (v, d, d)."""
+def _curvatures(
+    points: Array, normal: Array, pairs: Numbers, weight: Array, values: Array | None = None
+) -> Array:
+    """Return the curvature tensors at vertices, negative where convex, shape (v, d, d).
+
+    Of values at the vertices their second derivatives along the surface.
+    """
     count, d = points.shape
     # The last vectors of an orthonormal basis that begins with the normal.
     tangent = np.linalg.svd(normal[:, None, :])[2][:, 1:]
@@ -196,6 +218,11 @@ def _curvatures(points: Array, normal: Array, pairs: Numbers, weight: Array) -> 
     mixed = list(combinations(range(d - 1), 2))
     products = [along[:, i] * along[:, j] for i, j in mixed]
     columns = np.column_stack([along, 0.5 * along**2, *products])
+    if values is not None:
+        change = (values[pairs[1]] - values[pairs[0]]) / scale
+        form = _form(_fits(at, count, weight, columns, change), mixed)
+        form /= np.where(longest > 0, longest, 1.0)[:, None, None]
+        return np.asarray(np.einsum("via,vij,vjb->vab", tangent, form, tangent))
     # A part of z^2 beside the squares makes spheres exact, and the curvature along the normal of
     # the first fit cylinders too.
     shared = columns.copy()

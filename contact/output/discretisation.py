@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from contact.body.elements import MEAN_DILATATION, unlocked
 from contact.interface.mortar.search import nearest
 from contact.interface.mortar.surface import surface_of
+from contact.interface.obstacle import Shape
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import ALIKE_NORMALS
 from contact.output.solution import Remark, Solution
@@ -80,12 +81,12 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
             f"straight facets of the curved contact part reach {nodes.cut:.3g} into the "
             "foundation: the gap there is taken as 0; make the mesh finer from the beginning"
         )
-    closed = solution.status != "open"
+    closed, unknown = solution.status != "open", nodes.maximum(nodes.deviation)
     if nodes.maximum(closed.astype(float)) == 0:
         least = -nodes.maximum(-nodes.gap, -np.inf)
-        if nodes.deviation > DEVIATION * max(least, 0.0):
+        if unknown > DEVIATION * max(least, 0.0):
             yield (
-                f"nothing touches, but straight facets deviate by up to {nodes.deviation:.3g} from "
+                f"nothing touches, but straight facets deviate by up to {unknown:.3g} from "
                 f"a curved contact surface, and the least gap is {least:.3g}; make the mesh finer "
                 "from the beginning, or take space.degree = 2"
             )
@@ -103,7 +104,7 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
             )
         if scatter > DEVIATION * pressed:
             yield (
-                f"straight edges tell a curved contact surface to about {nodes.deviation:.2g}, and "
+                f"straight edges tell a curved contact surface to about {unknown:.2g}, and "
                 f"nodal pressures scatter by about {scatter:.2g}, {scatter / pressed:.0%} of the "
                 "largest; take curved cells (mesh.order = 2), or a finer mesh"
             )
@@ -114,9 +115,9 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
                 f"about {turn / 4:.1%} of the stress there; take curved cells (mesh.order = 2), or "
                 "a finer mesh"
             )
-    elif size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size:
+    elif size > 1e-9 * problem.domain.size and unknown > DEVIATION * size:
         yield (
-            f"straight facets deviate by up to {nodes.deviation:.3g} from a curved contact "
+            f"straight facets deviate by up to {unknown:.3g} from a curved contact "
             f"surface, and contact closes gaps of at most {size:.3g}: pressures are off by about "
             "that share; make the mesh finer from the beginning, or take space.degree = 2"
         )
@@ -141,21 +142,26 @@ def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, flo
     nodes = solution.problem.nodes
     touching, numbers = nodes.points[closed], nodes.nodes + space.dofmap.index_map.local_range[0]
 
-    def directions(asked: NDArray[np.int64]) -> Array:
-        found = np.full((asked.size, domain.dim), np.nan)
+    def here(asked: NDArray[np.int64]) -> Array:
+        found = np.full((asked.size, domain.dim + 1), np.nan)
         _, of, at = np.intersect1d(asked, numbers, return_indices=True)
-        found[of] = nodes.normal[at]
+        found[of] = np.column_stack([nodes.normal, nodes.deviation])[at]
         return found
 
     found: Array = np.array([0.0, 0.0, -1.0])
+    shapes = {c.on for c in solution.problem.contacts if isinstance(c.foundation, Shape)}
     for part in dict.fromkeys(p for c in solution.problem.contacts for p in (c.on, c.against) if p):
         side = surface_of(domain, space, part)
         if side.follows:
             near = nearest(domain.comm, side.centres, touching) <= side.radii
-            ends = side.owners.values(side.nodes[:, np.array(side.shape.edges)].ravel(), directions)
-            ends = ends.reshape(side.count, len(side.shape.edges), 2, domain.dim)[near]
-            cosine = np.einsum("fed,fed->fe", ends[:, :, 0], ends[:, :, 1])
-            here = (values[near].max(initial=0.0) for values in (side.turns, side.waves))
-            found = np.fmax(found, [*here, np.fmax.reduce(-cosine, axis=None, initial=-1.0)])
+            there = side.owners.values(side.nodes.ravel(), here)
+            there = there.reshape(*side.nodes.shape, domain.dim + 1)[near]
+            first, second = (there[:, of, :-1] for of in np.array(side.shape.edges).T)
+            cosine = np.einsum("fed,fed->fe", first, second)
+            waves = side.waves[near]
+            if part in shapes:
+                waves = np.nan_to_num(there[:, side.middles, -1]) / side.edges[near]
+            most = (values.max(initial=0.0) for values in (side.turns[near], waves))
+            found = np.fmax(found, [*most, np.fmax.reduce(-cosine, axis=None, initial=-1.0)])
     domain.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
     return float(found[0]), float(found[1]), float(-found[2])

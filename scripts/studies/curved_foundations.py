@@ -71,16 +71,11 @@ NOTE = (
     "Rings: Lame's solutions, an interference of 0.001 radii, and a pressure of 1 from within. "
     "Hertz's cylinder: nodes within 0.7 a. All others: the body shrinks by 0.001 under hydrostatic "
     "pressure. Errors of gaps are multiplied by E/h: at degree 2 gaps in the middle of edges are "
-    "those of the curved surface, by curvatures fitted to the vertices; before they were those of "
-    "the chord. The triangles are chords of the sphere themselves, by 5e-7, and errors are theirs: "
-    "at degree 1 and h = 0.1 triangles twice and four times as large have the least and largest "
-    "ratios 0.966, 1.030 and 0.886, 1.106. "
+    "those of curves fitted to the vertices, or to the gaps there. The triangles are chords of the "
+    "sphere themselves, by 5e-7, and errors are theirs: at degree 1 and h = 0.1 triangles twice "
+    "and four times as large have the least and largest ratios 0.966, 1.030 and 0.886, 1.106. "
     "Geometry: the degree of the cells' edges, straight or of second order. Off: the share of the "
-    "area, in per cent, whose nodes are off by more than 10 %; on straight edges most of these are "
-    "within a cell of the edge of the punch's face in 3-D, where the curvature jumps. 10 % of the "
-    "pressure is there a gap of 0.0025 h^2 and 0.005 h^2, and the best of the fits to the corners "
-    "of a facet, chosen edge by edge by the exact surface, is off by up to 0.010 h^2 and "
-    "0.006 h^2: the summary warns of it with a pressure."
+    "area, in per cent, whose nodes are off by more than 10 %."
 )
 
 #: Ratios and weights of the nodes, given a mesh size, a degree, and that of the geometry.

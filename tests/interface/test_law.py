@@ -40,6 +40,7 @@ def random_nodes(n: int, dim: int, block_size: int, rng: np.random.Generator) ->
         normal,
         tangent,
         rng.uniform(0.0, 0.4, n),
+        np.zeros(n),
         block_size,
     )
 

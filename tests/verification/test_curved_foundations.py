@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Body, Contact, Fixed, Linear, Problem, Sphere, parse_case, solve
-from contact.mesh import deviation
+from contact import Body, Contact, Fixed, Linear, Plane, Problem, Sphere, parse_case, solve
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
 from scripts.studies import curved_foundations as study
@@ -41,7 +40,7 @@ def test_hertz(degree):
 @pytest.mark.parametrize("kind", ["2-D", "revolution"])
 @pytest.mark.parametrize("name", ["sphere", "formula", "punch edge"])
 def test_hydrostatic_pressure_in_the_plane(name, kind, degree):
-    check(study.hydrostatic(name, 0.05, degree, kind), 0.002, 0.08)
+    check(study.hydrostatic(name, 0.05, degree, kind), 0.002, 0.02)
 
 
 @pytest.mark.parametrize("degree", [1, 2])
@@ -52,33 +51,10 @@ def test_hydrostatic_pressure_in_space(name, degree, monkeypatch):
     check(study.hydrostatic(name, 0.1, degree, "3-D"), 0.007, 0.1)
 
 
-def test_nodes_at_a_punch_edge_are_right_where_the_edges_are(monkeypatch):
-    """By the vertices alone nodes beside the jump of the curvature are 0 to 2.2 times: it is said.
-
-    None of the fits to the corners of a facet would do: 10 % are a gap of 0.0025 h^2.
-    """
-    check(study.hydrostatic("punch edge", 0.1, 2, "3-D", order=2), 0.002, 0.04)
-    seen, fits, between = [], [], deviation._between
-
-    def noted(*given):
-        points, *_, corners, _, _, value = given
-        middle = points[corners[:, :2]].mean(axis=1)
-        r = np.hypot(middle[:, 0], middle[:, 1])
-        exact = np.where(r < 0.5, 0, 4 * (np.hypot(r - 0.5, middle[:, 2]) - 1))
-        fits.append(np.abs(value - exact[:, None]).min(axis=1).max() / 4)
-        return between(*given)
-
-    monkeypatch.setattr(deviation, "_between", noted)
-    ratios = study.ratios
-    monkeypatch.setattr(study, "ratios", lambda *given: seen.append(given) or ratios(*given))
-    vertices, w = study.hydrostatic("punch edge", 0.1, 2, "3-D")
-    assert 0.005 < max(fits) / 0.1**2 < 0.015
-    off = np.abs(vertices - 1) > 0.1
-    assert 0.03 < w[off].sum() / w.sum() < 0.08
-    solution, exact = seen[0]
-    (found,) = warnings(solution)
-    said = float(re.search(r"nodal pressures scatter by about (\S+),", found)[1])
-    assert 0.5 < said / (np.abs(vertices - 1).max() * exact) < 2
+@pytest.mark.parametrize("order", [1, 2])
+def test_nodes_at_a_punch_edge_in_space(order):
+    """By the surface alone nodes beside the jump of its curvature are 0 to 2.2 times that."""
+    check(study.hydrostatic("punch edge", 0.1, 2, "3-D", order=order), 0.002, 0.05)
 
 
 @pytest.mark.parametrize("kind", ["2-D", "revolution", "3-D"])
@@ -106,48 +82,51 @@ def test_gaps_of_a_ring_are_exact_however_small_the_interference():
     np.testing.assert_allclose(found[1][0], found[0][0], rtol=1e-4)
 
 
-def test_curves_that_vertices_do_not_tell_are_warned_of(monkeypatch):
-    """An ellipse under a hundredth of the pressure: nodes are off by 22 times."""
+def test_bodies_of_the_form_of_their_foundation_are_right_under_any_pressure(monkeypatch):
+    """An ellipse under a hundredth of the pressure: by the surface alone nodes are 22 times off."""
     monkeypatch.setattr(study, "ALPHA", 1e-5)
-    seen = []
-    monkeypatch.setattr(study, "ratios", lambda solution, _: seen.append(solution))
-    for order in (1, 2):
-        study.hydrostatic("formula", 0.1, 2, "2-D", order=order)
-    assert [len(warnings(solution)) for solution in seen] == [1, 0]
+    p, w = study.hydrostatic("formula", 0.1, 2, "2-D")
+    check((100 * p, w), 0.002, 0.05)
+
+
+def test_curves_that_vertices_do_not_tell_are_warned_of():
+    """A side that is flat up to an arc meets a plane: neither it nor the gaps tell where."""
+    found = []
+    for cells in (44, 88):
+        domain = rectangle(COMM, [-1.0, -1.0], [2.0, 1.0], [cells, 8])
+        x = domain.mesh.geometry.x
+        x[:, 1] -= (1 + x[:, 1]) * np.maximum(x[:, 0] - 0.03, 0) ** 2 / 2
+        body = Body(Linear(1e3, 0.3), [Fixed("bottom", [0.0, 1e-3])])
+        plane = Contact("top", Plane(point=(0.0, 0.0), normal=(0.0, -1.0)))
+        solution = solve(Problem(domain, body, plane, degree=2))
+        assert solution.converged
+        found.append(warnings(solution))
+    assert [len(texts) for texts in found] == [1, 0]
+    assert re.search(r"edges tell .* nodal pressures scatter by about \S+,", found[0][0])
 
 
 @pytest.mark.parallel
-def test_a_curvature_that_varies():
-    """A paraboloid presses by 1.92 on all nodes: between .3 and 1.4 times that, without a word.
-
-    At the ends a side alone tells the curvature. On coarse meshes it is said by how much.
-    """
-    for cells, most, count in ((24, 0.3, 1), (32, 0.13, 1), (48, 0.1, 0)):
-        domain = rectangle(COMM, [-0.8, -1.0], [1.6, 1.0], [cells, 20])
-        x = domain.mesh.geometry.x
-        x[:, 1] += (1 + x[:, 1]) * x[:, 0] ** 2 / 1.2
-        sides = ("left", "right", "bottom")
-        case = {
-            "space": {"degree": 2},
-            "material": {"young": 1000.0, "poisson": 0.3},
-            "fixed": [{"on": side, "displacement": ["-1e-3*x", "-1e-3*y"]} for side in sides],
-            "contact": {
-                "on": "top", "overlap": "press",
-                "foundation": {
-                    "shape": "paraboloid", "apex": [0.0, 0.0], "axis": [0.0, 1.0], "radius": 0.5994
-                },
+@pytest.mark.parametrize(("cells", "most"), [(12, 0.05), (24, 0.03)])
+def test_a_curvature_that_varies(cells, most):
+    """A paraboloid: by the surface alone nodes were between .3 and 1.4 times the pressure."""
+    domain = rectangle(COMM, [-0.8, -1.0], [1.6, 1.0], [cells, 20])
+    x = domain.mesh.geometry.x
+    x[:, 1] += (1 + x[:, 1]) * x[:, 0] ** 2 / 1.2
+    sides = ("left", "right", "bottom")
+    case = {
+        "space": {"degree": 2},
+        "material": {"young": 1000.0, "poisson": 0.3},
+        "fixed": [{"on": side, "displacement": ["-1e-3*x", "-1e-3*y"]} for side in sides],
+        "contact": {
+            "on": "top", "overlap": "press",
+            "foundation": {
+                "shape": "paraboloid", "apex": [0.0, 0.0], "axis": [0.0, 1.0], "radius": 0.5994
             },
-        }  # fmt: skip
-        solution = solve(parse_case(case, without=("mesh",)), domain=domain)
-        nodes, exact = solution.problem.nodes, 1e-3 * 1000 / (1.3 * 0.4)
-        inside = np.abs(nodes.points[:, 0]) < (0.6 if cells == 24 else 1)
-        off = nodes.maximum(np.abs(solution.forces.pressure / exact - 1) * inside)
-        found = warnings(solution)
-        assert off < most
-        assert len(found) == count
-        if found:
-            said = float(re.search(r"nodal pressures scatter by about (\S+),", found[0])[1])
-            assert 0.5 < said / (off * exact) < 2
+        },
+    }  # fmt: skip
+    solution = solve(parse_case(case, without=("mesh",)), domain=domain)
+    nodes, exact = solution.problem.nodes, 1e-3 * 1000 / (1.3 * 0.4)
+    assert nodes.maximum(np.abs(solution.forces.pressure / exact - 1)) < most
 
 
 @pytest.mark.parametrize("degree", [1, 2])
@@ -187,7 +166,7 @@ def test_straight_edges_that_turn_much_are_warned_of():
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize(("count", "node"), [(8, 0.13), (10, 0.1), (12, 0.08), (6, None)])
+@pytest.mark.parametrize(("count", "node"), [(8, 0.14), (10, 0.1), (12, 0.08), (6, None)])
 def test_pins_of_few_edges(count, node):
     """A body around half a pin: vertices counted as corners have 20 times the pressure.
 

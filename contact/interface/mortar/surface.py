@@ -44,6 +44,10 @@ def dual_basis_transformation(shape: Shape, degree: int) -> Array:
     return change
 
 
+#: Exponent of the unknown parts in the weights of two ways to know the same.
+SHARP = 4
+
+
 @dataclass(frozen=True)
 class Surface:
     """Facets with the nodes of a Lagrange space.
@@ -113,7 +117,7 @@ class Surface:
         return np.asarray(spread.max(axis=1, initial=0.0))
 
     @cached_property
-    def _edges(self) -> Array:
+    def edges(self) -> Array:
         """The lengths of the edges, shape (f, edges)."""
         first, second = np.array(self.shape.edges).T
         return np.linalg.norm(self.corners[:, second] - self.corners[:, first], axis=2)
@@ -151,7 +155,7 @@ class Surface:
     @property
     def turns(self) -> Array:
         """How far the curve turns from end to end of a straight edge, the most, shape (f,)."""
-        return np.asarray(np.abs(2 * self.deviation / self._edges).max(axis=1, initial=0.0))
+        return np.asarray(np.abs(2 * self.deviation / self.edges).max(axis=1, initial=0.0))
 
     @property
     def unknown_deviation(self) -> float:
@@ -164,7 +168,7 @@ class Surface:
     @property
     def waves(self) -> Array:
         """The largest slope of the unknown part, along an edge, shape (f,)."""
-        return np.asarray((self.unknown / (4 * self._edges)).max(axis=1, initial=0.0))
+        return np.asarray((self.unknown / (4 * self.edges)).max(axis=1, initial=0.0))
 
     @property
     def follows(self) -> bool:
@@ -192,6 +196,15 @@ class Surface:
         """
         if not self.follows:
             return np.zeros(len(at))
+        along, products = self._bubbles(at)
+        sagitta, square = self.deviation[facets] / 4, self.edges[facets] ** 2
+        base = square / 4 - sagitta**2
+        root = np.sqrt(np.maximum(base**2 + 4 * sagitta**2 * products * square, 0.0))
+        heights = 2 * sagitta * products * square / (base + root)
+        return np.asarray(np.sum(along * heights, axis=1))
+
+    def _bubbles(self, at: Array) -> tuple[Array, Array]:
+        """Return the shares of the edges at points, and l_i l_j on them, shape (p, edges)."""
         first, second = np.array(self.shape.edges).T
         functions = self.shape.lagrange(1, at)
         products = functions[:, first] * functions[:, second]
@@ -200,11 +213,42 @@ class Surface:
             # Between opposite edges the arcs of both, in proportion.
             along = functions[:, first] + functions[:, second]
             products /= np.where(along != 0, along, 1.0) ** 2
-        sagitta, square = self.deviation[facets] / 4, self._edges[facets] ** 2
-        base = square / 4 - sagitta**2
-        root = np.sqrt(np.maximum(base**2 + 4 * sagitta**2 * products * square, 0.0))
-        heights = 2 * sagitta * products * square / (base + root)
-        return np.asarray(np.sum(along * heights, axis=1))
+        return along, products
+
+    @property
+    def middles(self) -> NDArray[np.intp]:
+        """The local numbers of the nodes of degree 2 in the middle of the edges."""
+        return np.asarray(self._bubbles(self.shape.nodes(self.degree))[1].argmax(axis=0))
+
+    def told_by(self, values: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return how a function that depends on the curve is told by its values at the corners.
+
+        As the corners' places tell the surface, on which its values elsewhere depend: both are of
+        third order where they are smooth. The less the neighbours of an edge differ, the more each
+        of both counts (weights of Jiang and Shu, as in `deviations`). Collective.
+
+        Parameters
+        ----------
+        values
+            Those at the corners of facets, shape (f, c), infinite where there is none.
+
+        Returns
+        -------
+        The nodes of this rank that facets have, ascending, and at each the value; its weight beside
+        that on the surface, from 0 to 1; and the part that is unknown then; shape (n, 3).
+        """
+        corners, places = self.nodes[:, : self.shape.corners], self.shape.nodes(self.degree)
+        rise, other = deviations(corners, self.points, self.normal, self.owners, values=values)
+        along, products = self._bubbles(places)
+        bubbles, finite = (along * products).T, np.all(np.isfinite(values), axis=1)
+        there = np.where(finite[:, None], values, 0.0) @ self.shape.lagrange(1, places).T
+        parts = there + rise @ bubbles, self.unknown @ bubbles, other @ bubbles, finite[:, None]
+        together = np.stack([*np.broadcast_arrays(*parts), np.ones_like(there)], axis=2)
+        nodes, sums = self.owners.sums(self.nodes.ravel(), together.reshape(-1, 5))
+        told, mine, other, finite = (sums[:, :4] / sums[:, 4:]).T
+        share = np.where(finite == 1, mine / np.where(mine + other > 0, mine + other, 1.0), 0.0)
+        weight = share**SHARP / (share**SHARP + (1 - share) ** SHARP)
+        return nodes, np.column_stack([told, weight, (1 - weight) * mine + weight * other])
 
     def distance(self, facets: NDArray[np.intp], at: Array, direction: Array) -> Array:
         """Return how far the surface is from points of straight facets along directions, (p,).
