@@ -251,7 +251,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
                 "A,B",
                 "show places with x (r) between these alone, coordinates of the mesh",
             ),
-            "--ylim": _value("A,B", "likewise y (z); of bodies in 3-D neither is read"),
+            "--ylim": _value("A,B", "likewise y (z); in 3-D of the contact alone"),
             "--mirror": _flag("show both halves of a body of revolution"),
             "--animate": _flag(
                 "draw animation-FIELD.gif instead, the deformed body over the steps of an evolution"

@@ -17,6 +17,7 @@ from contact.interface.pairing import facing_parts
 from contact.mesh.domain import ON_AXIS, Domain
 from contact.mesh.reader import from_file
 from contact.ranks import on_root
+from contact.tolerances import NEGLIGIBLE
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -47,12 +48,20 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
 
     Of several bodies that face each other onto each other, the lowest part held.
     """
-    heights, pairs = _heights(domain), facing_parts(domain)
+    heights, facing = _heights(domain), facing_parts(domain)
+    pairs = [(on, against) for _, on, against in facing]
     sides = {side for pair in pairs for side in pair}
-    order = sorted({*heights} - sides or {*heights}, key=lambda name: (heights[name], name))
+    order = sorted({*heights} - sides, key=lambda name: (heights[name], name))
+    if len(order) < 2:
+        raise InputError(
+            f"{mesh}: {', '.join(sorted(heights))} as parts: none to hold beside those in contact; "
+            "accepted: a mesh that also names the sides that are held and pressed"
+        )
     lowest, highest = order[0], order[-1]
     d = domain.dim
-    pressed = _along(d, -float(f"{1e-3 * domain.size:.0e}"))
+    step = float(f"{1e-3 * domain.size:.0e}")
+    closed = np.ceil(max(facing[0][0], 0.0) / step - NEGLIGIBLE) if facing else 0.0
+    pressed = _along(d, -float(f"{(1 + closed) * step:.6g}"))
     try:
         name = str(mesh.resolve().relative_to(path.resolve().parent))
     except ValueError:

@@ -229,10 +229,11 @@ def _connected(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> boo
     return bool(found.all(axis=0).any())
 
 
-def facing_parts(domain: Domain) -> list[tuple[str, str]]:
+def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
     """Return pairs of parts of different bodies that face each other, nearest first. Collective.
 
-    The finer side is the first of a pair. Parts that belong to several bodies are left out.
+    Each has its least gap (length), and the finer side is the first of a pair. Parts that belong to
+    several bodies are left out.
     """
     space = fem.functionspace(domain.mesh, ("Lagrange", 1))
     piece, count = components(space)
@@ -262,4 +263,4 @@ def facing_parts(domain: Domain) -> list[tuple[str, str]]:
             # They look away from each other where it is negative.
             if np.isfinite(least) and least > -2 * CHORDS * longest:
                 found.append((least, on, against))
-    return [(on, against) for _, on, against in sorted(found)]
+    return sorted(found)

@@ -65,9 +65,10 @@ class System:
 
     @property
     def labels(self) -> dict[str, str]:
-        """Names of the units of length, stress, potential and charge."""
+        """Names of the units of length, stress, potential and charge, as they are printed."""
         quantities = ("length", "stress", "potential", "charge")
-        return {name: _named(getattr(self, name), BASES[name]) for name in quantities}
+        named = {name: _named(getattr(self, name), BASES[name]) for name in quantities}
+        return {name: re.sub("^u(?=.)", "µ", unit) for name, unit in named.items()}
 
 
 def size(name: str, quantity: str) -> float | None:

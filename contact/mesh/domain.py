@@ -32,7 +32,8 @@ from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
 
 #: Where facets inside of the body may be a part all the same.
 UNLESS = (
-    ", unless its displacement or potential is given, it is an electrode, or a bolt is cut there"
+    ", unless components of its displacement or its potential are given, it is an electrode, or a "
+    "bolt is cut there"
 )
 
 

@@ -214,3 +214,36 @@ def test_a_part_that_faces_two_bodies_is_one_contact(tmp_path: Path) -> None:
     assert (contact.on, contact.against) == ("face", "one+two")
     assert main(["check", str(path)]) == CONVERGED
     assert main(["solve", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == CONVERGED
+
+
+def two_squares(path: Path, gap: float, *, skins: bool = False) -> Path:
+    """Write two unit squares above each other: sides with names, or one name a square."""
+    corners = [(x, y + k * (1 + gap)) for k in (0, 1) for y in (0, 1) for x in (0, 1)]
+    lines = [f"{i},{x},{y}" for i, (x, y) in enumerate(corners, 1)]
+    lines = ["*NODE", *lines, "*ELEMENT, TYPE=CPE4", "1,1,2,4,3", "2,5,6,8,7"]
+    sets = {"base": "1,2", "roof": "3,4", "under": "5,6", "lid": "7,8"}
+    for name, nodes in ({"a": "1,2,3,4", "b": "5,6,7,8"} if skins else sets).items():
+        lines += [f"*NSET, NSET={name}", nodes]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.05])
+def test_the_displacement_closes_the_gap(gap: float, tmp_path: Path) -> None:
+    mesh = two_squares(tmp_path / "apart.inp", gap)
+    assert main(["new", str(mesh)]) == CONVERGED
+    case, out = mesh.with_suffix(".toml"), tmp_path / "out"
+    assert main(["solve", str(case), "--out", str(out), "--quiet"]) == CONVERGED
+    assert json.loads((out / "summary.json").read_text())["contact_nodes"] > 0
+    (_, down) = (component.value for component in load_case(case).fixed[0].displacement)
+    assert -gap - 0.005 < down < -gap
+
+
+def test_bodies_of_one_part_each(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """They cannot be held and in contact by the same nodes: there is no case that works."""
+    mesh = two_squares(tmp_path / "skins.inp", 0.05, skins=True)
+    assert main(["new", str(mesh)]) == BAD_INPUT
+    assert "a, b as parts: none to hold beside those in contact; accepted: a" in (
+        capsys.readouterr().err
+    )
+    assert not mesh.with_suffix(".toml").exists()

@@ -156,3 +156,12 @@ def test_materials_of_two_systems_are_refused():
     ]
     with pytest.raises(InputError, match=r'material\.1\.units: "GPa", and material\.0 has "SI"'):
         parse_case(data)
+
+
+def test_labels_are_printed_with_the_letter_of_si() -> None:
+    """The names of systems keep letters of a keyboard."""
+    assert named("uN-um-MPa", {}).labels["length"] == "µm"
+    assert {"µm"} == {named(k, {}).labels["length"] for k in SYSTEMS if "um" in k}
+    assert named("N-mm-MPa", {}).labels == {
+        "length": "mm", "stress": "MPa", "potential": "V", "charge": "mC"
+    }  # fmt: skip

@@ -145,10 +145,10 @@ def test_the_loops_of_several_rigid_parts() -> None:
     assert named == [["left+right"], ["lid"]]
 
 
-def curved(nodes: int = 9, **columns: Any) -> Run:
-    """Return the run of a block whose contact part is taken for a quarter of a circle."""
+def curved(nodes: int = 9, turn: float = np.pi / 2, **columns: Any) -> Run:
+    """Return the run of a block whose contact part is taken for a quarter of a circle, or more."""
     run = run_of(solve(block(2)))
-    angle = np.linspace(0.0, np.pi / 2, len(run.table["x"]))
+    angle = np.linspace(0.0, turn, len(run.table["x"]))
     places = {"x": 3 - np.cos(angle), "y": np.sin(angle), "gap": 0 * angle}
     table = {k: v[:nodes] for k, v in (run.table | places | columns).items()}
     surface = run.surface.copy()
@@ -157,17 +157,30 @@ def curved(nodes: int = 9, **columns: Any) -> Run:
 
 
 def test_ends_of_axes_are_coordinates_on_curved_parts_too() -> None:
-    run = curved()
+    turn = 1.25 * np.pi
+    run = curved(turn=turn)
     whole = draw_line(run, Look()).axes[-1]
     assert whole.get_xlabel() == r"$\ell$ along $\Gamma_3$, from (2, 0)"
-    assert whole.get_xlim() == pytest.approx((0.0, np.pi / 2), rel=0.01)
-    # x < 2.3 is an angle below arccos(0.7), y > 0.5 one above 30 degrees.
-    room = run.table["weight"].max() / 2 + np.pi / 16
-    low, high = draw_line(run, Look(xlim=(0.0, 2.3), ylim=(0.5, 5.0))).axes[0].get_xlim()
-    assert abs(low - np.pi / 6) < room and abs(high - np.arccos(0.7)) < room
-    beside = "--xlim 0,1.9: beside the contact part, which has x from 2 to 3; accepted: coordinates"
+    assert whole.get_xlim() == pytest.approx((0.0, 16 * np.sin(turn / 16)), rel=1e-12)
+    # x < 3 is an angle below 90 degrees, y > 0.5 one above 30 degrees.
+    room = run.table["weight"].max() / 2 + turn / 8
+    low, high = draw_line(run, Look(xlim=(0.0, 3.0), ylim=(0.5, 5.0))).axes[0].get_xlim()
+    assert abs(low - np.pi / 6) < room and abs(high - np.pi / 2) < room
+    beside = "--xlim 0,1.9: beside the contact part, which has x from 2 to 3.981; accepted: coord"
     with pytest.raises(InputError, match=beside):
         draw_line(run, Look(xlim=(0.0, 1.9)))
+
+
+def test_curves_are_drawn_along_the_axis_over_which_they_are_graphs() -> None:
+    """A half width is read off where it is; the limits of the other axis show the nodes within."""
+    run = curved()
+    whole = draw_line(run, Look()).axes[-1]
+    assert whole.get_xlabel() == r"$x$ along $\Gamma_3$"
+    assert whole.get_xlim() == pytest.approx((2.0, 3.0), rel=1e-12)
+    low, high = draw_line(run, Look(ylim=(0.5, 5.0))).axes[0].get_xlim()
+    assert 2.0 < low < 3 - np.cos(np.pi / 4) and high == pytest.approx(3.0, rel=1e-12)
+    slim = replace(run, table=run.table | {"x": run.table["x"] / 2})
+    assert draw_line(slim, Look()).axes[-1].get_xlabel() == r"$y$ along $\Gamma_3$"
 
 
 def test_a_contact_beside_the_ends_is_left_out() -> None:

@@ -41,12 +41,15 @@ SMALL = 1 / 3
 def position(table: Table, run: Run) -> tuple[Array, str, tuple[float, float]]:
     """Return the positions of nodes along Gamma_3, the coordinate's name, and where Gamma_3 ends.
 
-    That is a coordinate where Gamma_3 lies along an axis, and the arc length elsewhere.
+    That is the coordinate over which Gamma_3 is a graph, of two that along which it is longer, and
+    the arc length elsewhere.
     """
     points, outer = np.column_stack([table["x"], table["y"]]), ends(table, run.held)
     extent = np.ptp(points, axis=0)
-    for axis in (0, 1):
-        if extent[1 - axis] <= 1e-9 * extent[axis]:
+    for axis in (0, 1) if extent[0] >= extent[1] else (1, 0):
+        steps = np.diff(points[:, axis])
+        straight = extent[1 - axis] <= 1e-9 * extent[axis]
+        if straight or np.all(steps > 0) or np.all(steps < 0):
             where, name, borders = points[:, axis], run.axes[axis], outer[:, axis]
             break
     else:
@@ -92,7 +95,8 @@ def shown(
     found: list[tuple[float, float] | None] = []
     for table, there in zip(tables, touching, strict=True):
         where, name, whole = position(table, run)
-        straight = [k for k in (0, 1) if run.axes[k] == name]
+        spans = [np.ptp(table[key]) for key in "xy"]
+        straight = [k for k in (0, 1) if run.axes[k] == name and spans[1 - k] <= 1e-9 * spans[k]]
         chosen = {k: asked[k] for k in straight or (0, 1) if k in asked}
         inside = np.ones(len(where), dtype=bool)
         for k, (low, high) in chosen.items():
