@@ -267,5 +267,7 @@ def measured(
                     shape.check_normals(points)
         except InputError as error:
             text = str(error)
-            raise InputError(text if text.startswith(label) else f"{label}: {text}") from None
+            raise InputError(
+                text if text.startswith(label) else f"{label}: {text}"
+            ) from error.__cause__
     return found
