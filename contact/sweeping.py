@@ -13,6 +13,7 @@ import hashlib
 import itertools
 import logging
 import os
+import re
 import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -111,8 +112,10 @@ def _spread(text: str, whole: str) -> str:
     except ValueError:
         accepted = f"a:b:n, n numbers from a to b, 2 to {MOST} of them"
         raise InputError(f"--over {whole}: given {text.strip()}; accepted: {accepted}") from None
-    # To twelve digits: 0.3, and not 0.30000000000000004.
-    return ",".join(repr(float(f"{number:.12g}")) for number in numbers)
+    # To twelve digits: 0.3, and not 0.30000000000000004. Some keys take whole numbers alone.
+    as_written = not {*f"{first}{last}"} & {*".eE"} and (numbers == np.rint(numbers)).all()
+    kind = int if as_written else float
+    return ",".join(repr(kind(float(f"{number:.12g}"))) for number in numbers)
 
 
 def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float]:
@@ -234,7 +237,7 @@ def sweep(
     # All of them before the first is solved.
     cases = on_root(comm, lambda: [load(point) for point in points])
     inputs = on_root(comm, lambda: [_input(case) for case in cases])
-    kept = on_root(comm, lambda: _kept_rows(folder, names, points[0], load))
+    kept = on_root(comm, lambda: _kept_rows(folder, names, columns, points[0], load))
     rows: list[dict[str, Any]] = []
     tell(logger, 0.0, "%d cases", len(cases))
     with stop_on_signal(comm, monitor) as stop:
@@ -276,7 +279,11 @@ def _seal(row: Mapping[str, Any]) -> str:
 
 
 def _kept_rows(
-    folder: Path, names: list[str], first: Mapping[str, str], load: Callable[..., Case]
+    folder: Path,
+    names: list[str],
+    columns: Sequence[str],
+    first: Mapping[str, str],
+    load: Callable[..., Case],
 ) -> dict[tuple[str, ...], dict[str, Any]]:
     """Return the rows that are there already, by the values of the keys. On one rank.
 
@@ -286,7 +293,8 @@ def _kept_rows(
     Raises
     ------
     InputError
-        If the files there are damaged, no sweep's, or those of a sweep of other input.
+        If the files there are damaged, no sweep's, or those of a sweep of other input or without
+        the further ``columns``.
     """
     table, before = folder / TABLE, folder / CASE
     for path in (table, before):
@@ -301,6 +309,14 @@ def _kept_rows(
                 f"{refused} a sweep over other keys; accepted: one over {', '.join(swept)}, or "
                 "another folder"
             )
+        for name in columns:
+            # Of a table, and of a vector: `reactions.left_x`.
+            ours = re.compile(rf"{re.escape(name)}(\..*)?(_([{AXES}]|\d+))?")
+            if not any(ours.fullmatch(column) for column in rows[0]):
+                raise InputError(
+                    f"--columns {name}: the rows of {table} have other columns; accepted: columns "
+                    "that they have, or another folder"
+                )
     text = to_toml(load(first), anchored=True)
     if before.exists():
         stored, where = to_toml(load(first, before), anchored=True), f"--out {folder}"

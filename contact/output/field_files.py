@@ -80,11 +80,16 @@ def _in_pieces(problem: ContactProblem) -> bool:
 
 
 def regions_of(problem: ContactProblem) -> NDArray[np.int32]:
-    """Return the region of each owned cell: its place among the names, the first of several."""
+    """Return the region of each owned cell: its place among the names. Collective.
+
+    Of several that share a cell it is the one of fewest cells, which lies in the others.
+    """
     domain = problem.domain
+    cells = [domain.regions[name] for name in sorted(domain.regions)]
+    sizes = problem.comm.allreduce(np.array([len(own) for own in cells]), op=MPI.SUM)
     found = np.full(domain.mesh.topology.index_map(domain.dim).size_local, -1, dtype=np.int32)
-    for k, name in reversed([*enumerate(sorted(domain.regions))]):
-        found[domain.regions[name]] = k
+    for k in np.argsort(-sizes, kind="stable"):
+        found[cells[k]] = k
     return found
 
 

@@ -120,8 +120,8 @@ _RUN = (
         lambda r: {part: held.moment for part, held in r.supports.items()},
     ),
     Quantity(
-        "region", "", "Place of the cell's region among `regions` of the summary, from 0. In "
-        "`fields.vtu`, in the cells.", _elsewhere, (BODY,),
+        "region", "", "Place of the cell's region among `regions` of the summary, from 0; of "
+        "several the one of fewest cells. In `fields.vtu`, in the cells.", _elsewhere, (BODY,),
     ),
     Quantity(
         "error", "",

@@ -177,7 +177,7 @@ def example(
 
 def with_forces(deformed: Picture) -> Figure:
     """Draw a plane body, and the forces of the foundation on it as arrows at the contact nodes."""
-    figure, table = draw_plane(deformed, Look()), deformed.run.table
+    figure, table = draw_plane(deformed), deformed.run.table
     normal = np.column_stack([table["nu_x"], table["nu_y"]])
     tangent = tangent_of(normal)
     place = np.column_stack([table["x"], table["y"]])

@@ -63,7 +63,7 @@ def draw(report: Report, number: str, case: Case, text: str, load: float) -> Tab
     report.figure(
         f"figure-{number}b",
         f"Figure {dotted} (b): deformed configuration and von Mises stress, {where}",
-        draw_plane(deformed, Look()),
+        draw_plane(deformed),
         {"smallest von Mises": [float(values.min())], "largest von Mises": [float(values.max())]},
     )
     return table

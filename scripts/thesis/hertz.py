@@ -13,7 +13,6 @@ from mpi4py import MPI
 
 from contact import Case, Solution, build_problem
 from contact.output.figures.body import draw_plane, picture
-from contact.output.figures.style import Look
 from contact.output.surface import contact_table
 from scripts.reporting import TWO_COLUMNS, Report, append, options, run_of, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
@@ -212,7 +211,7 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
     report.figure(
         "figure-7-2b",
         "Figure 7.2 (b): deformed quarter cylinder, von Mises stress",
-        draw_plane(deformed, Look()),
+        draw_plane(deformed),
         {"von Mises": [float(deformed.skin["values"].max())]},
         "Coulomb friction (7.16), rho = 1e4, contact along the foundation's normal. The number "
         "is the largest von Mises stress.",

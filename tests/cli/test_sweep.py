@@ -209,14 +209,15 @@ def test_damaged_files_are_refused_and_kept(sweep, tmp_path, capfd, kind):
 
 
 def test_rows_with_other_columns_are_kept(sweep, tmp_path, capfd):
-    """A new row would have more columns."""
+    """Rows that are there would lack a column that is asked for, and a new one have more."""
     sweep("--over", "friction.mu=0.2,0.4")
     table = tmp_path / "out" / "sweep.csv"
     before = table.read_bytes()
     more = ("--columns", "error.energy")
-    assert sweep("--over", "friction.mu=0.2,0.4,0.6", *more)[0] == 2
-    assert "other columns" in capfd.readouterr().err
-    assert table.read_bytes() == before
+    for values in ("0.2,0.4,0.6", "0.2,0.4"):
+        assert sweep("--over", f"friction.mu={values}", *more)[0] == 2
+        assert "--columns error.energy: the rows of" in capfd.readouterr().err
+        assert table.read_bytes() == before
 
 
 @pytest.mark.parametrize("name", ["sweep.csv", "sweep.toml"])
@@ -240,6 +241,10 @@ def test_other_files_under_our_names_are_left_alone(tmp_path, capfd, name, kind)
 
 def test_ranges():
     assert Axis.of("friction.mu=0.1:0.3:3").values == ("0.1", "0.2", "0.3")
+    assert Axis.of("mesh.refine=0:2:3").values == ("0", "1", "2")
+    assert Axis.of("x=-2:-6:3").values == ("-2", "-4", "-6")
+    assert Axis.of("x=0:1:3").values == ("0.0", "0.5", "1.0")
+    assert Axis.of("x=0.0:2.0:3").values == ("0.0", "1.0", "2.0")
     assert Axis.of("friction.mu=0,0.1:0.2:2").values == ("0", "0.1", "0.2")
     for wrong in ("0.1:0.2", "a:b:3", "0:1:1", "0:1:2.5", "0:inf:3", "0:1:100000"):
         with pytest.raises(InputError, match=r"--over friction\.mu=.*: given .*; accepted: a:b:n"):

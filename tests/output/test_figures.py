@@ -58,7 +58,7 @@ def test_figures_begin_at_the_edge_of_the_body() -> None:
     assert run.table["x"].min() == 0.25
     np.testing.assert_allclose(run.held, [[0.0, 0.0]], atol=1e-15)
     assert draw_line(run, Look()).axes[0].get_xlim() == pytest.approx((0.0, 2.0))
-    line = draw_plane(picture(run, "von_mises"), Look()).axes[0].lines[0].get_xdata()
+    line = draw_plane(picture(run, "von_mises")).axes[0].lines[0].get_xdata()
     assert (np.min(line), np.max(line)) == pytest.approx((0.0, 2.0))
 
 
@@ -80,10 +80,10 @@ def test_axes_end_where_they_are_asked_to() -> None:
     run = run_of(solve(block(2)))
     look = Look(xlim=(0.5, 1.0), ylim=(0.0, 0.4))
     assert draw_line(run, look).axes[0].get_xlim() == (0.5, 1.0)
-    ax = draw_plane(picture(run, "von_mises"), look).axes[0]
+    ax = draw_plane(picture(run, "von_mises", look=look)).axes[0]
     assert (ax.get_xlim(), ax.get_ylim()) == ((0.5, 1.0), (0.0, 0.4))
     # The foundation below remains where the ends of the other axis alone are given.
-    low, high = draw_plane(picture(run, "von_mises"), Look(xlim=(0.5, 1.0))).axes[0].get_ylim()
+    low, high = draw_plane(picture(run, "von_mises", look=Look(xlim=(0.5, 1.0)))).axes[0].get_ylim()
     assert low < 0 and high > 1
     body = r"beside the body, which is drawn from .*; accepted: ends that show some of it"
     for beside, words in (
@@ -91,17 +91,75 @@ def test_axes_end_where_they_are_asked_to() -> None:
         (Look(ylim=(-3.0, -2.0)), f"--ylim -3,-2: {body}"),
     ):
         with pytest.raises(InputError, match=words):
-            draw_plane(picture(run, "von_mises"), beside)
+            draw_plane(picture(run, "von_mises", look=beside))
     with pytest.raises(InputError, match=r"--xlim 5,6: beside the contact part, .* from 0 to 2"):
         draw_line(run, Look(xlim=(5.0, 6.0)))
+
+
+def test_a_crop_has_the_scales_of_what_it_shows() -> None:
+    """Limits of the axes and colours, and zones in the legend, from the part that is drawn."""
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [40, 8]}
+    run = run_of(solve(block(2, mesh=mesh)))
+    table, look = run.table, Look(xlim=(0.2, 0.45))
+    table = {
+        **table,
+        "pressure": 1 + table["x"],
+        "bound": 0.3 * (1 + table["x"]),
+        "status": np.where(table["x"] < 0.5, "open", "stick"),
+    }
+    figure = draw_line(replace(run, table=table), look)
+    assert figure.axes[0].get_ylim() == pytest.approx((0.0, 1.05 * 1.45))
+    assert figure.axes[1].get_ylim() == pytest.approx((-0.315 * 1.45, 0.315 * 1.45))
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "open" in words and "sticking" not in words
+    # The potential is x: nodal values are those of the cut, and cells those that it meets.
+    body = run.body.copy()
+    body.point_data["potential"] = body.points[:, 0]
+    body.cell_data["number"] = body.cell_centers().points[:, 0]
+    still = replace(run, body=body)
+    norm = picture(still, "potential", 0.0, look).norm
+    assert (norm.vmin, norm.vmax) == pytest.approx((0.2, 0.45))
+    norm = picture(still, "number", 0.0, look).norm
+    assert 0.15 < norm.vmin < 0.25 < 0.4 < norm.vmax < 0.5
+    turned = replace(still, axes="rz")
+    norm = picture(turned, "potential", 0.0, Look(mirror=True, xlim=(-0.5, 0.1))).norm
+    assert (norm.vmin, norm.vmax) == pytest.approx((0.0, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("xlim", "shown"),
+    [((-1.2, 1.0), (0.0, 1.2)), ((-1.0, -0.5), (0.5, 1.0)), ((-9.0, 9.0), (0.0, 2.0))],
+)
+def test_the_window_of_both_halves_is_one_of_radii_along_the_contact(
+    xlim: tuple[float, float], shown: tuple[float, float]
+) -> None:
+    run = replace(run_of(solve(block(2))), axes="rz")
+    found = draw_line(run, Look(mirror=True, xlim=xlim)).axes[0].get_xlim()
+    assert found == pytest.approx(shown)
+
+
+def test_regions_are_classes_with_names() -> None:
+    """Not a bar of numbers; a crop has those that it shows."""
+    mesh = {
+        "generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4],
+        "regions": {"coat": "y < 0.25", "hub": "x > 1.5"},
+    }  # fmt: skip
+    run = run_of(solve(block(2, mesh=mesh)))
+    for look, words in (
+        (Look(), ["body", "coat", "hub"]),
+        (Look(xlim=(0.1, 0.6), ylim=(0.1, 0.9)), ["body", "coat"]),
+    ):
+        figure = draw_plane(picture(run, "region", look=look))
+        assert [text.get_text() for text in figure.legends[0].get_texts()] == words
+        assert len(figure.axes) == 1
 
 
 def test_a_foundation_that_is_far_is_not_drawn() -> None:
     """The body would be a dot beside it, as its gap is scaled like the displacements."""
     case = block(2, contact={"on": "bottom", "gap": 1.0})
     run = run_of(solve(case))
-    assert not draw_plane(picture(run, "von_mises", scale=10.0), Look()).axes[0].lines
-    assert draw_plane(picture(run, "von_mises", scale=0.5), Look()).axes[0].lines
+    assert not draw_plane(picture(run, "von_mises", scale=10.0)).axes[0].lines
+    assert draw_plane(picture(run, "von_mises", scale=0.5)).axes[0].lines
 
 
 def moved(**columns: list[float]) -> Run:
@@ -300,7 +358,7 @@ def test_the_lines_of_a_title_are_above_the_body(height: float, lines: int) -> N
     title = "A body" + (lines - 1) * " that a load of some size presses for as long as it takes"
     run = replace(run_of(solution), title=title)
     with rc_context(Look(6.3).style):
-        figure = draw_plane(picture(run, "von_mises"), Look())
+        figure = draw_plane(picture(run, "von_mises"))
         FigureCanvasAgg(figure).draw()
     assert figure.axes[0].get_title().count("\n") == lines - 1
     assert figure.axes[0].title.get_window_extent().y1 < figure.bbox.height
@@ -332,12 +390,12 @@ def test_a_small_contact_zone_is_drawn_with_its_vicinity() -> None:
     assert near.scale <= whole.scale
     width = np.ptp(run.table["x"][status == "stick"])
     assert np.ptp(near.box, axis=0)[0] == pytest.approx(7 * width)
-    ax = draw_plane(near, Look()).axes[0]
+    ax = draw_plane(near).axes[0]
     assert ax.get_xlim() == pytest.approx((1 - 3.5 * width, 1 + 3.5 * width))
 
 
 def test_a_foundation_far_away_does_not_shrink_the_body() -> None:
     """The gap is scaled as the displacements are: the body would be a dot beside it."""
     run = run_of(solve(block(2, contact={"on": "bottom", "gap": 5.0})))
-    low, high = draw_plane(picture(run, "von_mises", 10.0), Look()).axes[0].get_ylim()
+    low, high = draw_plane(picture(run, "von_mises", 10.0)).axes[0].get_ylim()
     assert high - low < 2 * run.diameter

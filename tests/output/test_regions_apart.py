@@ -4,9 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
 
 from contact import load_case, parse_case, solve
+from contact.case.build import build_problem
 from contact.output.field_files import body_share, regions_of
 from contact.output.fields import DerivedFields
 from contact.output.figures.run import read_grid
@@ -107,6 +109,19 @@ def test_the_region_is_a_field_of_the_cells(tmp_path):
     assert middle[region == names.index("upper")].min() > middle[region == 0].max()
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["regions"] == names
     assert (regions_of(solution.problem) == region).all()
+
+
+@pytest.mark.parallel
+def test_the_smallest_of_several_regions_is_the_one_of_a_cell():
+    """A region in another one wins over it, whatever their names are; the rest is the other's."""
+    overrides = ["mesh.cells=[8, 4]", 'mesh.regions={"tip" = "(x > 1.5) * (y > 0.5)"}']
+    problem = build_problem(load_case(CASES / "bar.toml", overrides), COMM)
+    names = sorted(problem.domain.regions)
+    assert names == ["body", "tip"]
+    owned = np.arange(len(regions_of(problem)), dtype=np.int32)
+    middles = compute_midpoints(problem.domain.mesh, 2, owned).reshape(-1, 3)
+    inside = (middles[:, 0] > 1.5) & (middles[:, 1] > 0.5)
+    assert (regions_of(problem) == np.where(inside, 1, 0)).all()
 
 
 def test_strains_and_principal_stresses():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.tri import Triangulation
 
 from contact.errors import InputError
@@ -25,6 +26,7 @@ from contact.output.figures.run import Run
 from contact.output.figures.style import (
     BLUE,
     NARROW,
+    PAGE,
     Look,
     colour_range,
     fitted,
@@ -37,6 +39,8 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")
 
+#: The field whose values are regions.
+REGION = "region"
 #: Contact zones below this part of the body are drawn with their vicinity, of so many zones.
 SMALL, VICINITY = 0.04, 3.0
 #: Overlap of two bodies, over the diameter, that is not seen.
@@ -120,6 +124,10 @@ class Picture:
         Range and label of the colours.
     scale, box
         Factor of the displacements, and the corners of the part that is shown, shape (2, d).
+    look
+        The choices for the figure.
+    classes
+        Names of the values 0, 1, ..., where these are no quantity.
     """
 
     run: Run
@@ -128,6 +136,8 @@ class Picture:
     label: str
     scale: float
     box: Array
+    look: Look = PAGE
+    classes: Sequence[str] = ()
 
     @property
     def title(self) -> str:
@@ -136,15 +146,15 @@ class Picture:
         times = times if self.scale != 1 else "displacements to scale".replace(" ", "\u00a0")
         return fitted(f"{self.run.title} ({times})" if self.run.title else times)
 
+    @property
+    def colours(self) -> Any:
+        """The colours by name, or one for each class."""
+        continuous = matplotlib.colormaps["viridis"]
+        return continuous.resampled(len(self.classes)) if self.classes else continuous
 
-def picture(
-    run: Run,
-    field: str,
-    scale: float | None = None,
-    box: Array | None = None,
-    limits: tuple[float, float] | None = None,
-) -> Picture:
-    """Return a picture of the body.
+
+def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE) -> Picture:
+    """Return a picture of the body, with colours for the part of it that is shown.
 
     Parameters
     ----------
@@ -152,14 +162,19 @@ def picture(
         The run.
     field
         To colour by, as `scalar` takes it.
-    scale, box
-        As `Picture` has them; by default those of the body, or of a small contact zone's vicinity.
-    limits
-        Values at which the colours end; by default those that suit this picture.
+    scale
+        As `Picture` has it; by default that of the body, or of a small contact zone's vicinity,
+        which is then the part that is shown.
+    look
+        The choices; in 2-D that of the part that is shown.
+
+    Raises
+    ------
+    InputError
+        If there is no such field, or nothing to be seen.
     """
     values, in_cells = scalar(run, field)
-    label = named(field, run.units)[1]
-    norm, label = (Normalize(*limits), label) if limits else colour_range(values, label)
+    box = None
     if scale is None:
         box = vicinity(run)
         shown = run.diameter if box is None else float(np.ptp(box, axis=0).max())
@@ -168,24 +183,62 @@ def picture(
     (body.cell_data if in_cells else body.point_data)["values"] = values
     skin = body.extract_surface(nonlinear_subdivision=1)  # triangles; at degree 2 four of each
     whole = np.array([skin.points.min(axis=0), skin.points.max(axis=0)])[:, : len(run.axes)]
-    return Picture(run, skin, norm, label, scale, whole if box is None else np.clip(box, *whole))
+    box = whole.copy() if box is None else np.clip(box, *whole)
+    sides = look.sides(run.axes)
+    if run.plane:
+        if len(sides) > 1:
+            whole[0, 0], box[0, 0] = -whole[1, 0], -box[1, 0]
+        for k, (low, high) in enumerate(whole.T):
+            box[:, k] = look.ends(k, low, high, "the body") or box[:, k]
+    if np.any(box[0] > whole[0]) or np.any(box[1] < whole[1]):
+        values = _inside(skin, box, sides, values)
+    label = named(field, run.units)[1]
+    if field != REGION:
+        return Picture(run, skin, *colour_range(values, label), scale, box, look)
+    found = np.unique(values)
+    skin["values"] = np.searchsorted(found, skin["values"])
+    names = [run.regions[k] for k in found]
+    return Picture(run, skin, Normalize(-0.5, len(names) - 0.5), label, scale, box, look, names)
 
 
-def body_figure(picture: Picture, look: Look) -> Figure | None:
+def _inside(skin: Any, box: Array, sides: Sequence[int], values: Array) -> Array:
+    """Return the values of a surface, or of its mirror image, in a box; where it has none others.
+
+    Parameters
+    ----------
+    skin, box
+        As `Picture` has them.
+    sides
+        As `Look.sides` returns them.
+    values
+        Those for a box beside the surface.
+    """
+    found = []
+    for side in sides:
+        part, ends = skin, box.copy()
+        ends[:, 0] = np.sort(side * box[:, 0])
+        for above, k in np.ndindex(ends.shape):
+            if part.n_cells:
+                place = np.eye(3)[k] * ends[above, k]
+                part = part.clip("xyz"[k], origin=place, invert=above == 1)
+        found.append(np.asarray(part["values"]) if part.n_cells else np.empty(0))
+    every = np.concatenate(found)
+    return every if every.size else values
+
+
+def body_figure(picture: Picture) -> Figure | None:
     """Draw a deformed body; None in 3-D without a display."""
-    return draw_plane(picture, look) if picture.run.plane else draw_space(picture)
+    return draw_plane(picture) if picture.run.plane else draw_space(picture)
 
 
-def draw_plane(picture: Picture, look: Look) -> Figure:
+def draw_plane(picture: Picture) -> Figure:
     """Draw a plane body over its outline in the reference configuration, and the foundation."""
-    run, box, head = picture.run, picture.box.copy(), picture.title
-    mirrored = look.mirror and run.axes == "rz"
+    run, box, head, look = picture.run, picture.box, picture.title, picture.look
     places = np.asarray(picture.skin.points)[:, :2]
-    cut = bool(np.any(np.ptp(box, axis=0) < 0.99 * np.ptp(places, axis=0)))
-    box[0, 0] = -box[1, 0] if mirrored else box[0, 0]
-    for k, (low, high) in enumerate(zip(places.min(axis=0), places.max(axis=0), strict=True)):
-        low = -high if mirrored and k == 0 else low
-        box[:, k] = look.ends(k, low, high, "the body") or box[:, k]
+    sides = look.sides(run.axes)
+    free = [look.xlim is None, look.ylim is None]
+    whole = np.ptp(places, axis=0) * [len(sides), 1]
+    cut = bool(np.any(np.ptp(box, axis=0)[free] < 0.99 * whole[free]))
     width, height = box[1] - box[0]
     tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
     more = 0.02 * float(matplotlib.rcParams["font.size"]) * head.count("\n")
@@ -197,7 +250,7 @@ def draw_plane(picture: Picture, look: Look) -> Figure:
         feature_edges=False, manifold_edges=False, non_manifold_edges=False
     )
     outline = edges.points[edges.lines.reshape(-1, 3)[:, 1:], :2]
-    for side in (-1, 1) if mirrored else (1,):
+    for side in sides:
         _colour(ax, picture, side)
         # Dashes would be those of an edge each: none where edges are short.
         ax.add_collection(LineCollection(list(outline * [side, 1]), colors="black", lw=0.5))
@@ -221,8 +274,16 @@ def draw_plane(picture: Picture, look: Look) -> Figure:
 
 
 def _bar(figure: Figure, picture: Picture) -> None:
-    """Add the bar of the colours."""
-    colours, axes = ScalarMappable(picture.norm, "viridis"), figure.axes
+    """Add the bar of the colours, of classes a legend."""
+    colours, axes = ScalarMappable(picture.norm, picture.colours), figure.axes
+    if picture.classes:
+        rgba = colours.to_rgba(range(len(picture.classes)))
+        handles = [Patch(color=c, label=k) for c, k in zip(rgba, picture.classes, strict=True)]
+        columns = 2 if page_width() < NARROW else 4
+        figure.legend(
+            handles=handles, title=picture.label, ncols=columns, loc="outside lower center"
+        )
+        return
     bar = {"location": "bottom", "label": picture.label, "aspect": 40, "shrink": 0.8}
     text = figure.colorbar(colours, ax=axes, **bar).ax.xaxis.get_offset_text()
     text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the label
@@ -232,7 +293,7 @@ def _colour(ax: Axes, picture: Picture, side: int) -> None:
     """Draw the coloured body, or its mirror image where the side is -1."""
     skin = picture.skin.triangulate()
     mesh = Triangulation(*(skin.points[:, :2] * [side, 1]).T, skin.regular_faces)
-    shown: dict[str, Any] = {"norm": picture.norm, "cmap": "viridis", "rasterized": True}
+    shown: dict[str, Any] = {"norm": picture.norm, "cmap": picture.colours, "rasterized": True}
     if "values" in skin.cell_data:
         ax.tripcolor(mesh, facecolors=skin["values"], **shown)
     else:
@@ -271,7 +332,7 @@ def draw_space(picture: Picture) -> Figure | None:
 
     def add(plotter: Any) -> None:
         plotter.add_mesh(
-            skin, scalars="values", cmap="viridis", clim=[norm.vmin, norm.vmax],
+            skin, scalars="values", cmap=picture.colours, clim=[norm.vmin, norm.vmax],
             show_edges=skin.n_cells < 5000, line_width=0.5, edge_opacity=0.3, ambient=0.6,
             diffuse=0.4, show_scalar_bar=False,
         )  # fmt: skip

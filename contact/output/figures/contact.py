@@ -91,7 +91,12 @@ def shown(
     InputError
         If there are coordinates beside all of them.
     """
-    asked = {k: given for k, given in enumerate((look.xlim, look.ylim)) if given is not None}
+    given = {"xlim": look.xlim, "ylim": look.ylim}
+    asked = {k: ends for k, ends in enumerate(given.values()) if ends is not None}
+    if 0 in asked and len(look.sides(run.axes)) > 1:
+        # Its radii, of both halves.
+        low, high = asked[0]
+        asked[0] = max(low, -high, 0.0), min(max(high, -low), run.body.bounds[1])
     found: list[tuple[float, float] | None] = []
     for table, there in zip(tables, touching, strict=True):
         where, name, whole = position(table, run)
@@ -115,14 +120,14 @@ def shown(
         else:
             found.append(None)
     if all(each is None for each in found):
-        given = " ".join(f"--{'xy'[k]}lim {low:g},{high:g}" for k, (low, high) in asked.items())
+        words = " ".join(f"--{k} {ends[0]:g},{ends[1]:g}" for k, ends in given.items() if ends)
         lies = " and ".join(
             f"{run.axes[k]} from {min(t['xy'[k]].min() for t in tables):.4g} to "
             f"{max(t['xy'[k]].max() for t in tables):.4g}"
             for k in asked
         )
         raise InputError(
-            f"{given}: beside the contact part, which has {lies}; accepted: coordinates of the "
+            f"{words}: beside the contact part, which has {lies}; accepted: coordinates of the "
             "mesh that show some of it, or --field for the body alone"
         )
     return found
@@ -144,6 +149,12 @@ def ends(table: Table, held: Array) -> Array:
     return found
 
 
+def shares(where: Array, outer: tuple[float, float]) -> Array:
+    """Return where the shares of nodes end along Gamma_3, in the order of their positions."""
+    along = np.sort(where)
+    return np.concatenate([outer[:1], (along[1:] + along[:-1]) / 2, outer[1:]])
+
+
 def zones(ax: Axes, where: Array, outer: tuple[float, float], status: Any, rows: Array) -> None:
     """Colour the share of each node by its status.
 
@@ -158,10 +169,9 @@ def zones(ax: Axes, where: Array, outer: tuple[float, float], status: Any, rows:
     rows
         Where the rows begin and end, shape (m + 1,); those of one row in shares of the axis.
     """
-    order, along = np.argsort(where), np.sort(where)
-    borders = np.concatenate([outer[:1], (along[1:] + along[:-1]) / 2, outer[1:]])
+    order = np.argsort(where)
     ax.pcolormesh(
-        borders,
+        shares(where, outer),
         rows,
         np.argmax([status[:, order] == zone for zone in ZONES], axis=0),
         cmap=ListedColormap([colour for colour, _ in ZONES.values()]),
@@ -232,15 +242,24 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
     mark = "o" if len(where) == 1 else ""  # a line of one point is not seen
     bound, tau, units = table["bound"], table["tau"], run.units
     frictional = len(rows) > 1
+    order, borders = np.argsort(where), shares(where, whole)
+    seen = table["status"][order[(borders[1:] > limits[0]) & (borders[:-1] < limits[1])]]
+    inside = where[(where >= limits[0]) & (where <= limits[1])]
+    cuts = [end for end in limits if where.min() < end < where.max()]
+
+    def within(values: Array) -> Array:
+        """Return the values that are shown: of the nodes, and where the axis cuts the line."""
+        return np.interp([*inside, *cuts], where[order], values[order])
+
     for ax in rows:
         zones(ax, where, whole, table["status"][None], np.array([0.0, 1.0]))
     for zone, (colour, label) in ZONES.items():
-        if np.any(table["status"] == zone):
+        if np.any(seen == zone):
             words = label if frictional or zone == "open" else "in contact"
             rows[0].fill_between([], [], color=colour, lw=0, label=words)
     rows[0].plot(where, table["pressure"], color=BLUE, marker=mark, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
-    _focus(rows[0], table["pressure"], 0.0)
+    _focus(rows[0], within(table["pressure"]), 0.0)
     if frictional:
         rows[1].plot(
             where, tau, color=ORANGE, marker=mark, label=r"tangential stress $-\sigma_\tau\cdot t$"
@@ -249,14 +268,16 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
         rows[1].plot(where, -bound, "--", color=GREY, lw=0.8)
         rows[1].axhline(0.0, color="black", lw=0.4)
         rows[1].set_ylabel(units.label(r"$-\sigma_\tau\cdot t$", "stress"))
-        _focus(rows[1], bound, -1.0)
+        _focus(rows[1], within(bound), -1.0)
     if run.opposite is not None:
-        _draw_opposite(rows[0], table, where, run.opposite)
+        _draw_opposite(rows[0], table, where, run.opposite, limits)
     rows[-1].set_xlabel(along(table, run))
     rows[0].set_xlim(limits)
 
 
-def _draw_opposite(ax: Axes, table: Table, where: Array, opposite: Any) -> None:
+def _draw_opposite(
+    ax: Axes, table: Table, where: Array, opposite: Any, limits: tuple[float, float]
+) -> None:
     """Draw the pressure on the other side where its nodes are opposite of those of a contact."""
     own = opposite["entry"] == table["entry"][0]
     if not own.any() or len(where) == 1:
@@ -267,6 +288,8 @@ def _draw_opposite(ax: Axes, table: Table, where: Array, opposite: Any) -> None:
     # Along the side of the contact nodes, from the nearest of them.
     along = np.gradient(points, axis=0) / np.gradient(where)[:, None]
     there = where[near] + np.einsum("ni,ni->n", places - points[near], along[near])
+    if there.max() < limits[0] or there.min() > limits[1]:
+        return
     order = np.argsort(there)
     pressure = opposite["pressure"][own][order]
     ax.plot(there[order], pressure, ":", color=GREY, lw=1.0, label="pressure on the other side")
@@ -275,7 +298,7 @@ def _draw_opposite(ax: Axes, table: Table, where: Array, opposite: Any) -> None:
 def _focus(ax: Axes, values: Array, low: float) -> None:
     """Limit the axis where a singular corner would hide all else, and name the peak."""
     largest = float(values.max(initial=0.0))
-    usual = float(np.quantile(values, 0.97)) * 1.6
+    usual = float(np.quantile(values, 0.97, method="higher")) * 1.6
     if largest <= 0:
         return
     top = usual if 0 < usual < 0.7 * largest else 1.05 * largest
@@ -306,7 +329,9 @@ def draw_surface(run: Run, look: Look) -> Figure:
     figure = sheet(rows * (aspect / columns + 0.02) + (2.0 if stacked else 1.5) / page_width())
     figure.set_layout_engine("compressed")
     *lefts, right = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
-    highest = float(np.nanmax(surface["pressure"], initial=0.0)) or 1.0
+    inside = np.all((places >= low) & (places <= high), axis=1)
+    inside |= not inside.any()
+    highest = float(np.nanmax(surface["pressure"][inside], initial=0.0)) or 1.0
     x, y = (run.units.label(f"${'xyz'[k]}$", "length") for k in view)
     for ax, (side, name) in zip((*lefts, right), panels, strict=True):
         # Of degree 2 four pieces each.
@@ -314,7 +339,7 @@ def draw_surface(run: Run, look: Look) -> Figure:
         flat, facets = np.asarray(skin.points)[:, view], np.asarray(skin.regular_faces)
         ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
         if ax is right:
-            status = _draw_status(ax, skin, view, 0.1 * float((high - low).max()))
+            status = _draw_status(ax, skin, view, low, high)
         else:
             known = np.isfinite(skin["pressure"][facets]).all(axis=1)
             drawn = facets[known] if known.any() else facets
@@ -332,8 +357,8 @@ def draw_surface(run: Run, look: Look) -> Figure:
     return figure
 
 
-def _draw_status(ax: Axes, skin: Any, view: list[int], reach: float) -> Any:
-    """Draw the status of the nodes, and friction as arrows of a length at most; return colours."""
+def _draw_status(ax: Axes, skin: Any, view: list[int], low: Array, high: Array) -> Any:
+    """Draw the status of the nodes, and between two corners friction as arrows; return colours."""
     flat, status = np.asarray(skin.points)[:, view], skin["status"]
     known = status >= STATUS["open"]
     dots = float(np.clip(2e3 / len(flat), 0.5, 12))
@@ -343,12 +368,14 @@ def _draw_status(ax: Axes, skin: Any, view: list[int], reach: float) -> Any:
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
     friction = along[:, view]
     size = np.linalg.norm(friction, axis=1)
+    size[np.any((flat < low) | (flat > high), axis=1)] = 0.0
     # Rounding of the pressures is no friction.
     rounding = 1e-9 * np.linalg.norm(traction, axis=1).max(initial=0.0)
     acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
     if acting.size:
         chosen = acting[_thinned(flat[acting], 16)]
-        exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / reach}
+        longest = 0.1 * (high - low).max()
+        exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / longest}
         ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
     return shown
 

@@ -10,16 +10,17 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpi4py import MPI
 from PIL import Image
 
 from contact.errors import InputError
-from contact.output.figures.body import body_figure, magnification, picture, scalar
+from contact.output.figures.body import body_figure, magnification, picture
 from contact.output.figures.contact import contact_figure
 from contact.output.figures.run import Run, read_run, read_steps
 from contact.output.figures.steps import steps_figures
-from contact.output.figures.style import DEFORMED, OUTLIERS, PAGE, STYLE, Look, named
+from contact.output.figures.style import DEFORMED, PAGE, STYLE, Look, named
 from contact.output.folder import add, begin, discard, result_folder
 from contact.ranks import refused
 
@@ -73,7 +74,7 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
             if run.steps is not None:
                 found |= steps_figures(run, look)
         for field in fields or [field for field in DEFORMED if field in run.body.point_data]:
-            figure = body_figure(picture(run, field), look)
+            figure = body_figure(picture(run, field, look=look))
             if figure is not None:
                 found[named(field, run.units)[0]] = figure
     return found
@@ -145,11 +146,14 @@ def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
 
 def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
     runs = [replace(run, title=f"{run.title}, t = {time:.3g}".lstrip(", ")) for time, run in steps]
-    # Colours of all frames, without values far beyond the others.
-    limits = np.array([np.quantile(scalar(run, field)[0], OUTLIERS) for run in runs])
-    ends = limits[:, 0].min(), limits[:, 1].max()
     scale = magnification(runs[-1].diameter, *runs)
-    pictures = [picture(run, field, scale, limits=ends) for run in runs]
+    pictures = [picture(run, field, scale, look) for run in runs]
+    # Colours of all frames.
+    ends = np.array([(made.norm.vmin, made.norm.vmax) for made in pictures])
+    alike = {
+        "norm": Normalize(ends[:, 0].min(), ends[:, 1].max()),
+        "label": named(field, runs[0].units)[1],
+    }
     box = np.array(
         [
             np.min([made.box[0] for made in pictures], 0),
@@ -157,7 +161,7 @@ def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, loo
         ]
     )
     with matplotlib.rc_context(look.style):
-        found = [body_figure(replace(made, box=box), look) for made in pictures]
+        found = [body_figure(replace(made, box=box, **alike)) for made in pictures]
         figures = [figure for figure in found if figure is not None]
         if not figures:
             raise InputError("--animate: pyvista cannot draw here; accepted: a display, or Xvfb")

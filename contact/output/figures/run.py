@@ -50,6 +50,8 @@ class Run:
         the contact direction (``moved``).
     body, surface, opposite
         Grids of pyvista: body, contact part, and the other sides of contacts between bodies.
+    regions
+        Names of the regions, in the order of the numbers in the field ``region``.
     steps, tables
         The columns of ``steps.csv``, and the contact nodes of each step, of an evolution.
     """
@@ -61,6 +63,7 @@ class Run:
     body: Any
     surface: Any
     opposite: Any = None
+    regions: Sequence[str] = ()
     steps: Table | None = None
     tables: Sequence[Table] = ()
 
@@ -132,6 +135,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             body,
             surface,
             opposite=read(folder, OPPOSITE, read_grid) if OPPOSITE in files else None,
+            regions=about.get("regions", ()),
             steps=read(folder, "steps.csv", _steps) if "steps.csv" in files else None,
             tables=read(folder, "contact-steps.csv", _tables) if "steps.csv" in files else (),
         )

@@ -84,6 +84,10 @@ class Look:
         small = small if self.width < NARROW else {}
         return STYLE | {"figure.figsize": (self.width, self.width)} | small
 
+    def sides(self, axes: str) -> tuple[int, ...]:
+        """Return the signs of the first coordinate that are drawn of a body with some axes."""
+        return (-1, 1) if self.mirror and axes == "rz" else (1,)
+
     def ends(self, axis: int, low: float, high: float, shown: str) -> tuple[float, float] | None:
         """Return the ends that are asked for of the x or y axis (0 or 1); None for any.
 
