@@ -15,6 +15,7 @@ from contact.interface.obstacle import Shape
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import ALIKE_NORMALS
 from contact.output.solution import Remark, Solution
+from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 #: Ratio of bulk to shear modulus, of nu = 0.475, from which on elements of degree 1 lock.
@@ -84,7 +85,8 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     closed, unknown = solution.status != "open", nodes.maximum(nodes.deviation)
     if nodes.maximum(closed.astype(float)) == 0:
         least = -nodes.maximum(-nodes.gap, -np.inf)
-        if unknown > DEVIATION * max(least, 0.0):
+        rounding = NEGLIGIBLE * problem.domain.size
+        if unknown > max(DEVIATION * least, rounding):
             yield (
                 f"nothing touches, but straight facets deviate by up to {unknown:.3g} from "
                 f"a curved contact surface, and the least gap is {least:.3g}; make the mesh finer "

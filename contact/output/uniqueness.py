@@ -53,8 +53,10 @@ def uniqueness(
     Beside it, whether friction alone keeps the bodies in contact: the state without contact forces
     is a solution too. Below 1 the friction that is there is enough for several solutions. The
     touching nodes slide in the directions of their friction stresses, or all in one direction, or
-    in the opposite ones; of a body that touches nothing those that touch in the reference
-    configuration. Infinity without such a factor, and where nothing is known: with a layer, a
+    in the opposite ones, in 3-D the principal ones of their stiffness and of the pressures that
+    slips change; of a body that touches nothing those that touch in the reference configuration.
+    The factor belongs to these slips: by others the Jacobian may be singular at less.
+    Infinity without such a factor, and where nothing is known: with a layer, a
     potential, or a smoothed pressure, and of slips against which the bodies do not deform. NaN with
     more than `MOST` contact nodes, where it is not looked for. Collective.
 
@@ -86,13 +88,17 @@ def uniqueness(
     stiffness = condensation.stiffness(state)
     if stiffness is None:
         return np.inf, False
-    columns = [
-        (group.normal[:, None, :] * jump.lift[:, :, None] + group.tangential)
-        @ null_space(group.supports)
-        for group in groups(problem)
-    ]
+    columns, body = [], problem.equilibrium
+    balanced = jump.maximum(pressure) > interface.rounding(nodal)
+    external = body.external(state.time)
+    for group in groups(problem):
+        free = null_space(group.supports)
+        along = group.normal[:, None, :] * jump.lift[:, :, None]
+        columns.append((along + group.tangential) @ free)
+        for motion in (group.moved @ free).T:
+            most = body.product(np.abs(external), np.abs(motion))
+            balanced &= bool(abs(body.product(external, motion)) <= BALANCED * most)
     motions = np.concatenate(columns, axis=2)
-    pressed = jump.maximum(pressure) > interface.rounding(nodal)
     ranks = jump.comm.gather(
         (
             *(jump.lift, jump.tangent, state.forces.friction, closed, mu, motions),
@@ -107,11 +113,21 @@ def uniqueness(
         )
         if not np.any(touches & (rates > 0)):
             return np.inf, False
-        along = _directions(normal, tangent, None)
-        own = _directions(normal, tangent, force)
         rigid = motions.shape[2]
-        factor = min(_factor(stiffness, normal, t, touches, rates, rigid) for t in (along, own))
-        if not pressed:
+        closed = _onto_closed(stiffness, touches)
+        if closed is None:
+            return np.inf, False
+        uniform = _uniform(closed, normal[touches], tangent[touches])
+        own = _along(tangent, force)
+        unknown = np.linalg.norm(own, axis=1) < 0.5
+        own = own[touches]
+        own[unknown[touches]] = uniform[0][unknown[touches]]
+        largest = np.abs(stiffness).max()
+        factor = min(
+            _factor(closed, normal[touches], t, rates[touches], rigid, largest)
+            for t in (*uniform, own)
+        )
+        if not balanced:
             return factor, False
         size = problem.domain.size
         return factor, _free_of_contact(stiffness, normal, moved, forces, opening, size)
@@ -137,9 +153,6 @@ def _free_of_contact(
         change[used] = cho_solve(cho_factor(matrix), load)
     except LinAlgError:
         return False
-    # Loads on a body that contact alone holds need contact forces.
-    if np.linalg.norm(free.T @ load) > BALANCED * np.linalg.norm(load):
-        return False
     way = change.reshape(count, dim)
     met = np.isfinite(opening)
     allowed = BALANCED * np.linalg.norm(way, axis=1).max()
@@ -158,56 +171,73 @@ def _free_of_contact(
     return bool(found.status == 0)
 
 
-def _directions(normal: Array, tangent: Array, force: Array | None) -> Array:
-    """Return unit tangential vectors along forces, or along one direction; 0 without any."""
-    if force is None:
-        first = np.zeros_like(normal)
-        first[:, 0] = 1.0
-        if normal.shape[1] == 2:  # the tangent turns with the surface
-            first = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-    else:
-        first = force
-    along = np.einsum("nij,nj->ni", tangent, first)
+def _onto_closed(stiffness: Array, touches: NDArray[np.bool_]) -> Array | None:
+    """Return the stiffness condensed onto the nodes that touch, (k, d, k, d); None if singular."""
+    count = touches.size
+    rows = np.arange(stiffness.shape[0]).reshape(count, -1)
+    closed, free = rows[touches].ravel(), rows[~touches].ravel()
+    free = free[np.diag(stiffness)[free] > 0]
+    found = stiffness[np.ix_(closed, closed)]
+    if free.size:
+        try:
+            factors = cho_factor(stiffness[np.ix_(free, free)])
+        except LinAlgError:
+            return None
+        found = found - stiffness[np.ix_(closed, free)] @ cho_solve(
+            factors, stiffness[np.ix_(free, closed)]
+        )
+    shape = (np.count_nonzero(touches), rows.shape[1])
+    return np.asarray(found.reshape(*shape, *shape))
+
+
+def _along(tangent: Array, vectors: Array) -> Array:
+    """Return unit tangential vectors along others, shape (n, d); 0 without any."""
+    along = np.einsum("nij,nj->ni", tangent, vectors)
     size = np.linalg.norm(along, axis=1)
-    fallback = size <= EPS * max(size.max(initial=0.0), np.finfo(float).tiny)
-    if force is not None and fallback.any():
-        along[fallback] = _directions(normal, tangent, None)[fallback]
-        size = np.linalg.norm(along, axis=1)
-    return np.asarray(along / np.maximum(size, np.finfo(float).tiny)[:, None])
+    size[size <= EPS * max(size.max(initial=0.0), np.finfo(float).tiny)] = np.inf
+    return np.asarray(along / size[:, None])
+
+
+def _uniform(stiffness: Array, normal: Array, tangent: Array) -> list[Array]:
+    """Return fields of unit tangential vectors, (n, d): along one direction, or around a curve.
+
+    In 3-D those that are principal for the pressures which the slips change, |S_nt d|^2, beside
+    the stiffness d S_tt d: they turn with the axes, and of one node, where S_tt is isotropic, or
+    S_nt its eigenvector, the least critical mu is along the first. Where all are alike those along
+    the axes.
+    """
+    if normal.shape[1] == 2:  # the tangent turns with the surface
+        return [_along(tangent, np.stack([-normal[:, 1], normal[:, 0]], axis=1))]
+    forces = np.einsum("nimj,mjk->nik", stiffness, tangent)
+    against = np.einsum("nik,nil->kl", tangent, forces)
+    changes = np.einsum("ni,nik->nk", normal, forces)
+    pressures = changes.T @ changes
+    # Rounding does not choose between directions that are alike.
+    pressures += 1e-6 * np.trace(pressures) * np.diag([3.0, 2.0, 1.0])
+    values, vectors = np.linalg.eigh((against + against.T) / 2)
+    used = values > NEGLIGIBLE * values.max(initial=0.0)
+    back = vectors[:, used] / np.sqrt(values[used])
+    directions = back @ np.linalg.eigh(back.T @ pressures @ back)[1][:, ::-1]
+    found = [_along(tangent, np.broadcast_to(d, normal.shape)) for d in directions.T]
+    return found or [np.zeros_like(normal)]
 
 
 def _factor(
-    stiffness: Array,
-    normal: Array,
-    along: Array,
-    touches: NDArray[np.bool_],
-    mu: Array,
-    rigid: int,
+    stiffness: Array, normal: Array, along: Array, mu: Array, rigid: int, largest: float
 ) -> float:
     """Return the least |factor| at which S_tt - factor mu S_nt is singular.
 
-    Supports leave `rigid` motions of the bodies free.
+    S is condensed onto the nodes that touch; `largest` is its largest entry before that. Supports
+    leave `rigid` motions of the bodies free.
     """
-    count, dim = normal.shape
-    rows = np.arange(count * dim).reshape(count, dim)
-    closed = np.flatnonzero(touches & (np.linalg.norm(along, axis=1) > 0.5))
-    if closed.size == 0:  # supports let none of them slide
+    on = np.linalg.norm(along, axis=1) > 0.5
+    if not on.any():  # supports let none of them slide
         return np.inf
-    free = rows[~touches].ravel()
-    free = free[np.diag(stiffness)[free] > 0]
-    kept = np.zeros((2, closed.size, count * dim))
-    kept[0, np.arange(closed.size)[:, None], rows[closed]] = along[closed]
-    kept[1, np.arange(closed.size)[:, None], rows[closed]] = normal[closed]
-    try:
-        to_free = kept[0] @ stiffness[:, free]
-        factors = cho_factor(stiffness[np.ix_(free, free)]) if free.size else None
-        response = cho_solve(factors, to_free.T) if factors is not None else to_free.T
-        slides = kept[0] @ stiffness @ kept[0].T - to_free @ response
-        presses = kept[1] @ stiffness @ kept[0].T - (kept[1] @ stiffness[:, free]) @ response
-        energies, modes = eigh((slides + slides.T) / 2)
-    except LinAlgError:
-        return np.inf
-    largest = np.abs(stiffness).max()
+    normal, along, mu = normal[on], along[on], mu[on]
+    forces = np.einsum("nimj,mj->nim", stiffness[on][:, :, on], along)
+    slides = np.einsum("ni,nim->nm", along, forces)
+    presses = np.einsum("ni,nim->nm", normal, forces)
+    energies, modes = eigh((slides + slides.T) / 2)
     ladder = np.append(energies, largest)[: rigid + 1]
     sliding = np.flatnonzero(ladder[:-1] < RIGID * ladder[1:])
     begin = sliding[-1] + 1 if sliding.size else 0
@@ -215,6 +245,6 @@ def _factor(
     if energies.size == 0 or energies[0] <= 1e-10 * largest:  # friction alone resists
         return np.inf
     modes = modes / np.sqrt(energies)
-    values = np.linalg.eigvals(modes.T @ (mu[closed, None] * presses) @ modes)
+    values = np.linalg.eigvals(modes.T @ (mu[:, None] * presses) @ modes)
     real = np.abs(values[np.abs(values.imag) <= 1e-8 * np.abs(values)].real)
     return float(1 / real.max()) if real.max(initial=0.0) > 0 else np.inf

@@ -138,6 +138,48 @@ def test_any_number_of_ranks():
     assert again == pytest.approx(alone.critical_factor, rel=1e-8)
 
 
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+@pytest.mark.parametrize("yaw", [0.0, 0.7, np.pi / 2])
+def test_critical_friction_does_not_depend_on_the_axes(yaw, method, tmp_path):
+    """A tetrahedron on a plane, clamped along its slope: one node, and K as of the triangle.
+
+    It sticks, or slides with friction across the slope: of that direction nothing was critical.
+    """
+    turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    height, poisson = 0.5345, 0.3
+    points = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, height]])
+    points[:, :2] @= turn
+    facets = {"bottom": [0, 1, 2], "slope": [1, 2, 3], "side": [0, 1, 3]}
+    names = [f'2 {k} "{name}"' for k, name in enumerate(facets, 1)]
+    cells = [
+        f"{k} 2 2 {k} {k} {' '.join(str(n + 1) for n in nodes)}"
+        for k, nodes in enumerate(facets.values(), 1)
+    ]
+    lines = [
+        "$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", "4", *names, '3 4 "body"',
+        "$EndPhysicalNames", "$Nodes", "4",
+        *(f"{k} {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(points, 1)),
+        "$EndNodes", "$Elements", "4", *cells, "4 4 2 4 4 1 2 3 4", "$EndElements", "",
+    ]  # fmt: skip
+    (tmp_path / "tet.msh").write_text("\n".join(lines))
+    load = np.array([-0.015, 0.018]) @ turn
+    case = parse_case({
+        "mesh": {"file": str(tmp_path / "tet.msh")},
+        "material": {"young": 1.0, "poisson": poisson},
+        "fixed": [{"on": "slope", "displacement": [0.0, 0.0, 0.0]}],
+        "load": [{"on": "side", "traction": [*load.tolist(), -0.01]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 3.0},
+        "solver": {"method": method},
+    })  # fmt: skip
+    solution = solve(case, comm=MPI.COMM_SELF)
+    assert solution.converged
+    ratio = 2 * poisson / (1 - 2 * poisson)
+    critical = (ratio + 2 + 1 / height**2) * height / (ratio + 1)
+    assert 3.0 * solution.critical_factor == pytest.approx(critical, rel=1e-5)
+    assert [text for text in solution.warnings if "several solutions" in text]
+
+
 def test_no_critical_friction_where_supports_let_no_node_slide():
     """A single node of 15 touches, at the corner of a clamped side."""
     ((_, case),) = problems(False, "few-5", True)
@@ -186,6 +228,17 @@ def test_a_body_that_friction_alone_jams(tmp_path):
     assert jammed.jammed and not free.jammed
     said = "friction alone jams the bodies"
     assert [said in "".join(each.warnings) for each in (free, jammed)] == [False, True]
+    # Flat facets deviated by 1e-17 from a curve, and gaps are nothing.
+    assert "curved" not in "".join(free.warnings)
+
+
+def test_a_weight_needs_contact_however_hard_jaws_clamp(tmp_path):
+    """It was compared with the clamping forces, and "in balance without any contact force"."""
+    tables = rhombus(tmp_path, 0.5).model_dump(mode="json", exclude_unset=True)
+    tables["load"] = [{"on": "body_top", "traction": [0.0, -1e-8]}]
+    solution = solve(parse_case(tables), comm=MPI.COMM_SELF)
+    assert solution.converged and solution.pressure.max() > 1e-4
+    assert not solution.jammed
 
 
 @pytest.mark.parallel
