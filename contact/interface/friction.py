@@ -10,6 +10,7 @@ from mpi4py import MPI
 from contact.arguments import (
     PRESSURES,
     SAMPLES,
+    SEEN,
     check_finite,
     check_slope,
     expect,
@@ -22,6 +23,7 @@ from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoother
 from contact.ranks import on_all_ranks
+from contact.tolerances import EPS
 from contact.typing import Array
 from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, FrictionLaw, Tresca
 
@@ -100,7 +102,8 @@ class Friction:
         ------
         InputError
             If a bound or coefficient is negative or no number at a node, or a coefficient of the
-            slip where nothing slips, or a derivative is not that of its law.
+            slip where nothing slips, or a derivative, the maximum or the Lipschitz constant is not
+            that of its law.
         """
         if self.tresca is not None:
             bound = _at("tresca", self.tresca, nodes)
@@ -122,13 +125,14 @@ class Friction:
         with on_all_ranks(nodes.comm):
             given = self.coefficient
             check_slope("Friction: mu: derivative", given, given.derivative, SAMPLES)
+            _check_constants("Friction: mu", "mu", Coulomb(given))
         _check("coefficient without slip", resists, nodes)
         most = nodes.comm.allreduce(self.coefficient.maximum, op=MPI.MAX)
         return Coulomb(self.coefficient) if most > 0 else None
 
 
 def _check_law(law: FrictionLaw | None) -> None:
-    """Refuse a law whose derivatives are not its own."""
+    """Refuse a law whose derivatives, or constants, are not its own."""
     if law is None:
         return
     slip, pressure = np.tile(SAMPLES, PRESSURES.size), np.repeat(PRESSURES, SAMPLES.size)
@@ -137,6 +141,43 @@ def _check_law(law: FrictionLaw | None) -> None:
         ("by_pressure", lambda p: law(slip, p), lambda p: law.by_pressure(slip, p), pressure),
     ):
         check_slope(f"Friction: law: {name}", bound, slope, at)
+    _check_constants("Friction: law", "s/p", law)
+
+
+def _check_constants(name: str, symbol: str, law: FrictionLaw) -> None:
+    """Refuse an upper bound, or a Lipschitz constant, that values of s/p contradict.
+
+    A law that raises something at the places looked at is not judged, as by `check_slope`.
+    """
+    for key in ("maximum", "lipschitz"):
+        given = getattr(law, key)
+        fits = isinstance(given, int | float | np.number) and given >= 0
+        expect(f"{name}: {key}", given, "a number >= 0, or infinity", fits)
+    slips = np.concatenate([[0.0], SAMPLES])
+    slip, pressure = np.tile(slips, PRESSURES.size), np.repeat(PRESSURES, slips.size)
+    try:
+        with np.errstate(all="ignore"):
+            values = real(law(slip, pressure), slip.shape, "") / pressure
+    except Exception:
+        return  # the same law is asked for, and named, where it is used
+    with np.errstate(all="ignore"):
+        ratio, rounding = values.reshape(-1, slips.size), SEEN * EPS
+        above = ratio - law.maximum > rounding * np.abs(ratio)
+        falls, steps = -np.diff(ratio), np.diff(slips)
+        faster = falls - law.lipschitz * steps > rounding * np.abs(ratio[:, :-1])
+    if above.any():
+        row, k = np.unravel_index(np.argmax(np.where(above, ratio, -np.inf)), above.shape)
+        raise InputError(
+            f"{name}: maximum: given {law.maximum:.4g}, but {symbol} is {ratio[row, k]:.4g} at the "
+            f"slip {slips[k]:.3g}; accepted: an upper bound of {symbol} at all slips"
+        )
+    if faster.any():
+        row, k = np.unravel_index(np.argmax(np.where(faster, falls / steps, 0.0)), faster.shape)
+        raise InputError(
+            f"{name}: lipschitz: given {law.lipschitz:.4g}, but {symbol} falls by "
+            f"{falls[row, k] / steps[k]:.4g} per length between the slips {slips[k]:.3g} and "
+            f"{slips[k + 1]:.3g}; accepted: the Lipschitz constant of {symbol} in the slip"
+        )
 
 
 def _at(name: str, given: Given, nodes: ContactNodes) -> Array:

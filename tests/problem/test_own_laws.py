@@ -52,10 +52,17 @@ class Slipping:
         return -0.1 * self.factor * np.exp(-slip)
 
 
-class Pressed:
-    """s = 0.3 p / (1 + p), with derivatives times factors."""
+def with_constants(law, **constants):
+    """Return a law with a maximum or a Lipschitz constant of its own."""
+    for name, value in constants.items():
+        setattr(law, name, value)
+    return law
 
-    maximum, lipschitz = 0.3, 0.0
+
+class Pressed:
+    """s = 0.3 p / (1 + p) / (1 + slip), with derivatives times factors."""
+
+    maximum, lipschitz = 0.3, 0.3
 
     def __init__(self, factor=1.0):
         self.factor = factor
@@ -137,6 +144,26 @@ WRONG = {
     ),
     "slip law off by a factor": (lambda: problem(Friction(mu=Slipping(2.0))), "derivative: "),
     "law by pressure": (lambda: problem(Friction(law=Pressed(-1.0))), "Friction: law: by_pressure"),
+    "maximum below mu": (
+        lambda: problem(Friction(mu=with_constants(Slipping(), maximum=0.25))),
+        r"Friction: mu: maximum: given 0\.25, but mu is 0\.3 at the slip 0; accepted: ",
+    ),
+    "mu falls faster": (
+        lambda: problem(Friction(mu=with_constants(Slipping(), lipschitz=0.05))),
+        r"Friction: mu: lipschitz: given 0\.05, but mu falls by \S+ per length",
+    ),
+    "maximum below s/p": (
+        lambda: problem(Friction(law=with_constants(Pressed(), maximum=0.2))),
+        r"Friction: law: maximum: given 0\.2, but s/p is 0\.3 at the slip 0",
+    ),
+    "s/p falls faster": (
+        lambda: problem(Friction(law=with_constants(Pressed(), lipschitz=0.0))),
+        r"Friction: law: lipschitz: given 0, but s/p falls by \S+ per length",
+    ),
+    "no number for a maximum": (
+        lambda: problem(Friction(mu=with_constants(Slipping(), maximum="large"))),
+        "Friction: mu: maximum: given 'large'; accepted: a number >= 0, or infinity",
+    ),
     "layer": (lambda: problem(layer=layer(-1.0)), "layer: p_nu: derivative"),
     "drive of the current": (
         lambda: problem(piezo=PZT, conductor=conductor(-1.0)),
