@@ -15,6 +15,9 @@ from contact.case.section import File, Section, Text, as_tuple
 from contact.errors import InputError
 from contact.settings import Accepted, Count, Number
 
+#: Share of an amplitude's range from which on an extreme value that no step meets is told.
+LOST = 0.02
+
 Increasing: TypeAlias = Annotated[
     tuple[Number, ...],
     Field(min_length=2),
@@ -146,6 +149,23 @@ class Evolution(Section):
                 key = "time" if amplitude.file is None else "file"
                 raise fault(f"amplitudes.{name}.{key}", times, accepted)
         return self
+
+    @property
+    def lost_peaks(self) -> list[str]:
+        """The largest and the least values of amplitudes that no step meets, in words."""
+        steps, found = [self.times[0], *self.ends], []
+        for name, amplitude in self.amplitudes.items():
+            times, values = map(np.array, amplitude.points)
+            inside = (times > self.times[0]) & (times < self.times[-1])
+            met = np.interp(steps, times, values)
+            for k, seen in ((values.argmax(), met.max()), (values.argmin(), met.min())):
+                if inside[k] and abs(values[k] - seen) > LOST * np.ptp(values):
+                    found.append(
+                        f"evolution.amplitudes.{name}: {values[k]:.4g} at t = {times[k]:.4g} lies "
+                        f"between steps, which go to {seen:.4g}; a stage that ends there, or more "
+                        "steps, meet it"
+                    )
+        return found
 
     @property
     def ends(self) -> list[float]:

@@ -70,7 +70,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
         f"{domain.size:g}",
         *parts(domain),
         *regions(domain),
-        *(f"# note: {note}" for note in (*domain.notes, *grows(case))),
+        *(f"# note: {note}" for note in (*domain.notes, *amplitude_notes(case))),
         f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
         f"{problem.nodes.size}",
         *expectations(problem, _times(case)),
@@ -82,15 +82,19 @@ def describe(case: Case, problem: ContactProblem) -> str:
     return "\n".join(lines)
 
 
-def grows(case: Case) -> list[str]:
-    """Say which loads and values have no amplitude in an evolution."""
+def amplitude_notes(case: Case) -> list[str]:
+    """Say which loads and values have no amplitude in an evolution, and which peaks are lost."""
     found = growing(case)
-    if not found or case.evolution is None:
+    if case.evolution is None:
         return []
+    lost = case.evolution.lost_peaks
+    if not found:
+        return lost
     begin, end = case.evolution.times[:2]
     return [
+        *lost,
         f"{', '.join(found)} without an amplitude: from 0 at t = {begin:g} to all at t = {end:g}, "
-        'and then constant; amplitude = "constant": all the time'
+        'and then constant; amplitude = "constant": all the time',
     ]
 
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from contact.case.digest import check_restart, check_same
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
-from contact.cli.check import grows
+from contact.cli.check import amplitude_notes
 from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
 from contact.errors import InputError
@@ -53,7 +53,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not out:  # the present folder is "."; this is rather a variable that is not set
         raise InputError('--out "": no folder; accepted: a folder to write to')
     restart = None if options.restart is None else Path(options.restart)
-    for note in grows(case) if comm.rank == 0 else ():
+    for note in amplitude_notes(case) if comm.rank == 0 else ():
         logging.getLogger("contact.case").warning(note)
     with result_folder(out, comm, overwrite=True) as folder:
         if not options.overwrite:
