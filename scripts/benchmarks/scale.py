@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
-from scripts.benchmarks.processes import Run, columns, command, measured, started
+from scripts.benchmarks.processes import Run, command, measured, started
 from scripts.reporting import Report, parser
 
 #: How PETSc multiplies out the coarse levels of multigrid, and its option for that.
@@ -54,10 +55,49 @@ def read(coarse: bool) -> list[Run]:
 
 
 TABLES = {
-    "weak": (weak, "Slices of a bar on a foundation, one a rank"),
+    "weak": (weak, "Slices of a bar on a foundation, one per rank"),
     "pair": (pair, "Two bars on each other, the same on all numbers of ranks"),
     "read": (read, "A cube of tetrahedra of which each rank reads its share"),
 }
+
+#: Columns of the tables, the measured value of each, and the size of its unit.
+SHOWN: dict[str, dict[str, tuple[str, float]]] = {
+    "weak": {
+        "ranks": ("ranks", 1),
+        "unknowns": ("unknowns", 1),
+        "coarse levels": ("products", 1),
+        "memory per rank (MB)": ("memory", 1e6),
+        "over one rank": ("memory over one rank", 1),
+        "arrays of Python (MB)": ("python", 1e6),
+        "theirs over one rank": ("arrays over one rank", 1),
+        "iterations": ("iterations", 1),
+    },
+    "pair": {
+        "ranks": ("ranks", 1),
+        "unknowns": ("unknowns", 1),
+        "contact nodes": ("contact nodes", 1),
+        "linear solves": ("solves", 1),
+        "difference of the forces": ("difference", 1),
+        "pairing (s)": ("pairing", 1),
+        "a linear solve (s)": ("a linear solve", 1),
+        "pairing over a solve": ("pairing over a solve", 1),
+        "coupling per rank (kB)": ("coupling", 1e3),
+        "memory per rank (MB)": ("memory", 1e6),
+    },
+    "read": {
+        "ranks": ("ranks", 1),
+        "cells": ("cells", 1),
+        "memory in all (MB)": ("memory", 1e6),
+    },
+}
+
+
+def tabulated(table: str, rows: Sequence[Run]) -> dict[str, list[Any]]:
+    """Return the columns of a table, given the runs."""
+    return {
+        name: [row[key] / unit if unit > 1 else row[key] for row in rows]
+        for name, (key, unit) in SHOWN[table].items()
+    }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -65,10 +105,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     made = parser(__doc__, "scale")
     made.add_argument("table", choices=TABLES)
     given = made.parse_args(arguments)
-    rows, caption = TABLES[given.table][0](given.coarse), TABLES[given.table][1]
-    for row in rows:
-        row |= {k: " ".join(map(repr, v)) for k, v in row.items() if isinstance(v, list)}
-    Report(given.out).table(f"scale-{given.table}", caption, columns(rows), "Bytes and seconds.")
+    measure, caption = TABLES[given.table]
+    Report(given.out).table(
+        f"scale-{given.table}", caption, tabulated(given.table, measure(given.coarse))
+    )
 
 
 if __name__ == "__main__":
