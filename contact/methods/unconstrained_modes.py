@@ -15,6 +15,7 @@ inequalities by non-negative least squares.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -209,12 +210,11 @@ class UnconstrainedModes:
         if isinstance(problem, ContactProblem):
             body = problem.equilibrium
             vectors = [*(body.local(column) for column in whole.T), state.x]
-            rows = np.stack([_by_volume(problem, x) for x in vectors], axis=1)
+            rows, weights = _by_volume(problem, vectors)
         else:  # of a condensed body the displacements at contact nodes, relative to the other side
             values = np.concatenate([moved, nodal[:, : jump.dim, None]], axis=2)
-            values *= np.sqrt(jump.weight)[:, None, None]
-            rows = values.reshape(-1, values.shape[2])
-        gram = jump.comm.allreduce(rows.T @ rows, op=MPI.SUM)
+            rows, weights = values.reshape(-1, values.shape[2]), np.repeat(jump.weight, jump.dim)
+        gram = jump.comm.allreduce(rows.T @ (weights[:, None] * rows), op=MPI.SUM)
         products, sides = gram[:-1, :-1], gram[:-1, -1]
         wanted = amounts = np.linalg.lstsq(products, sides, rcond=EPS)[0]
         near, opening = np.isfinite(jump.gap), interface.opening(nodal)
@@ -241,20 +241,24 @@ class UnconstrainedModes:
         return found is not None and found[1]
 
 
-def _by_volume(problem: ContactProblem, x: Array) -> Array:
-    """Return displacements at points of this rank's cells times the roots of these points' volumes.
+def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array, Array]:
+    """Return displacements at points of this rank's cells, (n, k), and the points' volumes, (n,).
 
-    Of local unknowns; products are those in L2. Foundations that move count as the whole body.
+    Of local unknowns; products with these weights, some of which are negative, are those in L2.
+    Foundations that move count as the whole body.
     """
     body, domain = problem.equilibrium, problem.domain
     shape, nodes = shape_of(domain.mesh), geometry_nodes(domain)
     straight = shape.simplex and domain.order == 1
     points, weights = rule(shape, 2 * body.degree + (1 if straight else 3 * domain.order))
     size = measures(domain.revolved, shape, nodes, points, weights)
-    values = body.nodal(x)[body.space.dofmap.list[: len(size)], : body.dim]
-    at = np.einsum("qk,nkd->nqd", shape.lagrange(body.degree, points), values)
-    own = np.sqrt(size.sum()) * body.motion(x)
-    return np.append((np.sqrt(size)[:, :, None] * at).ravel(), own)
+    functions, cells = shape.lagrange(body.degree, points), body.space.dofmap.list[: len(size)]
+    rows = []
+    for x in vectors:
+        at = np.einsum("qk,nkd->nqd", functions, body.nodal(x)[cells, : body.dim])
+        rows.append(np.append(at.ravel(), body.motion(x)))
+    behind = np.full(len(rows[0]) - size.size * body.dim, size.sum())
+    return np.stack(rows, axis=1), np.append(np.repeat(size, body.dim), behind)
 
 
 def with_least_displacements(
