@@ -19,8 +19,8 @@ and a problem that is put together in Python by
   `Tabulated` hardening, and a stress update of your own, which returns a `Response`; several by
   `Material`, and crystals by `make_material`; `Rigid` with its `Motion`, `Electrode`, `Bolt`.
 - Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
-  `Level`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
-  `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
+  `Level`, `Heights`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`,
+  `Coulomb`; `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
 - Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
 - Derivatives: `sensitivity` by `Parameter` gives `Sensitivities`; `gap_gradient` and
   `field_gradient`; `identify` with `read_data` finds parameters from measurements, `Identified`.

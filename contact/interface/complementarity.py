@@ -110,14 +110,15 @@ def interface_residuals(
     # Where next to nothing presses, rounding is compared with the stress that closing would take,
     # but not of gaps far wider than nodes move: these say nothing of the loads.
     before = np.linalg.norm(interface.friction.history.jump, axis=1)
-    way = np.maximum(np.linalg.norm(nodal[:, : interface.dim], axis=1), before)
+    now = np.linalg.norm(nodal[:, : interface.dim], axis=1)
+    way = np.maximum(now, before)
     closing = interface.stiffness * interface.norms(
         np.minimum(np.minimum(np.abs(opening), way), interface.size)
     )
     pressed = interface.norms(interface.pressure(nodal, forces))
     # Where nothing presses, nodes may have moved until they just touch: gaps are rounding too.
     moved = interface.norms(np.full_like(way, interface.rounding(nodal)))
-    covered = interface.stiffness * interface.norms(np.minimum(way, interface.size))
+    covered = interface.stiffness * interface.norms(np.minimum(now, interface.size))
     closing = np.where(pressed <= moved, np.maximum(closing, covered), closing)
     scale = np.maximum(pressed, 1e-4 * closing)
     scale = np.maximum(scale, EPS * scale.max())
