@@ -18,7 +18,6 @@ from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import constrained_by_supports
 from scripts.benchmarks.bench_one import block
 
-
 #: A program of its own, for the tests ask the allocator to keep memory.
 FREED = """
 from pathlib import Path
