@@ -17,7 +17,7 @@ from contact.linear.operator import Counters
 from contact.methods.method import Method
 from contact.methods.report import IterationHistory, Outcome
 from contact.methods.signals import Interrupted
-from contact.methods.unconstrained_modes import with_least_displacements
+from contact.methods.unconstrained_modes import UnconstrainedModes, with_least_displacements
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate
 from contact.problem.rigid_modes import released, unilateral_supports
@@ -81,6 +81,8 @@ class Evolution:
         self.problem, self.method = problem, method
         self._last, self._before = start, before
         self._unilateral = unilateral_supports(problem)
+        # How supports constrain bodies is the same in all steps.
+        self._modes = UnconstrainedModes(problem)
 
     def run(self, times: Sequence[float], begin: float = 0.0) -> Iterator[LoadStep]:
         """Take the steps; the last one given has not converged if that has ended them. Collective.
@@ -141,12 +143,17 @@ class Evolution:
         if last is not None:
             before = None if self._before is None else Reached.of(problem, self._before)
             start, linearised_at = predicted(problem, Reached.of(problem, last), before)
-        state, outcome = solve_step(problem, method, start, linearised_at)
+        self._modes.problem = problem
+        state, outcome = solve_step(problem, method, start, linearised_at, self._modes)
         return LoadStep(problem, state, outcome, method.history, since(method.counters, counted))
 
 
 def solve_step(
-    problem: ContactProblem, method: Method, start: State | None, linearised_at: Array | None = None
+    problem: ContactProblem,
+    method: Method,
+    start: State | None,
+    linearised_at: Array | None = None,
+    modes: UnconstrainedModes | None = None,
 ) -> tuple[State, Outcome]:
     """Solve by a method, and evaluate the residuals once more. Collective.
 
@@ -158,7 +165,7 @@ def solve_step(
         state = method.state
         outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
     found = measured(problem, state, replace(outcome, allowed=method.options.allowed))
-    return with_least_displacements(problem, *found)
+    return with_least_displacements(modes or UnconstrainedModes(problem), *found)
 
 
 def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:

@@ -262,14 +262,14 @@ def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array
 
 
 def with_least_displacements(
-    problem: ContactProblem, state: State, outcome: Outcome
+    modes: UnconstrainedModes, state: State, outcome: Outcome
 ) -> tuple[State, Outcome]:
     """Take a rigid motion that costs nothing off a solution, whatever found it. Collective.
 
     Parameters
     ----------
-    problem
-        The whole problem.
+    modes
+        Those of the whole problem, at the time of the step.
     state, outcome
         Where a method has ended; nothing is changed without convergence.
 
@@ -278,7 +278,7 @@ def with_least_displacements(
     The solution with the least displacements in L2, and its residuals; those given where nothing is
     free.
     """
-    modes, body = UnconstrainedModes(problem), problem.equilibrium
+    problem, body = modes.problem, modes.problem.equilibrium
     if not outcome.converged or modes.constrained_by_supports:
         return state, outcome
     found = modes.minimal_motion(problem, state)

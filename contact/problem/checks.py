@@ -171,6 +171,8 @@ def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterato
             continue
         sides = (problem.domain.facets_anywhere(fixed.on) for fixed in (first, last))
         nodes = np.intersect1d(*(fem.locate_dofs_topological(space, d - 1, f) for f in sides))
+        if problem.comm.allreduce(nodes.size) == 0:
+            continue
         for name in names:
             for time in times:
                 found = _differing(problem.at(time), (i, j), name, nodes)
