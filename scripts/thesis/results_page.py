@@ -39,7 +39,7 @@ READING = """\
 ## How the thesis was read
 
 Every run reports its residuals, computed from scratch after the solve: *residual* is the largest of
-equilibrium, contact and friction, and 0 where forces balance to their rounding. The residual of a
+equilibrium, contact and friction, as computed: some 1e-14 is a balance to rounding. The residual of a
 penalty solution is that of the penalised problem (PV_eps). A script stops if a run does not
 converge, so that tables have converged runs alone, unless they say so. A dash, —, marks a value
 that is not defined or was not reached; dashed and dotted lines are bounds, limits and references.
