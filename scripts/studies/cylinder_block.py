@@ -42,49 +42,57 @@ STEPS = 8
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
     given = options(__doc__, "cylinder_block", arguments)
-    report = Report(given.out)
-    size = 1.2 if given.coarse else 0.6
-    rows: dict[str, list[Any]] = {"contact size": [], "load": [], "linear": [], "finite": []}
-    rows["more"] = []
+    report, size = Report(given.out), 1.2 if given.coarse else 0.6
+    depth(report, size, rotations(report, size))
+    friction(report, 100 if given.coarse else 400)
+
+
+def rotations(report: Report, size: float) -> float:
+    """Tabulate the depth without and with finite rotations; return how much these add to it."""
+    rows: dict[str, list[Any]] = {"load": [], "contact elements (mm)": [], "without": []}
+    rows |= {"with rotations": [], "more (%)": []}
     for length, share in ((2 * size, 1.0), (size, 1.0), (size, 0.5), (size, 0.25)):
         domain = build_problem(case(length, share)).domain
-        ways = [finite(domain, share, rotations) for rotations in (False, True)]
-        values = [length, share, *ways, ways[1] / ways[0] - 1]
-        for name, value in zip(rows, values, strict=True):
-            rows[name].append(value)
+        linear, turned = (finite(domain, share, finitely) for finitely in (False, True))
+        append(rows, share, length, linear, turned, f"{100 * (turned / linear - 1):.2f}")
     report.table(
         "cylinder-block-rotations",
-        "Middle of the block's top, linear and with finite rotations, frictionless",
+        "Depth u_y (mm) of the middle of the block's top, linear and with finite rotations",
         rows,
-        "Degree 2, node to segment, nothing of this package but the mesh.",
+        "Without friction; degree 2, node to segment, nothing of this package but the mesh.",
     )
-    more = rows["more"][1]
-    beside: dict[str, list[Any]] = {"mu": [], "linear": [], "code_aster": [], "apart": []}
-    beside |= {"with rotations": [], "apart then": []}
+    return float(rows["more (%)"][1]) / 100
+
+
+def depth(report: Report, size: float, more: float) -> None:
+    """Tabulate the depth beside that of code_aster, which has finite rotations."""
+    rows: dict[str, list[Any]] = {"mu": [], "linear": [], "code_aster": [], "apart (%)": []}
+    rows |= {"with rotations": [], "then apart (%)": []}
     for mu, published in CODE_ASTER.items():
         ours = middle(solved(case(size, 1.0, "space.degree=2", f"friction.mu={mu}")))
         turned = ours * (1 + more)
-        apart = [value / published - 1 for value in (ours, turned)]
-        values = [mu, ours, published, apart[0], turned, apart[1]]
-        for name, value in zip(beside, values, strict=True):
-            beside[name].append(value)
+        apart = [f"{100 * (value / published - 1):.1f}" for value in (ours, turned)]
+        append(rows, mu, ours, published, apart[0], turned, apart[1])
     report.table(
         "cylinder-block-depth",
-        "Middle of the block's top beside code_aster, which has finite rotations",
-        beside,
+        "The same depth beside code_aster, which has finite rotations",
+        rows,
         f"Linear: this package, degree 2. With rotations: {100 * more:.2f} % more, which the table "
         "before shows them to make.",
     )
-    found: dict[str, list[Any]] = {"mu": [], "steps": [], "a": [], "p_0": [], "stick": []}
-    for mu, steps in ((0.0, 1), (0.1, 1), (0.1, 32), (0.1, 128)):
-        values = half_planes(mu, 100 if given.coarse else 400, steps)
-        append(found, mu, steps, *values)
+
+
+def friction(report: Report, count: int) -> None:
+    """Tabulate two half planes with friction."""
+    rows: dict[str, list[Any]] = {"mu": [], "steps": [], "a": [], "p_0": [], "stick": []}
+    for mu, steps in ((0.0, 1), (0.1, 1), (0.1, 32)):
+        append(rows, mu, steps, *half_planes(mu, count, steps))
     report.table(
         "cylinder-block-friction",
         "Two half planes of steel and aluminium, pressed on each other in steps",
-        found,
-        "By boundary elements. stick: share of the contact that sticks. As the contact grows, "
-        "friction fixes each part of it where it first touches: a single step misses that.",
+        rows,
+        f"By {count} boundary elements; a in mm, p_0 in MPa. stick: share of the contact that "
+        "sticks.",
     )
 
 

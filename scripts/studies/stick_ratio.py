@@ -7,14 +7,14 @@ the pressure is left out, with gamma = (1 - 2 nu)/(2 (1 - nu)), K'(k)/K(k) = gam
 cylinder, and of the ball ln((1 + k)/(1 - k))/(2 k) = (mu/gamma) K'(k). A static law knows one step
 only, and finds far less.
 
-    python3 -m scripts.studies.stick_ratio [STEPS...]
+    python3 -m scripts.studies.stick_ratio [--out DIR] [--coarse]
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,6 +25,7 @@ from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from scripts.cases import CASES
+from scripts.reporting import Report, append, options
 from scripts.studies import stick_limit
 
 POISSON, HALF_WIDTH = 0.3, 0.02
@@ -113,8 +114,14 @@ PRESSED = {
     "ball": Pressed(ball, stick_limit.axisymmetric, ball_alone),
 }
 
-#: Friction coefficients of the tables.
-COEFFICIENTS = 0.1, 0.2, 0.3, 0.5
+#: The problems in words.
+CAPTIONS = {
+    "cylinder": f"a cylinder on a rigid plane, a/R = {HALF_WIDTH / 8:g}",
+    "ball": "a rigid ball on a half space, a/R = 1/4",
+}
+
+#: Friction coefficients of the tables, and numbers of load steps.
+COEFFICIENTS, STEPS = (0.1, 0.2, 0.3, 0.5), (1, 2, 8, 32, 64)
 
 
 def stick_ratio(problem: ContactProblem, state: State) -> float:
@@ -138,19 +145,27 @@ def _between(x: np.ndarray, beyond: np.ndarray) -> float:
     return float(x[first] + x[max(first - 1, 0)]) / 2 if first > 0 else 0.0
 
 
-def main(steps: Sequence[int]) -> None:
-    """Print the tables."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the tables."""
+    given = options(__doc__, "stick_ratio", arguments)
+    cells, steps = (20, STEPS[:3]) if given.coarse else (160, STEPS)
     for name, pressed in PRESSED.items():
-        print(
-            f"\n| {name}, mu | " + " | ".join(f"{n} step{'s' * (n > 1)}" for n in steps), end=" | "
-        )
-        print("boundary elements | without the shear's effect on the pressure |")
-        print("|---" * (len(steps) + 3) + "|")
+        labels = [f"{count} step{'s' * (count > 1)}" for count in steps]
+        columns: dict[str, list[Any]] = {
+            key: [] for key in ("mu", *labels, "boundary elements", "uncoupled")
+        }
         for mu in COEFFICIENTS:
-            row = [f"{value:.3f}" for value in pressed.ratios(mu, steps)]
-            row += [f"{pressed.coupled(mu):.3f}", f"{pressed.uncoupled(mu):.3f}"]
-            print("| " + " | ".join([f"{mu}", *row]) + " |", flush=True)
+            row = [*pressed.ratios(mu, steps, cells), pressed.coupled(mu), pressed.uncoupled(mu)]
+            append(columns, mu, *(f"{value:.3f}" for value in row))
+        Report(given.out).table(
+            f"stick-ratio-{name}",
+            f"Stick ratio c/a of {CAPTIONS[name]}",
+            columns,
+            f"nu = {POISSON}, degree 1, {cells} elements in a. Boundary elements and uncoupled are "
+            "limits of infinitely many steps on a half plane or half space, with and without the "
+            "effect of shear on the pressure.",
+        )
 
 
 if __name__ == "__main__":
-    main([int(argument) for argument in sys.argv[1:]] or [1, 2, 8, 32, 64])
+    main()

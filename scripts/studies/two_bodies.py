@@ -18,6 +18,7 @@ from contact.output.surface import contact_table
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, append, options, solved, subplots
+from scripts.studies.curved_foundations import ratios, two_rings
 
 #: E/(1 - nu^2) of steel and aluminium of the cylinder on a block, radius there.
 STEEL, ALUMINIUM, RADIUS = 210e3 / 0.91, 70e3 / 0.91, 50.0
@@ -40,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     hertz(report, coarse)
     round_bodies(report, (5, 10) if given.coarse else (5, 10, 20))
     partial_slip(report, *((0.05, 1) if given.coarse else (0.01, 2)))
+    rings(report, (0.1, 0.05) if given.coarse else (0.1, 0.05, 0.025))
 
 
 def table_of(solution: Solution) -> Table:
@@ -276,6 +278,23 @@ def partial_slip(report: Report, size: float, degree: int) -> None:
         {"x": x[near], "tau": tau[near], "exact": cattaneo(x[near], force, share)[2]},
         f"Q = {share:.3f} mu P. c/a = {(sticks + spacing / 2) / a:.3f} is found with nodes "
         f"{spacing / a:.3f} a apart, exact is sqrt(1 - Q/(mu P)) = {c / a:.3f}.",
+    )
+
+
+def rings(report: Report, sizes: Sequence[float]) -> None:
+    """Write the pressures of two rings with a small interference over the exact one."""
+    rows: dict[str, list[Any]] = {"degree": [], "h": [], "mean": [], "least": [], "largest": []}
+    for degree in (1, 2):
+        for h in sizes:
+            pressure, weight = ratios(*two_rings(h, degree))
+            mean = float(pressure @ weight / weight.sum())
+            append(rows, degree, h, mean, float(pressure.min()), float(pressure.max()))
+    report.table(
+        "two-rings",
+        "Two rings with an overlap of 0.001: contact pressure over the exact one",
+        rows,
+        "Radii 1, 1.5 and 2, a quarter by symmetry, plane strain; straight triangles of size h. "
+        "Mean, and least and largest at a node.",
     )
 
 
