@@ -41,29 +41,33 @@ INTRODUCTION = """\
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
-With more than 100,000 contact nodes on several ranks, each rank writes its own: `contact.0000.csv`,
-`contact.0001.csv` and so on, by x, y and z, and the pieces of `contact.pvtu`, which ParaView and
-pyvista open as one; `row` is the row in the file of the rank that has the node. The same holds
-for `contact-steps` and `contact-against`, and for a body with as many nodes, `fields.pvtu`.
-`node` numbers the points of all pieces, for a point on two of them is in both. Figures of the body
-are drawn from pieces, those of the contact are not.
-
 The files replace those of an earlier run together, once they are complete; other files in DIR are
 not touched. Results of another problem are replaced with `--overwrite` only; the same problem may
 be solved again by another method, to another tolerance, with other outputs.
 
+**Large contacts.** With more than 100,000 contact nodes on several ranks, each rank writes a file
+of its own nodes, sorted by x, y and z: `contact.0000.csv`, `contact.0001.csv` and so on, and the
+pieces of `contact.pvtu`, which ParaView and pyvista open as one. `row` is the row in the file of
+the rank that has the node. `contact-steps` and `contact-against` are divided likewise, and so is a
+body with as many nodes, into the pieces of `fields.pvtu`. A point between two pieces is in both;
+`node` numbers the points of all pieces. Figures of the body are drawn from pieces, those of the
+contact are not.
+
 `contact sweep` writes `sweep.csv`, one row per case, and `sweep.toml`, the case that was swept.
 
 **Units** are those of the case: with millimetres and newtons, stresses are in MPa. In 2-D forces
-and charges are per unit of depth; of bodies of revolution they are those of the full turn, and
+and charges are per unit of depth. Those of bodies of revolution are of the full turn, and
 resultants along r are 0.
 
-**Signs.** ν points out of the body, to the foundation. Pressure is positive; contact forces and
-friction stresses are those of the body *on the foundation*, reactions those of the supports *on
-the body*. Stresses in the body are positive in tension. In 2-D tangential components are along ν
-rotated counter-clockwise by 90 degrees: at the bottom of a body, where ν points down, along x.
-Charges of surfaces are D·ν, the opposite of the free charge of an electrode there: a positive
-`charge` lowers the potential, while a positive `body_charge` raises it.
+**Signs.** ν points out of the body, to the foundation.
+
+- Pressure is positive. Contact forces and friction stresses are those of the body *on the
+  foundation*, reactions those of the supports *on the body*.
+- Stresses in the body are positive in tension.
+- In 2-D tangential components are along ν rotated counter-clockwise by 90 degrees: at the bottom of
+  a body, where ν points down, along x.
+- Charges of surfaces are D·ν, the opposite of the free charge of an electrode there: a positive
+  `charge` lowers the potential, while a positive `body_charge` raises it.
 
 ## Opening them
 

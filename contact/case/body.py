@@ -365,7 +365,7 @@ class Bolt(Section):
     """Section force, tension > 0; in 2-D of a unit of depth, of a body of revolution that of the
     full turn. This or `shortening`."""
     shortening: TimeFormula | None = None
-    """Length by which the sides are drawn together: with a load that follows, a bolt stays so."""
+    """Length by which the sides are drawn together; a tightened bolt keeps it under later loads."""
     amplitude: AmplitudeName | None = None
     """Factor of it as a function of time, see `[evolution]`."""
 

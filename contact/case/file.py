@@ -126,8 +126,8 @@ class Case(Section):
     material: Materials
     """The material: `[material]`; several: `[[material]]`, each with its regions."""
     fixed: Annotated[tuple[Fixed, ...], as_tuple, Accepted("tables [[fixed]]")] = ()
-    """Supports and electrodes: `[[fixed]]`. None where contact, with friction that is enough, or
-    `[[rigid]]` holds the body."""
+    """Supports and electrodes: `[[fixed]]`. Not required where contact and friction, or
+    `[[rigid]]`, constrain the body."""
     elastic: Annotated[tuple[Elastic, ...], as_tuple, Accepted("tables [[elastic]]")] = ()
     """Elastic supports: any number of `[[elastic]]`."""
     load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = ()

@@ -318,8 +318,8 @@ class Contact(Section):
     layer: Annotated[
         float, Field(ge=0, allow_inf_nan=True), COMPLIANT, Accepted("a number >= 0, or inf")
     ] = 0.0
-    """Thickness of the layer: first touch at gap - layer; one thicker than the gap presses on the
-    undeformed body. `inf`: no rigid part, first touch at gap."""
+    """Thickness of the layer, which is touched at gap - layer. A layer thicker than the gap presses
+    on the undeformed body. `inf`: no rigid part, touched at gap."""
     stiffness: Annotated[NonNegative, COMPLIANT] = 10.0
     """c_nu."""
     limit: Annotated[

@@ -91,8 +91,8 @@ Pieces: TypeAlias = Annotated[
 class Adapt(Section):
     """`[mesh.adapt]`: the mesh is refined where the error is, and the case solved again.
 
-    It ends when the estimated error, or the number of unknowns, is reached. New nodes of
-    curved boundaries follow the curve that the vertices of the first mesh tell.
+    Refinement ends when the estimated error, or the number of unknowns, is reached. New nodes of
+    curved boundaries lie on curves through the vertices.
     """
 
     error: Annotated[float, Field(gt=0, lt=1), Accepted("a number between 0 and 1")] | None = None

@@ -125,11 +125,11 @@ _RUN = (
     ),
     Quantity(
         "error", "",
-        "Estimated discretisation error: `energy`, relative, in the energy norm, about the root of "
-        "that of displacements under given loads; its `effectivity`, the estimate over the "
-        "error itself, `null` where that is not known; and `intervals`, in which forces, the "
-        "largest displacement and pressure lie: of the last three meshes of `[mesh.adapt]` with "
-        "`fraction = 1`, `null` of one that does not converge, as a pressure at a corner. All "
+        "Estimated discretisation error. `energy`: relative, in the energy norm; displacements "
+        "under given loads are off by about its square. `effectivity`: the estimate over the "
+        "error, `null` where that is not known. `intervals`: in which forces, the largest "
+        "displacement and pressure lie, by the last three meshes of `[mesh.adapt]` with "
+        "`fraction = 1`; `null` of one that does not converge, as a pressure at a corner. All "
         "are `null` where the equations are not solved.",
         lambda r: {
             "energy": _error(r), "effectivity": None, "intervals": r.intervals,
