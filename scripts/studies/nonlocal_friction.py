@@ -20,6 +20,15 @@ from scripts.studies.error_norms import errors
 RHO = 1e4
 LOADS = (-0.005, -0.05)
 
+#: Remark on all tables.
+NOTE = (
+    "R smooths the pressure in the friction bound s = mu |R sigma_nu| alone. Where the pressure "
+    "varies quickly, at the end of the bar and at the ends of the contact zones, the bound is "
+    "spread over the radius. It is then positive on open nodes too, as in (3.6). For this law "
+    "existence is proved, and uniqueness where friction is small; the thesis computes with the "
+    "radius 0. A radius up to h is no smoothing on the mesh."
+)
+
 
 def radii(n: int) -> dict[str, float]:
     """Return the radii of the study: 0, h, and parts of the bar's height."""
@@ -85,17 +94,12 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         solutions[label], tables[label] = solution, contact_table(solution)
     name = f"nonlocal-{abs(load):g}".replace(".", "_")
     where = f"Example 7.2, f2 = {load:g}, rho = {RHO:g}, {4 * n} x {n} cells"
-    note = (
-        "Newton's method keeps a factorisation for further steps. "
-        "R smooths the pressure in the friction bound s = mu |R sigma_nu| alone; the pressure "
-        "changes only as far as friction changes it. Where it varies quickly, at the end of the "
-        "bar and at the ends of the contact zones, the bound is spread over the radius. It is then "
-        "positive on open nodes too, where friction acts by the letter of (3.6): this is "
-        "the price of a law for which existence is proved, and uniqueness where friction is small. "
-        "The thesis computes with radius 0; its theorems are about a positive radius; "
-        "a radius up to h is no smoothing on the mesh."
+    report.table(
+        f"{name}-table",
+        f"Smoothing radius of R: {where}",
+        columns,
+        NOTE if load == LOADS[0] else "",
     )
-    report.table(f"{name}-table", f"Smoothing radius of R: {where}", columns, note)
     if MPI.COMM_WORLD.rank == 0:
         _draw(report, name, where, tables)
     return solutions
