@@ -54,8 +54,8 @@ BEFORE, COARSE = "the step before", "the solution on a coarser mesh"
 class SolveInterrupted(SystemExit):
     """A SIGINT (Ctrl-C) or SIGTERM has ended a solve, on all ranks after the same iteration.
 
-    A program that does not catch it ends with the status 130 or 143, as by any SystemExit. That
-    of Ctrl-C is a KeyboardInterrupt too; of that of SIGTERM Python would make 130.
+    A program that does not catch it ends with the status 130 (SIGINT) or 143 (SIGTERM). After
+    Ctrl-C it is a KeyboardInterrupt too.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class _Pressed(SolveInterrupted, KeyboardInterrupt):
 
 
 class NotConvergedError(RuntimeError):
-    """A load step has not converged, however short."""
+    """A load step has not converged, even after it was halved."""
 
 
 @dataclass(frozen=True)

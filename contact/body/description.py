@@ -60,18 +60,18 @@ class Fixed:
     on
         Name of the part, or a list of names.
     displacement
-        A list with a value a component, as dolfinx asks for it too, each as `fields.field` takes
-        it: a number, a function of x, UFL, a dolfinx Function; None or "free" leaves a component
-        free. Or one UFL expression or Function of vectors.
+        A list with one value per component, each as `fields.field` takes it: a number, a function
+        of x, UFL, a dolfinx Function; None or "free" leaves a component free. Or one UFL
+        expression or Function of vectors.
     potential
         Of a piezoelectric body, likewise; None leaves it free.
     normal
         Instead of a displacement: that along the outward normal of the part, as on rollers; a
         number or a function likewise. The part is free to move along itself.
     amplitude
-        Function of time by which they are multiplied; "constant": they always act. By default
-        they grow from 0 at time 0 to all at time 1, and stay; values that are functions of time
-        are taken as they are.
+        Function of time by which the values are multiplied; "constant": they always act. By
+        default they grow linearly from time 0 to time 1, and then stay; values that are functions
+        of time are not multiplied.
 
     Raises
     ------
@@ -136,7 +136,7 @@ class Load:
     amplitude
         Function of time that multiplies all of them, as of `Fixed`.
     traction, body_force, body_charge
-        The words of the case file for density and charge.
+        The same as density and charge, by their names in the case file.
     force
         Resultant on a part, spread evenly over it: numbers; that of the full turn for a body of
         revolution, of a unit of depth for a plane one.
@@ -226,7 +226,7 @@ class Elastic:
     on
         Name of the part, or a list of names.
     stiffness
-        A value a component (force/area/length), each as `fields.field` takes it; 0 for none.
+        One value per component (force/area/length), each as `fields.field` takes it; 0 for none.
     normal
         Stiffness along the normal of the part, likewise: u has no resistance in its plane.
 

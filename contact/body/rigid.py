@@ -65,12 +65,12 @@ class Motion:
     Parameters
     ----------
     displacement
-        A list with a value a component (length), each a number or a function of time; None or
-        "free" for one that its force determines. Default: 0.
+        A list with one value per component (length), each a number or a function of time; None
+        or "free" for one that its force determines. Default: 0.
     rotation
         Rotation about the centre (radians), likewise: one angle in 2-D, a list of three in 3-D.
     force, moment
-        Those on the free components, as long as the two above. Default: 0.
+        Force and moment on the free components; lists as above. Default: 0.
     centre
         Centre of rotation, about which moments are taken; required where something turns.
     amplitude
@@ -202,8 +202,8 @@ class Bolt:
     on
         Name of a part inside of the body, all facets of a plane section.
     force
-        The section force (tension > 0), a number or a function of time; of a body of revolution
-        that of the full turn, of a plane one by unit thickness.
+        The section force (tension > 0), a number or a function of time: of the full turn for a
+        body of revolution, per unit of depth for a plane body.
     shortening
         Instead of it the length by which the sides are drawn together, likewise.
     amplitude

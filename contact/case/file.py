@@ -251,7 +251,7 @@ def load_case(
 
     Returns
     -------
-    The case, checked but for that which only its mesh can tell.
+    The case, checked as far as is possible without its mesh.
 
     Raises
     ------

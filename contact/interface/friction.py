@@ -34,7 +34,7 @@ LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 
 @dataclass(frozen=True)
 class Friction:
-    """Friction on the contact part: none or one of these, and a radius.
+    """Friction on a contact part, by one of `mu`, `coefficient`, `tresca` and `law`; or none.
 
     Attributes
     ----------

@@ -95,8 +95,8 @@ class Domain:
     notes
         Other contents of the source of the mesh, one sentence each.
     revolved
-        Whether the mesh is the half plane of a body of revolution, x its radius and y its axis
-       . Measures then are those of the whole body.
+        Whether the mesh is the half plane of a body of revolution, x the radius and y along the
+        axis. Measures then are those of the whole body.
     inside
         Name of a group with facets inside of the body -> its facets that this rank owns, as of
         parts. Nothing acts on these, but they may be fixed, or electrodes; they are unusable else.

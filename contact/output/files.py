@@ -40,8 +40,8 @@ def write_outputs(
 ) -> None:
     """Write summary, tables, fields and all that is asked for. Collective.
 
-    They take the place of an earlier run's results, all together: whatever fails, the folder
-    holds the earlier ones or the new ones. Other files in it are left alone.
+    The files replace those of an earlier run together: whatever fails, the folder has all earlier
+    results or all new ones. Other files in it are not touched.
 
     Parameters
     ----------

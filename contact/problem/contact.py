@@ -37,7 +37,7 @@ class Contact:
         The part of another body that it may touch, instead of a foundation, whose gap is then
         added to that between the bodies; None for a rigid one.
     gap
-        The case file's word for a foundation that is a gap.
+        The same as a gap for `foundation`, by its name in the case file.
 
     Raises
     ------
