@@ -13,7 +13,6 @@ import hashlib
 import itertools
 import logging
 import os
-import re
 import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -38,6 +37,7 @@ from contact.methods.report import Monitor, tell
 from contact.methods.signals import Interrupted, stop_on_signal
 from contact.output.formats import write_csv
 from contact.output.quantities import SUMMARY, SWEEP, quantities, values_of
+from contact.output.quantity import is_of
 from contact.output.remarks import measure
 from contact.output.solution import Solution
 from contact.problem.checks import check_potential
@@ -310,9 +310,7 @@ def _kept_rows(
                 "another folder"
             )
         for name in columns:
-            # Of a table, and of a vector: `reactions.left_x`.
-            ours = re.compile(rf"{re.escape(name)}(\..*)?(_([{AXES}]|\d+))?")
-            if not any(ours.fullmatch(column) for column in rows[0]):
+            if not any(is_of(column, name) for column in rows[0]):
                 raise InputError(
                     f"--columns {name}: the rows of {table} have other columns; accepted: columns "
                     "that they have, or another folder"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from operator import attrgetter, itemgetter
@@ -17,6 +18,14 @@ BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
 ROWS = (STEPS, SWEEP, ADAPT)
 #: Status of a node -> its number in ``contact.vtu``.
 STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
+
+
+def is_of(column: str, key: str) -> bool:
+    """Tell whether a column of a table is that of a key: itself, an entry or a component of it.
+
+    ``reactions`` has ``reactions.left_x``, as have ``reactions.left`` and the column's own name.
+    """
+    return re.fullmatch(rf"{re.escape(key)}(\..*)?(_([xyz]|\d+))?", column) is not None
 
 
 @dataclass(frozen=True)

@@ -310,13 +310,34 @@ def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
     assert (tmp_path / "out" / "figure-sweep.png").read_bytes() == whole
     drawn = {path.name for path in (tmp_path / "out").glob("figure-sweep-*")}
     assert drawn == {"figure-sweep-contact_area.png", "figure-sweep-max_pressure.png"}
-    assert main(["plot", out, "--field", "area"]) == 2
-    assert "no such column of sweep.csv; accepted: converged" in capsys.readouterr().err
+    assert main(["plot", out, "--field", "contact_are"]) == 2
+    told = "no such column of sweep.csv (did you mean contact_area?); accepted: converged"
+    assert told in capsys.readouterr().err
     assert main(["plot", out, "--xlim", "-0.5,1"]) == 2
     assert "--xlim: the figure of a sweep shows no places" in capsys.readouterr().err
     (tmp_path / "out" / "sweep.csv").write_text("nothing")
     assert main(["plot", out]) == 2
     assert "damaged" in capsys.readouterr().err
+
+
+def test_columns_that_were_asked_for_are_drawn(sweep, tmp_path, capsys):
+    """With a dot too; a vector or a table stands for all in it that varies."""
+    over = ("--over", "load.0.traction.1=-0.002:-0.006:3", "--set", "material.law=linear")
+    assert sweep(*over, "--columns", "reactions.left,error.energy,max_dev_strain")[0] == 0
+    swept = read_sweep(tmp_path / "out")
+    own = ["reactions.left_x", "reactions.left_y", "max_dev_strain"]
+    assert {*own} <= {*swept.default} and not {"kkt", "stick_nodes", "seconds"} & {*swept.default}
+    assert [name for name in DRAWN if swept.varies(name)] == swept.default[: -len(own) - 1]
+    assert swept.chosen("reactions.left") == swept.chosen("reactions") == own[:2]
+    assert swept.chosen("reactions.left_y") == ["reactions.left_y"]
+    labels = [ax.get_ylabel() for ax in sweep_figure(swept, own[:2]).axes]
+    assert labels == ["reactions: left, $x$", "reactions: left, $y$"]
+    fields = [text for name in ("reactions.left", "error.energy") for text in ("--field", name)]
+    assert main(["plot", str(tmp_path / "out"), *fields]) == 0
+    assert "figure-sweep-reactions.left.png" in capsys.readouterr().out
+    assert (tmp_path / "out" / "figure-sweep-error.energy.png").stat().st_size > 10_000
+    assert main(["plot", str(tmp_path / "out"), "--field", "reactions.lft"]) == 2
+    assert "(did you mean reactions.left_" in capsys.readouterr().err
 
 
 def test_the_forces_of_several_parts_together_are_a_column(sweep):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import itertools
 import os
 import tomllib
@@ -34,6 +35,7 @@ from contact.output.figures.style import (
 )
 from contact.output.options import Units
 from contact.output.quantities import SUMMARY, SWEEP, quantities
+from contact.output.quantity import is_of
 from contact.ranks import refused
 from contact.typing import Array
 
@@ -67,7 +69,9 @@ def plot_sweep(
     folder
         Of the sweep.
     columns
-        To draw, a figure each; by default those of `DRAWN` that vary, in one.
+        To draw, a figure each with a panel for each component, or entry of a table; by default
+        those of `DRAWN`, and those that were asked for with ``--columns``, as far as they vary, in
+        one figure.
     formats, look
         Endings of the files, and choices for the figure.
 
@@ -77,14 +81,10 @@ def plot_sweep(
         If the table is damaged, or has no such column.
     """
     swept = _read(folder)
-    for name in columns:
-        if name not in swept.columns:
-            accepted = ", ".join(column for column in swept.columns if column != "input")
-            raise InputError(f"--field {name}: no such column of sweep.csv; accepted: {accepted}")
-    drawn = [name for name in DRAWN if swept.varies(name)]
-    if not columns and not drawn:
+    figures = {f"-{name.replace('/', '-')}": swept.chosen(name) for name in columns}
+    figures = figures or {"": swept.default}
+    if not all(figures.values()):
         raise InputError(f"{folder}: no result of the sweep varies; accepted: --field COLUMN")
-    figures = {f"-{name}": [name] for name in columns} or {"": drawn}
     files = []
     with matplotlib.rc_context(look.style):
         for ending, chosen in figures.items():
@@ -137,6 +137,37 @@ class Swept:
         size = max(np.abs(self.values(column)).max() for column in whole)
         return bool(np.ptp(self.values(name)) > ROUNDING * size)
 
+    @property
+    def default(self) -> list[str]:
+        """The columns that are drawn by default: results that vary, and those asked for."""
+        summary = {quantity.name for quantity in quantities(SUMMARY)}
+        always = {quantity.name.removesuffix("_AXIS") for quantity in quantities(SWEEP)}
+
+        def asked(name: str) -> bool:
+            base = _parts(name)[0]
+            return base.partition(".")[0] in summary and ("." in base or base not in always)
+
+        names = [*DRAWN, *filter(asked, self.columns)]
+        return [name for name in names if self.varies(name)]
+
+    def chosen(self, key: str) -> list[str]:
+        """Return the columns of a key: those that vary, if any does.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        found = [name for name in self.columns if name != "input" and is_of(name, key)]
+        if not found:
+            near = difflib.get_close_matches(key, self.columns, n=1)
+            hint = f" (did you mean {near[0]}?)" if near else ""
+            accepted = ", ".join(column for column in self.columns if column != "input")
+            raise InputError(
+                f"--field {key}: no such column of sweep.csv{hint}; accepted: {accepted}"
+            )
+        return [name for name in found if len(found) > 1 and self.varies(name)] or found
+
     def values(self, name: str) -> Array:
         """Return a column of numbers."""
         try:
@@ -168,7 +199,8 @@ class Swept:
 
 def _parts(column: str) -> tuple[str, str]:
     """Return the name of a column, and the axis of a component."""
-    return (column[:-2], column[-1]) if column[-2:] in ("_x", "_y", "_z") else (column, "")
+    base, _, end = column.rpartition("_")
+    return (base, end) if end in {*"xyz"} or end.isdigit() else (column, "")
 
 
 def _read(folder: Path) -> Swept:
