@@ -12,14 +12,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from contact.cli.arguments import parse
 from contact.errors import InputError
-from contact.output.figures.body import draw_plane, magnification, picture
-from contact.output.figures.contact import draw_line
+from contact.output.figures.body import draw_plane, picture
+from contact.output.figures.contact import draw_line, draw_surface
 from contact.output.figures.figures import draw
 from contact.output.figures.run import Run
 from contact.output.figures.steps import draw_loop
 from contact.output.figures.style import Look, widened
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
+from contact.output.quantities import STATUS
 from contact.output.solution import Solution
 from contact.solving import solve
 from tests.problems.written import block, electric
@@ -275,23 +276,6 @@ def test_rows_may_run_against_the_axis() -> None:
     assert ax.get_xlim() == pytest.approx((0.0, 2.0))
 
 
-def test_magnified_bodies_do_not_overlap() -> None:
-    """A gap that small displacements close: bodies would overlap by 19 times of it."""
-    run = run_of(solve(block(2)))
-    large = run.displacement * 1e-3 * run.diameter / np.abs(run.displacement).max()
-    run.body.point_data["displacement"] = large
-    count = len(run.table["x"])
-    table = run.table | {"u_n": np.full(count, 1e-3), "gap": np.full(count, 1e-3)}
-    rigid, bodies = (
-        replace(run, table=table | {"rigid": np.full(count, flag)}) for flag in (True, False)
-    )
-    assert magnification(run.diameter, rigid) == 20.0
-    scale = magnification(run.diameter, bodies)
-    assert scale == 5.0 and scale * 1e-3 - 1e-3 <= 0.002 * run.diameter
-    table["gap"][:] = 1.0
-    assert magnification(run.diameter, bodies) == 20.0
-
-
 @pytest.mark.parametrize("width", [85 / 25.4, 6.3])
 @pytest.mark.parametrize("axes", ["x", "xy", "xyz"])
 def test_labels_of_a_loop_are_apart(width: float, axes: str) -> None:
@@ -399,3 +383,33 @@ def test_a_foundation_far_away_does_not_shrink_the_body() -> None:
     run = run_of(solve(block(2, contact={"on": "bottom", "gap": 5.0})))
     low, high = draw_plane(picture(run, "von_mises", 10.0)).axes[0].get_ylim()
     assert high - low < 2 * run.diameter
+
+
+@pytest.mark.parametrize(
+    ("look", "shown"),
+    [
+        (Look(xlim=(-0.5, 3.0)), [(0.0, 2.0), (0.0, 1.0)]),
+        (Look(xlim=(1.2, 1.3)), [(1.2, 1.3), (0.35, 0.65)]),
+        (Look(ylim=(0.6, 0.9)), [(0.55, 1.45), (0.6, 0.9)]),
+        (Look(xlim=(0.3, 0.4), ylim=(0.1, 0.2)), [(0.3, 0.4), (0.1, 0.2)]),
+    ],
+)
+def test_a_crop_in_3d_is_full(look: Look, shown: list[tuple[float, float]]) -> None:
+    """No empty patch beside the part, nor between nodes; colours end where the crop does."""
+    run = run_of(solve(block(3)))
+    surface = run.surface.copy()
+    surface["pressure"] = surface.points[:, 0]
+    pressure, status, *_ = draw_surface(replace(run, surface=surface), look).axes
+    for ax in (pressure, status):
+        assert ax.get_xlim() == pytest.approx(shown[0])
+        assert ax.get_ylim() == pytest.approx(shown[1])
+    colours = pressure.collections[-1].norm
+    assert (colours.vmin, colours.vmax) == pytest.approx((0.0, shown[0][1]))
+    # The shares of the nodes cover the part that is shown.
+    middle = np.mean(shown, axis=1)
+    paths = status.collections[0].get_paths()
+    found = [k for k, path in enumerate(paths) if path.contains_point(middle, radius=1e-9)]
+    node = np.argmin(np.linalg.norm(surface.points[:, :2] - middle, axis=1))
+    words = ["stick", "slip", "open"]
+    array = status.collections[0].get_array()
+    assert found and surface["status"][node] in [STATUS[words[int(array[k])]] for k in found]

@@ -6,6 +6,7 @@ import logging
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import matplotlib
@@ -17,14 +18,14 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from contact.errors import InputError
 from contact.mesh.cells import LINEAR
-from contact.output.figures.contact import ends
+from contact.output.figures.foundation import HATCHED, magnification, profiles
 from contact.output.figures.run import Run
 from contact.output.figures.style import (
-    BLUE,
     NARROW,
     PAGE,
     Look,
@@ -34,7 +35,6 @@ from contact.output.figures.style import (
     page_width,
     sheet,
 )
-from contact.output.formats import Table
 from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")
@@ -43,30 +43,6 @@ logger = logging.getLogger("contact.plots")
 REGION = "region"
 #: Contact zones below this part of the body are drawn with their vicinity, of so many zones.
 SMALL, VICINITY = 0.04, 3.0
-#: Overlap of two bodies, over the diameter, that is not seen.
-UNSEEN = 0.002
-#: Scaled gaps up to this part of Gamma_3 are drawn.
-FAR = 0.2
-
-
-def magnification(diameter: float, *runs: Run) -> float:
-    """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of a diameter.
-
-    Displacements that are visible anyway are drawn as they are, and bodies that touch do not
-    overlap: a gap that a displacement closes would be closed many times over.
-    """
-    largest = max(float(np.linalg.norm(run.displacement, axis=1).max()) for run in runs)
-    if not 0 < largest < 0.02 * diameter:
-        return 1.0
-    wanted = 0.05 * diameter / largest
-    for table in (run.table for run in runs):
-        closing = (table["u_n"] > 0) & ~table["rigid"]
-        room = np.maximum(table["gap"][closing], 0.0) + UNSEEN * diameter
-        wanted = min(wanted, float((room / table["u_n"][closing]).min(initial=np.inf)))
-    if wanted < 1:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(power * max(k for k in (1, 2, 5) if k * power <= wanted))
 
 
 def vicinity(run: Run) -> Array | None:
@@ -126,6 +102,8 @@ class Picture:
         Factor of the displacements, and the corners of the part that is shown, shape (2, d).
     look
         The choices for the figure.
+    near
+        Corners of the vicinity that has decided on the scale, shape (2, d); None for all.
     classes
         Names of the values 0, 1, ..., where these are no quantity.
     """
@@ -137,6 +115,7 @@ class Picture:
     scale: float
     box: Array
     look: Look = PAGE
+    near: Array | None = None
     classes: Sequence[str] = ()
 
     @property
@@ -174,16 +153,15 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
         If there is no such field, or nothing to be seen.
     """
     values, in_cells = scalar(run, field)
-    box = None
+    near = None
     if scale is None:
-        box = vicinity(run)
-        shown = run.diameter if box is None else float(np.ptp(box, axis=0).max())
-        scale = magnification(shown, run)
+        near = vicinity(run)
+        scale = magnification(run, box=near)
     body = run.body.warp_by_vector("displacement", factor=scale)
     (body.cell_data if in_cells else body.point_data)["values"] = values
     skin = body.extract_surface(nonlinear_subdivision=1)  # triangles; at degree 2 four of each
     whole = np.array([skin.points.min(axis=0), skin.points.max(axis=0)])[:, : len(run.axes)]
-    box = whole.copy() if box is None else np.clip(box, *whole)
+    box = whole.copy() if near is None else np.clip(near, *whole)
     sides = look.sides(run.axes)
     if run.plane:
         if len(sides) > 1:
@@ -194,11 +172,12 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
         values = _inside(skin, box, sides, values)
     label = named(field, run.units)[1]
     if field != REGION:
-        return Picture(run, skin, *colour_range(values, label), scale, box, look)
+        return Picture(run, skin, *colour_range(values, label), scale, box, look, near)
     found = np.unique(values)
     skin["values"] = np.searchsorted(found, skin["values"])
     names = [run.regions[k] for k in found]
-    return Picture(run, skin, Normalize(-0.5, len(names) - 0.5), label, scale, box, look, names)
+    classes = Normalize(-0.5, len(names) - 0.5)
+    return Picture(run, skin, classes, label, scale, box, look, near, names)
 
 
 def _inside(skin: Any, box: Array, sides: Sequence[int], values: Array) -> Array:
@@ -250,23 +229,23 @@ def draw_plane(picture: Picture) -> Figure:
         feature_edges=False, manifold_edges=False, non_manifold_edges=False
     )
     outline = edges.points[edges.lines.reshape(-1, 3)[:, 1:], :2]
+    scale, near = picture.scale, picture.near
+    found = [each for side in sides for each in profiles(run, scale, places, side, near)]
     for side in sides:
         _colour(ax, picture, side)
         # Dashes would be those of an edge each: none where edges are short.
         ax.add_collection(LineCollection(list(outline * [side, 1]), colors="black", lw=0.5))
-        for part in run.contacts:
-            if np.all(part["rigid"]):
-                edge = ends(part, run.held)
-                _foundation(ax, part, picture, edge, side)
+    for profile in found:
+        profile.draw(ax, HATCHED * float(np.ptp(box, axis=0).max()))
     _bar(figure, picture)
     ax.set_aspect("equal")
-    ax.use_sticky_edges = False
-    ax.margins(0.02)
-    ax.autoscale_view()
-    if cut or look.xlim:
-        ax.set_xlim(tuple(box[:, 0]))
-    if cut or look.ylim:
-        ax.set_ylim(tuple(box[:, 1]))
+    shown = np.array(box)
+    if not cut:
+        every = np.concatenate([outline.reshape(-1, 2) * [side, 1] for side in sides])
+        shown = np.array([np.minimum(box[0], every.min(0)), np.maximum(box[1], every.max(0))])
+    shown = reduce(lambda part, profile: profile.reach(part), found, shown)
+    shown += 0.0 if cut else 0.02 * np.ptp(shown, axis=0) * [[-1], [1]]
+    ax.set(xlim=look.xlim or tuple(shown[:, 0]), ylim=look.ylim or tuple(shown[:, 1]))
     ax.set_xlabel(run.units.label(f"${run.axes[0]}$", "length"))
     ax.set_ylabel(run.units.label(f"${run.axes[1]}$", "length"))
     ax.set_title(head, fontsize="medium")
@@ -285,8 +264,11 @@ def _bar(figure: Figure, picture: Picture) -> None:
         )
         return
     bar = {"location": "bottom", "label": picture.label, "aspect": 40, "shrink": 0.8}
-    text = figure.colorbar(colours, ax=axes, **bar).ax.xaxis.get_offset_text()
-    text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the label
+    made = figure.colorbar(colours, ax=axes, **bar)
+    made.formatter.set_powerlimits((-2, 4))  # long numbers would meet
+    made.locator = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10])
+    text = made.ax.xaxis.get_offset_text()
+    text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the bar
 
 
 def _colour(ax: Axes, picture: Picture, side: int) -> None:
@@ -298,32 +280,6 @@ def _colour(ax: Axes, picture: Picture, side: int) -> None:
         ax.tripcolor(mesh, facecolors=skin["values"], **shown)
     else:
         ax.tripcolor(mesh, skin["values"], shading="gouraud", **shown)
-
-
-def _foundation(ax: Axes, table: Table, picture: Picture, edges: Array, side: int) -> None:
-    """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled.
-
-    Not where it is far: gaps to a curved shape, scaled like the displacements, are no shape; and
-    beside one that is farther from the deformed body than that is thick the body would be a dot.
-    """
-    scale = picture.scale
-    points = np.column_stack([table["x"], table["y"]])
-    normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"] + table["moved"]
-    across = normal.mean(axis=0) / (np.linalg.norm(normal.mean(axis=0)) or 1.0)
-    thick = np.ptp(np.asarray(picture.skin.points)[:, :2] @ across)
-    if scale * np.min(table["gap"] - table["u_n"]) > thick > 0:
-        return
-    points = np.concatenate([edges[:1], points, edges[1:]]) * [side, 1]
-    normal = np.concatenate([normal[:1], normal, normal[-1:]]) * [side, 1]
-    gap = np.concatenate([gap[:1], gap, gap[-1:]])
-    surface = points + scale * gap[:, None] * normal
-    extent = np.ptp(points, axis=0).max()
-    far = max(FAR * extent, min(2 * scale * gap.min(), picture.run.diameter))
-    near = np.flatnonzero((scale == 1) | (scale * gap <= far))
-    for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1):
-        ax.plot(*surface[run].T, color="black", lw=0.5)
-        band = np.concatenate([surface[run], (surface + 0.03 * extent * normal)[run[::-1]]])
-        ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)
 
 
 def draw_space(picture: Picture) -> Figure | None:

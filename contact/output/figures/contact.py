@@ -11,6 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
@@ -30,9 +31,6 @@ from contact.output.figures.style import (
 from contact.output.formats import Table
 from contact.output.quantities import STATUS
 from contact.typing import Array
-
-#: Colours of the nodes of Gamma_3 in 3-D by their status, in the order of its numbers.
-STATES = {"open": "#C8C8C8", "stick": BLUE, "slip": ORANGE}
 
 #: Contact zones below this share of an axis are drawn with their vicinity alone.
 SMALL = 1 / 3
@@ -319,51 +317,89 @@ def draw_surface(run: Run, look: Look) -> Figure:
     panels.append((surface, "status, friction (arrows)"))
     places = surface.points[:, view]
     low, high = window(places, touching, 0.13)  # room for the arrows
-    for k in (0, 1):
-        if view[k] < 2:
-            given = look.ends(view[k], places[:, k].min(), places[:, k].max(), "the contact part")
-            low[k], high[k] = given or (low[k], high[k])
+    limits = [
+        look.ends(k, np.min(v), np.max(v), "the contact part") if k < 2 else None
+        for k, v in zip(view, places.T, strict=True)
+    ]
+    for k, ends in enumerate(limits):
+        if ends is not None:
+            low[k], high[k] = np.clip(ends, places[:, k].min(), places[:, k].max())
+    if None in limits and limits != [None, None]:
+        _balance(low, high, places, limits.index(None))
     stacked = page_width() < NARROW
     rows, columns = (len(panels), 1) if stacked else (1, len(panels))
     aspect = float(np.clip((high - low)[1] / (high - low)[0], 0.25, 0.8 if stacked else 1.25))
     figure = sheet(rows * (aspect / columns + 0.02) + (2.0 if stacked else 1.5) / page_width())
     figure.set_layout_engine("compressed")
     *lefts, right = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
-    inside = np.all((places >= low) & (places <= high), axis=1)
-    inside |= not inside.any()
-    highest = float(np.nanmax(surface["pressure"][inside], initial=0.0)) or 1.0
+    seen = np.nan_to_num(_clipped(surface, view, low, high)["pressure"])
+    highest = float(seen.max(initial=0.0)) or 1.0
     x, y = (run.units.label(f"${'xyz'[k]}$", "length") for k in view)
     for ax, (side, name) in zip((*lefts, right), panels, strict=True):
         # Of degree 2 four pieces each.
         skin = side.extract_surface(nonlinear_subdivision=1).triangulate()
         flat, facets = np.asarray(skin.points)[:, view], np.asarray(skin.regular_faces)
-        ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
         if ax is right:
-            status = _draw_status(ax, skin, view, low, high)
+            _draw_status(ax, flat, facets, skin["status"])
+            _draw_friction(ax, skin, view, low, high)
         else:
             known = np.isfinite(skin["pressure"][facets]).all(axis=1)
             drawn = facets[known] if known.any() else facets
+            ax.add_collection(PolyCollection(list(flat[facets]), facecolor=ZONES["open"][0], lw=0))
             colours = {"shading": "gouraud", "cmap": "viridis", "vmin": 0.0, "vmax": highest}
             shown = ax.tripcolor(*flat.T, drawn, np.nan_to_num(skin["pressure"]), **colours)
         ax.set_aspect("equal")
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=x, ylabel=y)
-        ax.set_title(name, fontsize="medium")
+        ax.set_title(name if aspect < 1 else name.replace(", ", ",\n"), fontsize="medium")
         ax.label_outer()
     label = run.units.label(r"$-\sigma_\nu$", "stress")
-    figure.colorbar(shown, ax=lefts, location="bottom", label=label, aspect=25)
-    bar = figure.colorbar(status, ax=right, location="bottom", aspect=25, ticks=range(len(STATES)))
-    bar.ax.set_xticklabels([ZONES[zone][1] for zone in STATES])
-    bar.ax.tick_params(length=0)
+    bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
+    figure.colorbar(shown, ax=[*lefts, right], **bar)
+    handles = [Patch(color=colour, label=words) for colour, words in ZONES.values()]
+    figure.legend(handles=handles, ncols=3, loc="outside lower center")
     return figure
 
 
-def _draw_status(ax: Axes, skin: Any, view: list[int], low: Array, high: Array) -> Any:
-    """Draw the status of the nodes, and between two corners friction as arrows; return colours."""
-    flat, status = np.asarray(skin.points)[:, view], skin["status"]
-    known = status >= STATUS["open"]
-    dots = float(np.clip(2e3 / len(flat), 0.5, 12))
-    colours = {"cmap": ListedColormap(list(STATES.values())), "vmin": -0.5, "vmax": 2.5}
-    shown = ax.scatter(*flat[known].T, c=status[known], s=dots, lw=0, **colours)
+def _balance(low: Array, high: Array, places: Array, k: int) -> None:
+    """Let an axis whose ends are not asked for show about as much as the other one does.
+
+    About its middle, and within the part; the panels would be slivers otherwise.
+    """
+    asked = high[1 - k] - low[1 - k]
+    middle, span = (low[k] + high[k]) / 2, float(np.clip(high[k] - low[k], asked / 3, 3 * asked))
+    ends = np.array([middle - span / 2, middle + span / 2])
+    low[k], high[k] = np.clip(ends, places[:, k].min(), places[:, k].max())
+
+
+def _clipped(surface: Any, view: list[int], low: Array, high: Array) -> Any:
+    """Return the part of a surface that is shown: with values where its facets are cut."""
+    part = surface.extract_surface(nonlinear_subdivision=1)
+    for k, *ends in zip(view, low, high, strict=True):
+        for above, end in enumerate(ends):
+            part = part.clip("xyz"[k], origin=np.eye(3)[k] * end, invert=above == 1)
+    return part
+
+
+def _draw_status(ax: Axes, flat: Array, facets: NDArray[np.int64], status: Array) -> None:
+    """Colour the share of each node of triangles by its status, as `zones`."""
+    corners = flat[facets]
+    middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
+    after, before = (np.roll(corners, k, axis=1) for k in (-1, 1))
+    quads = np.stack([corners, (corners + after) / 2, middle, (corners + before) / 2], axis=2)
+    numbers = status[facets]
+    known = numbers >= STATUS["open"]  # nodes that are held are no contact nodes
+    order = [STATUS[zone] for zone in ZONES]
+    shown = PolyCollection(
+        list(quads[known]), array=np.argsort(order)[numbers[known]], edgecolors="face", lw=0.2,
+        cmap=ListedColormap([colour for colour, _ in ZONES.values()]), rasterized=True,
+    )  # fmt: skip
+    shown.set_clim(-0.5, len(order) - 0.5)
+    ax.add_collection(shown)
+
+
+def _draw_friction(ax: Axes, skin: Any, view: list[int], low: Array, high: Array) -> None:
+    """Draw friction as arrows between two corners."""
+    flat = np.asarray(skin.points)[:, view]
     traction, normal = np.nan_to_num(skin["traction"]), np.nan_to_num(skin["normal"])
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
     friction = along[:, view]
@@ -377,7 +413,6 @@ def _draw_status(ax: Axes, skin: Any, view: list[int], low: Array, high: Array) 
         longest = 0.1 * (high - low).max()
         exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / longest}
         ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
-    return shown
 
 
 def _thinned(flat: Array, count: int) -> NDArray[np.intp]:

@@ -16,8 +16,9 @@ from mpi4py import MPI
 from PIL import Image
 
 from contact.errors import InputError
-from contact.output.figures.body import body_figure, magnification, picture
+from contact.output.figures.body import body_figure, picture
 from contact.output.figures.contact import contact_figure
+from contact.output.figures.foundation import magnification
 from contact.output.figures.run import Run, read_run, read_steps
 from contact.output.figures.steps import steps_figures
 from contact.output.figures.style import DEFORMED, PAGE, STYLE, Look, named
@@ -146,7 +147,7 @@ def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
 
 def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
     runs = [replace(run, title=f"{run.title}, t = {time:.3g}".lstrip(", ")) for time, run in steps]
-    scale = magnification(runs[-1].diameter, *runs)
+    scale = magnification(*runs)
     pictures = [picture(run, field, scale, look) for run in runs]
     # Colours of all frames.
     ends = np.array([(made.norm.vmin, made.norm.vmax) for made in pictures])
