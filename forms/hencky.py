@@ -229,7 +229,9 @@ class UserLaw(Isotropic):
 
     def secant_modulus(self, q: Value) -> Value:
         """Return g(sqrt(q)), kept away from the kink of the square root at q = 0."""
-        return self.modulus(sqrt(maximum(q, 1e-28)))
+        g = self.modulus(sqrt(maximum(q, 1e-28)))
+        # A function may return one number for all strains.
+        return g + 0 * q if isinstance(g, int | float | np.number) else g
 
     def shear_energy(self, q: Value) -> Value:
         """Return the integral of 2 g(s) s over [0, sqrt(q)]."""

@@ -207,3 +207,12 @@ def test_a_modulus() -> None:
     ):
         with pytest.raises(ValueError, match=f"^UserLaw: modulus: .*{words}"):
             UserLaw(10.0, 0.3, modulus=modulus)
+
+
+def test_a_modulus_may_return_one_number_for_all_strains() -> None:
+    law = UserLaw(10.0, 0.3, modulus=lambda _: 10.0 / 2.6)
+    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
+    own, linear = (solve(Problem(domain, Body(m, TOP), Contact("bottom"))) for m in (law, LAW))
+    assert own.converged
+    np.testing.assert_allclose(own.contact_force, linear.contact_force, rtol=1e-10, atol=1e-12)
+    assert own.error.energy == pytest.approx(linear.error.energy, rel=1e-8)
