@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -159,13 +160,43 @@ class OfTime:
             return float(value)
 
 
+def sampled(name: str, shape: tuple[int, ...], *calls: Callable[[], Any]) -> list[Array] | None:
+    """Return values of a user's law at samples; None where it raises something at one.
+
+    Such a law is not judged by its samples: it may never be asked there, and where it is used its
+    errors are named.
+
+    Parameters
+    ----------
+    name
+        In messages.
+    shape
+        Of each value.
+    calls
+        The values, unevaluated.
+
+    Raises
+    ------
+    InputError
+        If the law lacks an attribute.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            return [real(call(), shape, "") for call in calls]
+    except AttributeError as error:
+        with naming(name):
+            raise error
+    except Exception:
+        return None
+
+
 def check_slope(
     name: str, function: Callable[[Array], Array], slope: Callable[[Array], Array], at: Array
 ) -> None:
     """Refuse a derivative that the differences of its function contradict.
 
-    At kinks, and where differences cannot tell, anything is accepted; a function that raises
-    something at these places is not judged, for it may never be asked there.
+    At kinks, and where differences cannot tell, anything is accepted, as where `sampled` has no
+    values.
 
     Parameters
     ----------
@@ -182,17 +213,13 @@ def check_slope(
         If the derivative is off, or the object has none.
     """
     h = STEP * np.abs(at)
-    try:
-        with np.errstate(all="ignore"):
-            low, low2, middle, high2, high = (
-                real(function(at + step), at.shape, "") for step in (-h, -h / 2, 0, h / 2, h)
-            )
-            given = real(slope(at), at.shape, "")
-    except AttributeError as error:
-        with naming(name):
-            raise error
-    except Exception:
-        return  # the same law is asked for, and named, where it is used
+    arguments = [at + step for step in (-h, -h / 2, 0, h / 2, h)]
+    every = sampled(
+        name, at.shape, *(partial(function, near) for near in arguments), partial(slope, at)
+    )
+    if every is None:
+        return
+    low, low2, middle, high2, high, given = every
     with np.errstate(all="ignore"):
         slopes = np.stack([middle - low, high - middle, 2 * (middle - low2), 2 * (high2 - middle)])
         slopes /= h

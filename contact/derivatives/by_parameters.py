@@ -37,8 +37,8 @@ from contact.derivatives.differences import Family, Parameter, at, family_of
 from contact.errors import InputError
 from contact.history import History
 from contact.linear.operator import Counters
+from contact.methods.complementarity_parameters import complementarity_parameters
 from contact.methods.options import NewtonOptions
-from contact.methods.parameters import complementarity_parameters
 from contact.output.differentiable import (
     Differentiable,
     Largest,

@@ -4,7 +4,8 @@ With projections onto the admissible forces, a half line and a disc, the laws ar
 
     p - max(0, p - c (gap - u_nu)) = 0,     lambda_f - proj_s(lambda_f + c u_tau) = 0,
 
-whose pieces are those of the active set (`contact.interface.active_set`). `interface_residuals`
+with the initial gap (rho in the pages) and the opening gap - u_nu (the normal gap g_N).
+Their pieces are those of the active set (`contact.interface.active_set`). `interface_residuals`
 evaluates them; `linearise` takes a step of the semismooth Newton method on them, node by node.
 There a node in contact pushes with p - gamma (gap - u_nu), a sticking one with
 lambda_f + gamma u_tau, a slipping one with its friction bound along the slip: with gamma far above
@@ -154,7 +155,7 @@ class ComplementarityParameters:
     nodal_stiffness
         Of the body against a displacement of one contact node, about E'/h.
     gamma
-        Of the condensed constraints, far above the others.
+        Augmentation parameter: of the eliminated constraints, far above the others.
     """
 
     c: float

@@ -16,6 +16,7 @@ from contact.arguments import (
     expect,
     naming,
     real,
+    sampled,
 )
 from contact.body.fields import Given, field, values_at
 from contact.errors import InputError
@@ -147,7 +148,7 @@ def _check_law(law: FrictionLaw | None) -> None:
 def _check_constants(name: str, symbol: str, law: FrictionLaw) -> None:
     """Refuse an upper bound, or a Lipschitz constant, that values of s/p contradict.
 
-    A law that raises something at the places looked at is not judged, as by `check_slope`.
+    Nothing is refused where `sampled` has no values.
     """
     for key in ("maximum", "lipschitz"):
         given = getattr(law, key)
@@ -155,13 +156,11 @@ def _check_constants(name: str, symbol: str, law: FrictionLaw) -> None:
         expect(f"{name}: {key}", given, "a number >= 0, or infinity", fits)
     slips = np.concatenate([[0.0], SAMPLES])
     slip, pressure = np.tile(slips, PRESSURES.size), np.repeat(PRESSURES, slips.size)
-    try:
-        with np.errstate(all="ignore"):
-            values = real(law(slip, pressure), slip.shape, "") / pressure
-    except Exception:
-        return  # the same law is asked for, and named, where it is used
+    values = sampled(name, slip.shape, lambda: law(slip, pressure))
+    if values is None:
+        return
     with np.errstate(all="ignore"):
-        ratio, rounding = values.reshape(-1, slips.size), SEEN * EPS
+        ratio, rounding = (values[0] / pressure).reshape(-1, slips.size), SEEN * EPS
         above = ratio - law.maximum > rounding * np.abs(ratio)
         falls, steps = -np.diff(ratio), np.diff(slips)
         faster = falls - law.lipschitz * steps > rounding * np.abs(ratio[:, :-1])

@@ -1,8 +1,16 @@
-"""Solution methods: from a state of a problem to another one, and how that went.
+"""Solution methods: each takes an initial guess of a problem to a `State` and its `Outcome`.
 
-`newton` is the semismooth Newton method, with `interior_point` and `continuation` as its fallbacks;
-`thesis` has fixed points, Uzawa block relaxation and penalty; `load_stepping` is the quasi-static
-load stepping around any of them. Tolerances and parameters are in `options`.
+`newton` is the semismooth Newton method (primal-dual active set) with its order of fallbacks:
+`continuation`, `unconstrained_modes`, `interior_point`. Its steps are `newton_step` on the whole
+body and `condensed_step` on the body condensed onto its contact nodes, with `chord` steps. `thesis`
+has fixed points, Uzawa block relaxation and penalty; `load_stepping` is the quasi-static load
+stepping around any method. Tolerances and limits are in `options`; c, r and gamma in
+`complementarity_parameters`.
+
+The methods share, and do not define: complementarity functions and active set
+(`contact.interface.complementarity`, `active_set`), static condensation
+(`contact.problem.condensed`, `contact.linear.schur`), the constraint x = C y + d
+(`contact.linear.constraint`), the residuals (`contact.problem.residuals`).
 
 Imports: `contact.problem` and the packages below it.
 """

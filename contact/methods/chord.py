@@ -25,7 +25,7 @@ from contact.methods.newton_step import Iterate
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Steps that a new factorisation is worth: as many are taken with the old one at most.
+#: Chord steps that cost as much as a new factorisation: more are not taken with the old one.
 MOST_STEPS = 10.0
 
 #: Residual above which no factorisation is frozen: the tangent is not good there.

@@ -24,11 +24,11 @@ from contact.problem.condensed import Condensation, CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals
 
-#: Tolerance of the condensed contact problem, over the residual before the step.
+#: Ratio of the tolerance of the condensed contact problem to the residual before the step.
 CONTACT_PART = 1e-3
 
-#: Residual of the condensed contact problem, over that before the step, from which on it is no
-#: solution of it: a step that gains less is left to the whole body.
+#: Ratio of the residual of the condensed contact problem to that before the step above which the
+#: problem counts as unsolved, and the whole body is taken.
 UNSOLVED = 0.05
 
 #: Solves a condensed problem from an iterate, with a history of its own.

@@ -1,10 +1,10 @@
 """The derivative of the conductivity by the gap: whether a linearisation includes it.
 
-With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and converges
-fast even where the ramp psi is steep. But where a node that opens draws less current and thus opens
-further, the linearised charge may point back to the foundation, where the node is under tension:
-the active set cycles. Without the derivative (psi frozen, Picard) the node opens to the other end
-of the ramp.
+With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and Newton's
+method converges fast even where the ramp psi is steep. But a node that opens draws less charge,
+and may thus open further. The linearised charge then leads back to contact, where the node is under
+tension: the active set cycles. Without the derivative (psi frozen, Picard) the node opens to the
+other end of the ramp.
 """
 
 from __future__ import annotations

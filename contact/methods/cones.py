@@ -1,11 +1,11 @@
 """Slacks and multipliers of an interior-point method, with the scaling of Nesterov and Todd.
 
-Pressures live on half lines, friction in second-order cones: with t >= |a| for the length of a
-slip a, the pair (t, a) and (h, -q), h >= |q| for the friction force q, are both in the cone of
-Lorentz and orthogonal to each other where the law of Tresca holds. In the plane that cone is a
-quarter plane, and all that follows is the usual method on boxes.
+Pressures and gaps are in half lines, friction and slip in second-order (Lorentz) cones: with the
+slip a, its length t >= |a|, the friction force q and its bound h >= |q|, the pairs (t, a) and
+(h, -q) are both in the cone, and orthogonal to each other exactly where Tresca's law is met. In
+2-D that cone is a quarter plane, and the method is the one for bounds on single variables.
 
-Near the rim x_0 - |x_1| has no digits left. Vectors are therefore handled in a frame along the
+Near the boundary x_0 - |x_1| has no digits left. Vectors are therefore handled in a frame along the
 direction e of the slip: x_0 - e.x_1, x_0 + e.x_1 and the rest of x_1 across e, shape (k, 2 + t),
 in which the scaling is diagonal; and determinants x_0^2 - |x_1|^2 are carried along.
 
@@ -82,7 +82,7 @@ class Cones:
     Parameters
     ----------
     slack, force
-        Of the half lines: gaps that are left and contact forces, shape (n,), positive.
+        Of the half lines: open gaps and contact forces, shape (n,), positive.
     length, slip
         t and a of the discs, shapes (k,) and (k, t), t > |a|.
     bound, friction
@@ -114,19 +114,19 @@ class Cones:
     def interior(self) -> bool:
         """Tell whether all vectors are inside their cones by more than rounding. Collective.
 
-        Where nothing holds a body, they come to a rim, or go on for ever.
+        Where nothing constrains a body, they come to the boundary, or grow without limit.
         """
         depths = np.concatenate([self.slack, self.force, *self._dets])
         inside = bool(np.all((depths > 1 / HUGE) & (depths < HUGE)))  # NaN is not
         return bool(self._comm.allreduce(inside, op=MPI.LAND))
 
-    def work(self) -> float:
+    def duality_gap(self) -> float:
         """Return the sum of slacks times multipliers."""
         discs = float(self.length @ self.bound + np.sum(self.slip * self.friction))
         return float(self._comm.allreduce(self.slack @ self.force + max(discs, 0.0)))
 
-    def work_after(self, step: Step, part: float) -> float:
-        """Return the same after part of a step."""
+    def duality_gap_after(self, step: Step, part: float) -> float:
+        """Return the duality gap after part of a step."""
         slack, force = self.slack + part * step.slack, self.force + part * step.force
         relative = [self._lambda + part * move for move in self._scaled(step)]
         discs = (relative[0][:, :2] * relative[1][:, :2]).sum() / 2
@@ -173,7 +173,7 @@ class Cones:
         return -self.force, -self._multiplier
 
     def target(self, affine: Step, centre: float) -> tuple[Array, Array]:
-        """Return the same with Mehrotra's correction, for slack times multiplier = centre."""
+        """Return k with Mehrotra's correction, for slack times multiplier = centre."""
         force = -self.force + (centre - affine.slack * affine.force) / self.slack
         cross = -_product(*self._scaled(affine))
         cross[:, :2] += centre
@@ -217,8 +217,8 @@ class Cones:
             (slip, rest + rise[:, None] * self._axis),
         )
 
-    def longest(self, step: Step) -> float:
-        """Return how much of a step leads to the rim of a cone; nothing of one that is NaN."""
+    def to_boundary(self, step: Step) -> float:
+        """Return the part of a step that leads to the boundary of a cone; 0 of a step with NaN."""
         rates = [-step.slack / self.slack, -step.force / self.force]
         for lead, size in self._relative(step):
             rates.append(size - lead)

@@ -1,9 +1,9 @@
 """Continuation in the conductivity of the foundation.
 
-A foundation that conducts well across a gap pins the potential of a node where it comes near and
-lets it go where it leaves, so that the active set cycles. Where it conducts
-little, the problem is nearly one of contact alone; from there the solutions are followed up to its
-k_e, each one the initial guess of the next.
+A foundation of high conductivity fixes the potential of a node that comes near and releases it
+where the node leaves, so that the active set cycles. With a small part of the conductivity k_e the
+problem is nearly one of contact alone; the part is raised to 1, and each solution is the initial
+guess of the next problem. (Continuation in the load is `contact.methods.load_stepping`.)
 
 References
 ----------
@@ -20,19 +20,20 @@ from contact.methods.report import Outcome
 #: Note of its steps in the history.
 CONTINUATION = "continuation"
 
-#: Factor by which the conductivity grows: at first, and at least.
+#: Factor by which the conductivity grows: the first, and the least one that is tried.
 FACTOR, LEAST_FACTOR = 1e3, 1.2
 
-#: Smallest part of it: three of the first factors from the whole.
+#: First part of the conductivity: three of the first factors below the whole.
 FIRST_PART = FACTOR**-3
 
 
 def continuation(
     solve: Callable[[float, Iterate], tuple[Iterate, Outcome]], start: Iterate
 ) -> tuple[Iterate, Outcome] | None:
-    """Let the foundation conduct more and more; None where that does not lead to the whole.
+    """Return the solution with the whole conductivity; None where continuation fails.
 
-    Where Newton's method fails with hardly any conductivity too, that is not why.
+    A part that fails is halved on the logarithmic scale. Where the first one fails the conductivity
+    is not the cause, and no other is tried.
 
     Parameters
     ----------

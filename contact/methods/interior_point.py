@@ -1,14 +1,15 @@
-"""The fallback of Newton's method: a primal-dual interior point, sparse or dense.
+"""Primal-dual interior-point method, the last fallback of Newton's: sparse or dense.
 
 Frictionless contact and Tresca's friction are convex. The linear systems of an interior point are
 those of a Newton step with other nodal blocks: force over slack in place of gamma. So it runs on
 whole bodies and condensed ones alike, on any number of ranks.
 
-1. The friction bound is zero at first; where friction alone restrains a body, no load exceeds it.
+1. The friction bound is zero at first; where friction alone constrains a rigid-body mode, it is
+   above all loads.
 2. A step of the interior point is Mehrotra's predictor and corrector with the scaling of Nesterov
-   and Todd, both with one matrix; material, layer and current are linearised anew in each.
-3. Where the duality gap is closed the contact zone is known; Newton's method takes the last steps.
-4. Where it has not converged, the friction bound is that of the last solution (Haslinger's
+   and Todd (`cones`), both with one matrix; each linearises material, layer and current anew.
+3. Where the duality gap is closed the active set is known; Newton's method takes the last steps.
+4. Where these have not converged, the friction bound is that of the last solution (Haslinger's
    iteration), and the next problem begins at 2.
 
 References
@@ -30,8 +31,8 @@ from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.methods.cones import Array, Cones, Step
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep
-from contact.methods.progress import PROGRESS
 from contact.methods.report import Outcome
+from contact.methods.stagnation import PROGRESS
 from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
 from contact.problem.protocols import Problem
 from contact.problem.residuals import evaluate, residual_forces
@@ -41,27 +42,28 @@ from contact.tolerances import EPS
 #: Note of its steps in the history.
 INTERIOR_POINT = "interior point"
 
-#: Steps of one convex problem at most, and convex problems with one friction bound after the other.
+#: Most steps of one convex problem, and most friction bounds (Haslinger's iterations).
 LIMIT, UPDATES = 60, 8
 
-#: Duality gap over the work of loads and contact, below which the active sets are known. Below its
-#: square no solver tells more.
+#: Ratio of the duality gap to the work of loads and contact below which the active set is known.
+#: Below its square the end does not wait for equilibrium any more.
 CLOSED = 1e-10
 
 #: Forcing term of inexact Newton: relative residual of an iterative solve. With a hundredth of that
-#: there are as many steps, and a third to a half more iterations. As large may the residual of
-#: equilibrium be in the end: where an iterative solver leaves more, the slacks vanish beneath its
-#: tolerance long before, and Newton's method, whose right-hand sides are residuals, does better.
+#: there are as many steps, and a third to a half more iterations. The residual of equilibrium may
+#: be as large at the end: further slacks vanish below the tolerance of an iterative solver, and
+#: Newton's last steps, whose right-hand sides are residuals, do better.
 FORCING = 1e-4
 
-#: Work at the start, over that of the loads in the way that the foundation bars.
+#: Slack times force of each node at the start, over the work of the loads in the penetration of
+#: the displacement without contact.
 SHARE = 1e-2
 
-#: The same for a body with rigid-body modes that contact alone constrains, over the work of the
-#: loads in the mean gap.
+#: The same where rigid-body modes are not constrained by the supports, over the work of the loads
+#: in the mean gap.
 SHARE_UNSUPPORTED = 0.1
 
-#: Parts of the way to the rim of a cone that a step takes.
+#: Least and largest part of the way to the boundary of the cones that a step takes.
 SHORTEST, LONGEST = 0.9, 0.999
 
 
@@ -71,14 +73,14 @@ def interior_point(
     modes: UnconstrainedModes,
     finish: Callable[[State], tuple[Iterate, Outcome]],
 ) -> tuple[Iterate, Outcome]:
-    """Solve convex problems with one friction bound after the other. Collective.
+    """Solve by the interior point and Newton's last steps, and update the bound. Collective.
 
     Parameters
     ----------
     iteration
         The problem, its best iterate and the number of steps left.
     whole
-        Has the operator of the body, with blocks at its contact nodes.
+        Newton's step, whose operator has nodal blocks that the cones take the place of.
     modes
         Of the whole problem.
     finish
@@ -101,20 +103,20 @@ def interior_point(
             return iterate, outcome
         if iteration.left <= 0:
             break
-        # Where Newton's method makes progress its pressures are nearer; else they may come back.
+        # Pressures of the last steps are nearer where these make progress, else those of the cones.
         if aside is None and outcome.kkt.significant < PROGRESS * best:
             state = iterate.state
         best = min(best, outcome.kkt.significant)
         nodal = interface.jump.apply(state.x)
         bound = interface.bound(nodal, state.forces)
-        # Where nothing presses, the next problem is solved by the same state.
+        # Where all nodes are open, the next bound is zero and has the same solution.
         if aside is not None and interface.jump.maximum(bound) <= interface.rounding(nodal):
             break
     return aside or (iterate, outcome)
 
 
 class InteriorPoint:
-    """The interior-point method on a body with its contact nodes, for one friction bound.
+    """The interior-point method for one given friction bound, as of Tresca's law.
 
     Layer and current are linearised anew in each step, like the material.
 
@@ -123,14 +125,15 @@ class InteriorPoint:
     problem
         The contact problem.
     whole
-        Has the operator of the body, with blocks at its contact nodes.
+        Newton's step, whose operator has nodal blocks that the cones take the place of.
     bound
         Friction bound, shape (n,) (stress).
-    held
-        Whether supports hold the body: where it would go without contact then says much.
+    supported
+        Whether the supports constrain all modes: slacks then start from the displacement without
+        contact, by one linear solve.
     """
 
-    def __init__(self, problem: Problem, whole: NewtonStep, bound: Array, held: bool) -> None:
+    def __init__(self, problem: Problem, whole: NewtonStep, bound: Array, supported: bool) -> None:
         self.problem, self._whole = problem, whole
         interface = problem.interface
         jump, self._state = interface.jump, problem.start()
@@ -140,16 +143,16 @@ class InteriorPoint:
         self._frictional = self._near & (limit > EPS * max(jump.maximum(limit), total / count))
         nodal = jump.apply(self._state.x)
         moved = np.zeros_like(nodal)
-        if held:
+        if supported:
             moved = jump.apply(whole.without_contact(self._state, FORCING).x) - nodal
         opening = interface.opening(nodal + moved)[self._near]
         gap = jump.gap[self._near]
         scales = problem.scales
         block = scales.plane_modulus * scales.area / scales.height
-        if held:
+        if supported:
             way = jump.maximum(np.abs(moved[:, : jump.dim]).max(axis=1, initial=0.0))
-            # Where no load moves it the body is taken for a block, and where it touches nothing
-            # by that, any work will do.
+            # Where no load moves the body its stiffness is that of a block, and where it meets
+            # nothing by that displacement, any work will do.
             far = jump.maximum(-opening) or SHARE * (way or interface.size)
             least = np.sqrt(SHARE) * far
             work = (total / way if total > 0 and way > 0 else block) * least**2
@@ -157,7 +160,7 @@ class InteriorPoint:
             total = total or block * jump.maximum(np.abs(opening))
             least = self._sum(float(np.maximum(gap, 0.0).sum())) / count + total / block
             work = SHARE_UNSUPPORTED * total * least / count
-        # Where the body would lift off, the slack is that from the beginning.
+        # Where the body would lift off, the slack at the start is that opening.
         slack = np.maximum(np.maximum(gap, opening), least)
         frictional = self._frictional
         slips, limit = interface.slip_length(nodal + moved)[frictional], limit[frictional]
@@ -166,7 +169,7 @@ class InteriorPoint:
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
 
     def run(self, iteration: Iteration) -> Outcome:
-        """Go towards the solution, until the duality gap is closed. Collective."""
+        """Take steps until the duality gap is closed. Collective."""
         kkt, ended = evaluate(self.problem, self.state), "the interior point was given no step"
         for steps in range(1, min(LIMIT, iteration.left) + 1):
             try:
@@ -186,7 +189,7 @@ class InteriorPoint:
             if pressure <= self.problem.interface.rounding(nodal):
                 ended = f"nothing presses after {steps} steps"
                 break
-            gap = self.gap()
+            gap = self.relative_gap()
             if gap <= CLOSED and (
                 kkt.equilibrium <= max(FORCING, kkt.floors[0]) or gap <= CLOSED**2
             ):
@@ -200,15 +203,15 @@ class InteriorPoint:
 
     @property
     def state(self) -> State:
-        """Where the method is."""
+        """The present iterate."""
         cones, jump = self.cones, self.problem.interface.jump
         pressure, friction = np.zeros(jump.weight.size), np.zeros(jump.normal.shape)
         pressure[self._near] = cones.force / jump.weight[self._near]
         friction[self._frictional] = -cones.friction / jump.weight[self._frictional, None]
         return replace(self._state, forces=Multipliers.of(jump, pressure, friction))
 
-    def gap(self) -> float:
-        """Return slacks times forces, over the work of loads and contact. Collective."""
+    def relative_gap(self) -> float:
+        """Return the duality gap over the work of loads and contact. Collective."""
         body, interface, x = self.problem.equilibrium, self.problem.interface, self._state.x
         jump, cones, nodal = interface.jump, self.cones, interface.jump.apply(x)
         ways = np.abs(jump.gap) + np.abs(jump.normal_component(nodal))
@@ -217,7 +220,7 @@ class InteriorPoint:
         own = body.owned_part(x)[: body.owned]
         forces = body.internal_forces(replace(self._state, x=x)), body.external(self._state.time)
         works = [abs(self._sum(float(own @ force[: body.owned]))) for force in forces]
-        return cones.work() / ((contact + sum(works)) or 1.0)
+        return cones.duality_gap() / ((contact + sum(works)) or 1.0)
 
     def step(self) -> bool:
         """Take a step; False if rounding lets no more be taken. Collective."""
@@ -252,7 +255,7 @@ class InteriorPoint:
                 constants, closed, jump.tangential_component(moved)[frictional] + slip
             )
 
-        dx, step, length = central(cones, solve)
+        dx, step, length = predictor_corrector(cones, solve)
         if not (np.isfinite(length) and length > 1e-12):
             return False
         x = body.prescribe(body.moved(state.x, length * dx), state.time)
@@ -265,23 +268,23 @@ class InteriorPoint:
 Solve = Callable[[tuple[Array, Array]], tuple[Array, Step]]
 
 
-def central(cones: Cones, solve: Solve) -> tuple[Array, Step, float]:
-    """Return the step of the body, that of the cones, and how much of both is to be taken.
+def predictor_corrector(cones: Cones, solve: Solve) -> tuple[Array, Step, float]:
+    """Return Mehrotra's step of the body, that of the cones, and the part of both to take.
 
     Parameters
     ----------
     cones
-        The point of the method, scaled.
+        The present slacks and multipliers, scaled.
     solve
         Solves the linearised problem; both times with the same matrix.
     """
-    now, degree = cones.work(), max(cones.degree, 1)
+    now, degree = cones.duality_gap(), max(cones.degree, 1)
     dx, affine = solve(cones.affine_target())
-    length = min(1.0, cones.longest(affine))
+    length = min(1.0, cones.to_boundary(affine))
     if length == 0:  # the system is singular to rounding
         return dx, affine, length
-    centre = (cones.work_after(affine, length) / now) ** 3 if now > 0 else 0.0
+    centre = (cones.duality_gap_after(affine, length) / now) ** 3 if now > 0 else 0.0
     centre = max(0.0, centre)
     dx, step = solve(cones.target(affine, centre * now / degree))
     share = min(LONGEST, max(SHORTEST, 1 - centre))
-    return dx, step, min(1.0, share * cones.longest(step))
+    return dx, step, min(1.0, share * cones.to_boundary(step))

@@ -1,8 +1,8 @@
 """Quasi-static load stepping with incremental friction.
 
-A step is a static problem with the loads of its end and the history of the last step's. It
-starts from a prediction, and a method that has factorised a linear body does not do so again. A
-step that fails is halved; the steps before it stay.
+A step is a static problem with the loads at its end and the history at its beginning. It starts
+from a prediction, and a linear body is factorised once for all steps. A step that fails is halved;
+the steps before it stay. Where the loads grow from zero this is continuation in the load.
 """
 
 from __future__ import annotations
@@ -198,7 +198,7 @@ def since(now: Counters, before: Counters) -> Counters:
     return Counters(**{name: count - vars(before)[name] for name, count in vars(now).items()})
 
 
-#: Largest part of the last step's way that the prediction adds to it.
+#: Largest ratio of the predicted increment of the solution to that of the last step.
 FARTHEST = 2.0
 
 

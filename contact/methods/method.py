@@ -1,4 +1,4 @@
-"""The protocol of all methods, and these by their names."""
+"""The protocol `Method` of all methods, and the methods by name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contact.typing import Array
 
 
 class Method(Protocol):
-    """A solver of one problem: from a state to another one, and how that went.
+    """A solver of one problem: it takes an initial guess to a state and its `Outcome`.
 
     A new one is a class with these that is made of a problem, its options and a monitor; its
     options, with an entry in `contact.methods.options.OPTIONS`; and an entry in

@@ -1,32 +1,35 @@
 """Semismooth Newton method, a primal-dual active set strategy: the default solver; its fallbacks.
 
 1. Complementarity functions p - max(0, p + c (u_nu - rho)) and lambda - proj(lambda + c u_tau)
-   state contact and friction at each node. Their values tell the active sets: which nodes are
-   open, stick or slip. Each of them has a generalised derivative there.
+   state contact and friction at each node. Their arguments define the active set: which nodes are
+   open, stick or slip (`contact.interface.active_set`). On it each has a generalised derivative
+   (`contact.interface.complementarity`).
 2. A step linearises material, contact, friction, layer and current together (`newton_step`). The
    multipliers are eliminated node by node with the augmentation parameter gamma, so that one
    linear system in the unknowns of the body is left: with gamma far above the stiffness of the
-   body its solution meets u_nu = rho and u_tau = 0 (`contact.interface.complementarity`). No line
-   search: the active sets find themselves.
+   body its solution meets u_nu = rho and u_tau = 0. Steps are taken whole, without a line search:
+   the residuals may rise while the active set changes, and the stagnation limit bounds how long.
 3. Where the contact nodes are few, the body is condensed onto them first: a step then linearises
    the material, and a Newton method of its own solves contact on the Schur complement
    (`condensed_step`).
-4. The iteration ends with the residuals of the problem, computed from scratch, or with their
-   stagnation: the active sets cycle. It ends after one step where c overestimates the stiffness.
+4. The iteration ends by the residuals of the problem, computed from scratch, or by their
+   stagnation: the active sets cycle. On the whole body it also ends after a first step whose
+   penetration shows that c is far above the stiffness of the body, as on slender ones.
 
-Fallbacks, in this order, where a stage has ended without convergence, and a step without contact
-forces does not solve the problem:
+Where a stage has ended without convergence, the state with all nodes open is tried, at the cost of
+one linear solve. If it is no solution the fallbacks follow, in this order:
 
-1. the condensed body for the whole one, or the whole for the condensed one;
-2. on a condensed body through whose contact nodes charge passes, solutions followed from a
-   foundation that hardly conducts (`continuation`);
+1. the condensed body in place of the whole one, or the whole in place of the condensed one;
+2. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
+   foundation (`continuation`);
 3. on a condensed body that the supports do not constrain, a rigid motion to a state in which
-   nothing presses (`unconstrained_modes`);
+   all nodes are open (`unconstrained_modes`);
 4. a primal-dual interior point on the same operator, which finds the active sets, with the friction
    bound updated outside, and Newton's last steps from there (`interior_point`). A converged
-   solution in which contact has pushed a body aside is compared with its solution too.
+   solution in which contact has moved a body to where nothing constrains it, although friction
+   could, gives way to that of the interior point if there is one.
 
-The notes of the history say which.
+The notes of the history name them.
 
 References
 ----------
@@ -54,14 +57,17 @@ from contact.interface.active_set import touching
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
+from contact.methods.complementarity_parameters import (
+    complementarity_parameters,
+    overestimates_stiffness,
+)
 from contact.methods.condensed_step import CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation
 from contact.methods.interior_point import INTERIOR_POINT, interior_point
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep, Step
 from contact.methods.options import NewtonOptions
-from contact.methods.parameters import complementarity_parameters, overestimates_stiffness
-from contact.methods.progress import PROGRESS, Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import IterationHistory, Monitor, Outcome
+from contact.methods.stagnation import PROGRESS, Best, Stagnation, undeformed_equilibrium
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
 from contact.problem.problem import ContactProblem
@@ -76,8 +82,8 @@ logger = logging.getLogger("contact.solver")
 RIGID_MOTION = "rigid motion"
 FALLBACKS = CONTINUATION, RIGID_MOTION, INTERIOR_POINT
 
-#: Stagnation limit where another way follows, or has gone before: the whole body where it can be
-#: condensed, and Newton's last steps.
+#: Stagnation limit where another stage follows, or has gone before: of the whole body where it can
+#: be condensed, and of Newton's last steps.
 SHORT = 4
 
 #: The same in a continuation: condensed steps cost little beside another value of the parameter,
@@ -103,7 +109,7 @@ class Newton:
     parameters
         Parameters of the complementarity functions; chosen from the body by default.
     modes
-        Of a condensed problem that of the whole one, whose supports it does not see.
+        Rigid-body modes; a condensed problem, which has no supports, is given those of the whole.
     """
 
     problem: Problem
@@ -232,17 +238,18 @@ class Newton:
         return iterate, outcome
 
     def _without_forces(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
-        """Return where a step without contact forces ends, if that solves it. Collective.
+        """Return the state with all nodes open, if it solves the problem. Collective.
 
-        Active sets may cycle on forces that are all rounding of others. Not of bodies that contact
-        alone restrains: moved aside they may be in balance, but others hold them.
+        Active sets may cycle on contact forces that are rounding of the other forces. Not tried
+        where contact constrains a mode: a body moved aside may be in balance too, though friction
+        has another solution that holds it.
         """
         assert self.modes is not None
         if not self.modes.constrained_by_supports:
             return None
         try:
             state = self.whole.without_contact(iterate.state)
-        except SingularError:  # far away, where no material has a stiffness any more
+        except SingularError:  # at large strains, where the material has no stiffness any more
             self.whole.renew()
             return None
         residuals = evaluate(self.problem, state)
@@ -268,14 +275,14 @@ class Newton:
         return NewtonLoop(self.iteration, self._condensed_step()).run(iterate)
 
     def _fall_back(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
-        """Solve by continuation or the interior point, on the condensed body where there is one.
+        """Try the fallbacks in turn, on the condensed body where there is one.
 
-        Its many steps cost one factorisation of the body there. They begin with zero: where the
-        active sets cycle, a body may have moved far away.
+        Their many steps cost one factorisation of the body there. They start from the zero initial
+        guess: where the active sets cycle, a body may have moved far away.
         """
         iteration = self.iteration
         if isinstance(self.problem, CondensedProblem):
-            found = self._conducting(self.problem) or self._separated(outcome)
+            found = self._continuation(self.problem) or self._separated(outcome)
             if found is not None:
                 return found
         elif self._condensable and not self._pays and iteration.left > 0:
@@ -289,8 +296,8 @@ class Newton:
             iterate, outcome = interior_point(iteration, self.whole, self.modes, self.last_steps)
         return iterate, outcome
 
-    def _conducting(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
-        """Follow solutions from a foundation that hardly conducts, if it conducts."""
+    def _continuation(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
+        """Solve by continuation in the conductivity of the foundation, if it conducts."""
         interface = problem.interface
         if interface.law.conductor is None:
             return None
@@ -307,7 +314,7 @@ class Newton:
         return continuation(solve, Iterate(problem.start()))
 
     def _separated(self, outcome: Outcome) -> tuple[Iterate, Outcome] | None:
-        """Return a state in which nothing presses, where pushed bodies come to it. Collective."""
+        """Return a state with all nodes open that a rigid motion leads to, if any. Collective."""
         problem, modes = self.problem, self.modes
         if outcome.converged or not isinstance(problem, CondensedProblem):
             return None
@@ -317,7 +324,7 @@ class Newton:
         state = modes.separated(problem, self.whole.operator, self._parameters.nodal_stiffness)
         if state is None:
             return None
-        # All forces are rounding then: they are measured by those without the motion.
+        # All forces are rounding then: they are relative to those at zero displacement.
         body = problem.equilibrium
         left, first = (
             body.norm(body.unbalanced(residual_forces(problem, at)))
@@ -397,7 +404,7 @@ class NewtonLoop:
         residuals = evaluate(problem, iterate.state)
         pressed = self._largest_pressure(iterate)
         limit = self.stagnation_limit or options.stagnation_limit
-        stagnation = Stagnation(limit, PROGRESS, together=True)
+        stagnation = Stagnation(limit, PROGRESS, cumulative=True)
         if iterate.active_set is not None and residuals.significant <= options.tolerance:
             iteration.see(iterate, residuals)
             iteration.history.record(residuals, f"{note} initial guess".strip(), inner=0)

@@ -1,7 +1,7 @@
 """One step of Newton's method: contact, friction, layer and current linearised together.
 
-The nodal multipliers are condensed onto the displacement, so that the linear systems keep the
-size and the pattern of the elastic ones.
+The nodal multipliers are eliminated node by node (`contact.interface.complementarity.linearise`),
+so that the linear systems keep the size and the pattern of the elastic ones.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.conductivity_derivative import ConductivityDerivative
 from contact.methods.options import NewtonOptions
-from contact.methods.progress import Best
 from contact.methods.report import IterationHistory, Record
+from contact.methods.stagnation import Best
 from contact.problem.protocols import Problem
 from contact.problem.residuals import Residuals, residual_forces
 from contact.problem.state import State
@@ -39,12 +39,12 @@ FORCING = 1e-2
 #: two digits the active set may cycle. Its least value is the tolerance.
 STAGNANT = 3
 
-#: Levenberg-Marquardt regularisation of underconstrained bodies, over a node's stiffness and the
-#: residual.
+#: Levenberg-Marquardt regularisation of underconstrained bodies, over the stiffness of a node times
+#: the residual.
 REGULARISATION = 1e-2
 
-#: Equilibrium residual over the largest one below which the material is left as it was linearised
-#: last: the error is in contact and friction.
+#: Ratio of the equilibrium residual to the largest one below which the last linearisation of the
+#: material is used again: the error is in contact and friction.
 SMALL = 0.1
 
 
@@ -57,7 +57,7 @@ class Iterate:
     state
         Unknowns and contact forces.
     active_set
-        Which nodes were open, stuck or slipped in that step; None before the first one.
+        Which nodes were open, stick or slip in that step; None before the first one.
     layer_pressure
         Pressure of the linearised layer after it, shape (n,); None for that of the state.
     linearised_at
@@ -73,12 +73,12 @@ class Iterate:
 
 @dataclass(frozen=True)
 class StepResult:
-    """A step that was taken.
+    """The result of a step.
 
     Attributes
     ----------
     iterate
-        Where it led.
+        The new iterate.
     note
         Its kind in the history, empty for a plain step.
     inner
@@ -187,7 +187,7 @@ class NewtonStep:
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
     def renew(self) -> None:
-        """Forget the operator after a solve that failed: MUMPS does not begin anew after that."""
+        """Make a new operator in the next step: MUMPS does not recover from a failed solve."""
         self._kind, self._operator = "", None
 
     def _forcing_term(self, reached: float) -> float:
@@ -224,7 +224,7 @@ class NewtonStep:
         self.operator.update("secant", state, weighted, constant=body.linear)
 
     def without_contact(self, state: State, rtol: float | None = None) -> State:
-        """Return where a state would go without contact forces, by one solve. Collective."""
+        """Return the state after one linear solve with all nodes open. Collective."""
         problem, jump = self.problem, self.problem.interface.jump
         body, free = problem.equilibrium, replace(state, forces=Multipliers.zero(jump))
         self.assemble(free, np.zeros((jump.nodes.size, jump.block_size, jump.block_size)))
@@ -303,9 +303,9 @@ def linearised_layer(
 ) -> tuple[Array, Array]:
     """Linearise the layer; return its block, and how it differs from the layer's force.
 
-    It is linearised where the law is met from the pressure and the displacement of the step
-    before together, as the active set is. Linearised about the displacement
-    alone, a layer stiffer than the body cycles between its regimes.
+    Like the active set, the place of the linearisation follows from pressure and displacement
+    together: it is the point of the law with their sum p + c u_nu. Linearised about the
+    displacement alone, a layer stiffer than the body cycles between its regimes.
     """
     law, jump, c = interface.law, interface.jump, parameters.c
     graph = law.normal_law(nodal)

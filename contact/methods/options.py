@@ -168,7 +168,7 @@ class NewtonOptions(Options):
     max_iterations
         Number of steps allowed in each stage.
     gamma
-        Stiffness of the condensed constraints over that of the body.
+        Augmentation parameter: stiffness of the eliminated constraints over that of the body.
     stagnation_limit
         Steps without progress after which the stage is given up.
     softening

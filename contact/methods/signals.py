@@ -1,4 +1,4 @@
-"""Stop a solve between its iterations, on all ranks together, and a run anywhere else."""
+"""Signals of the operating system: they end a solve between iterations, on all ranks together."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Rigid-body modes of a problem's bodies: constrained by supports, by contact or by friction alone.
 
-Where friction alone constrains a mode, a method cannot begin without friction, nor with the bound
-of pressures that are not known yet: the linear system would be singular. The nodes that touch first
-are taken for sticking.
+Where friction alone constrains a mode, the linear systems are singular without friction, and at
+zero displacement there are no pressures yet that would give a friction bound. The nodes that touch
+first are therefore given a bound at which they stick (`UnconstrainedModes.stuck_bound`).
 
 Where nothing constrains a mode at a solution, a rigid motion costs nothing: of all solutions the
 one is taken whose displacements have the least norm in L2.
@@ -46,22 +46,22 @@ from contact.problem.state import State
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 
-#: Force that a node can bear by friction then, over all loads.
+#: Friction bound of such a node, as a force over all loads.
 STUCK = 10.0
 
 
 @dataclass(frozen=True)
 class _RigidMotion:
-    """Rigid motions that are free at a solution, and how much of each is taken off.
+    """Rigid motions that nothing constrains at a solution, and the amounts to subtract.
 
     Attributes
     ----------
     motions, columns
         Of the whole problem's unknowns, shape (unknowns, m), and of the jumps, (n, d, m).
     wanted, amounts
-        For the least displacements of all, and for the least that pass through nothing, (m,).
+        For the least norm of the displacements, and for the least without penetration, (m,).
     depth
-        How deep the first would pass through (length); 0 for not at all.
+        Penetration with `wanted` (length); 0 without any.
     limited
         Whether that is more than rounding.
     """
@@ -157,10 +157,10 @@ class UnconstrainedModes:
     def separated(
         self, problem: CondensedProblem, operator: Operator, stiffness: float
     ) -> State | None:
-        """Return a state in which nothing presses: bodies that others push move off. Collective.
+        """Return a state with all nodes open, by a rigid motion along the push. Collective.
 
-        As far as they are pushed: farther aside, out of a wedge, friction might hold them. None
-        where that does not suffice.
+        None where the motion would lead aside, more than 45 degrees off the push: out of a wedge,
+        say, in which friction might hold the body.
 
         Parameters
         ----------
@@ -169,8 +169,8 @@ class UnconstrainedModes:
         operator
             That of its body.
         stiffness
-            Of a node (stress/length): next to nothing of it makes the system regular. Rigid
-            motions are left as they are then, and a second, proximal step takes its forces off.
+            Of a node (stress/length). A proximal term of sqrt(EPS) times it makes the system
+            regular and leaves rigid motions as they are; a second step removes its forces.
         """
         jump, start = problem.interface.jump, problem.start()
         blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
@@ -231,9 +231,9 @@ class UnconstrainedModes:
         return _RigidMotion(whole, moved, wanted, amounts, depth, limited)
 
     def pushed_aside(self, problem: Problem, state: State) -> bool:
-        """Tell whether contact has pushed a body to where nothing holds it. Collective.
+        """Tell whether contact has moved a body to where nothing constrains it. Collective.
 
-        With friction there may be another solution, in which it is held.
+        With friction there may be another solution, in which it is constrained.
         """
         if not problem.interface.friction.acts or self.constrained_by_supports:
             return False

@@ -24,14 +24,14 @@ from contact.interface import complementarity
 from contact.linear import block, dense, multigrid
 from contact.methods import (
     chord,
+    complementarity_parameters,
     condensed_step,
     conductivity_derivative,
     continuation,
     interior_point,
     newton,
     newton_step,
-    parameters,
-    progress,
+    stagnation,
 )
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -147,9 +147,9 @@ DEVICES = (
     Device("sticking start where friction alone restrains", (UnconstrainedModes.stuck_bound,), "-",
            ((UnconstrainedModes, "stuck_bound", _nothing),)),
     Device("continuation in the conductivity", (continuation,), "Allgower and Georg 2003",
-           ((Newton, "_conducting", _nothing),)),
+           ((Newton, "_continuation", _nothing),)),
     Device("estimate of the stiffness from the first step",
-           (parameters.overestimates_stiffness,), "-",
+           (complementarity_parameters.overestimates_stiffness,), "-",
            ((newton, "overestimates_stiffness", lambda *_: False),)),
     Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
            ((newton_step, "REGULARISATION", 0.0),)),
@@ -171,7 +171,7 @@ DEVICES = (
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
            _block),
     Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
-    Device("zero displacement where nothing acts", (progress.undeformed_equilibrium,), "-",
+    Device("zero displacement where nothing acts", (stagnation.undeformed_equilibrium,), "-",
            ((newton.NewtonLoop, "_loss_of_contact", _nothing),)),
     Device("no contact forces where supports hold a body", (Newton._without_forces,), "-",
            ((Newton, "_without_forces", _nothing),)),

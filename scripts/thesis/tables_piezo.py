@@ -11,7 +11,7 @@ import numpy as np
 
 from contact import Case, Solution, build_problem, load_case
 from contact.linear.operator import SparseOperator
-from contact.methods.parameters import automatic_r
+from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.thesis.uzawa import augmentation
 from contact.output.resultants import charge_balance
 from contact.problem.problem import ContactProblem

@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from contact.interface.friction import Friction
 from contact.linear.operator import SparseOperator
+from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.options import FixedPointOptions
-from contact.methods.parameters import automatic_r
 from contact.methods.thesis.fixed_point import FixedPoint
 from contact.methods.thesis.uzawa import augmentation
 from contact.output.resultants import charge_balance

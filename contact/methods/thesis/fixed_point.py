@@ -20,9 +20,9 @@ from typing import ClassVar
 import numpy as np
 
 from contact.linear.operator import Operator
+from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.conductivity_derivative import ConductivityDerivative
 from contact.methods.options import FixedPointOptions
-from contact.methods.parameters import automatic_r
 from contact.methods.report import Outcome
 from contact.methods.thesis.outer_loop import NEAR, OuterLoop
 from contact.methods.thesis.uzawa import augmentation, split, uzawa_block_relaxation

@@ -32,7 +32,7 @@ from contact.interface.nodes import ContactNodes
 from contact.linear.multigrid import TOLERANCE
 from contact.linear.operator import Operator
 from contact.methods.options import FixedPointOptions
-from contact.methods.progress import Stagnation
+from contact.methods.stagnation import Stagnation
 from contact.methods.thesis.acceleration import ResidualMinimiser
 from contact.problem.protocols import Problem
 from contact.problem.residuals import residual_forces

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from contact.interface.friction import Friction
 from contact.methods.options import FixedPointOptions, PenaltyOptions
-from contact.methods.progress import Best, Stagnation
+from contact.methods.stagnation import Best, Stagnation
 from contact.methods.thesis.fixed_point import FixedPoint
 from contact.methods.thesis.penalty import Penalty
 from contact.problem.residuals import evaluate
@@ -63,7 +63,7 @@ def test_the_best_iterate_is_left_where_the_last_one_is_worse(
 
 @pytest.mark.parametrize(("rate", "given_up"), [(0.4, False), (0.8, False), (0.95, True)])
 def test_steps_together_make_progress_where_they_halve_the_measure_in_time(rate, given_up):
-    stagnation = Stagnation(limit=8, progress=0.5, together=True)
+    stagnation = Stagnation(limit=8, progress=0.5, cumulative=True)
     assert any(stagnation(rate**step) for step in range(40)) == given_up
 
 
@@ -73,6 +73,6 @@ def test_each_step_by_itself_is_compared_with_the_best_one():
 
 
 def test_what_rises_again_is_compared_with_the_last_progress():
-    stagnation = Stagnation(limit=3, progress=0.5, together=True)
+    stagnation = Stagnation(limit=3, progress=0.5, cumulative=True)
     assert [stagnation(at) for at in (1.0, 0.6, 0.9, 0.45, 0.6, 0.5, 0.3)] == 6 * [False] + [True]
     assert stagnation.best == 0.3

@@ -1,4 +1,4 @@
-"""The progress of an iteration: its best iterate, and the limit of its stagnation."""
+"""Stagnation limit of an iteration, its best iterate, and equilibrium at zero displacement."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contact.problem.protocols import Problem
 from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
 
-#: Part of the least residual below which a step is progress.
+#: Ratio to the least residual so far below which a residual counts as progress.
 PROGRESS = 0.5
 
 T = TypeVar("T")
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 @dataclass
 class Best(Generic[T]):
-    """The iterate with the least residual, which a method leaves where it fails.
+    """The iterate with the least residual, which a method returns where it fails.
 
     Attributes
     ----------
@@ -45,36 +45,36 @@ class Stagnation:
     limit
         Steps without progress after which the iteration is given up.
     progress
-        A measure below this part of the best one is progress.
-    together
-        Whether steps make progress together too: the reference is the best measure at the last
-        progress, not that of the step before. Where steps are to halve the measure, ones that
-        take a fifth of it each would be given up else.
+        Ratio to the reference below which a measure is progress.
+    cumulative
+        Whether the decrease over several steps counts: the reference is then the least measure at
+        the last progress, else the least of all steps before. With a ratio of 1/2, steps that
+        reduce the measure by a fifth each would be given up else.
     best
         The least measure so far.
     """
 
     limit: int
     progress: float
-    together: bool = False
+    cumulative: bool = False
     best: float = np.inf
     _since: int = 0
     _reference: float = np.inf
 
     def __call__(self, measure: float, limit: int | None = None) -> bool:
-        """Take note of a step's measure; tell whether to give up.
+        """Count a step by its measure; tell whether the limit is reached.
 
         Parameters
         ----------
         measure
             The residual, or another number that is to vanish.
         limit
-            In place of that of all steps.
+            Limit for this step in place of the attribute.
         """
         gained = measure < self.progress * self._reference
         self._since = 0 if gained else self._since + 1
         self.best = min(self.best, measure)
-        if gained or not self.together:
+        if gained or not self.cumulative:
             self._reference = self.best
         return self._since >= (self.limit if limit is None else limit)
 
@@ -82,9 +82,9 @@ class Stagnation:
 def undeformed_equilibrium(problem: Problem, tolerance: float) -> tuple[State, Residuals] | None:
     """Return zero displacement and its residuals, where it is in equilibrium. Collective.
 
-    Beside forces that vanish no residual is small, and only those that are 0 have none: a method
-    that comes nearer and nearer to them never ends. Asked where a method has failed: a body that
-    friction has locked in may be in equilibrium elsewhere.
+    Residuals are relative to the forces that act. Where all of these vanish in the limit, as at
+    zero displacement without loads, a method that approaches it never has a small residual, and
+    does not end. Asked only where a method has failed: with friction there may be other solutions.
     """
     state = problem.start()
     residuals = evaluate(problem, state)

@@ -1,4 +1,7 @@
-"""Parameters of the complementarity functions: stiffnesses of a block of the body's height."""
+"""Parameters c and gamma of the complementarity functions, and r of the Uzawa block relaxation.
+
+All are stiffnesses (stress/length) of a block that has the height of the body.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,8 @@ from contact.problem.protocols import Problem, Scales
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 
-#: Forces that c makes of the first penetration, over the loads, from which on c overestimates the
-#: stiffness of the body. Of a block, whose stiffness c is, they are some sqrt(H/h).
+#: Ratio of c times the penetration of the first step to the loads above which c overestimates the
+#: stiffness of the body. It is about sqrt(H/h) for a block, whose stiffness c estimates.
 OVERESTIMATE = 1e3
 
 
