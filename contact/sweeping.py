@@ -30,7 +30,7 @@ from contact.case.messages import listed
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
 from contact.mesh.domain import Domain
-from contact.methods.load_stepping import Reached, predicted, since, solve_step
+from contact.methods.load_stepping import Reached, predicted, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
@@ -422,7 +422,7 @@ class _Runner:
         end = Reached.of(problem, state)
         self._reached = [*ends[-1:], end] if outcome.converged else []
         check_potential(problem, state)
-        counters = since(method.counters, counted)
+        counters = method.counters - counted
         return Solution(problem, state, outcome, method.history, counters, name, seconds={})
 
 

@@ -69,6 +69,10 @@ class Counters:
     linear_iterations: int = 0
     contact_solves: int = 0
 
+    def __sub__(self, before: Counters) -> Counters:
+        """Return the counts since an earlier moment."""
+        return Counters(**{name: count - vars(before)[name] for name, count in vars(self).items()})
+
 
 class Operator(Protocol):
     """Solves with a bulk matrix plus blocks at nodes, sparse or dense."""

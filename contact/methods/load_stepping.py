@@ -130,9 +130,11 @@ class Evolution:
         return LoadStep(problem, state, outcome, IterationHistory(), Counters())
 
     def _at(self, time: float) -> ContactProblem:
-        """Return the problem of a step that ends at a time."""
+        """Return the problem of a step that ends at a time, with the history of the last one."""
         problem, last = self.problem, self._last
-        return problem.at(time) if last is None else after(problem, last, time)
+        if last is None:
+            return problem.at(time)
+        return problem.at(time, problem.commit(last), since=last.time)
 
     def _solve(self, time: float) -> LoadStep:
         last, method = self._last, self.method
@@ -145,7 +147,7 @@ class Evolution:
             start, linearised_at = predicted(problem, Reached.of(problem, last), before)
         self._modes.problem = problem
         state, outcome = solve_step(problem, method, start, linearised_at, self._modes)
-        return LoadStep(problem, state, outcome, method.history, since(method.counters, counted))
+        return LoadStep(problem, state, outcome, method.history, method.counters - counted)
 
 
 def solve_step(
@@ -176,26 +178,6 @@ def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[S
     x = problem.equilibrium.prescribe(state.x, problem.time)
     state = replace(state, x=x, time=problem.time, history=problem.history)
     return state, replace(outcome, kkt=evaluate(problem, state))
-
-
-def after(problem: ContactProblem, state: State, time: float) -> ContactProblem:
-    """Return the step of a problem that follows a state.
-
-    Parameters
-    ----------
-    problem
-        The problem at any step.
-    state
-        Where it is, with the history of the step that led there.
-    time
-        End of the step.
-    """
-    return problem.at(time, problem.commit(state), since=state.time)
-
-
-def since(now: Counters, before: Counters) -> Counters:
-    """Return the counts since an earlier moment."""
-    return Counters(**{name: count - vars(before)[name] for name, count in vars(now).items()})
 
 
 #: Largest ratio of the predicted increment of the solution to that of the last step.
