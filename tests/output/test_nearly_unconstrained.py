@@ -1,4 +1,4 @@
-"""What is said of bodies that contact resists by next to nothing."""
+"""Warnings about bodies whose rigid motion contact resists by next to nothing."""
 
 import pytest
 from mpi4py import MPI

@@ -1,4 +1,4 @@
-"""Evolutions in the middle of which loads let a body go that contact alone holds."""
+"""Evolutions whose loads change so that contact alone no longer constrains a body."""
 
 import pytest
 from mpi4py import MPI

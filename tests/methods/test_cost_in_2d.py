@@ -1,4 +1,4 @@
-"""What a material that yields costs in the plane: factorisations and steps, not seconds."""
+"""Cost of a material in the plastic range in 2-D: factorisations and steps, not seconds."""
 
 from __future__ import annotations
 

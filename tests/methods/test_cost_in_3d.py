@@ -1,4 +1,4 @@
-"""Newton's method with multigrid: what it costs in set-ups and iterations, not in seconds."""
+"""Cost of Newton's method with multigrid in 3-D: set-ups and iterations, not seconds."""
 
 from __future__ import annotations
 
