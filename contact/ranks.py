@@ -1,4 +1,4 @@
-"""Work and errors of one rank for all, which else wait for ever; values of neighbouring ranks."""
+"""Work and errors of one rank for all, which else wait for ever; sums; values of neighbours."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from contact.errors import InputError
 from contact.typing import Array
@@ -59,6 +59,16 @@ def on_each(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
         except OSError as error:
             raise refused(error) from None
     return result  # type: ignore[no-any-return]
+
+
+def summed(comm: MPI.Comm, values: ArrayLike) -> Array:
+    """Return the sums over all ranks of values of the same shape on each. Collective.
+
+    They are sent as they are: pickled, a number of NumPy takes twenty times as long.
+    """
+    sums = np.array(values, dtype=np.float64, order="C")
+    comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+    return sums
 
 
 def exchanged(

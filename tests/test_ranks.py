@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact.history import BodyState
 from contact.linear.dense import DenseOperator
 from contact.linear.operator import Counters
-from contact.ranks import on_all_ranks, on_root
+from contact.ranks import on_all_ranks, on_root, summed
 from tests.conftest import _covering
 
 COMM = MPI.COMM_WORLD
@@ -45,6 +45,19 @@ def test_a_dense_factorisation_without_room(monkeypatch):
     monkeypatch.setattr(DenseOperator, "_factorise", lambda *_: fails())
     with pytest.raises(MemoryError, match="no room"):
         operator.update("tangent", BodyState(np.zeros(2)), np.ones((1, 2, 2)))
+
+
+@pytest.mark.parallel
+def test_sums_over_all_ranks():
+    """Of numbers and arrays, in any order in memory, with none at all."""
+    own, ranks = 1.0 + COMM.rank, sum(range(1, COMM.size + 1))
+    given = own * np.arange(6.0).reshape(2, 3)
+    assert float(summed(COMM, np.float64(own))) == ranks
+    # that of rank 0 lies in memory by columns
+    found = summed(COMM, given if COMM.rank else np.asfortranarray(given))
+    assert np.array_equal(found, ranks * np.arange(6.0).reshape(2, 3))
+    assert summed(COMM, np.zeros((0, 3))).shape == (0, 3)
+    assert given[0, 1] == own, "the given values are changed"
 
 
 def test_on_several_ranks_each_value_of_each_parameter_stays():

@@ -17,6 +17,7 @@ from contact.body.global_unknowns import GlobalUnknowns
 from contact.linear.krylov import Components
 from contact.mesh.domain import Domain
 from contact.mesh.entities import component_sums, graph_components
+from contact.ranks import summed
 from contact.typing import Array
 
 
@@ -87,7 +88,7 @@ class ComponentNorms:
         owned = values.size - self.behind.size
         own, other = values[:owned], values[owned:]
         if self.count == 1:
-            square = self.comm.allreduce(np.dot(own, own), op=MPI.SUM) + np.dot(other, other)
+            square = summed(self.comm, np.dot(own, own)) + np.dot(other, other)
             return np.array([np.sqrt(square)])
         component = np.repeat(self.component, self.block_size)
         squares = component_sums(self.comm, component, own**2, self.count)

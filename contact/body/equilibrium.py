@@ -43,6 +43,7 @@ from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import components
+from contact.ranks import summed
 from contact.tolerances import MOST_ROUNDING
 from contact.typing import Array
 
@@ -454,12 +455,12 @@ class BodyEquilibrium:
     def product(self, one: Array, other: Array) -> float:
         """Return the inner product of owned values, global ones behind them. Collective."""
         own, n = np.dot(one[: self.owned], other[: self.owned]), self.owned
-        return float(self.comm.allreduce(own, op=MPI.SUM) + np.dot(one[n:], other[n:]))
+        return float(summed(self.comm, own) + np.dot(one[n:], other[n:]))
 
     def products(self, ones: Array, others: Array) -> Array:
         """Return the inner products of columns of local values, as a matrix. Collective."""
         n, behind = self.owned, ones.shape[0] - self.global_unknowns.size
-        own = self.comm.allreduce(ones[:n].T @ others[:n], op=MPI.SUM)
+        own = summed(self.comm, ones[:n].T @ others[:n])
         return np.asarray(own + ones[behind:].T @ others[behind:])
 
     def sizes(self, values: Array) -> Array:

@@ -24,6 +24,7 @@ from contact.body.description import Body
 from contact.body.rigid import Bolt, Electrode, Rigid, rigid_motions
 from contact.errors import InputError
 from contact.mesh.domain import Domain
+from contact.ranks import summed
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
@@ -159,7 +160,7 @@ class GlobalUnknowns:
         """Return the forces on q of those on owned unknowns: R^T f, shape (m,). Collective."""
         if not self.tying:
             return np.zeros(self.size)
-        return np.asarray(self.comm.allreduce(self.ties.T @ forces, op=MPI.SUM))
+        return summed(self.comm, self.ties.T @ forces)
 
     def with_foundations(self, nodes: NDArray[np.int32], motion: Array) -> sparse.csr_array:
         """Return R at the nodes that follow and at contact nodes, shape (owned, m).

@@ -28,7 +28,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.arguments import expect
 from contact.case.build import build_problem
@@ -62,6 +61,7 @@ from contact.problem.linearised_steps import (
 )
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.ranks import summed
 from contact.typing import Array
 
 logger = logging.getLogger("contact.sensitivity")
@@ -444,4 +444,4 @@ def _adjoint(
 
 def _total(problem: ContactProblem, one: Array, other: Array) -> float:
     """Return the inner product of values at places of all ranks. Collective."""
-    return float(problem.comm.allreduce(float(np.sum(one * other)), op=MPI.SUM))
+    return float(summed(problem.comm, np.sum(one * other)))

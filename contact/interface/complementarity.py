@@ -23,12 +23,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.interface.active_set import ActiveSet
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
+from contact.ranks import summed
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -223,7 +223,7 @@ def linearise(
     size = np.linalg.norm(trial, axis=1)
     closed, sticks, slips = active.closed, active.sticks, active.slips
     changed = before is None or not active.same(before)
-    unchanged = interface.comm.allreduce(int(changed), op=MPI.SUM) == 0
+    unchanged = float(summed(interface.comm, changed)) == 0
 
     pressure = np.where(closed, p - parameters.gamma * opening, 0.0)
     blocks = np.zeros((p.size, jump.block_size, jump.block_size))

@@ -16,6 +16,7 @@ from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.linear.constraint import Change
 from contact.mesh.entities import component_sums
+from contact.ranks import summed
 from contact.tolerances import EPS, NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 
@@ -171,8 +172,8 @@ class Interface:
         """
         closed = active.closed | (self.law.layer_pressure(nodal) > 0)
         sticks = closed & active.sticks
-        local = np.array([np.sum(~closed), np.sum(sticks), np.sum(closed & ~sticks)])
-        opened, stick, slip = self.comm.allreduce(local, op=MPI.SUM).tolist()
+        local = [np.count_nonzero(nodes) for nodes in (~closed, sticks, closed & ~sticks)]
+        opened, stick, slip = (int(count) for count in summed(self.comm, local))
         return opened, stick, slip
 
     def rounding(self, nodal: Array) -> float:

@@ -15,6 +15,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.interface.mortar.operator import CouplingOperator
+from contact.ranks import summed
 from contact.typing import Array
 
 
@@ -139,7 +140,7 @@ class ContactNodes:
         values[self.nodes[own]] += nodal[own]
         if self.motion is not None:
             total = np.einsum("ni,nim->m", nodal, self.motion[:, :size])
-            into[into.size - total.size :] -= self.comm.allreduce(total, op=MPI.SUM)
+            into[into.size - total.size :] -= summed(self.comm, total)
 
     def normal_component(self, u: Array) -> Array:
         """Return u . nu, shape (n,), of vectors of shape (n, >= d)."""
@@ -156,7 +157,7 @@ class ContactNodes:
 
     def sum(self, values: Array) -> float:
         """Return the lumped integral of nodal values over Gamma_3."""
-        return float(self.comm.allreduce(np.dot(self.weight, values), op=MPI.SUM))
+        return float(summed(self.comm, np.dot(self.weight, values)))
 
     def norm(self, values: Array) -> float:
         """Return the lumped L2(Gamma_3) norm of scalars (n,) or vectors (n, d)."""
@@ -165,7 +166,7 @@ class ContactNodes:
 
     def maximum(self, values: Array, default: float = 0.0) -> float:
         """Return the largest nodal value over all ranks."""
-        return float(self.comm.allreduce(np.max(values, initial=default), op=MPI.MAX))
+        return float(self.comm.allreduce(float(np.max(values, initial=default)), op=MPI.MAX))
 
     @cached_property
     def size(self) -> int:

@@ -35,6 +35,7 @@ from contact.history import Evaluated
 from contact.linear.layout import Layout, times
 from contact.linear.operator import Bulk, Counters, SparseOperator
 from contact.mesh.owners import Halo
+from contact.ranks import summed
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
@@ -165,7 +166,7 @@ class Constraint:
 
     def gathered(self, forces: Array) -> Array:
         """Return R^T f of owned forces, shape (owned,) or (owned, k). Collective."""
-        return np.asarray(self.layout.comm.allreduce(self.motions.T @ forces, op=MPI.SUM))
+        return summed(self.layout.comm, self.motions.T @ forces)
 
     def expand(self, y: Array) -> Array:
         """Return x = C y, q behind. Collective."""
@@ -377,7 +378,7 @@ class ConstrainedOperator:
 
     def _on_q(self, columns: Array, values: Array) -> Array:
         """Return columns^T times values, summed over the ranks. Collective."""
-        return np.asarray(self._bulk.layout.comm.allreduce(columns.T @ values, op=MPI.SUM))
+        return summed(self._bulk.layout.comm, columns.T @ values)
 
     def _eliminate(self, blocks: Array) -> None:
         """Eliminate those of q that anything resists, for an iterative solver. Collective."""

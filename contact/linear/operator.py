@@ -33,6 +33,7 @@ from contact.linear.layout import (
     times,
 )
 from contact.linear.multigrid import TOUCH, Hierarchy, held_motions
+from contact.ranks import summed
 from contact.typing import Array
 
 
@@ -285,12 +286,12 @@ class SparseOperator:
             As `solve`.
         """
         given = np.column_stack([self.layout.mask(side) for side in sides.T])
-        norm = float(np.sqrt(self.layout.comm.allreduce(np.sum(given**2))))
+        norm = float(np.sqrt(summed(self.layout.comm, np.sum(given**2))))
         if self.ksp.getPC().getFailedReason():
             check_overflow(self.layout, self.matrix.norm(), norm)
             raise no_solution(self.ksp.getPC(), self._prefix)
         found = mat_solve(self.ksp, given)
-        self._solved(1, norm, float(np.sqrt(self.layout.comm.allreduce(np.sum(found**2)))))
+        self._solved(1, norm, float(np.sqrt(summed(self.layout.comm, np.sum(found**2)))))
         return np.column_stack([self.layout.mask(x) for x in found.T])
 
     def _solved(self, iterations: int, rhs: float, solution: float) -> None:

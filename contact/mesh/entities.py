@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from contact._compat import lasting
 from contact.mesh.cells import shape_of
+from contact.ranks import summed
 
 Indices: TypeAlias = npt.NDArray[np.int32]
 
@@ -157,9 +158,7 @@ def component_sums(
     comm: MPI.Intracomm, component: npt.NDArray[Any], values: npt.NDArray[np.float64], count: int
 ) -> npt.NDArray[np.float64]:
     """Return the sums of the values of all ranks over each component, (count,). Collective."""
-    # Of no values at all numpy makes integers.
-    own = np.bincount(component, values, minlength=count).astype(np.float64)
-    return np.asarray(comm.allreduce(own, op=MPI.SUM))
+    return summed(comm, np.bincount(component, values, minlength=count))
 
 
 def graph_components(

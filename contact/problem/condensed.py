@@ -30,6 +30,7 @@ from contact.linear.schur import SchurComplement
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Scales
 from contact.problem.state import State
+from contact.ranks import summed
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
@@ -160,7 +161,7 @@ class CondensedBody:
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
-        return float(np.sqrt(self.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
+        return float(np.sqrt(summed(self.comm, np.dot(values, values))))
 
 
 @dataclass(frozen=True)
@@ -279,7 +280,7 @@ class Condensation:
         interior: Array = np.zeros(body.owned)
         if body.comm.allreduce(bool(self._schur.exceeds(self._rhs, nothing)), op=MPI.LOR):
             interior = self._schur.interior(self._rhs)
-        inside = body.comm.allreduce(self._responses.T @ self._rhs, op=MPI.SUM)
+        inside = summed(body.comm, self._responses.T @ self._rhs)
         self._on_q = restricted[body.owned :][self._free] - inside
         forces = self._border.T @ self._solve_q(self._on_q) - self._schur.condense(
             self._rhs, interior
@@ -330,7 +331,7 @@ class Condensation:
         self._responses = np.reshape(responses, columns.shape).T
         #: Forces on q by kept unknowns, shape (free, kept).
         self._border = np.reshape(border, (self._free.size, schur.size))
-        inside = body.comm.allreduce(columns @ self._responses, op=MPI.SUM)
+        inside = summed(body.comm, columns @ self._responses)
         corner = self._bulk.corner[np.ix_(self._free, self._free)] - inside
         self._corner = lu_factor(corner, check_finite=False) if self._free.size else None
         if body.comm.rank == 0 and self._free.size:

@@ -22,7 +22,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.interface.complementarity import disc_derivative, interface_residuals, project_disc
 from contact.interface.interface import Interface
@@ -37,6 +36,7 @@ from contact.methods.thesis.acceleration import ResidualMinimiser
 from contact.problem.protocols import Problem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
+from contact.ranks import summed
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 from forms.foundation import contact_multiplier
@@ -154,7 +154,7 @@ class _Projection:
         weights = np.repeat(jump.weight / size**2, shape[1])
 
         def inner(a: Array, b: Array) -> Array:
-            return np.asarray(jump.comm.allreduce(a.T @ (weights[:, None] * b), op=MPI.SUM))
+            return summed(jump.comm, a.T @ (weights[:, None] * b))
 
         def project(flat: Array) -> Array:
             return self(flat.reshape(shape)).ravel()
