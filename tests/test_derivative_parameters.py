@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from contact import InputError, load_case, parse_case, sensitivity, solve
 from contact.case.text import number_at, with_number
-from scripts.studies.derivatives import values
+from scripts.studies.derivatives import by_both, values
 
 SELF = MPI.COMM_SELF
 
@@ -67,7 +67,7 @@ def check(case, names, keys, steps=None, tolerance=1e-6):
     At 0 `steps` has those of the differences, on one side where a negative number is refused.
     """
     run = solve(case, comm=SELF)
-    tangent, adjoint = (sensitivity(run, names, keys, m) for m in ("tangent", "adjoint"))
+    tangent, adjoint = by_both(run, names, keys)
     here = values(run, names)
     for key in keys:
         at = number_at(case, key)

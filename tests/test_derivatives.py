@@ -2,7 +2,7 @@
 
 from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -44,6 +44,7 @@ from scripts.studies.derivatives import (
     FAMILIES,
     FURTHER,
     STEPS,
+    by_both,
     compared,
     differences,
     problem,
@@ -55,7 +56,9 @@ from tests.problems.rigid import indented
 SELF = MPI.COMM_SELF
 
 
+@cache
 def solution(seed):
+    """Return the solution of a problem, which no test changes."""
     return solve(parse_case(problem(seed)[1]), comm=SELF)
 
 
@@ -156,7 +159,7 @@ def test_a_law_without_a_differential_of_its_own(kinematic):
         keys = ["friction.mu", "fixed.0.displacement.1"]
         parameters = {k: Parameter(number_at(case, k), partial(build, k)) for k in keys}
         run = solve(case, comm=SELF, law=given)
-        ways = [sensitivity(run, names, parameters, way) for way in ("tangent", "adjoint")]
+        ways = by_both(run, names, parameters)
         found.append(np.array([[[of[n][k] for k in keys] for n in names] for of in ways]))
     for tangent, adjoint in found:
         assert tangent == pytest.approx(adjoint, rel=1e-10)
@@ -174,9 +177,7 @@ def test_ranks(family):
     if family == "numbers at 0":
         keys = ["contact.foundation.centre.0", "friction.mu.rho"]
     runs = [solve(parse_case(problem(seed)[1]), comm=comm) for comm in (MPI.COMM_WORLD, SELF)]
-    found = [
-        [sensitivity(run, names, keys, method) for method in ("tangent", "adjoint")] for run in runs
-    ]
+    found = [by_both(run, names, keys) for run in runs]
     run = runs[1]
     alone = found[1][0]
     for one in (*found[0], found[1][1]):

@@ -8,7 +8,8 @@ import csv
 import time
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,14 @@ from mpi4py import MPI
 from contact import solve
 from contact.case.file import Case, parse_case
 from contact.case.text import number_at, to_toml, with_number
-from contact.derivatives.by_parameters import sensitivity
+from contact.derivatives.by_parameters import (
+    ADJOINT,
+    TANGENT,
+    Sensitivities,
+    parameters_of,
+    sensitivity,
+)
+from contact.derivatives.differences import Parameter
 from contact.errors import InputError
 from contact.output.differentiable import named_quantities
 from contact.output.solution import Solution
@@ -349,6 +357,21 @@ class Compared:
     ways: int
 
 
+def by_both(
+    solution: Solution, names: Sequence[str], parameters: Sequence[str] | Mapping[str, Parameter]
+) -> tuple[Sensitivities, Sensitivities]:
+    """Return the derivatives by the tangent and by the adjoint. Collective.
+
+    The problems beside the parameters, which take most of the time to set up, are the same.
+    """
+    shared = {
+        name: replace(one, problem=cache(one.problem))
+        for name, one in parameters_of(solution, parameters)
+    }
+    tangent, adjoint = (sensitivity(solution, names, shared, way) for way in (TANGENT, ADJOINT))
+    return tangent, adjoint
+
+
 def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
     """Compare the derivatives of a random problem by all of its parameters. Collective.
 
@@ -374,8 +397,7 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
     if family == "turning plate":
         names += ["rigid_x", "rigid_y", "rigid_rotation"]
     size = np.array([size_of(solution.source, key) for key in given])
-    found = sensitivity(solution, names, given, "tangent")
-    other = sensitivity(solution, names, given, "adjoint")
+    found, other = by_both(solution, names, given)
     # By relative changes of the parameters: in the units of the results.
     tangent, adjoint = (
         np.array([[of[name][key] for key in given] for name in names]) * size
