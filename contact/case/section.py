@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar, get_args, get_origin
 
@@ -75,21 +76,27 @@ class Section(BaseModel):
         return {key: value for key, value in handler(self).items() if key not in unread}
 
 
-def _conditions(table: Any) -> Iterator[tuple[str, FieldInfo, ReadWith]]:
-    """Give the keys of a table that are read under a condition."""
-    of: type = type(table)
-    for key, field in keys_of(of).items():
-        yield from ((key, field, mark) for mark in field.metadata if isinstance(mark, ReadWith))
+@cache
+def _conditions(of: type) -> tuple[tuple[str, FieldInfo, ReadWith], ...]:
+    """Return the keys of a kind of table that are read under a condition."""
+    return tuple(
+        (key, field, mark)
+        for key, field in keys_of(of).items()
+        for mark in field.metadata
+        if isinstance(mark, ReadWith)
+    )
 
 
 def without_effect(table: Any) -> set[str]:
     """Return the keys of a table that are not read, given the others."""
-    return {k for k, _, needs in _conditions(table) if not needs.met(getattr(table, needs.key))}
+    of: Any = type(table)
+    return {key for key, _, needs in _conditions(of) if not needs.met(getattr(table, needs.key))}
 
 
 def check_conditions(table: Table) -> Table:
     """Return a table, if no key is without effect and none is missing."""
-    for key, field, needs in _conditions(table):
+    of: Any = type(table)
+    for key, field, needs in _conditions(of):
         value, other = getattr(table, key), getattr(table, needs.key)
         if not needs.met(other):
             if value != field.default:
@@ -134,10 +141,8 @@ def walk(
     """
     if isinstance(value, BaseModel) or is_dataclass(value):
         of: Any = type(value)
-        fields = of.model_fields if issubclass(of, BaseModel) else keys_of(of)
-        for name, field in fields.items():
-            below = (*field.metadata, *_marks(field.annotation))
-            yield from walk(getattr(value, name), (*path, field.alias or name), below)
+        for name, key, below in _marked(of):
+            yield from walk(getattr(value, name), (*path, key), below)
         return
     if isinstance(value, Mapping):
         for key, entry in value.items():
@@ -147,6 +152,16 @@ def walk(
     if isinstance(value, tuple):
         for i, entry in enumerate(value):
             yield from walk(entry, (*path, str(i)), marks)
+
+
+@cache
+def _marked(of: Any) -> tuple[tuple[str, str, tuple[Any, ...]], ...]:
+    """Return the fields of a kind of table, their keys, and the marks of their types."""
+    fields = of.model_fields if issubclass(of, BaseModel) else keys_of(of)
+    return tuple(
+        (name, field.alias or name, (*field.metadata, *_marks(field.annotation)))
+        for name, field in fields.items()
+    )
 
 
 def _marks(annotation: Any) -> Iterator[Any]:
