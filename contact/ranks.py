@@ -24,6 +24,8 @@ def on_all_ranks(comm: MPI.Intracomm) -> Iterator[None]:
         yield
     except Exception as error:
         failure = error
+    if not summed(comm, failure is not None):
+        return
     from contact._compat import lasting  # loads PETSc, whose options come before it
 
     failures = lasting(comm).allgather(failure)
@@ -69,6 +71,13 @@ def summed(comm: MPI.Comm, values: ArrayLike) -> Array:
     sums = np.array(values, dtype=np.float64, order="C")
     comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
     return sums
+
+
+def largest(comm: MPI.Comm, value: float) -> float:
+    """Return the largest number over all ranks, NaN on all where it is on one. Collective."""
+    found = np.array([-np.inf if np.isnan(value) else value, np.isnan(value)])
+    comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
+    return float(np.nan if found[1] else found[0])
 
 
 def exchanged(

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact.history import BodyState
 from contact.linear.dense import DenseOperator
 from contact.linear.operator import Counters
-from contact.ranks import on_all_ranks, on_root, summed
+from contact.ranks import largest, on_all_ranks, on_root, summed
 from tests.conftest import _covering
 
 COMM = MPI.COMM_WORLD
@@ -58,6 +58,14 @@ def test_sums_over_all_ranks():
     assert np.array_equal(found, ranks * np.arange(6.0).reshape(2, 3))
     assert summed(COMM, np.zeros((0, 3))).shape == (0, 3)
     assert given[0, 1] == own, "the given values are changed"
+
+
+@pytest.mark.parallel
+def test_the_largest_over_all_ranks():
+    """NaN on one rank is NaN on all: a comparison with it would be false on that rank alone."""
+    assert largest(COMM, float(COMM.rank)) == COMM.size - 1
+    assert np.isnan(largest(COMM, np.nan if COMM.rank == 0 else 1.0))
+    assert largest(COMM, -np.inf) == -np.inf
 
 
 def test_on_several_ranks_each_value_of_each_parameter_stays():

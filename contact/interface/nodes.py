@@ -15,7 +15,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.interface.mortar.operator import CouplingOperator
-from contact.ranks import summed
+from contact.ranks import largest, summed
 from contact.typing import Array
 
 
@@ -166,7 +166,7 @@ class ContactNodes:
 
     def maximum(self, values: Array, default: float = 0.0) -> float:
         """Return the largest nodal value over all ranks."""
-        return float(self.comm.allreduce(float(np.max(values, initial=default)), op=MPI.MAX))
+        return largest(self.comm, np.max(values, initial=default))
 
     @cached_property
     def size(self) -> int:

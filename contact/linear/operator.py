@@ -207,7 +207,7 @@ class SparseOperator:
         return self._split is None and self.ksp.getPC().getType() == "gamg"
 
     def _all(self, flag: bool) -> bool:
-        return bool(self.layout.comm.allreduce(int(flag)) == self.layout.comm.size)
+        return bool(summed(self.layout.comm, flag) == self.layout.comm.size)
 
     def _set_up(self, symmetric: bool) -> None:
         """Set up the solver for the matrix as it is."""

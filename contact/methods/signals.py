@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from mpi4py import MPI
 
+from contact.ranks import largest
+
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.methods.report import Monitor, Record
 
@@ -116,7 +118,7 @@ class Stop:
             self.caught.append(number)
 
     def _first(self) -> int:
-        return self.comm.allreduce(self.caught[0] if self.caught else 0, op=MPI.MAX)
+        return int(largest(self.comm, self.caught[0] if self.caught else 0))
 
 
 @contextmanager
