@@ -23,13 +23,16 @@ REFERENCE = [
 
 #: Of meshes that have no number of cells.
 COARSE = {
-    "bracket": ["mesh.size=16.0", "mesh.contact_size=6.0"],
     "ball-in-steel": ["mesh.contact_size=0.012", "mesh.edge_size=0.012"],
     "indent-punch-tilted": ["mesh.contact_size=0.6", "mesh.edge_size=0.1"],
 }
 
 
-@pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
+#: All case files but the one whose coarse version `test_gallery` solves, with the same assertions.
+PATHS = [path for path in sorted(CASES.glob("*.toml")) if path.stem != "bracket"]
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 def test_case_converges(path: Path) -> None:
     """A coarse version of each case file converges by the file's own method."""
     case = load_case(path)

@@ -131,23 +131,21 @@ def test_a_library_that_fails_to_write_does_not_end_in_an_abort(
 
 
 @RANKS
-@pytest.mark.parametrize("what", ["path", "home", "folder"])
-def test_what_the_system_refuses_is_said_in_words(what: str, ranks: int, tmp_path: Path) -> None:
-    out, environ = tmp_path / "out", environment()
-    if what == "path":
-        out = tmp_path / ("long" * 75)
-    elif what == "folder":
-        out = Path("/proc/self/out")
-    else:
-        environ |= {"HOME": "/proc/self/nobody"}
-        environ.pop("XDG_CACHE_HOME", None)
-    done = subprocess.run(
-        solving(out, ranks=ranks), env=environ, capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 2
-    (message,) = messages(done.stderr)
-    assert "accepted: " in message
-    assert ranks > 1 or done.stderr.count("\n") == 1
+def test_what_the_system_refuses_is_said_in_words(ranks: int, tmp_path: Path) -> None:
+    """A path that is too long, a folder of the system's, and a home that is none."""
+    with served(ranks) as run:
+        outs = tmp_path / ("long" * 75), Path("/proc/self/out")
+        ends = [run("solve", str(BAR), "--out", str(out), *SMALL) for out in outs]
+    # HOME is that of a process: caches are there.
+    environ = environment() | {"HOME": "/proc/self/nobody"}
+    environ.pop("XDG_CACHE_HOME", None)
+    started = solving(tmp_path / "out", ranks=ranks)
+    done = subprocess.run(started, env=environ, capture_output=True, text=True, timeout=120)
+    for status, text in (*ends, (done.returncode, done.stderr)):
+        assert status == 2
+        (message,) = messages(text)
+        assert "accepted: " in message
+        assert ranks > 1 or text.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
 

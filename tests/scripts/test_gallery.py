@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from contact import load_case
+from scripts.cases import CASES
 from scripts.gallery import EXAMPLES, FOLDER, on_meshes, row, solved
 from tests.docs.pages import ROOT
 
@@ -34,6 +36,8 @@ def test_a_coarse_mesh_has_the_values_of_its_table(name: str, tmp_path: Path) ->
     pytest.importorskip("gmsh")
     example, kept = EXAMPLES[name], on_meshes(name)
     run = solved(example, tmp_path, figures=False, changes=example.meshes[0][1])
+    case = load_case(CASES / f"{example.case}.toml")
+    assert case.title and max(run.summary["kkt"].values()) <= case.solver.tolerance
     for quantity, computed in row(run).items():
         assert float(kept[0][quantity]) == pytest.approx(computed, rel=1e-3)
     assert [words for words, _ in example.meshes] == [one["cells"] for one in kept]
