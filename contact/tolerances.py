@@ -18,6 +18,9 @@ NEGLIGIBLE = 1e-9
 #: The least tolerance: rounding keeps relative residuals from falling below.
 PRECISION = 1e-15
 
+#: Share of loads, of their work or of displacements that is taken for none where bodies balance.
+BALANCED = 1e-6
+
 #: Numbers beyond this one, or below its inverse, are too near to those whose squares overflow.
 HUGE = 1e150
 

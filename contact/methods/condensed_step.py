@@ -117,7 +117,9 @@ class CondensedStep:
         end, outcome = self._solve(condensed, options, self.parameters, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves
-        if outcome.kkt.significant > max(enough, UNSOLVED * reached.significant):
+        overloaded = outcome.overloaded and body.linear
+        unsolved = outcome.kkt.significant > max(enough, UNSOLVED * reached.significant)
+        if unsolved and not overloaded:
             return None
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)
@@ -128,4 +130,4 @@ class CondensedStep:
         notes = [record.note for record in history.records]
         taken = [word for word in self._fallbacks if any(word in note for note in notes)]
         note = ", ".join([*["chord step"] * keep, *taken])
-        return StepResult(replace(end, state=new), note, tuple(history.records))
+        return StepResult(replace(end, state=new), note, tuple(history.records), overloaded)

@@ -10,7 +10,9 @@ whole bodies and condensed ones alike, on any number of ranks.
    and Todd (`cones`), both with one matrix; each linearises material, layer and current anew.
 3. Where the duality gap is closed the active set is known; Newton's method takes the last steps.
 4. Where these have not converged, the friction bound is that of the last solution (Haslinger's
-   iteration), and the next problem begins at 2.
+   iteration), and the next problem begins at 2. It has a solution where this friction balances the
+   loads on rigid motions (`limit_analysis`): where not, it is once made twice as large as they ask
+   for, and the second time the method ends.
 
 References
 ----------
@@ -41,6 +43,9 @@ from contact.tolerances import EPS
 
 #: Note of its steps in the history.
 INTERIOR_POINT = "interior point"
+
+#: Why the updates of the friction bound end where the next convex problem has no solution.
+OVERLOADED = "the friction of the pressures that were found does not balance the loads"
 
 #: Most steps of one convex problem, and most friction bounds (Haslinger's iterations).
 LIMIT, UPDATES = 60, 8
@@ -90,7 +95,7 @@ def interior_point(
     stuck = modes.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
     aside: tuple[Iterate, Outcome] | None = None
-    best = 1.0
+    best, raised = 1.0, False
     for _ in range(UPDATES):
         method = InteriorPoint(problem, whole, bound, modes.constrained_by_supports)
         outcome, state = method.run(iteration), method.state
@@ -112,6 +117,13 @@ def interior_point(
         # Where all nodes are open, the next bound is zero and has the same solution.
         if aside is not None and interface.jump.maximum(bound) <= interface.rounding(nodal):
             break
+        multiple = modes.overload(bound)
+        if multiple == np.inf or (raised and multiple > 1):
+            outcome = replace(outcome, kkt=evaluate(problem, state))
+            iterate, outcome = Iterate(state), replace(outcome, ended=OVERLOADED, overloaded=True)
+            break
+        if multiple > 1:  # pressures may differ where friction is what the loads ask for
+            bound, raised = np.asarray(multiple / PROGRESS * bound, dtype=float), True
     return aside or (iterate, outcome)
 
 

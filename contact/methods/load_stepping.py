@@ -18,9 +18,9 @@ from contact.methods.method import Method
 from contact.methods.report import IterationHistory, Outcome
 from contact.methods.signals import Interrupted
 from contact.methods.unconstrained_modes import UnconstrainedModes, with_least_displacements
+from contact.problem.limit_analysis import released, unilateral_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate
-from contact.problem.rigid_modes import released, unilateral_supports
 from contact.problem.state import State
 from contact.typing import Array
 

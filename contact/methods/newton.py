@@ -63,7 +63,7 @@ from contact.methods.complementarity_parameters import (
 )
 from contact.methods.condensed_step import CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation
-from contact.methods.interior_point import INTERIOR_POINT, interior_point
+from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED, interior_point
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep, Step
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Monitor, Outcome
@@ -225,13 +225,14 @@ class Newton:
         self.history.restart()
         assert self.modes is not None
         iterate, outcome = self._iterate(iterate)
-        if not outcome.converged:
+        if not outcome.converged and not outcome.overloaded:
             found = self._without_forces(iterate)
             iterate, outcome = found or self._fall_back(iterate, outcome)
         elif not self._pays and self.modes.pushed_aside(self.problem, iterate.state):
             found = self._fall_back(iterate, outcome)
             iterate, outcome = found if found[1].converged else (iterate, outcome)
-        if not outcome.converged and iteration.best.found is not None:
+        unsolved = not outcome.converged and not outcome.overloaded
+        if unsolved and iteration.best.found is not None:
             iterate = iteration.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
         iteration.at = iterate
@@ -262,7 +263,7 @@ class Newton:
         iteration = self.iteration
         if self._pays:
             iterate, outcome = self._condensed_loop(iterate)
-            if outcome.converged or iteration.left <= 0:
+            if outcome.converged or outcome.overloaded or iteration.left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
             return self.whole_loop().run(iterate)
@@ -432,6 +433,8 @@ class NewtonLoop:
                 iteration.see(iterate, residuals)
             if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)
+            if taken.overloaded:
+                return iterate, replace(self._end(residuals, OVERLOADED), overloaded=True)
             if (found := self._loss_of_contact(iterate, pressed, note)) is not None:
                 return found
             pressed = max(pressed, self._largest_pressure(iterate))

@@ -83,11 +83,14 @@ class StepResult:
         Its kind in the history, empty for a plain step.
     inner
         Newton iterations on the condensed problem that it took.
+    overloaded
+        Whether friction does not balance the loads.
     """
 
     iterate: Iterate
     note: str = ""
     inner: tuple[Record, ...] = ()
+    overloaded: bool = False
 
 
 @dataclass

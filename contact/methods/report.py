@@ -146,6 +146,8 @@ class Outcome:
         Number of the signal that ended it; 0 for none.
     criterion
         The method's own criterion, in words, where it ends by another one than the residuals.
+    overloaded
+        Whether friction does not balance the loads, so that no other way is worth a try.
     """
 
     kkt: Residuals
@@ -153,6 +155,7 @@ class Outcome:
     ended: str = ""
     signal: int = 0
     criterion: str = ""
+    overloaded: bool = False
 
     @property
     def converged(self) -> bool:

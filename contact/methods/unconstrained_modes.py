@@ -31,6 +31,7 @@ from contact.mesh.entities import component_sums
 from contact.mesh.geometry import geometry_nodes, measures
 from contact.methods.report import Outcome
 from contact.problem.condensed import CondensedProblem
+from contact.problem.limit_analysis import Overload
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.residuals import evaluate, residual_forces
@@ -104,17 +105,34 @@ class UnconstrainedModes:
     def stuck_bound(self) -> Array | None:
         """Return friction bounds that no load exceeds, shape (n,) (stress). Collective.
 
-        None where supports and the foundation restrain all modes without friction.
+        None where supports and the foundation restrain all modes, and the loads on them, without
+        friction.
         """
-        if not self.friction_alone:
-            return None
         problem = self.problem
         weight = problem.interface.jump.weight
+        if not problem.frictional:
+            return None
+        if not self.friction_alone and self.overload(np.zeros_like(weight)) == 1:
+            return None
         loads = _loads(problem)
         borne, total = float(loads[_without_supports(problem)].sum()), float(loads.sum())
         # Loads on another body need not be borne, but where a body is squeezed by it alone.
         bound = STUCK * (borne if borne > EPS * total else total)
         return np.where(self._nearest(), bound / weight, 0.0)
+
+    def overload(self, bound: Array) -> float:
+        """Return the least multiple of friction bounds that balances the loads, at least 1.
+
+        Infinity where none does, however large the pressures. Collective.
+
+        Parameters
+        ----------
+        bound
+            The bounds at the contact nodes of this rank, shape (n,) (stress).
+        """
+        friction, time = self.problem.nodes.weight * bound, self.problem.time
+        found = [Overload.of(group, time, friction) for group in self._unsupported]
+        return max((lost.multiple for lost in found if lost is not None), default=1.0)
 
     def _nearest(self) -> NDArray[np.bool_]:
         """Tell which nodes of each unsupported body touch first, shape (n,). Collective.

@@ -12,11 +12,11 @@ from scipy import linalg
 from contact.mesh.entities import cells_at, owned_among
 from contact.mesh.owners import Owners
 from contact.output.solution import Note, Remark, Solution
+from contact.problem.limit_analysis import Overload, UnilateralSupport
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
     Group,
-    UnilateralSupport,
     constrained_by_supports,
     described,
     groups,
@@ -219,21 +219,14 @@ def not_held(solution: Solution) -> Iterator[Remark]:
 
     A block between two jaws that touch it aslant gets out of their way and falls: no solution.
     """
-    problem = solution.problem
     if solution.converged:
         return
-    contact = "friction" if problem.frictional else "contact"
-    for group in groups(problem):
-        support = UnilateralSupport.of(group, solution.status != "open")
-        if support is None:
+    contact = "friction" if solution.problem.frictional else "contact"
+    for group in groups(solution.problem):
+        lost = _lost(solution, group)
+        if lost is None:
             continue
-        motion = support.lost(solution.state.time)
-        why = "the nodes that touch at last, pressed by whatever force, do not balance its loads"
-        if motion is None:
-            motion = _drift(group, support.free, solution.state)
-            why = "it has moved by more than the size of the bodies"
-            if _reach(group, motion) <= problem.domain.size:
-                continue
+        motion, why = lost
         large = np.abs(motion) > 0.1 * np.abs(motion).max()
         words = ", ".join(dict.fromkeys(np.array(group.names)[large].tolist()))
         yield (
@@ -241,6 +234,26 @@ def not_held(solution: Solution) -> Iterator[Remark]:
             f"has left it: {why}; supports, more friction, or a load that presses it where it "
             "touches hold it"
         )
+
+
+def _lost(solution: Solution, group: Group) -> tuple[Array, str] | None:
+    """Return the rigid motion on which contact has not held bodies, and how. Collective."""
+    problem, time = solution.problem, solution.state.time
+    if solution.outcome.overloaded:
+        friction = problem.nodes.weight * solution.friction_bound
+        overload = Overload.of(group, time, friction)
+        words = "friction bounded by the pressures there does not balance its loads"
+        return None if overload is None else (overload.motion, words)
+    support = UnilateralSupport.of(group, solution.status != "open")
+    if support is None:
+        return None
+    if (motion := support.lost(time)) is not None:
+        words = "the nodes that touch at last, pressed by whatever force, do not balance its loads"
+        return motion, words
+    motion = _drift(group, support.free, solution.state)
+    if _reach(group, motion) <= problem.domain.size:
+        return None
+    return motion, "it has moved by more than the size of the bodies"
 
 
 def _drift(group: Group, free: Array, state: State) -> Array:

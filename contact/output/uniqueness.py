@@ -31,14 +31,11 @@ from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import groups, null_space
 from contact.problem.state import State
 from contact.ranks import on_root
-from contact.tolerances import EPS, NEGLIGIBLE
+from contact.tolerances import BALANCED, EPS, NEGLIGIBLE
 from contact.typing import Array
 
 #: Contact nodes up to which eigenvalues take no time to speak of.
 MOST = 300
-
-#: Relative accuracy of the balance, and of displacements, without contact forces.
-BALANCED = 1e-6
 
 #: Energy of rigid sliding over that of the next mode, which deforms: below this. On curved surfaces
 #: their normals' tilt resists it, by 2e-3 and less; the first modes of slender bodies differ by 16.

@@ -21,10 +21,10 @@ from contact.body.fields import values_at
 from contact.body.loads import to_blame
 from contact.errors import InputError
 from contact.interface.law import Conductor
+from contact.problem.limit_analysis import UnilateralSupport
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
     Group,
-    UnilateralSupport,
     described,
     groups,
     middle,

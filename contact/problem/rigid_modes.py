@@ -1,14 +1,13 @@
 """Rigid-body modes that the supports do not constrain, and whether contact constrains them.
 
 Of each connected component of the mesh, or of those that move together, the modes are seen by their
-Gram matrices at supports and contact nodes; whether contact forces can balance the loads on them is
-a linear program (Farkas). A cut of a bolt under a given force ends a component: its sides move
-together, but for the shortening.
+Gram matrices at supports and contact nodes. A cut of a bolt under a given force ends a component:
+its sides move together, but for the shortening.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -20,7 +19,6 @@ from numpy.typing import NDArray
 from contact.body.cuts import Pieces
 from contact.body.rigid import Bolt, Rigid, rigid_motions
 from contact.problem.problem import ContactProblem
-from contact.ranks import on_root
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
@@ -331,137 +329,3 @@ def null_space(gram: Array) -> Array:
     """Return a basis of the null space, shape (m, k), of a matrix with eigenvalues up to some 1."""
     values, vectors = np.linalg.eigh(gram)
     return vectors[:, values < NEGLIGIBLE]
-
-
-#: Directions in 3-D, of half a turn, in which friction is asked for its bound.
-DIRECTIONS = 8
-
-#: Halvings of the time between loads that contact holds and loads that it does not.
-BISECTIONS = 20
-
-
-@dataclass(frozen=True)
-class UnilateralSupport:
-    """Contact as a unilateral support of bodies with modes that their supports do not constrain.
-
-    Attributes
-    ----------
-    group
-        The components, with all their motions.
-    free
-        The motions that no support holds, shape (m, k).
-    cone
-        Of all ranks, shape (rows, k): contact forces do no work on motions q with cone q <= 0.
-    """
-
-    group: Group
-    free: Array
-    cone: Array
-
-    @staticmethod
-    def of(group: Group, at: NDArray[np.bool_] | slice = slice(None)) -> UnilateralSupport | None:
-        """Return that of bodies; None if supports hold them, or no bound is known. Collective.
-
-        A given friction bound, and a smoothed pressure, are not bounded by the pressure at the
-        node: such problems are left to the solver.
-
-        Parameters
-        ----------
-        group, at
-            The bodies, and the contact nodes of this rank that may press, all by default.
-        """
-        problem, free = group.problem, null_space(group.supports)
-        friction, comm = problem.interface.friction, problem.comm
-        mu = 0.0 if friction.law is None else friction.law.maximum
-        mu = comm.allreduce(mu, op=MPI.MAX)
-        if free.shape[1] == 0 or not np.isfinite(mu) or not friction.local:
-            return None
-        normal = group.normal @ free
-        across = [
-            mu * np.einsum("ni,nim->nm", along, group.tangential) @ free
-            for along in _sideways(problem.nodes.normal)
-        ]
-        rows = [normal + sign * part for part in across for sign in (-1, 1)]
-        return UnilateralSupport(
-            group, free, np.concatenate([problem.nodes.gather(row[at]) for row in rows])
-        )
-
-    def lost(self, time: float) -> Array | None:
-        """Return the rigid motion by which the loads of a time take the bodies off. Collective.
-
-        Shape (m,); None where contact forces can balance them. They cannot where the loads do work
-        on a rigid motion m on which no admissible contact force does any against them:
-        m.nu <= -mu |m_tau| at every node (Farkas).
-        """
-        problem, moved = self.group.problem, self.group.moved
-        body, comm = problem.equilibrium, problem.comm
-        loads = body.external(time)
-        on_masters = loads[body.owned :]
-        own = np.where(self.group.inside[:, None], body.nodal(loads), 0.0).ravel()
-        work = comm.allreduce(moved[: body.owned].T @ own, op=MPI.SUM)
-        work = (work + moved[body.owned :].T @ on_masters) @ self.free
-        scale = comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM) + np.abs(on_masters).sum()
-        return on_root(comm, lambda: self._lost(work, scale))
-
-    def _lost(self, work: Array, scale: float) -> Array | None:
-        """Return the motion on which loads do most work, on the rank that has the cone."""
-        if np.abs(work).max() <= NEGLIGIBLE * scale:
-            return None
-        from scipy.optimize import linprog  # takes a while to load
-
-        bounds = [(-1, 1)] * work.size
-        motion = linprog(-work, self.cone, np.zeros(len(self.cone)), bounds=bounds)
-        if motion.status != 0 or -motion.fun <= 1e-6 * scale:
-            return None
-        return np.asarray(self.free @ motion.x)
-
-    @property
-    def besides(self) -> str:
-        """The other motions that may be lost besides a body that is pulled off, in words."""
-        moving = ", or force and moment the rigid part off the body" if self.group.moving else ""
-        moving += ", or the force of a bolt one side of its cut" if self.group.cut else ""
-        along = ", or along it by more than friction holds" if self.group.problem.frictional else ""
-        return moving + along
-
-
-def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
-    """Return the modes of a problem that contact alone has to constrain. Collective."""
-    found = [UnilateralSupport.of(group) for group in groups(problem)]
-    return [support for support in found if support is not None]
-
-
-def released(held_by: Sequence[UnilateralSupport], begin: float, end: float) -> str:
-    """Say when loads let a body go that contact alone holds, and how; nothing if not. Collective.
-
-    Parameters
-    ----------
-    held_by
-        Its unilateral supports.
-    begin, end
-        A time at which contact can hold it, and one that is asked for.
-    """
-    for support in held_by:
-        if support.lost(end) is None:
-            continue
-        for _ in range(BISECTIONS):
-            middle = (begin + end) / 2
-            begin, end = (middle, end) if support.lost(middle) is None else (begin, middle)
-        return f"from t = {end:g} on the loads pull the body off the foundation{support.besides}"
-    return ""
-
-
-def _sideways(normal: Array) -> list[Array]:
-    """Return tangential vectors t, shape (n, d) each, with |m_tau| <= max |m.t| for every m.
-
-    In 2-D that is the unit tangent. In 3-D they are spread over half a turn, and as long as
-    it takes: planes around the cone of friction, 2 % wider at most.
-    """
-    if normal.shape[1] == 2:
-        return [normal[:, ::-1] * [-1.0, 1.0]]
-    beside = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    first = np.cross(normal, beside)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    second = np.cross(normal, first)
-    longer = 1 / np.cos(np.pi / (2 * DIRECTIONS))
-    angles = np.pi / DIRECTIONS * np.arange(DIRECTIONS)
-    return [longer * (np.cos(angle) * first + np.sin(angle) * second) for angle in angles]

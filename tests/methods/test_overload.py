@@ -1,0 +1,59 @@
+"""Loads that friction cannot balance: a linear program tells, and methods end."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import build_problem, parse_case, solve
+from contact.problem.limit_analysis import Overload
+from contact.problem.rigid_modes import groups
+
+MU, PRESS = 0.3, 1e-3
+
+
+def wall(dim, part, angle=0.0):
+    """Return a unit block pressed to a wall, and along it by a part of the force friction holds.
+
+    Without Poisson's effect the wall presses by E times the way of the other side.
+    """
+    free = ["free"] * (dim - 1)
+    along = np.array([-1.0] if dim == 2 else [np.sin(angle), -np.cos(angle)]) * part * MU * PRESS
+    return parse_case({
+        "mesh": {"generator": "rectangle" if dim == 2 else "box", "size": [1.0] * dim,
+                 "cells": [4] * dim},
+        "material": {"young": 1.0, "poisson": 0.0},
+        "fixed": [{"on": "right", "displacement": [-PRESS, *free]}],
+        "load": [{"everywhere": True, "body_force": [0.0, *along.tolist()]}],
+        "contact": {"on": "left"},
+        "friction": {"law": "coulomb", "mu": MU},
+    })  # fmt: skip
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(("dim", "angle"), [(2, 0.0), (3, 0.0), (3, 0.3)])
+def test_the_multiple_of_friction_that_holds_a_block(dim, angle):
+    """Of a third of that friction there is three times too little, in all directions of 3-D."""
+    problem = build_problem(wall(dim, 1.0, angle), MPI.COMM_WORLD)
+    (group,) = groups(problem)
+    nodes = problem.nodes
+    friction = nodes.weight * MU * PRESS
+    assert Overload.of(group, 1.0, 1.01 * friction) is None
+    found = Overload.of(group, 1.0, friction / 3)
+    assert found.multiple == pytest.approx(3.0, rel=1e-5)
+    named = {name: abs(size) for name, size in zip(group.names, found.motion, strict=True)}
+    assert max(named, key=named.get) == f"translation along {'xyz'[dim - 1]}"
+    assert Overload.of(group, 1.0, 0.0 * friction).multiple == np.inf
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_block_at_a_wall_is_held_or_not(dim):
+    """At a hundredth more than friction can hold: it took 352 solves, and no word of friction."""
+    held, lost = (solve(wall(dim, part), comm=MPI.COMM_WORLD) for part in (0.99, 1.01))
+    assert held.converged and not held.outcome.overloaded
+    assert not lost.converged and lost.outcome.overloaded
+    assert lost.counters.linear_solves + lost.counters.contact_solves <= 130
+    assert lost.outcome.reason.startswith("the friction of the pressures that were found does not")
+    (said,) = [text for text in lost.warnings if "[not-held]" in text]
+    assert f"friction cannot hold the body (translation along {'xyz'[dim - 1]})" in said
+    assert "friction bounded by the pressures there does not balance its loads" in said
