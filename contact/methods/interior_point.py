@@ -122,7 +122,7 @@ def interior_point(
             outcome = replace(outcome, kkt=evaluate(problem, state))
             iterate, outcome = Iterate(state), replace(outcome, ended=OVERLOADED, overloaded=True)
             break
-        if multiple > 1:  # pressures may differ where friction is what the loads ask for
+        if multiple > 1:  # with as much friction as the loads ask for pressures may differ
             bound, raised = np.asarray(multiple / PROGRESS * bound, dtype=float), True
     return aside or (iterate, outcome)
 

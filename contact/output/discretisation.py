@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from contact.body.elements import MEAN_DILATATION, unlocked
 from contact.interface.mortar.search import nearest
-from contact.interface.mortar.surface import surface_of
+from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.obstacle import Shape
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import ALIKE_NORMALS
+from contact.mesh.entities import cells_at
+from contact.output.fields import DerivedFields
 from contact.output.solution import Remark, Solution
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
@@ -30,6 +32,12 @@ COARSE = 0.15
 #: Largest deviation of facets from a curved surface, as a share of the gaps that are closed; and
 #: of the directions of its tangents along a straight edge of degree 2.
 DEVIATION = 0.1
+
+#: Scatter of pressures by chords, over their mean, without a warning.
+SCATTER = 0.05
+
+#: The same by chords, over the plane modulus times their normal strain and their turn.
+CHORDS = 0.5
 
 
 def locks(solution: Solution) -> bool:
@@ -110,12 +118,17 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
                 f"nodal pressures scatter by about {scatter:.2g}, {scatter / pressed:.0%} of the "
                 "largest; take curved cells (mesh.order = 2), or a finer mesh"
             )
-        elif turn > DEVIATION:
+            return
+        force = nodes.sum(solution.pressure)
+        if force <= 0 or turn <= NEGLIGIBLE:
+            return
+        mean, scatter = nodes.sum(solution.pressure**2) / force, _of_chords(solution, closed)
+        if scatter > SCATTER * mean:
             yield (
                 f"straight edges of a curved contact surface turn by up to {turn:.2g} where it "
                 "touches, and displacements are those of their chords: nodal pressures scatter by "
-                f"about {turn / 4:.1%} of the stress there; take curved cells (mesh.order = 2), or "
-                "a finer mesh"
+                f"about {scatter:.2g}, {scatter / mean:.0%} of the mean; take curved cells "
+                "(mesh.order = 2), or a finer mesh"
             )
     elif size > 1e-9 * problem.domain.size and unknown > DEVIATION * size:
         yield (
@@ -130,10 +143,8 @@ def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, flo
 
     Beside them, the least cosine between contact directions at the ends of an edge.
 
-    In the middle of an edge, f = h^2/(8 R) below the curve, displacements are taken f eps_nn aside:
-    to them the surface is as stiff as under waves of the length 2 h, and pressures are off by
-    E eps_nn pi h/(16 R), a share of the stress that is of first order in h. Where the curvature
-    varies f is known to some u, and waves of this height take pressures E pi u/(4 h).
+    Where the curvature varies the deviation of the curve from an edge of the length h is known to
+    some u: waves of this height and the length 2 h take pressures E' pi u/(4 h).
 
     Parameters
     ----------
@@ -142,7 +153,7 @@ def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, flo
     """
     domain, space = solution.problem.domain, solution.problem.equilibrium.space
     nodes = solution.problem.nodes
-    touching, numbers = nodes.points[closed], nodes.nodes + space.dofmap.index_map.local_range[0]
+    numbers = nodes.nodes + space.dofmap.index_map.local_range[0]
 
     def here(asked: NDArray[np.int64]) -> Array:
         found = np.full((asked.size, domain.dim + 1), np.nan)
@@ -152,10 +163,8 @@ def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, flo
 
     found: Array = np.array([0.0, 0.0, -1.0])
     shapes = {c.on for c in solution.problem.contacts if isinstance(c.foundation, Shape)}
-    for part in dict.fromkeys(p for c in solution.problem.contacts for p in (c.on, c.against) if p):
-        side = surface_of(domain, space, part)
+    for part, side, near in _touching(solution, closed):
         if side.follows:
-            near = nearest(domain.comm, side.centres, touching) <= side.radii
             there = side.owners.values(side.nodes.ravel(), here)
             there = there.reshape(*side.nodes.shape, domain.dim + 1)[near]
             first, second = (there[:, of, :-1] for of in np.array(side.shape.edges).T)
@@ -167,3 +176,51 @@ def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, flo
             found = np.fmax(found, [*most, np.fmax.reduce(-cosine, axis=None, initial=-1.0)])
     domain.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
     return float(found[0]), float(found[1]), float(-found[2])
+
+
+def _touching(
+    solution: Solution, closed: NDArray[np.bool_]
+) -> Iterator[tuple[str, Surface, NDArray[np.bool_]]]:
+    """Give the contact parts, and which of their facets on this rank touch. Collective."""
+    problem, points = solution.problem, solution.problem.nodes.points[closed]
+    for part in dict.fromkeys(p for c in problem.contacts for p in (c.on, c.against) if p):
+        side = surface_of(problem.domain, problem.equilibrium.space, part)
+        yield part, side, nearest(problem.comm, side.centres, points) <= side.radii
+
+
+def _of_chords(solution: Solution, closed: NDArray[np.bool_]) -> float:
+    """Return by how much pressures scatter by displacements of chords (stress). Collective.
+
+    The middle of a straight edge of degree 2, f = h^2/(8 R) within the curve, moves by f eps_nn
+    less or more. Pressures that even this out are E' eps_nn h/R times some number: from .33 (rings
+    on a rigid shaft) to .5 (rings in rings, on the finer side) on triangles, a third less on
+    quadrilaterals, whatever the stiffness of the other side. Both sides' add up; where they cancel,
+    since both move alike, edges that do not meet leave half of one.
+
+    Parameters
+    ----------
+    solution, closed
+        The solution, and which contact nodes of this rank touch, shape (n,).
+    """
+    domain, body = solution.problem.domain, solution.problem.equilibrium
+    fields = DerivedFields(body, solution.state)
+    strain, d = fields.columns["strain"], domain.dim
+    stresses = np.zeros((domain.mesh.topology.index_map(d).size_local, d, d))
+    for material, own in enumerate(body.body.materials):
+        modulus = own.law.young / (1 - own.law.poisson**2)
+        for cells, values in fields.of_material(material):
+            mean = values[..., strain].mean(axis=1).reshape(-1, 3, 3)
+            stresses[cells] = modulus * mean[:, :d, :d]
+    largest: dict[str, float] = {}
+    for part, side, near in _touching(solution, closed):
+        cells, _ = cells_at(domain.mesh, domain.facets(part))
+        across = np.einsum("fi,fij,fj->f", side.normal, stresses[cells], side.normal)
+        bends = 2 * side.deviation / side.edges  # h/R, below 0 where it is hollow
+        values = (bends * across[:, None])[near].ravel()
+        ends = domain.comm.allgather([values.min(initial=0.0), values.max(initial=0.0)])
+        largest[part] = max(np.ravel(ends), key=abs)
+    found = [0.0]
+    for contact in solution.problem.contacts:
+        sides = [largest[part] for part in (contact.on, contact.against) if part]
+        found.append(max(abs(sum(sides)), max(map(abs, sides)) / 2))
+    return CHORDS * max(found)

@@ -235,8 +235,8 @@ class DerivedFields:
             for name in self.body.laws.names
         }
 
-    def _chunks(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
-        """Yield owned cells of a material and the values, shape (cells, points, components)."""
+    def of_material(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Yield owned cells of a material, by its number, and the values as `chunks`."""
         body, cells = self.body, self.body.cells[material]
         expression = partial(self._expression, body.body.materials[material])
         name = "fields", material, self.points.tobytes()
@@ -247,7 +247,7 @@ class DerivedFields:
 
     def chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield owned cells and the values there, shape (cells, points, components)."""
-        return chain.from_iterable(map(self._chunks, range(len(self.body.cells))))
+        return chain.from_iterable(map(self.of_material, range(len(self.body.cells))))
 
     def move_to(self, state: Evaluated) -> None:
         """Look at the fields of another state of the same body from now on."""
@@ -258,8 +258,8 @@ class DerivedFields:
         """Return |dev eps| in the owned cells of each material, shape (cells, points)."""
         column = self.columns["dev_strain"]
         return [
-            np.concatenate([values[..., column][..., 0] for _, values in self._chunks(material)])
-            for material in range(len(self.body.cells))
+            np.concatenate([values[..., column][..., 0] for _, values in self.of_material(k)])
+            for k in range(len(self.body.cells))
         ]
 
     def extremes(self) -> list[Extremes]:
@@ -272,7 +272,7 @@ class DerivedFields:
             limit = getattr(material.law, "first_yield", np.inf)
             flows = EQUIVALENT in laws.variables(material.law)
             largest, sums = np.zeros(3), np.zeros(2)
-            for chosen, values in self._chunks(index):
+            for chosen, values in self.of_material(index):
                 largest[0] = max(largest[0], values[..., strain].max(initial=0.0))
                 largest[1] = max(largest[1], values[..., mises].max(initial=0.0))
                 beyond = (values[..., strain] > limit).mean(axis=(1, 2))
