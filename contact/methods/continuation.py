@@ -32,8 +32,8 @@ def continuation(
 ) -> tuple[Iterate, Outcome] | None:
     """Return the solution with the whole conductivity; None where continuation fails.
 
-    A part that fails is halved on the logarithmic scale. Where the first one fails the conductivity
-    is not the cause, and no other is tried.
+    After a part that fails the square root of the factor is tried. Where the first part fails the
+    conductivity is not the cause, and no other is tried.
 
     Parameters
     ----------

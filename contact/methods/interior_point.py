@@ -7,7 +7,7 @@ whole bodies and condensed ones alike, on any number of ranks.
 1. The friction bound is zero at first; where friction alone constrains a rigid-body mode, it is
    above all loads.
 2. A step of the interior point is Mehrotra's predictor and corrector with the scaling of Nesterov
-   and Todd (`cones`), both with one matrix; each linearises material, layer and current anew.
+   and Todd (`cones`), both with one matrix. Every step linearises material, layer and current.
 3. Where the duality gap is closed the active set is known; Newton's method takes the last steps.
 4. Where these have not converged, the friction bound is that of the last solution (Haslinger's
    iteration), and the next problem begins at 2. It has a solution where this friction balances the
@@ -51,7 +51,7 @@ OVERLOADED = "the friction of the pressures that were found does not balance the
 LIMIT, UPDATES = 60, 8
 
 #: Ratio of the duality gap to the work of loads and contact below which the active set is known.
-#: Below its square the end does not wait for equilibrium any more.
+#: Below its square the iteration ends whatever the residual of equilibrium is.
 CLOSED = 1e-10
 
 #: Forcing term of inexact Newton: relative residual of an iterative solve. With a hundredth of that

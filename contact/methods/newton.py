@@ -16,8 +16,9 @@
    stagnation: the active sets cycle. On the whole body it also ends after a first step whose
    penetration shows that c is far above the stiffness of the body, as on slender ones.
 
-Where a stage has ended without convergence, the state with all nodes open is tried, at the cost of
-one linear solve. If it is no solution the fallbacks follow, in this order:
+Where a stage has ended without convergence and the supports constrain all rigid-body modes, the
+state with all nodes open is tried, by one linear solve. If it is no solution the fallbacks follow,
+in this order:
 
 1. the condensed body in place of the whole one, or the whole in place of the condensed one;
 2. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
