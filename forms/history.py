@@ -94,8 +94,9 @@ class Response:
 class HistoryLaw(Protocol):
     """A law of the stress with internal variables, which a step changes; see `hencky.Hencky`.
 
-    `symmetric`, where it has that and it is False, says that its stiffness is not symmetric.
-    `differential`, where it has that, is its own `differential` (the function below).
+    A subclass of `forms.hencky.Isotropic` has the elastic constants. `symmetric`, where a law has
+    that and it is False, says that its stiffness is not symmetric. `differential`, where it has
+    that, is its own `differential` (the function below).
 
     Examples
     --------
@@ -110,6 +111,14 @@ class HistoryLaw(Protocol):
     @property
     def poisson(self) -> float:
         """Poisson's ratio of these."""
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus of these."""
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus of these."""
 
     def variables(self, size: int) -> Mapping[str, ArrayLike]:
         """Return the names of the variables, with their values in the reference configuration.

@@ -12,7 +12,7 @@ import numpy as np
 from dolfinx.fem import Function
 from ufl.core.expr import Expr
 
-from contact.arguments import expect, is_law, several
+from contact.arguments import CONSTANTS, expect, is_law, several
 from contact.body.fields import (
     Amplitude,
     Given,
@@ -282,7 +282,9 @@ class Material:
         object.__setattr__(self, "on", names)
         accepted = (
             "Linear(young, poisson), Log, UserLaw, forms.elasticity.Anisotropic(stiffness), of a "
-            "crystal in 2-D with .in_plane(), ..."
+            "crystal in 2-D with .in_plane(), or an object with the numbers "
+            f"{', '.join(CONSTANTS)} and a stress as forms.hencky.Hencky or "
+            "forms.history.HistoryLaw have it"
         )
         expect("law", self.law, accepted, is_law(self.law))
         fits = isinstance(self.piezo, Piezo | None)

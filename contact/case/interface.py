@@ -208,7 +208,6 @@ class SlipLaw(Section):
 Mu: TypeAlias = Annotated[
     Annotated[NonNegativeFormula, Tag("formula")] | Annotated[SlipLaw, Tag("slip")],
     formula_or_law,
-    Accepted('a number >= 0 or a formula or a table { law = "slip", a, b, rho }'),
 ]
 
 

@@ -164,7 +164,8 @@ def kinds_of(sections: Iterable[type]) -> tuple[str, dict[str, type]]:
 
 
 def accepted_by(annotation: Any, metadata: Iterable[Any] = ()) -> str:
-    """Return the accepted values of an annotation in words."""
+    """Return the accepted values of an annotation in words, tables after other kinds."""
+    others: list[str] = []
     for item in reversed([*metadata]):  # the last one is of the narrower type
         if isinstance(item, Accepted):
             return item.text
@@ -176,8 +177,10 @@ def accepted_by(annotation: Any, metadata: Iterable[Any] = ()) -> str:
         some = [kind for kind in get_args(annotation) if kind is not type(None)]
         if len(some) == 1:  # a value that may be missing
             return accepted_by(some[0])
+        others += [accepted_by(kind) for kind in some if not sections_of(kind)]
     key, kinds = kinds_of(sections_of(annotation).values())
-    return f"a table with {key} = {either(map(shown, kinds))}" if kinds else "a table"
+    table = f"a table with {key} = {either(map(shown, kinds))}" if kinds else "a table"
+    return ", or ".join([*others, table])
 
 
 def describe(error: ValidationError, root: type[BaseModel], source: str) -> str:

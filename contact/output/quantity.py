@@ -39,11 +39,11 @@ class Quantity:
     text
         The description, with the sign; `unit` is "length", "stress", ..., empty for none.
     value
-        A function of `solution.Solution`; in ``history.csv`` of `methods.report.Record`, in
-        ``contact.csv`` and ``contact.vtu`` of `surface.ContactResult`, in ``fields.vtu`` of
-        `fields.Point`, on master sides of a mapping. By default the attribute, or entry, of the
-        quantity's name. A mapping has several columns, a vector one per component; None is for a
-        quantity that a problem does not have, which has no key, column or field then.
+        A function of `solution.Solution`, called on all ranks; in ``history.csv`` of
+        `methods.report.Record`, in ``contact.csv`` and ``contact.vtu`` of `surface.ContactResult`,
+        in ``fields.vtu`` of `fields.Point`, on master sides of a mapping. By default the attribute,
+        or entry, of the quantity's name. A mapping has several columns, a vector one per component;
+        None is for a quantity that a problem does not have, which has no key, column or field then.
     files
         Where it stands; the first has the description.
     component

@@ -142,7 +142,10 @@ BAD = {
         "a number >= 1",
     ),
     "tresca without bound": ({"friction": {"law": "tresca"}}, "friction.bound: missing"),
-    "coulomb without mu": ({"friction": {"law": "coulomb"}}, "friction.mu: missing"),
+    "coulomb without mu": (
+        {"friction": {"law": "coulomb"}},
+        'friction.mu: missing; accepted: a number >= 0 or a formula, or a table with law = "slip"',
+    ),
     "mu without friction": (
         {"friction__law": "none"},
         'friction.mu: given a table; accepted: mu with law = "coulomb"',

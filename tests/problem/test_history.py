@@ -6,18 +6,19 @@ onto a frictionless foundation is in a homogeneous state, known in closed form.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import evolve, parse_case, solve
+from contact import InputError, Material, evolve, parse_case, solve
 from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
 from contact.output.checkpoint import read_steps
 from contact.output.fields import DerivedFields
 from forms.hencky import Isotropic
-from forms.history import Response, isotropic_stiffness
+from forms.history import HistoryLaw, Response, isotropic_stiffness
 from scripts.examples.own_return_mapping import DruckerPrager
 
 YOUNG, POISSON, LIMIT, MOST, HEIGHT, WIDTH = 10.0, 0.3, 2e-3, 0.5, 1.0, 2.0
@@ -123,6 +124,22 @@ def test_a_restart_goes_on_with_the_same_history(tmp_path):
     total = on_one.commit(last).arrays()["material.kappa"].sum()
     here = comm.allreduce(kappa_after(whole).sum(), op=MPI.SUM)
     assert total == pytest.approx(here, rel=1e-6)
+
+
+def test_the_protocol_has_all_that_is_asked_of_a_law():
+    """As one finds who writes a class by `HistoryLaw` alone."""
+    given, names = Damage(YOUNG, POISSON), [key for key in dir(HistoryLaw) if key[0] != "_"]
+    bare = SimpleNamespace(**{name: getattr(given, name) for name in names})
+    forces = [solve(case(), law=law).steps[-1].row["contact_force_y"] for law in (given, bare)]
+    assert forces[0] == pytest.approx(forces[1], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["young", "poisson", "bulk", "shear"])
+def test_a_law_without_a_constant_is_refused_by_a_message_with_its_name(name):
+    given = {"young": YOUNG, "poisson": POISSON, "bulk": 1.0, "shear": 1.0, "variables": dict}
+    del given[name]
+    with pytest.raises(InputError, match=f"^law: given .* accepted: .*{name}.*HistoryLaw"):
+        Material(SimpleNamespace(**given))
 
 
 def test_a_state_without_its_history_is_of_another_step():
