@@ -230,18 +230,19 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
             "agreement-branches",
             "Examples with several solutions, and who finds which",
             columns,
-            "Number of contact nodes that stick, slide and are open, and of those that do "
-            "something else than in solution A; the largest relative difference to A; the "
-            "largest residual, computed from scratch; then how far Newton's method and Uzawa block "
-            "relaxation go away from the solution if they are started there, and which "
-            f"solution they end at if each node is off by up to {DISTURBANCE:g} of its values. "
-            "nested: Newton's method by way of coarser meshes; eps: next to the penalised "
-            "solution. "
-            "With (7.16) mu falls from 0.6 to 0.5 as soon as a node slides by a few 1/rho: one "
-            "where |sigma_tau| lies between 0.5 and 0.6 of the pressure may stick or slide. In "
-            "Example 7.2 that is so for the node at the end of the bar and for those at the tip "
-            "of the sliding zone, each on its own; between sticking and sliding there is a "
-            "solution on the falling part of the law, which both methods leave if disturbed.",
+            "Columns: contact nodes that stick, slide and are open, and those in another state "
+            "than in solution A; the largest relative difference to A; the largest residual, "
+            "computed from scratch. Then how far Newton's method and Uzawa block relaxation move "
+            "from the solution if they start there. Last, the solutions at which they end if each "
+            "node is disturbed by up to "
+            f"{DISTURBANCE:g} "
+            "of its values. nested: Newton's method by way of coarser meshes; eps: next to the "
+            "penalised solution. With (7.16) mu falls from 0.6 to 0.5 as soon as a node slides by "
+            "a few 1/rho. A node where |sigma_tau| lies between 0.5 and 0.6 of the pressure may "
+            "therefore stick or slide. In Example 7.2 these are the node at the end of the bar and "
+            "those at the tip of the sliding zone, each on its own. Between sticking and sliding "
+            "there is a solution on the falling part of the law, which both methods leave if "
+            "disturbed.",
         )
 
 

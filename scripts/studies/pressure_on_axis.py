@@ -30,14 +30,14 @@ POISSON, RADIUS, DEPTH, SIZE = 0.3, 4.0, 9e-4, 0.5
 WAYS = "right", "left", "crossed", "left_right", "whole"
 CAPTION = "Contact pressure next to the axis of revolution: a rigid ball of radius 4 on a block"
 NOTE = (
-    "Squares of 1/h a unit in a block of 0.5 x 0.5, cut by diagonals or whole (quadrilaterals); "
-    "a = 0.06 = 6, 12 and 24 h. Errors, in per cent, beside the fit p_0 (1 - r^2/a^2)^(1/2) of "
-    "degree 2 on the finest mesh: of p_0 by the like fit to the nodes with 1.5 h < r < 0.6 a, and "
-    "of the nodes at r = h, 2 h, 3 h (degree 2: h/2, h, 3 h/2) and r = a/2. At degree 1 on squares "
-    "that are whole or cut by both diagonals they are those of C h^2/r: all rings fall like h "
-    "where they are as many cells from the axis, and like h^2 where they are as far from it. "
-    "At degree 1 no node on the axis carries a multiplier. A case file whose rectangle reaches the "
-    "axis is cut by both diagonals at degree 1."
+    "Squares of 1/h a unit in a block of 0.5 x 0.5, cut by diagonals or whole (quadrilaterals); a "
+    "= 0.06 = 6, 12 and 24 h. Errors, in per cent, are relative to the fit p_0 (1 - r^2/a^2)^(1/2) "
+    "of degree 2 on the finest mesh. They are those of p_0, by a fit to the nodes with 1.5 h < r < "
+    "0.6 a, and of the nodes at r = h, 2 h, 3 h (degree 2: h/2, h, 3 h/2) and r = a/2. At degree 1 "
+    "on squares that are whole or cut by both diagonals the errors of nodes are C h^2/r: they fall "
+    "like h at a given number of cells from the axis, and like h^2 at a given radius. At degree 1 "
+    "no node on the axis carries a multiplier. By default a rectangle that reaches the axis is cut "
+    "by both diagonals at degree 1."
 )
 
 

@@ -273,8 +273,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "little from that of the symmetric mesh, and less on finer ones."
     )
     steep = (
-        "The ramp of psi of earlier versions, 1000 over the largest extent: far below the spacing "
-        "of the nodes, so that the mesh decides where the bar touches. Shown to warn."
+        "A steep ramp of psi, delta = 1000 over the largest extent: its width is far below the "
+        "spacing of the nodes, and the mesh decides where the bar touches."
     )
     ramp, layer = [*crossed, "electric.delta=83.3333"], "layer of thickness 0.1"
     examples: list[tuple[Any, ...]] = [

@@ -22,7 +22,7 @@ THESIS: Mapping[float, int] = {
 #: Algorithms 6 and 8 as in the thesis: j_1 and l lagged, Kacanov's steps.
 LAGGED = ("contact.lagged=true", "electric.lagged=true", "solver.material_step=secant")
 
-#: The ramp of psi of earlier versions, a thousandth of the body's size, which no mesh resolves.
+#: A steep ramp of psi, a thousandth of the body's size wide, which no mesh resolves.
 STEEP = "electric.delta=83.3333"
 
 #: So exact that the change (3.46) shows, also where one iteration is enough for 1e-8.
@@ -39,13 +39,12 @@ LITERAL = (
 
 #: Results of Table 8.4, without and with a layer.
 NOTES = {
-    "": "With the default ramp of psi, 1/delta = 0.3, the counts of Algorithm 6 are the thesis's "
-    "but for 2 more in the first row and 1 less in the last; with the steep one of earlier "
-    "versions (delta = 83.3, next column; — : not met) they are not.",
+    "": "With the default ramp of psi, 1/delta = 0.3, the counts of Algorithm 6 are those of the "
+    "thesis except for 2 more in the first row and 1 less in the last. With a steep ramp "
+    "(delta = 83.3, next column; — : not met) they differ.",
     "-layer": "The counts of Algorithm 6 are by 1 above the thesis's in the first rows, and do not "
     "fall below 4: so many iterations the lagged layer takes by itself, without friction or "
-    "current (Example 8.3 with a layer, next section). Next column: the steep ramp of psi of "
-    "earlier versions.",
+    "current (Example 8.3 with a layer, next section). Next column: a steep ramp of psi.",
 }
 
 #: Iterations end at a relative change of the friction bound of 1e-5, (3.46).
@@ -129,14 +128,14 @@ def table_8_4(
         f"Table 8.4: iterations for mu = k_e, phi_F = 32, {topic}, {cells[0]} x {cells[1]} cells",
         columns,
         "Alg. 6: layer and current lagged, with inner solves to 2e-12; counted to a relative "
-        "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: "
-        "r = 0.25 E and the thesis's rules in both loops; the inner rule ends after two solves "
-        "when the change of one is small, not the error, so that the bound creeps; the residual "
-        "in the end is in the next column (— : (3.46) is not met in 400 "
-        "iterations). Implicit: the layer solved with the constraint, phi in the operator; "
-        "solves and residual are its own. Newton: linear solves of the whole body, "
-        "Newton iterations on the condensed problem, and the relative difference of "
-        "its solution to the implicit one in the nodal unknowns; — where it does not converge. "
+        "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: r = 0.25 "
+        "E and the thesis's rules in both loops (— : (3.46) is not met in 400 iterations), and "
+        "the residual at the end. The inner rule ends after two solves, where the change of a "
+        "solve is small but not the error; the bound therefore changes little from iteration to "
+        "iteration. Implicit: the layer solved with the constraint, phi in the operator; solves "
+        "and residual are its own. Newton: linear solves of the whole body, Newton iterations on "
+        "the condensed problem, and the relative difference of its solution to the implicit one "
+        "in the nodal unknowns; — where it does not converge. "
         f"{NOTES[suffix]}",
     )
 
