@@ -246,6 +246,21 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
     report.table("closed-forms", "Indentation, computed over closed form", columns, note)
 
 
+def half_spaces(report: Report) -> None:
+    """Tabulate the moduli of the half spaces, and charge over force of a grounded indenter."""
+    names = "material", "E* insulating (GPa)", "E* conducting (GPa)", "|Q/P| (pC/N)"
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    for material in MATERIALS:
+        body = Setting(material, "ball", 0.0).body
+        charge = 1e3 * abs(body.charge_ratio)  # from C/m2 over GPa
+        append(columns, material, body.insulating, body.conducting, charge)
+    note = (
+        "Q/P: charge over force of a grounded indenter. The material of the thesis has isotropic "
+        "elasticity and the coupling of PZT-5A."
+    )
+    report.table("half-spaces", "Moduli of piezoelectric half spaces", columns, note)
+
+
 def units_and_poling(report: Report, fineness: float) -> None:
     """Tabulate the effects of poling and units on a ball on PZT-4. Collective."""
     names = ("indenter", "given", "P", "Q or phi", "largest difference of p", "of phi")
@@ -287,6 +302,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = options(__doc__, "indentation", arguments)
     fineness = 6.0 if chosen.coarse else 12.0
     report = Report(chosen.out)
+    half_spaces(report)
     units_and_poling(report, fineness)
     table(report, fineness, MATERIALS[:1] if chosen.coarse else MATERIALS)
 
