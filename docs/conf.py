@@ -31,6 +31,7 @@ html_theme_options = {
     "logo": {"text": f"{project} {version}"},
     "navbar_align": "left",
     "header_links_before_dropdown": 8,
+    "navbar_persistent": ["search-button"],
     "show_toc_level": 2,
     "navigation_with_keys": False,
     "footer_start": ["copyright"],

@@ -7,8 +7,8 @@
 # %% [markdown]
 # # First contact
 #
-# A block of rubber is pressed on a rigid table and pushed sideways. Where does it stick, where does
-# it slide? A problem in ten lines of Python, its solution, and a check by hand.
+# A soft block is pressed on a rigid table and pushed sideways. This notebook finds the parts of its
+# bottom that stick and slide: a problem in ten lines of Python, its solution, and a check by hand.
 
 # %%
 import matplotlib.pyplot as plt
@@ -50,8 +50,8 @@ plt.legend()
 plt.show()
 
 # %% [markdown]
-# By hand: the forces on the block balance, and without friction the strain is 0.005 and the modulus
-# that of plane strain, E/(1 - ν²).
+# By hand: the forces on the block balance. Without friction the block is in uniaxial stress, with
+# the strain 0.005 and the modulus of plane strain, E/(1 - ν²).
 
 # %%
 np.testing.assert_allclose(solution.reaction("top"), solution.contact_force, rtol=1e-7)

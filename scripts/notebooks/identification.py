@@ -8,9 +8,9 @@
 # # Parameters from measurements, and a shape for a wanted pressure
 #
 # With the consistent Newton matrix factorised at the solution of a contact problem, each derivative
-# of a result costs a few more back-substitutions. Here derivatives find friction
-# and modulus from a noisy loop, piezoelectric constants from two indentations, and the shape of a
-# foundation with 500 parameters. See [Sensitivities](../derivatives.md).
+# of a result costs a few more back-substitutions. Here derivatives identify friction and modulus
+# from a noisy loop, piezoelectric constants from two indentations, and the shape of a foundation
+# with 500 parameters. See [Sensitivities](../derivatives.md).
 
 # %%
 import logging
@@ -80,10 +80,10 @@ plt.show()
 # %% [markdown]
 # ## Constants of PZT-4 from two indentations
 #
-# Under a grounded ball the force depends on the constants otherwise than under an insulating one:
-# $\partial\ln P/\partial\ln c_{33}$ is .89 and .63, by $e_{33}$ -.07 and .18. Both force
-# curves together give two constants, if the others are known. One curve alone does not: the
-# correlation would be 1.
+# The force depends on the constants differently under a grounded and under an insulating ball:
+# $\partial\ln P/\partial\ln c_{33}$ is 0.89 and 0.63, and $\partial\ln P/\partial\ln e_{33}$ is
+# -0.07 and 0.18. Both force curves together determine two constants, if the others are known. One
+# curve alone does not: the correlation would be 1.
 
 # %%
 ball = [
@@ -109,9 +109,9 @@ print(f"right: 113 and 13.84; correlation {constants.correlation[0, 1]:.2f}")
 # %% [markdown]
 # ## The shape that gives a wanted pressure
 #
-# A foundation with 500 heights under a block: which ones give a pressure that is a half sine? The
-# misfit and its gradient by all heights take one solution and one adjoint. The quantity states its
-# value and its derivatives by the unknowns and by the contact forces.
+# The 500 heights of a foundation under a block are sought for which the pressure is a half sine.
+# The misfit and its gradient by all heights take one solution and one adjoint. The quantity states
+# its value and its derivatives by the unknowns and by the contact forces.
 
 # %%
 count = 500

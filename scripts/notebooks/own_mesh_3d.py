@@ -8,7 +8,8 @@
 # # A part of one's own in 3-D
 #
 # A bracket with a fillet and a bolt hole, made by Gmsh's OpenCASCADE kernel, is screwed down on a
-# rigid table: the washer presses on it, a load pulls at its upright. Does the foot lift off?
+# rigid table. The washer presses on it, and a load pulls at its upright. This notebook finds the
+# parts of the foot that lift off.
 
 # %%
 from pathlib import Path

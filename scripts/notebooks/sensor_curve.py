@@ -7,9 +7,9 @@
 # %% [markdown]
 # # A contact sensor
 #
-# A piezoelectric body between an electrode and a table with friction: the charge of the
-# short-circuited electrode, or the potential of the open one, measures the load. How linear is
-# it? `scripts/examples/sensor.py` makes this curve for any case file.
+# A piezoelectric body lies between an electrode and a table with friction. The charge of the
+# short-circuited electrode, or the potential of the open one, measures the load; this notebook
+# draws the curve. `scripts/examples/sensor.py` does so for any case file.
 
 # %%
 import matplotlib.pyplot as plt

@@ -7,8 +7,8 @@
 # %% [markdown]
 # # Two bodies: a steel cylinder on a block of aluminium
 #
-# Parts of one mesh may touch each other: `[contact] against = ...`. By the mortar method their
-# meshes need not match. The example is NAFEMS's R0094-1, half of it by symmetry.
+# Parts of one mesh may touch each other, `[contact] against = ...`, on meshes that need not match
+# (mortar method). The example is NAFEMS R0094-1, half of it by symmetry.
 
 # %%
 from tempfile import TemporaryDirectory

@@ -207,6 +207,13 @@ def test_every_public_name_has_its_place_in_the_reference() -> None:
             assert re.search(r"^ *(Returns|Yields)\n *-{6,7}$", made.__doc__ or "", re.M), name
 
 
+def test_equations_with_a_number_have_rows_that_sphinx_leaves_alone() -> None:
+    """Those with a double backslash get an environment in which a tag is an error."""
+    for page in DOCS.glob("*.md"):
+        for formula in re.findall(r"\$\$.*?\$\$", page.read_text(), re.S):
+            assert "\\tag" not in formula or "\\\\" not in formula, f"{page.name}: {formula}"
+
+
 def test_every_citation_has_its_entry() -> None:
     known = set(re.findall(r"^@\w+{(\w+),", (DOCS / "references.bib").read_text(), re.M))
     pages = [*DOCS.glob("*.md"), *(ROOT / "scripts" / "thesis").glob("*.py")]
