@@ -8,10 +8,13 @@ import signal
 from pathlib import Path
 
 import pytest
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from contact.cli.main import main
 from contact.errors import InputError
 from contact.methods.signals import Interrupted
+from contact.output.figures.style import Look
 from contact.output.figures.sweep import DRAWN
 from contact.output.figures.sweep import _figure as sweep_figure
 from contact.output.figures.sweep import _read as read_sweep
@@ -370,6 +373,27 @@ def test_labels_of_a_sweep_have_words_and_units(tmp_path):
         assert list(force.lines[0].get_xdata()) == [-4.0, -1.0]
         assert force.lines[0].get_label() == r"friction: $\mu$ = 0.1"
         assert figure.get_suptitle() == "Bars"
+    with pytest.raises(InputError, match=r"--field input: no such column of sweep\.csv; accepted"):
+        swept.chosen("input")
     (tmp_path / "sweep.toml").unlink()
     with pytest.raises(InputError, match=r"sweep\.toml: missing or damaged"):
         read_sweep(tmp_path)
+
+
+@pytest.mark.parametrize("inches", [85 / 25.4, 6.3])
+def test_the_legend_of_a_sweep_is_within_its_figure(tmp_path, inches):
+    """A line for each of the other keys, in words with units."""
+    rows = [f"[0.0, {-k}.0],0.{m},True,{k * m}.0,3.0" for k in (1, 2, 3) for m in (1, 2)]
+    lines = ["load.0.traction,friction.mu,converged,max_pressure,contact_area", *rows]
+    table = "\n".join(line.replace("[", '"[').replace("]", ']"') for line in lines)
+    (tmp_path / "sweep.csv").write_text(f"{table}\n")
+    (tmp_path / "sweep.toml").write_text(
+        '[case.units]\nlength = "mm"\nstress = "daN/mm²"\n[space]\nkinematics = "plane_strain"\n'
+    )
+    with rc_context(Look(inches).style):
+        figure = sweep_figure(read_sweep(tmp_path), ["max_pressure", "contact_area"])
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        box = figure.get_tightbbox(canvas.get_renderer())
+    width, height = figure.get_size_inches()
+    assert min(box.x0, box.y0) > -0.02 and box.x1 < width + 0.02 and box.y1 < height + 0.02

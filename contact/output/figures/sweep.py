@@ -158,13 +158,13 @@ class Swept:
         InputError
             If there is none.
         """
-        found = [name for name in self.columns if name != "input" and is_of(name, key)]
+        known = [name for name in self.columns if name != "input"]
+        found = [name for name in known if is_of(name, key)]
         if not found:
-            near = difflib.get_close_matches(key, self.columns, n=1)
+            near = difflib.get_close_matches(key, known, n=1)
             hint = f" (did you mean {near[0]}?)" if near else ""
-            accepted = ", ".join(column for column in self.columns if column != "input")
             raise InputError(
-                f"--field {key}: no such column of sweep.csv{hint}; accepted: {accepted}"
+                f"--field {key}: no such column of sweep.csv{hint}; accepted: {', '.join(known)}"
             )
         return [name for name in found if len(found) > 1 and self.varies(name)] or found
 
@@ -275,7 +275,8 @@ def _figure(swept: Swept, drawn: Sequence[str]) -> Figure:
         panel.axis("off")
     if len(lines) > 1:
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        columns = 1 if page_width() < NARROW else 2
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns)
     if swept.title:
         figure.suptitle(fitted(swept.title), fontsize="large")
     return figure
