@@ -386,15 +386,20 @@ def _draw_status(ax: Axes, flat: Array, facets: NDArray[np.int64], status: Array
     middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
     after, before = (np.roll(corners, k, axis=1) for k in (-1, 1))
     quads = np.stack([corners, (corners + after) / 2, middle, (corners + before) / 2], axis=2)
-    numbers = status[facets]
-    known = numbers >= STATUS["open"]  # nodes that are held are no contact nodes
-    order = [STATUS[zone] for zone in ZONES]
-    shown = PolyCollection(
-        list(quads[known]), array=np.argsort(order)[numbers[known]], edgecolors="face", lw=0.2,
-        cmap=ListedColormap([colour for colour, _ in ZONES.values()]), rasterized=True,
-    )  # fmt: skip
-    shown.set_clim(-0.5, len(order) - 0.5)
-    ax.add_collection(shown)
+    known = status[facets] >= STATUS["open"]  # nodes that are held are no contact nodes
+    if not known.any():
+        return
+    order = np.argsort([STATUS[zone] for zone in ZONES])
+    halves = 4 * np.arange(known.sum())[:, None, None] + [[0, 1, 2], [0, 2, 3]]
+    ax.tripcolor(
+        *quads[known].reshape(-1, 2).T,
+        halves.reshape(-1, 3),
+        np.repeat(order[status[facets][known]], 4),
+        shading="gouraud",
+        cmap=ListedColormap([colour for colour, _ in ZONES.values()]),
+        vmin=-0.5,
+        vmax=len(ZONES) - 0.5,
+    )
 
 
 def _draw_friction(ax: Axes, skin: Any, view: list[int], low: Array, high: Array) -> None:
