@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.quiver import Quiver
 
 from contact.cli.arguments import parse
 from contact.errors import InputError
@@ -415,3 +416,20 @@ def test_a_crop_in_3d_is_full(look: Look, shown: list[tuple[float, float]]) -> N
         shares.get_array()[::2],
     )  # two halves have four corners
     assert found and surface["status"][node] in [STATUS[words[int(codes[k])]] for k in found]
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_panels_in_3d_name_what_they_show(mu: float) -> None:
+    """Without friction nothing slides; titles stay beside each other in slim panels too."""
+    run = run_of(solve(block(3, friction={"law": "coulomb", "mu": mu} if mu else {"law": "none"})))
+    look = Look(6.3, xlim=(1.0, 1.2))
+    with rc_context(look.style):
+        figure = draw_surface(run, look)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        titles = [ax.title.get_window_extent(canvas.get_renderer()) for ax in figure.axes[:2]]
+    assert titles[0].x1 < titles[1].x0
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == (["sticking", "sliding", "open"] if mu else ["in contact", "open"])
+    arrows = [each for each in figure.axes[1].collections if isinstance(each, Quiver)]
+    assert len(arrows) == (mu > 0)

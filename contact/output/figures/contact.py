@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -31,6 +33,9 @@ from contact.output.figures.style import (
 from contact.output.formats import Table
 from contact.output.quantities import STATUS
 from contact.typing import Array
+
+#: Names of the zones without friction.
+TOUCHING = {"slip": "in contact", "open": "open"}
 
 #: Contact zones below this share of an axis are drawn with their vicinity alone.
 SMALL = 1 / 3
@@ -253,7 +258,7 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
         zones(ax, where, whole, table["status"][None], np.array([0.0, 1.0]))
     for zone, (colour, label) in ZONES.items():
         if np.any(seen == zone):
-            words = label if frictional or zone == "open" else "in contact"
+            words = label if frictional else TOUCHING.get(zone, "in contact")
             rows[0].fill_between([], [], color=colour, lw=0, label=words)
     rows[0].plot(where, table["pressure"], color=BLUE, marker=mark, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
@@ -314,7 +319,8 @@ def draw_surface(run: Run, look: Look) -> Figure:
     view = sorted(int(k) for k in np.argsort(np.abs(mean))[:2])  # the axes most across it
     sides = [(surface, "contact pressure"), (run.opposite, "on the other side")]
     panels = [(side, name) for side, name in sides if side is not None]
-    panels.append((surface, "status, friction (arrows)"))
+    frictional = bool(np.any(run.table["bound"] > 0))
+    panels.append((surface, "status, friction (arrows)" if frictional else "status"))
     places = surface.points[:, view]
     low, high = window(places, touching, 0.13)  # room for the arrows
     limits = [
@@ -328,12 +334,14 @@ def draw_surface(run: Run, look: Look) -> Figure:
         _balance(low, high, places, limits.index(None))
     stacked = page_width() < NARROW
     rows, columns = (len(panels), 1) if stacked else (1, len(panels))
-    aspect = float(np.clip((high - low)[1] / (high - low)[0], 0.25, 0.8 if stacked else 1.25))
+    tall = (high - low)[1] / (high - low)[0]
+    aspect = float(np.clip(tall, 0.25, 0.8 if stacked else 1.25))
     figure = sheet(rows * (aspect / columns + 0.02) + (2.0 if stacked else 1.5) / page_width())
     figure.set_layout_engine("compressed")
     *lefts, right = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
-    seen = np.nan_to_num(_clipped(surface, view, low, high)["pressure"])
-    highest = float(seen.max(initial=0.0)) or 1.0
+    highest = _highest(surface, view, low, high) or 1.0
+    letters = 150 / float(matplotlib.rcParams["font.size"]) * page_width() / columns
+    letters = int(max(8.0, 0.8 * letters * min(1.0, aspect / tall)))
     x, y = (run.units.label(f"${'xyz'[k]}$", "length") for k in view)
     for ax, (side, name) in zip((*lefts, right), panels, strict=True):
         # Of degree 2 four pieces each.
@@ -350,12 +358,13 @@ def draw_surface(run: Run, look: Look) -> Figure:
             shown = ax.tripcolor(*flat.T, drawn, np.nan_to_num(skin["pressure"]), **colours)
         ax.set_aspect("equal")
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=x, ylabel=y)
-        ax.set_title(name if aspect < 1 else name.replace(", ", ",\n"), fontsize="medium")
+        ax.set_title(textwrap.fill(name, letters), fontsize="medium")
         ax.label_outer()
     label = run.units.label(r"$-\sigma_\nu$", "stress")
     bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
     figure.colorbar(shown, ax=[*lefts, right], **bar)
-    handles = [Patch(color=colour, label=words) for colour, words in ZONES.values()]
+    words = {zone: label for zone, (_, label) in ZONES.items()} if frictional else TOUCHING
+    handles = [Patch(color=ZONES[zone][0], label=label) for zone, label in words.items()]
     figure.legend(handles=handles, ncols=3, loc="outside lower center")
     return figure
 
@@ -371,13 +380,14 @@ def _balance(low: Array, high: Array, places: Array, k: int) -> None:
     low[k], high[k] = np.clip(ends, places[:, k].min(), places[:, k].max())
 
 
-def _clipped(surface: Any, view: list[int], low: Array, high: Array) -> Any:
-    """Return the part of a surface that is shown: with values where its facets are cut."""
+def _highest(surface: Any, view: list[int], low: Array, high: Array) -> float:
+    """Return the largest pressure that is shown, where facets are cut too."""
     part = surface.extract_surface(nonlinear_subdivision=1)
     for k, *ends in zip(view, low, high, strict=True):
         for above, end in enumerate(ends):
-            part = part.clip("xyz"[k], origin=np.eye(3)[k] * end, invert=above == 1)
-    return part
+            if part.n_cells:
+                part = part.clip("xyz"[k], origin=np.eye(3)[k] * end, invert=above == 1)
+    return float(np.nanmax(part["pressure"], initial=0.0)) if part.n_cells else 0.0
 
 
 def _draw_status(ax: Axes, flat: Array, facets: NDArray[np.int64], status: Array) -> None:
@@ -409,7 +419,8 @@ def _draw_friction(ax: Axes, skin: Any, view: list[int], low: Array, high: Array
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
     friction = along[:, view]
     size = np.linalg.norm(friction, axis=1)
-    size[np.any((flat < low) | (flat > high), axis=1)] = 0.0
+    least = 1e-6 * (high - low)  # less is rounding of the places
+    size[np.any((flat < low - least) | (flat > high + least), axis=1)] = 0.0
     # Rounding of the pressures is no friction.
     rounding = 1e-9 * np.linalg.norm(traction, axis=1).max(initial=0.0)
     acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
