@@ -19,8 +19,8 @@ from contact.ranks import largest, summed
 from contact.typing import Array
 
 
-def free_directions(normal: Array, movable: Array) -> tuple[Array, Array]:
-    """Return the lifts of unit normals, and the projectors onto the free tangential directions.
+def contact_directions(normal: Array, movable: Array) -> tuple[Array, Array]:
+    """Return the lifts of unit normals, and the projectors onto the directions of friction.
 
     Parameters
     ----------
@@ -36,7 +36,9 @@ def free_directions(normal: Array, movable: Array) -> tuple[Array, Array]:
     admissible = np.einsum("nij,nj->ni", movable, normal)
     length = np.linalg.norm(admissible, axis=1)[:, None]
     unit = admissible / length
-    return unit / length, movable - unit[:, :, None] * unit[:, None, :]
+    aslant = length[:, :, None] < 1 - 1e-12
+    acting = np.where(aslant, movable, np.eye(normal.shape[1]))
+    return unit / length, acting - unit[:, :, None] * unit[:, None, :]
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,9 @@ class ContactNodes:
         The least displacement along directions that no support holds whose normal component is 1,
         shape (n, d): the normal, but where a support holds nodes aslant to it.
     tangent
-        Projector onto the free tangential directions, shape (n, d, d).
+        Projector onto the directions in which nodes slip and friction acts, shape (n, d, d): all
+        tangential ones, as a node that supports move slips too; but where they hold it aslant to
+        the contact direction they bear the friction along what they hold.
     gap
         Distance to the foundation along the contact direction, shape (n,).
     deviation

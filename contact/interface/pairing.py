@@ -14,7 +14,7 @@ from contact.errors import InputError
 from contact.interface.mortar.coupling import Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
-from contact.interface.nodes import ContactNodes, free_directions
+from contact.interface.nodes import ContactNodes, contact_directions
 from contact.interface.obstacle import Obstacle
 from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
@@ -86,7 +86,7 @@ def find_pair(
         points,
         coupling.weight,
         normal,
-        *free_directions(normal, body.movable(local)),
+        *contact_directions(normal, body.movable(local)),
         gap + added,
         np.full(local.size, unknown),
         body.block_size,

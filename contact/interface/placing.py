@@ -17,7 +17,7 @@ from contact.body.rollers import APART
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import Surface, surface_of
-from contact.interface.nodes import ContactNodes, free_directions
+from contact.interface.nodes import ContactNodes, contact_directions
 from contact.interface.obstacle import Obstacle, Shape
 from contact.interface.obstacle.protocol import measured
 from contact.mesh.cells import shape_of
@@ -246,8 +246,8 @@ def find_nodes(
     A node whose contact direction supports hold, or that follows a rigid part, is left out. Where
     they hold it aslant to that, as a plane of symmetry beside an inclined foundation does, it is
     met by the displacements that are free and those that are prescribed; the force along directions
-    that are held is borne by the supports. Friction acts along tangential directions alone that are
-    free.
+    that are held is borne by the supports. Friction acts along the directions of
+    `ContactNodes.tangent`.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def find_nodes(
         points,
         weight[keep],
         direction,
-        *free_directions(direction, movable[keep]),
+        *contact_directions(direction, movable[keep]),
         gap[keep],
         unknown[keep],
         space.dofmap.index_map_bs,
