@@ -120,10 +120,11 @@ def destroy_unused(*comms: MPI.Intracomm) -> None:
     """Destroy objects of PETSc that are no longer in use. Collective.
 
     Where several ranks share one, petsc4py leaves it to this call: each collects its garbage at
-    another moment.
+    another moment. Those of one rank alone are destroyed at once.
     """
     for comm in comms:
-        PETSc.garbage_cleanup(comm)
+        if comm.size > 1:
+            PETSc.garbage_cleanup(comm)
 
 
 def give_memory_back() -> None:
