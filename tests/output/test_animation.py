@@ -35,6 +35,19 @@ def test_one_frame_a_step(run: Path) -> None:
     assert abs(frames[0] - frames[-1]).max() > 100
 
 
+def test_paper_is_white(tmp_path: Path) -> None:
+    """A picture has more colours than its file, which has had a grey in place of white."""
+    small = ["mesh.cells=[10, 8]", "space.degree=1", "evolution.steps=[2, 1]", "output.fields=vtu"]
+    given = [text for each in small for text in ("--set", each)]
+    case = str(CASES / "ring-on-mandrel.toml")
+    assert main(["solve", case, "--out", str(tmp_path), *given, "--quiet"]) == 0
+    assert main(["plot", str(tmp_path), "--animate"]) == 0
+    image = Image.open(tmp_path / "animation-deformed.gif")
+    for k in range(image.n_frames):
+        image.seek(k)
+        assert image.convert("RGB").getpixel((1, 1)) == (255, 255, 255)
+
+
 def test_a_later_run_takes_it_away(run: Path) -> None:
     assert main(["plot", str(run), "--animate", "--field", "displacement_x"]) == 0
     assert (run / "animation-displacement_x.gif").is_file()

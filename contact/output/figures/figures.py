@@ -31,6 +31,9 @@ FORMATS = ("png", "pdf", "svg")
 #: Dots per inch of an animation: a file that a page can show.
 DPI = 90
 
+#: Least red, green and blue of paper, in animations.
+PAPER = 246
+
 #: Milliseconds of the whole animation, and of a frame at least and at most.
 LENGTH, SHORTEST, LONGEST = 6000, 40, 500
 
@@ -174,9 +177,11 @@ def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, loo
                 ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         files = [io.BytesIO(image(figure, "png", DPI)) for figure in figures]
     images = [Image.open(file).convert("RGB") for file in files]
-    palette = images[-1].quantize(
-        256, Image.Quantize.MAXCOVERAGE
-    )  # one for all, so that nothing flickers; the bar has it
+    # One for all, so that nothing flickers; the bar has it. Paper is white, and not nearly so.
+    palette = images[-1].quantize(256, Image.Quantize.MAXCOVERAGE)
+    entries = np.array(palette.getpalette(), dtype=np.uint8).reshape(-1, 3)
+    entries[entries.min(axis=1) >= PAPER] = 255
+    palette.putpalette(entries.tobytes())
     first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in images)
     path = folder / f"animation-{named(field, runs[0].units)[0]}.gif"
     duration = int(np.clip(LENGTH / len(steps), SHORTEST, LONGEST))
