@@ -66,7 +66,7 @@ class ContactNodes:
     tangent
         Projector onto the directions in which nodes slip and friction acts, shape (n, d, d): all
         tangential ones, as a node that supports move slips too; but where they hold it aslant to
-        the contact direction they bear the friction along what they hold.
+        the contact direction they bear the friction along directions they hold.
     gap
         Distance to the foundation along the contact direction, shape (n,).
     deviation
