@@ -234,6 +234,7 @@ class InteriorPoint:
         works = [abs(self._sum(float(own @ force[: body.owned]))) for force in forces]
         return cones.duality_gap() / ((contact + sum(works)) or 1.0)
 
+    @np.errstate(over="ignore", invalid="ignore")  # of a body that falls; no such step is taken
     def step(self) -> bool:
         """Take a step; False if rounding lets no more be taken. Collective."""
         cones, interface, state = self.cones, self.problem.interface, self.state

@@ -289,7 +289,8 @@ def with_least_displacements(
     modes
         Those of the whole problem, at the time of the step.
     state, outcome
-        Where a method has ended; nothing is changed without convergence.
+        Where a method has ended; without convergence nothing is changed but where the bodies are in
+        balance without any contact force.
 
     Returns
     -------
@@ -297,8 +298,15 @@ def with_least_displacements(
     free.
     """
     problem, body = modes.problem, modes.problem.equilibrium
-    if not outcome.converged or modes.constrained_by_supports:
+    if outcome.signal or modes.constrained_by_supports:
         return state, outcome
+    if not outcome.converged:
+        # Bodies that have been pushed aside press by rounding, on which a method stalls.
+        free = replace(state, forces=Multipliers.zero(problem.interface.jump))
+        residuals = evaluate(problem, free)
+        if residuals.excess(outcome.allowed):
+            return state, outcome
+        state, outcome = free, replace(outcome, kkt=residuals)
     found = modes.minimal_motion(problem, state)
     if found is None:
         return state, outcome

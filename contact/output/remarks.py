@@ -17,6 +17,7 @@ from contact.output.solution import Note, Remark, Solution
 from contact.output.uniqueness import MOST
 from contact.problem.checks import meeting_supports
 from contact.problem.residuals import left_as_pressures, residual_forces
+from contact.problem.rigid_modes import constrained_by_supports
 from contact.tolerances import EPS, LARGEST_VIOLATION
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky
@@ -368,12 +369,18 @@ def strong_friction(solution: Solution) -> Iterator[Remark]:
     if np.isnan(factor):
         yield Note(f"with more than {MOST} contact nodes, a critical friction is not looked for")
     if solution.jammed:
-        yield (
-            f"there are several solutions, and this is one reached from {solution.start}: friction "
-            "alone jams the bodies, which without any contact force are in balance where they do "
-            "not meet; load steps choose one by the way of loading, a support against the motion "
-            "away, or no friction, leaves one"
-        )
+        several = f"there are several solutions, and this is one reached from {solution.start}"
+        balance = "without any contact force are in balance where they do not meet; load steps"
+        if constrained_by_supports(solution.problem):
+            yield (
+                f"{several}: friction alone keeps the bodies in contact, which on their supports "
+                f"{balance} choose one by the way of loading, less friction, or none, leaves one"
+            )
+        else:
+            yield (
+                f"{several}: friction alone jams the bodies, which {balance} choose one by the way "
+                "of loading, a support against the motion away, or no friction, leaves one"
+            )
     elif factor <= 1:
         law, nodes = solution.problem.interface.friction.law, solution.problem.nodes
         own = law.maximum if law is not None and nodes.nodes.size else 0.0

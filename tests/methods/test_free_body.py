@@ -140,9 +140,8 @@ def test_two_pads_that_are_lifted_off_stay_where_they_were(seed, tmp_path):
     assert solution.counters.contact_solves <= 150  # one took 6668, for steps that were halved
 
 
-@pytest.mark.parametrize("weight", [1e-5, 1e-3])
-def test_a_block_that_jaws_touch_aslant_is_said_to_fall(weight, tmp_path):
-    """It turns out of their way: the end was "not converged" after 350 solves, and no more."""
+def between_jaws(folder, weight):
+    """Return a block that jaws touch aslant: it turns out of their way, and falls."""
     bodies = Bodies(np.random.default_rng(0))
     turn = np.array([[np.cos(0.05), np.sin(0.05)], [-np.sin(0.05), np.cos(0.05)]])
     square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) @ turn
@@ -150,10 +149,10 @@ def test_a_block_that_jaws_touch_aslant_is_said_to_fall(weight, tmp_path):
     bodies.block("a", [[-2.0, -0.6], [-x, -0.6], [-x, 0.6], [-2.0, 0.6]], 0.25)
     bodies.block("m", square.tolist(), 0.2)
     bodies.block("z", [[x, -0.6], [2.0, -0.6], [2.0, 0.6], [x, 0.6]], 0.25)
-    write_msh(bodies.mesh(), tmp_path / "row.msh")
+    write_msh(bodies.mesh(), folder / "row.msh")
     friction = {"law": "coulomb", "mu": 0.2}
-    case = {
-        "mesh": {"file": str(tmp_path / "row.msh")},
+    return parse_case({
+        "mesh": {"file": str(folder / "row.msh")},
         "material": {"young": 1.0, "poisson": 0.1},
         "fixed": [
             {"on": "a_left", "displacement": [0.0015, 0.0]},
@@ -164,10 +163,22 @@ def test_a_block_that_jaws_touch_aslant_is_said_to_fall(weight, tmp_path):
             {"on": "m_left", "against": "a_right", "friction": friction},
             {"on": "m_right", "against": "z_left", "friction": friction},
         ],
-        "solver": {"max_outer": 60},
-    }
-    solution = solve(parse_case(case), comm=MPI.COMM_SELF)
+    })  # fmt: skip
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_falling_body_overflows_without_a_word(tmp_path, monkeypatch):
+    """Where nothing tells that it falls, steps end with infinite forces: NumPy warned of NaN."""
+    monkeypatch.setattr(UnconstrainedModes, "overload", lambda *_: 1.0)
+    assert not solve(between_jaws(tmp_path, 0.1), comm=MPI.COMM_SELF).converged
+
+
+@pytest.mark.parametrize("weight", [1e-5, 1e-3])
+def test_a_block_that_jaws_touch_aslant_is_said_to_fall(weight, tmp_path):
+    """The end was "not converged" after 350 solves, and no more."""
+    solution = solve(between_jaws(tmp_path, weight), comm=MPI.COMM_SELF)
     assert not solution.converged
+    assert solution.counters.linear_solves + solution.counters.contact_solves <= 130
     (said,) = [text for text in solution.warnings if "[not-held]" in text]
     assert "friction cannot hold m (" in said
     assert "translation along y" in said

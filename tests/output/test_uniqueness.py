@@ -57,6 +57,15 @@ def test_several_solutions_of_a_triangle_are_warned_of(mu, warned, load, method,
     assert not warned or "mu up to 1.497" in said[0]
 
 
+def test_a_body_on_supports_that_friction_alone_keeps_in_contact(tmp_path):
+    """It sticks, and without contact forces lifts off: nothing is jammed, nor lacks a support."""
+    solution = solve(triangle(tmp_path, 3.0, [-0.02, -0.01]), comm=MPI.COMM_SELF)
+    assert solution.converged and solution.pressure.max() > 0 and solution.jammed
+    (said,) = [text for text in solution.warnings if "[strong-friction]" in text]
+    assert "friction alone keeps the bodies in contact, which on their supports" in said
+    assert "jams" not in said and "support against" not in said
+
+
 def under_a_cylinder(method):
     """Return a block on a plane, pressed by a rigid cylinder up whose flanks it slides."""
     return parse_case({
@@ -230,6 +239,15 @@ def test_a_body_that_friction_alone_jams(tmp_path):
     assert [said in "".join(each.warnings) for each in (free, jammed)] == [False, True]
     # Flat facets deviated by 1e-17 from a curve, and gaps are nothing.
     assert "curved" not in "".join(free.warnings)
+
+
+def test_a_body_that_is_turned_aside_by_fixed_points(tmp_path):
+    """Its pressures are rounding at last: the end was a friction residual of 5e-6, and no more."""
+    tables = rhombus(tmp_path, 0.05).model_dump(mode="json", exclude_unset=True)
+    free = solve(parse_case(tables | {"solver": {"method": "uzawa"}}), comm=MPI.COMM_SELF)
+    assert free.converged and free.pressure.max() == 0
+    assert np.abs(free.state.x).max() == pytest.approx(0.2031, rel=1e-3)
+    assert "nothing holds body against rigid motions" in "".join(free.warnings)
 
 
 def test_a_weight_needs_contact_however_hard_jaws_clamp(tmp_path):
