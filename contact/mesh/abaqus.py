@@ -13,6 +13,7 @@ chapter 6.2 (elements).
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from contact.mesh.cells import distinct, once, together
-from contact.mesh.extraction import Contents, Ints, same_name
+from contact.mesh.extraction import Contents, Ints, letters, same_name
 
 #: meshio's names of elements by their dimension and number of nodes.
 KINDS = {
@@ -44,10 +45,16 @@ KINDS = {
 
 #: Types of elements: beginnings of their names, and their dimension.
 TYPES = (
-    (re.compile(r"(?:AC|D|F)?C3D(\d+)"), 3),
-    (re.compile(r"(?:AC|D)?(?:CPS|CPE|CPEG|CAX|CGAX|C2D|MAX|M3D|S|DS|SC|R3D|SFM3D|STRI)(\d+)"), 2),
+    (re.compile(r"(?:(?:AC|D|F)?C3D|SC|CSS)(\d+)"), 3),
+    (re.compile(r"(?:AC|D)?(?:CPS|CPE|CPEG|CAX|CGAX|C2D|MAX|M3D|S|DS|R3D|SFM3D|STRI)(\d+)"), 2),
     (re.compile(r"(?:T2D|T3D|B2|B3|R2D|RAX|SAX|F2D)(\d)"), 1),
 )
+
+#: Commas that are not within quotation marks.
+COMMA = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')
+
+#: Elements between nodes that are no part of a mesh.
+NO_CELLS = re.compile(r"MASS|ROTARYI|SPRIN|DASHPOT|CONN|GAP|DCOUP|USER|U\d")
 
 #: Beginnings of the names of plane elements, and the kinematics for which they are made.
 KINEMATICS = {"CPS": "plane_stress", "CPE": "plane_strain", "CAX": "axisymmetric"}
@@ -77,7 +84,7 @@ DIMENSIONS = {name: dim for (dim, _), name in KINDS.items()}
 SIDES = {"", "S1", "S2", "SPOS", "SNEG"}
 
 #: Keywords without a meaning for a mesh that are not worth a word.
-SILENT = {"HEADING", "PREPRINT", "END PART", "PART", "ASSEMBLY", "END ASSEMBLY", "END INSTANCE"}
+SILENT = {"HEADING", "PREPRINT", "ASSEMBLY", "END ASSEMBLY"}
 
 #: Keywords that make or move nodes and elements which do not stand in the file.
 MAKING = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPORT"}
@@ -92,23 +99,52 @@ FROM_FILES = {"NODE", "ELEMENT"}
 
 @dataclass
 class _Read:
-    """The data of a file by number and by name, names as they stood first."""
+    """The data of a file by number and by name, names as they stood first.
+
+    A part has names of its own (``scope``), which an assembly calls by its instance.
+    """
 
     points: dict[int, list[float]] = field(default_factory=dict)
     elements: dict[str, list[int]] = field(default_factory=dict)
     nodes: dict[str, list[int | str]] = field(default_factory=dict)
     nodes_of: dict[str, list[str]] = field(default_factory=dict)
     sets: dict[str, list[int | str]] = field(default_factory=dict)
-    surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
+    surfaces: dict[str, tuple[str, list[tuple[int | str, str]]]] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
-    placed: set[str] = field(default_factory=set)
+    placed: dict[str, str] = field(default_factory=dict)
+    instances: dict[str, str] = field(default_factory=dict)
     other: list[str] = field(default_factory=list)
+    scope: str = ""
 
-    def name(self, given: str) -> str:
-        """Return the key of a name: capitals do not matter."""
-        key = given.strip().strip('"').upper()
-        self.names.setdefault(key, given.strip().strip('"'))
+    def name(self, given: str, instance: str = "") -> str:
+        """Return the key of a name, of an instance where one is given: capitals do not matter."""
+        word = given.strip().strip('"')
+        before, _, own = word.rpartition(".")
+        part = self._part(before) or self._part(instance) or self.scope
+        word = own if self._part(before) else word
+        key = f"{part}.{word}".upper() if part else word.upper()
+        self.names.setdefault(key, word)
         return key
+
+    def member(self, given: str, instance: str = "") -> int | str:
+        """Return the number that a word stands for, or the key of a set."""
+        before, _, own = given.rpartition(".")
+        number = own if self._part(before) else given
+        return int(number) if number.lstrip("+-").isdigit() else self.name(given, instance)
+
+    def _part(self, instance: str) -> str:
+        """Return the part of an instance, "" for none of that name."""
+        return self.placed.get(instance.strip().strip('"').upper(), "")
+
+    def shown(self) -> dict[str, str]:
+        """Return the names by key: those of parts behind their instance where others have them."""
+        count = Counter(word.upper() for word in self.names.values())
+        found = {}
+        for key, word in self.names.items():
+            part = key.removesuffix(word.upper()).rstrip(".")
+            alone = not part or count[word.upper()] == 1
+            found[key] = word if alone else f"{self.instances.get(part, part)}.{word}"
+        return found
 
 
 def read(file: Path) -> Contents:
@@ -143,7 +179,7 @@ def _blocks(file: Path) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]
     values: list[list[str]] = []
     for _, line in _lines(file):
         if not line.startswith("*"):
-            values.append([value.strip() for value in line.rstrip(",").split(",")])
+            values.append([value.strip() for value in _split(line.rstrip(","))])
             continue
         if keyword:
             yield keyword, options, values
@@ -152,9 +188,14 @@ def _blocks(file: Path) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]
         yield keyword, options, values
 
 
+def _split(line: str) -> list[str]:
+    """Return the values of a line."""
+    return COMMA.split(line) if '"' in line else line.split(",")
+
+
 def _keyword(line: str) -> tuple[str, dict[str, str]]:
     """Return the keyword of a line, and its options."""
-    first, *others = line[1:].split(",")
+    first, *others = _split(line[1:])
     pairs = (other.partition("=") for other in others)
     options = {key.strip().upper().replace(" ", ""): value.strip() for key, _, value in pairs}
     return " ".join(first.upper().split()), options
@@ -165,7 +206,7 @@ def _lines(file: Path, depth: int = 0) -> Iterator[tuple[Path, str]]:
     if depth > 10:
         raise ValueError(f"*INCLUDE: {file.name} includes itself")
     pending = ""
-    for raw in file.read_text(encoding="utf-8", errors="replace").splitlines():
+    for raw in letters(file.read_bytes()).splitlines():
         line = pending + raw.strip()
         pending = ""
         if not line or line.startswith("**"):
@@ -194,13 +235,17 @@ def _take(
     if keyword == "NODE":
         numbers = [int(line[0]) for line in lines]
         for number, line in zip(numbers, lines, strict=True):
-            point = [float(value or 0) for value in [*line[1:4], "", ""][:3]]
+            point = [_number(value) for value in [*line[1:4], "", ""][:3]]
             if found.points.setdefault(number, point) != point and not np.isnan(point).any():
                 raise ValueError(f"*NODE: node {number} is at two places; {FLAT}")
         if "NSET" in options:
             found.nodes.setdefault(found.name(options["NSET"]), []).extend(numbers)
     elif keyword == "ELEMENT":
         kind = options.get("TYPE", "").upper()
+        if NO_CELLS.match(kind):
+            found.other.append(f"ELEMENT, TYPE={kind}")
+            found.sets.setdefault(found.name(options.get("ELSET", kind)), [])
+            return
         numbers = found.elements.setdefault(kind, [])
         count = _nodes(kind) + 1
         values = [int(value) for line in lines for value in line if value]
@@ -213,35 +258,49 @@ def _take(
         if keyword not in options:
             raise ValueError(f"*{keyword} without a name")
         into = found.nodes if keyword == "NSET" else found.sets
+        instance = options.get("INSTANCE", "")
         key = found.name(options[keyword])
         members = into.setdefault(key, [])
         if keyword == "NSET" and "ELSET" in options:
-            found.nodes_of.setdefault(key, []).append(found.name(options["ELSET"]))
+            found.nodes_of.setdefault(key, []).append(found.name(options["ELSET"], instance))
         elif "GENERATE" in options:
             for line in lines:
                 first, last, step = (*(int(value) for value in line[:3]), 1)[:3]
                 members.extend(range(first, last + 1, step))
         else:
             every = (value for line in lines for value in line if value)
-            members.extend(int(v) if v.lstrip("+-").isdigit() else found.name(v) for v in every)
+            members.extend(found.member(value, instance) for value in every)
     elif keyword == "SURFACE":
-        rows = [list(line) for line in lines]
+        rows = [(found.member(line[0]), line[1].upper() if len(line) > 1 else "") for line in lines]
         kind = options.get("TYPE", "ELEMENT").upper()
         if "NAME" not in options:
             raise ValueError("*SURFACE without a name")
         if "COMBINE" in options:
             word = f"*SURFACE, COMBINE={options['COMBINE']}"
             raise ValueError(f"{word}: no surfaces are made of others; accepted: faces of elements")
-        found.surfaces[found.name(options["NAME"])] = (kind, rows)
+        found.surfaces.setdefault(found.name(options["NAME"]), (kind, []))[1].extend(rows)
+    elif keyword == "PART":
+        found.scope = options.get("NAME", "").strip('"').upper()
     elif keyword == "INSTANCE":
         part = options.get("PART", "").strip('"').upper()
-        moved = len(lines) > 1 or any(float(value or 0) for line in lines for value in line)
-        if moved or part in found.placed:
+        moved = len(lines) > 1 or any(_number(value) for line in lines for value in line)
+        if moved or part in found.instances:
             how = "moved" if moved else "placed twice"
             raise ValueError(f"*INSTANCE: part {part} is {how}; {FLAT}")
-        found.placed.add(part)
+        found.instances[part] = options.get("NAME", "").strip('"')
+        found.placed[found.instances[part].upper()] = found.scope = part
+    elif keyword in ("END PART", "END INSTANCE"):
+        found.scope = ""
     elif keyword not in SILENT and keyword not in found.other:
         found.other.append(keyword)
+
+
+def _number(value: str) -> float:
+    """Return a number, which may have Fortran's exponent, 0 for none."""
+    try:
+        return float(value or 0)
+    except ValueError:
+        return float(re.sub(r"[Dd](?=[+-]?\d+$)", "E", value))
 
 
 def _nodes(kind: str) -> int:
@@ -254,8 +313,8 @@ def _known(kind: str) -> tuple[int, int]:
     for pattern, dim in TYPES:
         if match := pattern.match(kind):
             count = int(match[1])
-            if dim == 1:  # T3D2, B31: nodes, or the order
-                count = count if "D" in kind else count + 1
+            if dim == 1:  # T3D2, RAX2, B31: nodes, or the order
+                count = count if "D" in kind or kind.startswith("RAX") else count + 1
             if kind.startswith("STRI65"):
                 count = 6
             if (dim, count) in KINDS:
@@ -282,22 +341,22 @@ def _deck(found: _Read) -> Contents:
     twice = elements[1:, 0][np.diff(elements[:, 0]) == 0]
     if twice.size:
         raise ValueError(f"*ELEMENT: element {twice[0]} is there twice; {FLAT}")
-    deck = Contents(points, blocks)
+    deck, names = Contents(points, blocks), found.shown()
     for key in found.sets:
         members = _members(found.sets, key, ())
-        deck.groups[found.names[key]] = _by_block(members, elements)
+        deck.groups[names[key]] = _by_block(members, elements)
     for key, sets in found.nodes_of.items():
         chosen = [number for name in sets for number in _members(found.sets, name, ())]
         for block, within in _by_block(chosen, elements).items():
             found.nodes[key] += map(int, tags[np.unique(blocks[block][1][within])])
     for key in found.nodes:
         numbers = _members(found.nodes, key, ())
-        deck.nodes[found.names[key]] = np.flatnonzero(np.isin(tags, numbers))
+        deck.nodes[names[key]] = np.flatnonzero(np.isin(tags, numbers))
     dim, twice = max((DIMENSIONS[name] for name, _ in blocks), default=0), []
     for key, (sort, lines) in found.surfaces.items():
-        name = found.names[key]
+        name = names[key]
         if sort == "NODE":
-            numbers = _named(found, found.nodes, [line[0] for line in lines])
+            numbers = _named(found.nodes, [member for member, _ in lines])
             own = np.flatnonzero(np.isin(tags, numbers))
             if not np.array_equal(deck.nodes.setdefault(name, own), own):
                 twice.append(name)
@@ -334,20 +393,16 @@ def _members(sets: dict[str, list[int | str]], key: str, above: tuple[str, ...])
         raise ValueError(f"the set {key} holds itself")
     if key not in sets:
         raise ValueError(f"there is no set {key}")
-    numbers: list[int] = []
-    for member in sets[key]:
-        if isinstance(member, int):
-            numbers.append(member)
-        else:
-            numbers += _members(sets, member, (*above, key))
-    return numbers
+    return _named(sets, sets[key], (*above, key))
 
 
-def _named(found: _Read, sets: dict[str, list[int | str]], given: Sequence[str]) -> list[int]:
-    """Return the numbers that words stand for, each a number or a set."""
+def _named(
+    sets: dict[str, list[int | str]], given: Sequence[int | str], above: tuple[str, ...] = ()
+) -> list[int]:
+    """Return the numbers of members, each a number or a set."""
     numbers: list[int] = []
-    for word in given:
-        numbers += [int(word)] if word.isdigit() else _members(sets, found.name(word), ())
+    for member in given:
+        numbers += [member] if isinstance(member, int) else _members(sets, member, above)
     return numbers
 
 
@@ -359,7 +414,7 @@ def _by_block(numbers: Sequence[int], elements: Ints) -> dict[int, Ints]:
 
 def _faces(
     found: _Read,
-    rows: Sequence[Sequence[str]],
+    rows: Sequence[tuple[int | str, str]],
     elements: Ints,
     blocks: Sequence[tuple[str, Ints]],
     dim: int,
@@ -367,8 +422,8 @@ def _faces(
     """Return the faces of a surface by their corners; edges of shells are no faces of solids."""
     faces: list[Ints] = []
     whole: dict[str, list[Ints]] = {}
-    for given, label in ((row[0], row[1].upper() if len(row) > 1 else "") for row in rows):
-        for block, members in _by_block(_named(found, found.sets, [given]), elements).items():
+    for given, label in rows:
+        for block, members in _by_block(_named(found.sets, [given]), elements).items():
             name, nodes = blocks[block]
             stem, of = name.rstrip("0123456789"), DIMENSIONS[name]
             corners = FACES.get(stem, ())
@@ -380,7 +435,8 @@ def _faces(
             elif of == dim and label == "":
                 whole.setdefault(name, []).append(nodes[members])
             elif of == dim or not (number or label in SIDES):
-                raise ValueError(f"*SURFACE: elements {given} have no face {label!r}")
+                said = found.names.get(str(given), given)
+                raise ValueError(f"*SURFACE: elements {said} have no face {label!r}")
     every: list[Ints] = []
     for name, alike in whole.items():
         cells = distinct(np.concatenate(alike))

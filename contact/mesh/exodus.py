@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from contact.mesh.cells import together
-from contact.mesh.extraction import Contents, Ints
+from contact.mesh.extraction import Contents, Ints, letters
 
 #: Beginnings of the names of elements, and meshio's names without a number; "" for points.
 KINDS = {
@@ -132,7 +132,7 @@ def _names(data: Any, kind: str, count: int) -> list[str]:
     for k in range(count):
         said = b"" if names is None else b"".join(names[k])
         number = k + 1 if numbers is None else int(numbers[k])
-        found.append(said.split(b"\0")[0].decode(errors="replace").strip() or str(number))
+        found.append(letters(said.split(b"\0")[0]).strip() or str(number))
     return found
 
 

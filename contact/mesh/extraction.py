@@ -142,6 +142,14 @@ class Contents:
     space: dict[str, Any] = field(default_factory=dict)
 
 
+def letters(given: bytes) -> str:
+    """Return a text of a file, in the letters of Western Europe (Latin-1) if it is not UTF-8."""
+    try:
+        return given.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return given.decode("latin-1")
+
+
 def degree(kinds: Sequence[tuple[str, int, int]]) -> dict[str, int]:
     """Return the degree for which cells of some types were made, as a key of ``[space]``."""
     dim = max((of for _, of, _ in kinds), default=0)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from contact.mesh.extraction import Contents, Ints
+from contact.mesh.extraction import Contents, Ints, letters
 
 #: Kinds of elements: meshio's names, and numbers of nodes.
 KINDS = {
@@ -87,8 +87,8 @@ def _names(families: Any) -> dict[int, list[str]]:
     found = {}
     for family in families.values():
         none = np.zeros((0, 80), dtype=np.uint8)
-        letters = np.asarray(family["GRO/NOM"][()]).view(np.uint8) if "GRO" in family else none
-        texts = [bytes(row).split(b"\0")[0].decode("utf-8", "replace") for row in letters]
+        given = np.asarray(family["GRO/NOM"][()]).view(np.uint8) if "GRO" in family else none
+        texts = [letters(bytes(row).split(b"\0")[0]) for row in given]
         found[int(family.attrs["NUM"])] = [text.strip() for text in texts]
     return found
 

@@ -108,3 +108,72 @@ def test_what_is_left_out_is_shown(tmp_path, capsys):
     shown = capsys.readouterr().out
     assert "# note: 1 cell(s) that stand twice in it count once" in shown
     assert "# note: sets left out, as a surface of other facets has their name: End" in shown
+
+
+PARTS = """*PART, NAME=Part-1
+{block}*NSET, NSET=Set-1, GENERATE
+1, 27
+*ELSET, ELSET=Set-1, GENERATE
+1, 8
+*END PART
+*ASSEMBLY, NAME=Assembly
+*INSTANCE, NAME=Part-1-1, PART=Part-1
+*END INSTANCE
+{sets}*END ASSEMBLY
+"""
+
+
+def in_parts(sets: str) -> str:
+    """Return the unit cube as Abaqus/CAE writes it: a part with sets, and those of an assembly."""
+    return PARTS.format(block=block().replace(", ELSET=Eall", ""), sets=sets)
+
+
+def test_a_part_and_its_assembly_have_names_of_their_own(tmp_path):
+    """Set-1 is Abaqus/CAE's first name for the section of a part, and for supports."""
+    sets = "*NSET, NSET=Set-1, INSTANCE=Part-1-1, GENERATE\n1, 9\n"
+    sets += "*ELSET, ELSET=set-1, INSTANCE=Part-1-1\n1, 2\n"
+    domain = read(tmp_path, in_parts(sets))
+    assert measures(domain) == pytest.approx({"Set-1": 1.0, "Part-1-1.Set-1": 6.0})
+    found = {name: len(cells) for name, cells in domain.regions.items()}
+    assert found == {"Part-1-1.Set-1": 8, "Set-1": 2}
+
+
+def test_names_behind_their_instance(tmp_path):
+    sets = "*NSET, NSET=low, INSTANCE=Part-1-1, GENERATE\n1, 9\n*NSET, NSET=all\nPart-1-1.Set-1\n"
+    sets += "*NSET, NSET=more, INSTANCE=Part-1-1\nSet-1\n*NSET, NSET=step\nlow"
+    sets += ", part-1-1.10, Part-1-1.11, part-1-1.12\n*SURFACE, NAME=top\n"
+    sets += "".join(f"Part-1-1.{k}, S2\n" for k in range(5, 9))
+    domain = read(tmp_path, in_parts(sets))
+    expected = {"low": 1.0, "all": 6.0, "more": 6.0, "Set-1": 6.0, "top": 1.0}
+    expected |= {"step": 1.5}
+    assert measures(domain) == pytest.approx(expected)
+
+
+def test_continuum_shells_are_solids(tmp_path):
+    text = block() + "*NODE\n28, 0, 0, 2\n29, 1, 0, 2\n30, 1, 1, 2\n31, 0, 1, 2\n"
+    text += "*ELEMENT, TYPE=SC8R\n9, 19, 21, 27, 25, 28, 29, 30, 31\n"
+    domain = read(tmp_path, text + "*NSET, NSET=low, GENERATE\n1, 9\n")
+    assert integral(domain, domain.dx) == pytest.approx(2.0)
+
+
+def test_elements_between_nodes_are_left_out(tmp_path):
+    text = block() + "*ELEMENT, TYPE=MASS, ELSET=point\n9, 27\n*ELEMENT, TYPE=SPRINGA\n10, 1, 27\n"
+    domain = read(tmp_path, text + "*NSET, NSET=low, GENERATE\n1, 9\n*NSET, NSET=a, ELSET=point\n")
+    assert measures(domain) == pytest.approx({"low": 1.0})
+    assert domain.notes[0] == "left out: *ELEMENT, TYPE=MASS, *ELEMENT, TYPE=SPRINGA"
+
+
+def test_a_surface_that_goes_on(tmp_path):
+    text = "*SURFACE, NAME=low\n1, S1\n2, S1\n*SURFACE, NAME=Low\n3, S1\n4, S1\n"
+    assert measures(read(tmp_path, block() + text)) == pytest.approx({"low": 1.0})
+
+
+def test_letters_and_numbers_of_other_programs(tmp_path):
+    """A byte order mark, Fortran's exponents, letters in Latin-1, commas in quotation marks."""
+    text = block().replace("0.5", "5.0D-1")
+    text += '*NSET, NSET="under, façade", GENERATE\n1, 9\n*NSET, NSET=faèade, GENERATE\n19, 27\n'
+    expected = {"under, façade": 1.0, "faèade": 1.0}
+    for written in (text.encode("latin-1"), text.encode("utf-8-sig")):
+        (tmp_path / "block.inp").write_bytes(written)
+        domain = from_file(MPI.COMM_SELF, tmp_path / "block.inp")
+        assert measures(domain) == pytest.approx(expected)
