@@ -38,7 +38,7 @@ from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
 from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
-from contact.linear.layout import Layout, masked, projectors, times
+from contact.linear.layout import Layout, congruent, masked, projectors, times
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
@@ -412,7 +412,7 @@ class BodyEquilibrium:
         inclined = self.layout.inclined
         if held and inclined is not None:
             # P K P + 1 - P, as of fixed unknowns: P has the pattern of the nodes' blocks.
-            product = matrix.ptap(self._projection)
+            product = congruent(matrix, self._projection)
             product.copy(matrix)
             product.destroy()
             inclined.add(matrix, 1.0)

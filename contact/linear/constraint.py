@@ -32,7 +32,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from contact.history import Evaluated
-from contact.linear.layout import Layout, times
+from contact.linear.layout import Layout, congruent, times
 from contact.linear.operator import Bulk, Counters, SparseOperator
 from contact.mesh.owners import Halo
 from contact.ranks import summed
@@ -226,7 +226,7 @@ class ConstrainedBulk:
             return made
         self._plain = made
         self._bulk.assemble(made, "secant", self._rest)
-        product = made.ptap(self.constraint.matrix)
+        product = congruent(made, self.constraint.matrix)
         product.setLGMap(*made.getLGMap())
         return product
 
@@ -239,7 +239,7 @@ class ConstrainedBulk:
             self._bulk.assemble(matrix, kind, state)
         else:
             self._bulk.assemble(self._plain, kind, state)
-            self._plain.ptap(self.constraint.matrix, result=matrix)
+            congruent(self._plain, self.constraint.matrix, matrix)
         if self.constraint.free.size == 0:
             return
         for k, column in enumerate(self.constraint.motions.T.toarray()):

@@ -174,6 +174,31 @@ def times(matrix: PETSc.Mat | None, values: Array, transposed: bool = False) -> 
     return np.asarray(image.array)
 
 
+def congruent(matrix: PETSc.Mat, basis: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
+    """Return Q^T K Q of a basis Q with few entries a row. Collective.
+
+    Of several ranks it is summed row by row, unless the user says how: by default PETSc keeps K Q
+    and all summands, twice the size of K. With many entries a row that default is faster.
+
+    Parameters
+    ----------
+    matrix, basis
+        K and Q.
+    result
+        The matrix of an earlier call with the same Q and a K of the same pattern, to be
+        computed again; None for a new matrix.
+    """
+    options = PETSc.Options()
+    chosen = matrix.comm.size > 1 and not options.hasName("matptap_via")
+    if chosen:
+        options["matptap_via"] = "allatonce_merged"
+    try:
+        return matrix.ptap(basis, result=result)
+    finally:
+        if chosen:
+            options.delValue("matptap_via")
+
+
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:
     """Put the size of the matrix's own diagonal at fixed unknowns, in place of ones. Collective.
 
