@@ -19,7 +19,9 @@ from contact.ranks import largest, summed
 from contact.typing import Array
 
 
-def contact_directions(normal: Array, movable: Array) -> tuple[Array, Array]:
+def contact_directions(
+    normal: Array, movable: Array, given: NDArray[np.bool_] | bool = True
+) -> tuple[Array, Array]:
     """Return the lifts of unit normals, and the projectors onto the directions of friction.
 
     Parameters
@@ -28,6 +30,9 @@ def contact_directions(normal: Array, movable: Array) -> tuple[Array, Array]:
         Contact directions, of which some part is free, shape (n, d).
     movable
         The projectors onto the directions that no support holds, shape (n, d, d).
+    given
+        Whether the jumps along the directions that supports hold are given by supports alone,
+        shape (n,): in front of a foundation they are.
 
     Returns
     -------
@@ -36,8 +41,8 @@ def contact_directions(normal: Array, movable: Array) -> tuple[Array, Array]:
     admissible = np.einsum("nij,nj->ni", movable, normal)
     length = np.linalg.norm(admissible, axis=1)[:, None]
     unit = admissible / length
-    aslant = length[:, :, None] < 1 - 1e-12
-    acting = np.where(aslant, movable, np.eye(normal.shape[1]))
+    every = (length[:, 0] >= 1 - 1e-12) & given
+    acting = np.where(every[:, None, None], np.eye(normal.shape[1]), movable)
     return unit / length, acting - unit[:, :, None] * unit[:, None, :]
 
 
@@ -65,8 +70,9 @@ class ContactNodes:
         shape (n, d): the normal, but where a support holds nodes aslant to it.
     tangent
         Projector onto the directions in which nodes slip and friction acts, shape (n, d, d): all
-        tangential ones, as a node that supports move slips too; but where they hold it aslant to
-        the contact direction they bear the friction along directions they hold.
+        tangential ones, as a node that supports move slips too; but they bear the friction along
+        directions they hold where these are aslant to the contact direction, or where the other
+        side moves along them: no unknown is the jump there, as of nodes on a plane of symmetry.
     gap
         Distance to the foundation along the contact direction, shape (n,).
     deviation

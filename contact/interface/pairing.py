@@ -21,6 +21,7 @@ from contact.interface.placing import check_gap
 from contact.mesh.domain import Domain
 from contact.mesh.entities import components, owned_among
 from contact.mesh.owners import Owners
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 #: Share of the mesh's extent up to which facets are taken to face each other.
@@ -80,13 +81,14 @@ def find_pair(
     check_gap(body.domain, added, key, press)
     sides = (side.unknown_deviation for side in (slave, master))
     unknown = body.comm.allreduce(max(sides, default=0.0), op=MPI.MAX)
+    movable = body.movable(local)
     nodes = ContactNodes(
         body.comm,
         local,
         points,
         coupling.weight,
         normal,
-        *contact_directions(normal, body.movable(local)),
+        *contact_directions(normal, movable, _given(body, coupling, slave.owners, movable)),
         gap + added,
         np.full(local.size, unknown),
         body.block_size,
@@ -163,6 +165,25 @@ def _one_sided(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> NDA
 
     opposite = owners.values(coupling.masters, fixed)
     return fixed(coupling.nodes) & (np.abs(coupling.other) @ opposite <= 0)
+
+
+def _given(
+    body: BodyEquilibrium, coupling: Coupling, owners: Owners, movable: Array
+) -> NDArray[np.bool_]:
+    """Tell where supports hold the masters along all directions in which they hold the slave.
+
+    Shape (n,), of projectors `movable` of the slave nodes. Collective.
+    """
+
+    def free(numbers: NDArray[np.int64]) -> Array:
+        """Return the directions in which nodes of this rank move, shape (k, d^2)."""
+        local = np.asarray(numbers - owners.begin, dtype=np.int32)
+        return np.abs(body.movable(local)).reshape(local.size, body.dim**2)
+
+    moves = np.abs(coupling.other) @ owners.values(coupling.masters, free)
+    held = np.eye(body.dim) - movable
+    along = held @ moves.reshape(-1, body.dim, body.dim)
+    return np.asarray(np.abs(along).max(axis=(1, 2), initial=0.0) <= ROUNDING)
 
 
 def _check_rim(
