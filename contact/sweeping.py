@@ -119,7 +119,7 @@ def _spread(text: str, whole: str) -> str:
 
 
 def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float]:
-    """Return keys of the summary as columns, a vector one per component. Collective.
+    """Return keys of the summary as columns: of a vector ``_x``..., of a list ``_0``. Collective.
 
     Parameters
     ----------
@@ -132,6 +132,7 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
         If there is no such key, or no number in it.
     """
     found: dict[str, float] = {}
+    vectors = {quantity.name for quantity in quantities(SUMMARY) if quantity.component}
     for name in names:
         top = name.partition(".")[0]
         known = _numbers(values_of(SUMMARY, solution, top))
@@ -147,11 +148,9 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
                 f"summary.json{hint}; accepted: {listed(known)}"
             )
         for key, numbers in own.items():
-            ends = [""] if np.ndim(numbers) == 0 else [f"_{axis}" for axis in AXES[: len(numbers)]]
-            if len(ends) < np.size(numbers):
-                ends = [f"_{k}" for k in range(np.size(numbers))]
-            columns = zip(ends, np.atleast_1d(numbers), strict=True)
-            found |= {f"{key}{end}": float(x) for end, x in columns}
+            ends = AXES if key.partition(".")[0] in vectors else map(str, range(numbers.size))
+            columns = [f"{key}_{end}" for end in ends] if numbers.size > 1 else [key]
+            found |= {column: float(x) for column, x in zip(columns, numbers.flat, strict=False)}
     return found
 
 

@@ -102,14 +102,14 @@ _RUN = (
     Quantity(
         "contact_moment", "force · length", "Moment of these about the origin of coordinates, of "
         "points in the reference configuration: in 2-D a list of one, about z and "
-        "counter-clockwise, in 3-D a vector.",
+        "counter-clockwise, in 3-D a vector.", component=_VECTOR,
     ),
     Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(
         "reactions", "force", "Force of the support of each part on the body, a vector per part. "
         "A node of two parts counts for the first of them in the case. The sum with the loads and "
         "minus `contact_force`, without forces between bodies, is zero.",
-        lambda r: {part: held.force for part, held in r.supports.items()},
+        lambda r: {part: held.force for part, held in r.supports.items()}, component=_VECTOR,
     ),
     Quantity(
         "reaction_AXIS_PART", "force", "The same of each support: `reaction_x_left`, ...",
@@ -117,7 +117,7 @@ _RUN = (
     ),
     Quantity(
         "reaction_moments", "force · length", "Moments of these, as `contact_moment`.",
-        lambda r: {part: held.moment for part, held in r.supports.items()},
+        lambda r: {part: held.moment for part, held in r.supports.items()}, component=_VECTOR,
     ),
     Quantity(
         "region", "", "Place of the cell's region among `regions` of the summary, from 0; of "
@@ -241,11 +241,11 @@ _RUN = (
         "rigid", "", "The foundation that moves: its `displacement` and `rotation` (degrees), and "
         "the `force` and `moment` on it from outside, given or reactions. Of several, one entry "
         "per part.",
-        lambda r: r.movements.get("rigid"),
+        lambda r: r.movements.get("rigid"), component=_VECTOR,
     ),
     Quantity(
         "rigid_parts", "", "The same of each part that moves as a rigid body, by part.",
-        lambda r: r.movements.get("rigid_parts"),
+        lambda r: r.movements.get("rigid_parts"), component=_VECTOR,
     ),
     Quantity(
         "electrodes", "",

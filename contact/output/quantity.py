@@ -47,7 +47,7 @@ class Quantity:
     files
         Where it stands; the first has the description.
     component
-        Of a vector: name of the column of a component.
+        Of a vector, or of the vectors in a table: name of the column of a component.
     """
 
     name: str
