@@ -34,6 +34,7 @@ from contact.output.figures.style import (
     named,
     page_width,
     sheet,
+    smooth,
 )
 from contact.typing import Array
 
@@ -275,11 +276,11 @@ def _colour(ax: Axes, picture: Picture, side: int) -> None:
     """Draw the coloured body, or its mirror image where the side is -1."""
     skin = picture.skin.triangulate()
     mesh = Triangulation(*(skin.points[:, :2] * [side, 1]).T, skin.regular_faces)
-    shown: dict[str, Any] = {"norm": picture.norm, "cmap": picture.colours, "rasterized": True}
+    values, norm, colours = skin["values"], picture.norm, picture.colours
     if "values" in skin.cell_data:
-        ax.tripcolor(mesh, facecolors=skin["values"], **shown)
+        ax.tripcolor(mesh, facecolors=values, norm=norm, cmap=colours, rasterized=True)
     else:
-        ax.tripcolor(mesh, skin["values"], shading="gouraud", **shown)
+        smooth(ax, mesh, values, norm, colours)
 
 
 def draw_space(picture: Picture) -> Figure | None:

@@ -9,11 +9,13 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
@@ -29,6 +31,7 @@ from contact.output.figures.style import (
     fitted,
     page_width,
     sheet,
+    smooth,
 )
 from contact.output.formats import Table
 from contact.output.quantities import STATUS
@@ -39,6 +42,9 @@ TOUCHING = {"slip": "in contact", "open": "open"}
 
 #: Contact zones below this share of an axis are drawn with their vicinity alone.
 SMALL = 1 / 3
+
+#: Elements beside the contact zone that are shown of it at least.
+BESIDE = 3
 
 
 def position(table: Table, run: Run) -> tuple[Array, str, tuple[float, float]]:
@@ -202,7 +208,9 @@ def window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[A
     zone = float(np.ptp(places[touching], axis=0).max()) if touching.any() else extent
     room = margin * extent
     if zone < SMALL * extent:
-        places, room = places[touching], max(0.4 * zone, 0.02 * extent)
+        # A zone of a node or two is seen beside its neighbours.
+        apart = KDTree(np.unique(places, axis=0)).query(places[touching], k=2)[0][:, 1].max()
+        places, room = places[touching], max(0.4 * zone, 0.02 * extent, BESIDE * apart)
     return places.min(axis=0) - room, places.max(axis=0) + room
 
 
@@ -339,7 +347,7 @@ def draw_surface(run: Run, look: Look) -> Figure:
     figure = sheet(rows * (aspect / columns + 0.02) + (2.0 if stacked else 1.5) / page_width())
     figure.set_layout_engine("compressed")
     *lefts, right = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
-    highest = _highest(surface, view, low, high) or 1.0
+    shown = ScalarMappable(Normalize(0.0, _highest(surface, view, low, high) or 1.0), "viridis")
     letters = 150 / float(matplotlib.rcParams["font.size"]) * page_width() / columns
     letters = int(max(8.0, 0.8 * letters * min(1.0, aspect / tall)))
     x, y = (run.units.label(f"${'xyz'[k]}$", "length") for k in view)
@@ -354,8 +362,8 @@ def draw_surface(run: Run, look: Look) -> Figure:
             known = np.isfinite(skin["pressure"][facets]).all(axis=1)
             drawn = facets[known] if known.any() else facets
             ax.add_collection(PolyCollection(list(flat[facets]), facecolor=ZONES["open"][0], lw=0))
-            colours = {"shading": "gouraud", "cmap": "viridis", "vmin": 0.0, "vmax": highest}
-            shown = ax.tripcolor(*flat.T, drawn, np.nan_to_num(skin["pressure"]), **colours)
+            mesh = Triangulation(*flat.T, drawn)
+            smooth(ax, mesh, np.nan_to_num(skin["pressure"]), shown.norm, shown.cmap)
         ax.set_aspect("equal")
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=x, ylabel=y)
         ax.set_title(textwrap.fill(name, letters), fontsize="medium")

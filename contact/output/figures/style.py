@@ -8,8 +8,10 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
 
 from contact.errors import InputError
 from contact.library.units import force_of
@@ -24,6 +26,7 @@ STYLE: dict[str, Any] = {
     "mathtext.fontset": "dejavuserif",
     "axes.linewidth": 0.6,
     "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,
     "lines.linewidth": 1.2,
     "legend.frameon": False,
     "legend.fontsize": 8,
@@ -51,6 +54,8 @@ DEFORMED: dict[str, tuple[str, str, Quantity | None]] = {
 }
 #: Other fields, with their components, whose unit may have a name.
 QUANTITIES: dict[str, Quantity] = {"displacement": "length", "stress": "stress"}
+#: Colours of a bar, from its least to its largest value.
+SHADES = 256
 #: Quantiles of the values at which colours end where some values lie far beyond.
 OUTLIERS = (0.005, 0.995)
 
@@ -178,6 +183,13 @@ def unit_of(quantity: str, units: Units, plane: bool) -> str:
     power -= plane
     side = f"{length}$^{power}$" if power > 1 else length
     return f" ({stress} {side})" if stressed else f" ({side})"
+
+
+def smooth(ax: Axes, mesh: Triangulation, values: Array, norm: Normalize, colours: Any) -> None:
+    """Colour triangles by values at their nodes, between which values are linear, not colours."""
+    levels = np.linspace(norm.vmin, norm.vmax, SHADES + 1)
+    filled = ax.tricontourf(mesh, values, levels, norm=norm, cmap=colours, extend="both")
+    filled.set_rasterized(True)
 
 
 def widened(low: float, high: float) -> tuple[float, float]:
