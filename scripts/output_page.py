@@ -39,6 +39,7 @@ INTRODUCTION = """\
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
 | `checkpoint.npz` | with `output.checkpoint = true`; on several ranks a file of each |
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
+| `figure-*-step-N.png` | of a step of an evolution, by `contact plot DIR --step N` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
 The files replace those of an earlier run together, once they are complete; other files in DIR are

@@ -253,6 +253,12 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
             ),
             "--ylim": _value("A,B", "likewise y (z); in 3-D of the contact alone"),
             "--mirror": _flag("show both halves of a body of revolution"),
+            "--step": _value(
+                "N",
+                "draw the results at the end of a step of an evolution, from 1, as "
+                "figure-NAME-step-N",
+                type=int,
+            ),
             "--animate": _flag(
                 "draw animation-FIELD.gif instead, the deformed body over the steps of an evolution"
             ),

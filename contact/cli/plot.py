@@ -37,16 +37,18 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
     def draw() -> list[Path]:
         if (folder / TABLE).is_file() and not (folder / "summary.json").exists():
-            for option in ("xlim", "ylim", "mirror", "animate"):
-                if getattr(options, option):
+            for option in ("xlim", "ylim", "mirror", "animate", "step"):
+                if getattr(options, option) not in (None, False):
                     raise InputError(
                         f"--{option}: the figure of a sweep shows no places; accepted: --field, "
                         "--format, --width"
                     )
             return plot_sweep(folder, options.field, formats, look)
+        if options.animate and options.step is not None:
+            raise InputError("--step: an animation shows all steps; accepted: --step or --animate")
         if options.animate:
             return animate(folder, options.field, look)
-        return plot(folder, options.field, formats, look)
+        return plot(folder, options.field, formats, look, options.step)
 
     with signals_held():  # no figure is left half written
         files = on_root(comm, draw)

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from contact.cli.main import main
-from contact.output.figures.run import read_steps
+from contact.output.figures.run import read_run, read_step, read_steps
 from scripts.cases import CASES
 
 SMALL = ["--set", "mesh.cells=[8,4]", "--set", "evolution.steps=[1,2,1,1]", "--quiet"]
@@ -64,9 +64,29 @@ def test_frames_are_the_steps(run: Path) -> None:
         assert abs(step.table["moved"]).max() < 1e-12
 
 
+def test_a_step_is_drawn(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Contact and body of the step, in files that end with its number."""
+    assert main(["plot", str(run), "--step", "2"]) == 0
+    drawn = {path.name for path in run.glob("figure-*-step-2.png")}
+    assert drawn == {"figure-contact-step-2.png", "figure-deformed-step-2.png"}
+    step, last = read_step(run, 2), read_run(run)
+    tables = last.tables
+    np.testing.assert_array_equal(step.table["pressure"], tables[1]["pressure"])
+    assert abs(step.table["tau"] - last.table["tau"]).max() > 0
+    own = step.surface["row"] >= 0
+    pressure = tables[1]["pressure"][step.surface["row"][own].astype(int)]
+    np.testing.assert_allclose(step.surface["pressure"][own], pressure, rtol=1e-6)
+    assert step.title.endswith("t = 1.5")
+    assert main(["plot", str(run), "--step", "6"]) == 2
+    assert "--step 6: no fields of such a step; accepted: 1, 2, 3, 4, 5" in capsys.readouterr().err
+    assert main(["plot", str(run), "--step", "2", "--animate"]) == 2
+    assert "an animation shows all steps" in capsys.readouterr().err
+
+
 def test_static_results_have_no_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     case = str(CASES / "bar.toml")
     arguments = ["solve", case, "--out", str(tmp_path), "--set", "mesh.cells=[8,2]", "--quiet"]
     assert main(arguments) == 0
-    assert main(["plot", str(tmp_path), "--animate"]) == 2
-    assert "no steps there; accepted: the results of an evolution" in capsys.readouterr().err
+    for option in (["--animate"], ["--step", "1"]):
+        assert main(["plot", str(tmp_path), *option]) == 2
+        assert "no steps there; accepted: the results of an evolution" in capsys.readouterr().err

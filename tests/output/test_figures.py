@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
+from matplotlib.tri import Triangulation
+from scipy.spatial import KDTree
 
 from contact.cli.arguments import parse
 from contact.errors import InputError
@@ -18,7 +22,7 @@ from contact.output.figures.contact import draw_line, draw_surface
 from contact.output.figures.figures import draw
 from contact.output.figures.run import Run
 from contact.output.figures.steps import draw_loop
-from contact.output.figures.style import Look, widened
+from contact.output.figures.style import Look, smooth, widened
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
 from contact.output.quantities import STATUS
@@ -96,6 +100,43 @@ def test_axes_end_where_they_are_asked_to() -> None:
             draw_plane(picture(run, "von_mises", look=beside))
     with pytest.raises(InputError, match=r"--xlim 5,6: beside the contact part, .* from 0 to 2"):
         draw_line(run, Look(xlim=(5.0, 6.0)))
+
+
+def test_a_crop_has_nodes_beside_a_single_one() -> None:
+    """Three elements on each side at least, and numbers of the axis without an offset."""
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [40, 2]}
+    run = run_of(solve(block(2, mesh=mesh)))
+    table = run.table
+    zone = np.isclose(table["x"], 1.0)
+    table = {
+        **table,
+        "status": np.where(zone, "slip", "open"),
+        "pressure": np.where(zone, 1.0, 0.0),
+    }
+    with rc_context(Look().style):
+        ax = draw_line(replace(run, table=table), Look()).axes[0]
+        assert ax.get_xlim() == pytest.approx((0.85, 1.15))
+        assert not ax.xaxis.get_major_formatter().get_useOffset()
+    table = {**table, "status": np.full(zone.shape, "open"), "pressure": 0.0 * table["pressure"]}
+    ax = draw_line(replace(run, table=table), Look()).axes[0]
+    assert [text.get_text() for text in ax.texts] == ["no contact"]
+
+
+def test_between_nodes_values_are_coloured_and_not_colours_mixed() -> None:
+    """Across one triangle all colours are those of the bar."""
+    figure = Figure(figsize=(2, 2), dpi=100)
+    ax = figure.add_axes((0, 0, 1, 1))
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    ax.axis("off")
+    triangle = Triangulation([-1, 3, -1], [-1, -1, 3])
+    colours = colormaps["viridis"]
+    smooth(ax, triangle, np.array([0.0, 1.0, 0.5]), Normalize(0.0, 1.0), colours)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    seen = np.asarray(canvas.buffer_rgba())[..., :3].reshape(-1, 3)
+    bar = np.round(255 * colours(np.linspace(0, 1, 256))[:, :3])
+    assert KDTree(bar).query(seen)[0].max() <= 2.0
+    assert len(np.unique(seen, axis=0)) > 50
 
 
 def test_a_crop_has_the_scales_of_what_it_shows() -> None:

@@ -271,6 +271,8 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
     rows[0].plot(where, table["pressure"], color=BLUE, marker=mark, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
     _focus(rows[0], within(table["pressure"]), 0.0)
+    if np.all(seen == "open"):
+        _tell_open(rows[0])
     if frictional:
         rows[1].plot(
             where, tau, color=ORANGE, marker=mark, label=r"tangential stress $-\sigma_\tau\cdot t$"
@@ -306,12 +308,19 @@ def _draw_opposite(
     ax.plot(there[order], pressure, ":", color=GREY, lw=1.0, label="pressure on the other side")
 
 
+def _tell_open(ax: Axes) -> None:
+    """Say that there is no contact, where nothing else is seen."""
+    there = {"transform": ax.transAxes, "bbox": {"facecolor": "white", "lw": 0}}
+    ax.text(0.5, 0.5, "no contact", ha="center", va="center", **there)
+
+
 def _focus(ax: Axes, values: Array, low: float) -> None:
     """Limit the axis where a singular corner would hide all else, and name the peak."""
     largest = float(values.max(initial=0.0))
-    usual = float(np.quantile(values, 0.97, method="higher")) * 1.6
     if largest <= 0:
+        ax.set(ylim=(low, 1.0), yticks=[0.0])  # there is no scale
         return
+    usual = float(np.quantile(values, 0.97, method="higher")) * 1.6
     top = usual if 0 < usual < 0.7 * largest else 1.05 * largest
     ax.set_ylim(low * top, top)
     if top < largest:
@@ -361,13 +370,16 @@ def draw_surface(run: Run, look: Look) -> Figure:
         else:
             known = np.isfinite(skin["pressure"][facets]).all(axis=1)
             drawn = facets[known] if known.any() else facets
-            ax.add_collection(PolyCollection(list(flat[facets]), facecolor=ZONES["open"][0], lw=0))
+            below: dict[str, Any] = {"facecolor": ZONES["open"][0], "lw": 0, "zorder": -2}
+            ax.add_collection(PolyCollection(list(flat[facets]), **below))
             mesh = Triangulation(*flat.T, drawn)
             smooth(ax, mesh, np.nan_to_num(skin["pressure"]), shown.norm, shown.cmap)
         ax.set_aspect("equal")
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=x, ylabel=y)
         ax.set_title(textwrap.fill(name, letters), fontsize="medium")
         ax.label_outer()
+    if not touching.any():
+        _tell_open(lefts[0])
     label = run.units.label(r"$-\sigma_\nu$", "stress")
     bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
     figure.colorbar(shown, ax=[*lefts, right], **bar)

@@ -19,7 +19,7 @@ from contact.errors import InputError
 from contact.output.figures.body import body_figure, picture
 from contact.output.figures.contact import contact_figure
 from contact.output.figures.foundation import magnification
-from contact.output.figures.run import Run, read_run, read_steps
+from contact.output.figures.run import Run, read_run, read_step, read_steps
 from contact.output.figures.steps import steps_figures
 from contact.output.figures.style import DEFORMED, PAGE, STYLE, Look, named
 from contact.output.folder import add, begin, discard, result_folder
@@ -92,19 +92,25 @@ def draw(
     look: Look = PAGE,
 ) -> list[Path]:
     """Draw the figures of `figures_of` into a folder; return the files. On one rank."""
-    files = []
+    files, step = [], "" if run.step is None else f"-step-{run.step}"
     with matplotlib.rc_context(look.style):
         for name, figure in figures_of(run, fields, look).items():
             for ending in formats:
-                files.append(folder / f"figure-{name}.{ending}")
+                files.append(folder / f"figure-{name}{step}.{ending}")
                 files[-1].write_bytes(image(figure, ending))
     return files
 
 
 def plot(
-    folder: Path, fields: Sequence[str] = (), formats: Sequence[str] = ("png",), look: Look = PAGE
+    folder: Path,
+    fields: Sequence[str] = (),
+    formats: Sequence[str] = ("png",),
+    look: Look = PAGE,
+    step: int | None = None,
 ) -> list[Path]:
     """Draw the figures of a run into its folder, as `draw` does; return the files. On one rank.
+
+    Those of a step, numbered from 1, end with its number.
 
     Raises
     ------
@@ -112,7 +118,11 @@ def plot(
         If the folder has not all that is needed, or no such field, cannot be written to, or another
         run works in it.
     """
-    return _added(folder, lambda new: draw(read_run(folder), new, fields, formats, look))
+
+    def read() -> Run:
+        return read_run(folder) if step is None else read_step(folder, step)
+
+    return _added(folder, lambda new: draw(read(), new, fields, formats, look))
 
 
 def animate(folder: Path, fields: Sequence[str] = (), look: Look = PAGE) -> list[Path]:
@@ -149,7 +159,7 @@ def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
 
 
 def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
-    runs = [replace(run, title=f"{run.title}, t = {time:.3g}".lstrip(", ")) for time, run in steps]
+    runs = [run for _, run in steps]
     scale = magnification(*runs)
     pictures = [picture(run, field, scale, look) for run in runs]
     # Colours of all frames.

@@ -52,6 +52,8 @@ class Run:
         Grids of pyvista: body, contact part, and the other sides of contacts between bodies.
     regions
         Names of the regions, in the order of the numbers in the field ``region``.
+    step
+        Number of the step that these are the results of, from 1; None for the last results.
     steps, tables
         The columns of ``steps.csv``, and the contact nodes of each step, of an evolution.
     """
@@ -64,6 +66,7 @@ class Run:
     surface: Any
     opposite: Any = None
     regions: Sequence[str] = ()
+    step: int | None = None
     steps: Table | None = None
     tables: Sequence[Table] = ()
 
@@ -131,7 +134,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             heading(str(about["title"])),
             Units(**about.get("units", {})),
             "xyz" if "z" in columns else flat,
-            _moved(columns | _of_surface(surface), columns, body),
+            _moved(columns | _of_surface(surface), body),
             body,
             surface,
             opposite=read(folder, OPPOSITE, read_grid) if OPPOSITE in files else None,
@@ -145,19 +148,53 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
 
 def read_steps(folder: Path) -> list[tuple[float, Run]]:
     """Read an evolution: at most `MOST` of its times and results then, the last one always."""
+    run, frames = _frames(folder)
+    chosen = frames[:: -int(np.ceil(len(frames) / MOST))][::-1]
+    return [(frame[0], _at(run, folder, *frame)) for frame in chosen]
+
+
+def read_step(folder: Path, number: int) -> Run:
+    """Read the results at the end of a step, numbered from 1.
+
+    Raises
+    ------
+    InputError
+        If the folder has no such step with its fields.
+    """
+    run, frames = _frames(folder)
+    known = {frame[1] + 1: frame for frame in frames}
+    if number not in known:
+        accepted = ", ".join(map(str, known))
+        raise InputError(f"--step {number}: no fields of such a step; accepted: {accepted}")
+    return _at(run, folder, *known[number])
+
+
+def _frames(folder: Path) -> tuple[Run, list[tuple[float, int, str, str]]]:
+    """Return an evolution and, of each step with fields, its end, row and files."""
     if not (folder / "fields.pvd").is_file():
         raise InputError(
             f"{folder}: no steps there; accepted: the results of an evolution, with "
             'output.fields = "vtu"'
         )
-    sets = _SET.findall(read(folder, "fields.pvd", lambda path: path.read_text("utf-8")))
-    run, found = read_run(folder), []
+    run = read_run(folder)
     assert run.steps is not None  # where there are fields in time, there are steps
-    for time, name in sets[:: -int(np.ceil(len(sets) / MOST))][::-1]:
-        body = read(folder, name, read_grid)
-        step = run.tables[int(np.argmin(abs(run.steps["t"] - float(time))))]
-        found.append((float(time), replace(run, body=body, table=_moved(run.table, step, body))))
-    return found
+    fields, contact = (
+        _SET.findall(read(folder, f"{kind}.pvd", lambda path: path.read_text("utf-8")))
+        for kind in ("fields", "contact")
+    )
+    times = [float(time) for time, _ in fields]
+    rows = [int(np.argmin(abs(run.steps["t"] - time))) for time in times]
+    files = ([name for _, name in sets] for sets in (fields, contact))
+    return run, list(zip(times, rows, *files, strict=True))
+
+
+def _at(run: Run, folder: Path, time: float, row: int, fields: str, contact: str) -> Run:
+    """Return an evolution's results at a time, the end of the step of a row."""
+    body, surface = (read(folder, name, read_grid) for name in (fields, contact))
+    title = f"{run.title}, t = {time:.3g}".lstrip(", ")
+    table = _moved({**run.table, **run.tables[row]}, body)
+    own = {"table": table, "body": body, "surface": surface, "opposite": None}
+    return replace(run, title=title, step=row + 1, steps=None, tables=(), **own)
 
 
 def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
@@ -272,10 +309,10 @@ def _of_surface(surface: Any) -> dict[str, NDArray[Any]]:
     return added | {"entry": surface["entry"][nodes], "rigid": surface["rigid"][nodes] > 0}
 
 
-def _moved(table: Table, step: Table, body: Any) -> Table:
-    """Return contact nodes with how far the foundation has moved by a step."""
+def _moved(table: Table, body: Any) -> Table:
+    """Return contact nodes with how far the foundation has moved."""
     normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"])
     places = np.column_stack([table.get(axis, np.zeros(len(normal))) for axis in "xyz"])
     nodes = KDTree(body.points).query(places)[1]
     along = np.einsum("ni,ni->n", body.point_data["displacement"][nodes], normal)
-    return {**table, "u_n": step["u_n"], "moved": along - step["u_n"]}
+    return {**table, "moved": along - table["u_n"]}

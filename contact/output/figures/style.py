@@ -188,8 +188,9 @@ def unit_of(quantity: str, units: Units, plane: bool) -> str:
 def smooth(ax: Axes, mesh: Triangulation, values: Array, norm: Normalize, colours: Any) -> None:
     """Colour triangles by values at their nodes, between which values are linear, not colours."""
     levels = np.linspace(norm.vmin, norm.vmax, SHADES + 1)
-    filled = ax.tricontourf(mesh, values, levels, norm=norm, cmap=colours, extend="both")
-    filled.set_rasterized(True)
+    look: dict[str, Any] = {"norm": norm, "cmap": colours, "extend": "both"}
+    ax.tricontourf(mesh, values, levels, zorder=-1, **look)
+    ax.set_rasterization_zorder(0)  # as they are, contours would stay shapes
 
 
 def widened(low: float, high: float) -> tuple[float, float]:
