@@ -22,9 +22,9 @@ from contact.output.figures.contact import draw_line, draw_surface
 from contact.output.figures.figures import draw
 from contact.output.figures.run import Run
 from contact.output.figures.steps import draw_loop
-from contact.output.figures.style import Look, smooth, widened
+from contact.output.figures.style import Look, smooth, unit_of, widened
 from contact.output.files import write_outputs
-from contact.output.options import OutputOptions
+from contact.output.options import OutputOptions, Units
 from contact.output.quantities import STATUS
 from contact.output.solution import Solution
 from contact.solving import solve
@@ -100,6 +100,24 @@ def test_axes_end_where_they_are_asked_to() -> None:
             draw_plane(picture(run, "von_mises", look=beside))
     with pytest.raises(InputError, match=r"--xlim 5,6: beside the contact part, .* from 0 to 2"):
         draw_line(run, Look(xlim=(5.0, 6.0)))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "plane", "space"),
+    [
+        ("area", "(mm)", "(mm$^2$)"),
+        ("force", "(N/mm)", "(N)"),
+        ("work", "(N)", "(N mm)"),
+        ("force · length", "(N)", "(N mm)"),
+    ],
+)
+def test_units_of_a_unit_of_thickness(quantity: str, plane: str, space: str) -> None:
+    units = Units(length="mm", stress="MPa")
+    assert unit_of(quantity, units, True) == f" {plane}"
+    assert unit_of(quantity, units, False) == f" {space}"
+    ours = Units(length="l", stress="s")
+    assert unit_of("work", ours, True) == " (s l$^2$)"
+    assert unit_of("force", ours, True) == " (s l)"
 
 
 def test_a_crop_has_nodes_beside_a_single_one() -> None:

@@ -154,8 +154,9 @@ def named(field: str, units: Units) -> tuple[str, str]:
     return field, units.label(words, QUANTITIES[base]) if base in QUANTITIES else words
 
 
-#: Quantities whose unit is a power of that of length, for stresses in them times that of stress.
-POWERS = {"area": (2, False), "volume": (3, False), "force": (2, True), "work": (3, True)}
+#: Quantities whose unit is a power of that of length, of some times that of force.
+POWERS = {"area": (2, False), "volume": (3, False), "force": (0, True), "work": (1, True)}
+POWERS["force · length"] = POWERS["work"]
 
 
 def unit_of(quantity: str, units: Units, plane: bool) -> str:
@@ -174,15 +175,15 @@ def unit_of(quantity: str, units: Units, plane: bool) -> str:
     if quantity not in POWERS:
         name = getattr(units, quantity, None)
         return f" ({name})" if name else ""
-    power, stressed = POWERS[quantity]
-    if not length or (stressed and not stress):
+    power, forced = POWERS[quantity]
+    if not length or (forced and not stress):
         return ""
-    force = force_of(stress, length) if stress and quantity == "force" else None
-    if force is not None:
-        return f" ({force}/{length})" if plane else f" ({force})"
+    force = force_of(stress, length) if forced and stress else ""
+    if force is None:  # of no name: stress times area
+        force, power = stress, power + 2
     power -= plane
-    side = f"{length}$^{power}$" if power > 1 else length
-    return f" ({stress} {side})" if stressed else f" ({side})"
+    sides = {-1: f"/{length}", 0: "", 1: f" {length}"}
+    return f" ({(force or '') + sides.get(power, f' {length}$^{power}$')})".replace("( ", "(")
 
 
 def smooth(ax: Axes, mesh: Triangulation, values: Array, norm: Normalize, colours: Any) -> None:
