@@ -103,7 +103,7 @@ def _results(solution: Solution) -> list[str]:
         "contact force": f"({force})",
         "contact area": f"{area:.6g}",
         "largest pressure": f"{nodes.maximum(solution.pressure):.6g} {solution.units.stress or ''}",
-        "sticking": share,
+        **({"sticking": share} if solution.problem.frictional else {}),
         "seconds": seconds,
     }
     lines = [f"  {name:18}{value}".rstrip() for name, value in rows.items()]

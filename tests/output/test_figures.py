@@ -23,6 +23,7 @@ from contact.output.figures.figures import draw
 from contact.output.figures.run import Run
 from contact.output.figures.steps import draw_loop
 from contact.output.figures.style import Look, smooth, unit_of, widened
+from contact.output.figures.sweep import Swept
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions, Units
 from contact.output.quantities import STATUS
@@ -118,6 +119,14 @@ def test_units_of_a_unit_of_thickness(quantity: str, plane: str, space: str) -> 
     ours = Units(length="l", stress="s")
     assert unit_of("work", ours, True) == " (s l$^2$)"
     assert unit_of("force", ours, True) == " (s l)"
+
+
+def test_a_swept_motion_has_its_unit() -> None:
+    """That of its own column, not of the table of the summary of the same name."""
+    swept = Swept("", Units(length="mm", stress="MPa"), "plane_strain", [], [{"rigid_y": "1"}])
+    assert swept.label("rigid_y") == "rigid, $y$ (mm)"
+    assert swept.label("rigid_force_y") == "rigid force, $y$ (N/mm)"
+    assert swept.label("volume_ratio_1") == "volume ratio, $1$"
 
 
 def test_a_crop_has_nodes_beside_a_single_one() -> None:

@@ -179,11 +179,11 @@ class Swept:
         """Return a column in words, with its unit: a component by its axis."""
         base, axis = _parts(name)
         top = base.partition(".")[0]
-        known = {quantity.name: quantity.unit for quantity in quantities(SWEEP)}
-        known |= {quantity.name: quantity.unit for quantity in quantities(SUMMARY)}
+        own = {each.name.removesuffix("_AXIS"): each.unit for each in quantities(SWEEP)}
+        known = {each.name: each.unit for each in quantities(SUMMARY)}
         words = base.replace(".", ": ").replace("_", " ").replace("von mises", "von Mises stress")
         words = f"largest {words.removeprefix('max ')}" if base.startswith("max_") else words
-        unit = unit_of(known.get(top, ""), self.units, self.plane)
+        unit = unit_of(own.get(base, known.get(top, "")), self.units, self.plane)
         return f"{words}{f', ${axis}$' if axis else ''}{unit}"
 
     def key(self, key: str, axis: str = "") -> str:
