@@ -25,6 +25,21 @@ def held_aslant(solution: Solution) -> Iterator[Remark]:
         )
 
 
+def moved_along(solution: Solution) -> Iterator[Remark]:
+    """Say where supports move nodes along another body that follows there, with friction."""
+    problem, nodes, d = solution.problem, solution.problem.nodes, solution.problem.dim
+    jump = problem.nodal(solution.state)[:, :d]
+    along = jump - nodes.normal_component(jump)[:, None] * nodes.normal
+    held = np.linalg.norm(along - nodes.tangential_component(jump), axis=1)
+    moves = np.linalg.norm(problem.equilibrium.nodal(solution.state.x)[nodes.nodes, :d], axis=1)
+    if nodes.maximum(np.where(solution.friction_bound > 0, held, 0.0)) > 0.1 * nodes.maximum(moves):
+        yield Note(
+            "supports move contact nodes along another body, whose nodes are free there: no "
+            "friction acts at these nodes along the directions that supports hold; the error of "
+            "forces is that of these nodes alone"
+        )
+
+
 def fitting(problem: ContactProblem) -> Iterator[Remark]:
     """Say where a curved part has no gap anywhere: its foundation has then its very shape."""
     comm, size = problem.comm, problem.domain.size

@@ -99,6 +99,7 @@ def review(solution: Solution) -> None:
         "small-strain": small_strain(solution),
         "curved-surface": discretisation.coarse_curves(solution),
         "held-aslant": foundations.held_aslant(solution),
+        "moved-along": foundations.moved_along(solution),
         "own-shape": foundations.fitting(solution.problem),
         "no-heights": foundations.without_heights(solution.problem, solution),
         "layer": layers(solution),
@@ -274,6 +275,9 @@ def untouched(solution: Solution) -> Iterator[Remark]:
     problem = solution.problem
     closed = bool(np.any(solution.status != "open"))
     if any(record.row["contact_nodes"] > 0 for record in solution.steps):
+        return
+    # The method has then left the body where its friction did not hold it.
+    if solution.outcome.overloaded:
         return
     if problem.since is not None or problem.comm.allreduce(closed, op=MPI.LOR):
         return

@@ -1,10 +1,13 @@
 """Loads that friction cannot balance: a linear program tells, and methods end."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact import build_problem, parse_case, solve
+from contact.output.remarks import untouched
 from contact.problem.limit_analysis import Overload
 from contact.problem.rigid_modes import groups
 
@@ -57,3 +60,7 @@ def test_a_block_at_a_wall_is_held_or_not(dim):
     (said,) = [text for text in lost.warnings if "[not-held]" in text]
     assert f"friction cannot hold the body (translation along {'xyz'[dim - 1]})" in said
     assert "friction bounded by the pressures there does not balance its loads" in said
+    # Where the method stopped no node may touch: a foundation too far away is not the cause then.
+    start = lost.problem.start()
+    assert not list(untouched(replace(lost, state=start)))
+    assert list(untouched(replace(held, state=start)))
