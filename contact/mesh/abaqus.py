@@ -13,14 +13,13 @@ chapter 6.2 (elements).
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from contact.mesh.assembly import NESTING, Assembly, Member, Scope, real
 from contact.mesh.cells import distinct, once, together
 from contact.mesh.extraction import Contents, Ints, letters, same_name
 
@@ -91,60 +90,10 @@ MAKING = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPORT
 MAKING |= {"SYMMETRIC MODEL GENERATION"}
 
 #: The files that are read.
-FLAT = "accepted: every node and element in the file, by its pre-processor without parts"
+FLAT = "accepted: every node and element in the file"
 
 #: Keywords whose data lines may stand in a file of their own, by INPUT.
 FROM_FILES = {"NODE", "ELEMENT"}
-
-
-@dataclass
-class _Read:
-    """The data of a file by number and by name, names as they stood first.
-
-    A part has names of its own (``scope``), which an assembly calls by its instance.
-    """
-
-    points: dict[int, list[float]] = field(default_factory=dict)
-    elements: dict[str, list[int]] = field(default_factory=dict)
-    nodes: dict[str, list[int | str]] = field(default_factory=dict)
-    nodes_of: dict[str, list[str]] = field(default_factory=dict)
-    sets: dict[str, list[int | str]] = field(default_factory=dict)
-    surfaces: dict[str, tuple[str, list[tuple[int | str, str]]]] = field(default_factory=dict)
-    names: dict[str, str] = field(default_factory=dict)
-    placed: dict[str, str] = field(default_factory=dict)
-    instances: dict[str, str] = field(default_factory=dict)
-    other: list[str] = field(default_factory=list)
-    scope: str = ""
-
-    def name(self, given: str, instance: str = "") -> str:
-        """Return the key of a name, of an instance where one is given: capitals do not matter."""
-        word = given.strip().strip('"')
-        before, _, own = word.rpartition(".")
-        part = self._part(before) or self._part(instance) or self.scope
-        word = own if self._part(before) else word
-        key = f"{part}.{word}".upper() if part else word.upper()
-        self.names.setdefault(key, word)
-        return key
-
-    def member(self, given: str, instance: str = "") -> int | str:
-        """Return the number that a word stands for, or the key of a set."""
-        before, _, own = given.rpartition(".")
-        number = own if self._part(before) else given
-        return int(number) if number.lstrip("+-").isdigit() else self.name(given, instance)
-
-    def _part(self, instance: str) -> str:
-        """Return the part of an instance, "" for none of that name."""
-        return self.placed.get(instance.strip().strip('"').upper(), "")
-
-    def shown(self) -> dict[str, str]:
-        """Return the names by key: those of parts behind their instance where others have them."""
-        count = Counter(word.upper() for word in self.names.values())
-        found = {}
-        for key, word in self.names.items():
-            part = key.removesuffix(word.upper()).rstrip(".")
-            alone = not part or count[word.upper()] == 1
-            found[key] = word if alone else f"{self.instances.get(part, part)}.{word}"
-        return found
 
 
 def read(file: Path) -> Contents:
@@ -155,10 +104,13 @@ def read(file: Path) -> Contents:
     ValueError
         If something is missing, or no number where one belongs; the message names it.
     """
-    found = _Read()
+    found = Assembly()
     for keyword, options, lines in _blocks(file):
-        _take(found, keyword, options, lines)
-    return _deck(found)
+        if keyword in NESTING:
+            found.nest(keyword, options, lines)
+        else:
+            _take(found.here, keyword, options, lines)
+    return _deck(found.flat())
 
 
 def included(file: Path) -> list[Path]:
@@ -226,18 +178,16 @@ def _lines(file: Path, depth: int = 0) -> Iterator[tuple[Path, str]]:
 
 
 def _take(
-    found: _Read, keyword: str, options: dict[str, str], lines: Sequence[Sequence[str]]
+    found: Scope, keyword: str, options: dict[str, str], lines: Sequence[Sequence[str]]
 ) -> None:
     """Take a keyword with its data."""
     if keyword in MAKING or (keyword == "NODE" and options.get("SYSTEM", "R").upper() != "R"):
         word = keyword if keyword in MAKING else f"NODE, SYSTEM={options['SYSTEM']}"
         raise ValueError(f"*{word} makes or moves nodes or elements; {FLAT}")
     if keyword == "NODE":
-        numbers = [int(line[0]) for line in lines]
+        numbers = [found.number(line[0]) for line in lines]
         for number, line in zip(numbers, lines, strict=True):
-            point = [_number(value) for value in [*line[1:4], "", ""][:3]]
-            if found.points.setdefault(number, point) != point and not np.isnan(point).any():
-                raise ValueError(f"*NODE: node {number} is at two places; {FLAT}")
+            found.put(number, [real(value) for value in [*line[1:4], "", ""][:3]])
         if "NSET" in options:
             found.nodes.setdefault(found.name(options["NSET"]), []).extend(numbers)
     elif keyword == "ELEMENT":
@@ -248,7 +198,7 @@ def _take(
             return
         numbers = found.elements.setdefault(kind, [])
         count = _nodes(kind) + 1
-        values = [int(value) for line in lines for value in line if value]
+        values = [found.number(value) for line in lines for value in line if value]
         if len(values) % count:
             raise ValueError(f"*ELEMENT, TYPE={kind}: {len(values)} numbers, {count} an element")
         numbers.extend(values)
@@ -265,13 +215,14 @@ def _take(
             found.nodes_of.setdefault(key, []).append(found.name(options["ELSET"], instance))
         elif "GENERATE" in options:
             for line in lines:
-                first, last, step = (*(int(value) for value in line[:3]), 1)[:3]
-                members.extend(range(first, last + 1, step))
+                first, last = (found.number(value, instance) for value in line[:2])
+                members.extend(range(first, last + 1, int((*line, "", "")[2] or 1)))
         else:
             every = (value for line in lines for value in line if value)
             members.extend(found.member(value, instance) for value in every)
     elif keyword == "SURFACE":
-        rows = [(found.member(line[0]), line[1].upper() if len(line) > 1 else "") for line in lines]
+        instance = options.get("INSTANCE", "")
+        rows = [(found.member(line[0], instance), (*line, "")[1].upper()) for line in lines]
         kind = options.get("TYPE", "ELEMENT").upper()
         if "NAME" not in options:
             raise ValueError("*SURFACE without a name")
@@ -279,28 +230,8 @@ def _take(
             word = f"*SURFACE, COMBINE={options['COMBINE']}"
             raise ValueError(f"{word}: no surfaces are made of others; accepted: faces of elements")
         found.surfaces.setdefault(found.name(options["NAME"]), (kind, []))[1].extend(rows)
-    elif keyword == "PART":
-        found.scope = options.get("NAME", "").strip('"').upper()
-    elif keyword == "INSTANCE":
-        part = options.get("PART", "").strip('"').upper()
-        moved = len(lines) > 1 or any(_number(value) for line in lines for value in line)
-        if moved or part in found.instances:
-            how = "moved" if moved else "placed twice"
-            raise ValueError(f"*INSTANCE: part {part} is {how}; {FLAT}")
-        found.instances[part] = options.get("NAME", "").strip('"')
-        found.placed[found.instances[part].upper()] = found.scope = part
-    elif keyword in ("END PART", "END INSTANCE"):
-        found.scope = ""
     elif keyword not in SILENT and keyword not in found.other:
         found.other.append(keyword)
-
-
-def _number(value: str) -> float:
-    """Return a number, which may have Fortran's exponent, 0 for none."""
-    try:
-        return float(value or 0)
-    except ValueError:
-        return float(re.sub(r"[Dd](?=[+-]?\d+$)", "E", value))
 
 
 def _nodes(kind: str) -> int:
@@ -322,7 +253,7 @@ def _known(kind: str) -> tuple[int, int]:
     raise ValueError(f"*ELEMENT, TYPE={kind}: elements that are not known")
 
 
-def _deck(found: _Read) -> Contents:
+def _deck(found: Scope) -> Contents:
     tags = np.array(sorted(found.points), dtype=np.int64)
     points = np.array([found.points[tag] for tag in tags], dtype=float).reshape(-1, 3)
     blocks: list[tuple[str, Ints]] = []
@@ -340,7 +271,8 @@ def _deck(found: _Read) -> Contents:
     elements = elements[np.argsort(elements[:, 0], kind="stable")]
     twice = elements[1:, 0][np.diff(elements[:, 0]) == 0]
     if twice.size:
-        raise ValueError(f"*ELEMENT: element {twice[0]} is there twice; {FLAT}")
+        number = found.said(int(twice[0]))
+        raise ValueError(f"*ELEMENT: element {number} is there twice; accepted: once")
     deck, names = Contents(points, blocks), found.shown()
     for key in found.sets:
         members = _members(found.sets, key, ())
@@ -387,7 +319,7 @@ def _indices(tags: Ints, rows: Ints, words: str) -> Ints:
     return np.asarray(places)
 
 
-def _members(sets: dict[str, list[int | str]], key: str, above: tuple[str, ...]) -> list[int]:
+def _members(sets: dict[str, list[Member]], key: str, above: tuple[str, ...]) -> list[int]:
     """Return the numbers of a set, those of sets in it too."""
     if key in above:
         raise ValueError(f"the set {key} holds itself")
@@ -397,7 +329,7 @@ def _members(sets: dict[str, list[int | str]], key: str, above: tuple[str, ...])
 
 
 def _named(
-    sets: dict[str, list[int | str]], given: Sequence[int | str], above: tuple[str, ...] = ()
+    sets: dict[str, list[Member]], given: Sequence[Member], above: tuple[str, ...] = ()
 ) -> list[int]:
     """Return the numbers of members, each a number or a set."""
     numbers: list[int] = []
@@ -413,8 +345,8 @@ def _by_block(numbers: Sequence[int], elements: Ints) -> dict[int, Ints]:
 
 
 def _faces(
-    found: _Read,
-    rows: Sequence[tuple[int | str, str]],
+    found: Scope,
+    rows: Sequence[tuple[Member, str]],
     elements: Ints,
     blocks: Sequence[tuple[str, Ints]],
     dim: int,
@@ -435,8 +367,8 @@ def _faces(
             elif of == dim and label == "":
                 whole.setdefault(name, []).append(nodes[members])
             elif of == dim or not (number or label in SIDES):
-                said = found.names.get(str(given), given)
-                raise ValueError(f"*SURFACE: elements {said} have no face {label!r}")
+                word = f"*SURFACE: elements {found.said(given)} have"
+                raise ValueError(f"{word} no face {label!r}")
     every: list[Ints] = []
     for name, alike in whole.items():
         cells = distinct(np.concatenate(alike))

@@ -381,16 +381,9 @@ def test_what_is_wrong_with_a_deck_is_said(old, new, words, tmp_path):
         from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
 
 
-INSTANCE = "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=i, PART=p\n{}*END INSTANCE\n"
-ELSE = "accepted: every node and element in the file"
-
-
 @pytest.mark.parametrize(
     ("added", "words"),
     [
-        (INSTANCE.format("0., 0., 1.\n"), "INSTANCE: part P is moved"),
-        (INSTANCE.format("0., 0., 0.\n0., 0., 0., 0., 0., 1., 90.\n"), "INSTANCE: part P is moved"),
-        (2 * INSTANCE.format(""), "INSTANCE: part P is placed twice"),
         ("*NODE\n4, 0., 2.\n", "NODE: node 4 is at two places"),
         ("*ELEMENT, TYPE=CPE4\n8, 1, 2, 5, 4\n", "ELEMENT: element 8 is there twice"),
         ("*NODE, SYSTEM=C\n20, 1., 90.\n", "NODE, SYSTEM=C makes or moves nodes"),
@@ -403,12 +396,12 @@ def test_keywords_that_change_the_mesh_are_refused(added, words, tmp_path, capsy
     (tmp_path / "plate.inp").write_text(PLATE.replace("*BOUNDARY", f"{added}*BOUNDARY"))
     assert main(["new", str(tmp_path / "plate.inp")]) == BAD_INPUT
     said = capsys.readouterr().err
-    assert words in said and ELSE in said
+    assert words in said and "; accepted: " in said
 
 
-def test_parts_in_their_places_are_read(tmp_path):
-    """One instance that is not moved, a node that is repeated, directions of *TRANSFORM."""
-    added = INSTANCE.format("0., 0., 0.\n") + "*NODE\n4, 0., 1.\n*TRANSFORM, NSET=ground\n1, 0, 0\n"
+def test_a_node_that_is_repeated(tmp_path):
+    """In its place; directions of *TRANSFORM are left out."""
+    added = "*NODE\n4, 0., 1.\n*TRANSFORM, NSET=ground\n1, 0, 0\n"
     (tmp_path / "plate.inp").write_text(PLATE.replace("*BOUNDARY", f"{added}*BOUNDARY"))
     domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
     assert regions(domain)["Eall"] == pytest.approx(2.0)
