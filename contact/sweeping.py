@@ -28,7 +28,7 @@ from contact.case.digest import check_files, check_same, digest
 from contact.case.file import Case, load_case
 from contact.case.messages import listed
 from contact.case.text import literal, to_toml
-from contact.errors import InputError
+from contact.errors import InputError, counted
 from contact.mesh.domain import Domain
 from contact.methods.load_stepping import Reached, predicted, solve_step
 from contact.methods.method import METHODS, Method
@@ -54,11 +54,14 @@ TABLE, CASE = "sweep.csv", "sweep.toml"
 #: Column with the digests of the files that the case of a row reads, and the row's own by `SEAL`.
 INPUT, SEAL = "input", "row"
 
-#: Most values of a range, and names of the components of a vector.
-MOST, AXES = 10_000, "xyz"
+#: Most values of a range.
+MOST = 10_000
 
 #: Columns that every table has.
 COLUMNS = ("converged", "kkt", "seconds", INPUT)
+
+#: Keys of the summary with lists of fixed length -> names of the entries.
+_ENTRIES = {given.name: given.entries for given in quantities(SUMMARY) if given.component}
 
 #: Sections that may change without another matrix or other contact nodes.
 LIGHT = ("title", "load", "output", "friction", "fixed")
@@ -119,7 +122,7 @@ def _spread(text: str, whole: str) -> str:
 
 
 def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float]:
-    """Return keys of the summary as columns: of a vector ``_x``..., of a list ``_0``. Collective.
+    """Return keys of the summary as columns, an entry of a list each. Collective.
 
     Parameters
     ----------
@@ -129,10 +132,9 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
     Raises
     ------
     InputError
-        If there is no such key, or no number in it.
+        If there is no such key, no number in it, or a list of any length.
     """
     found: dict[str, float] = {}
-    vectors = {quantity.name for quantity in quantities(SUMMARY) if quantity.component}
     for name in names:
         top = name.partition(".")[0]
         known = _numbers(values_of(SUMMARY, solution, top))
@@ -148,14 +150,14 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
                 f"summary.json{hint}; accepted: {listed(known)}"
             )
         for key, numbers in own.items():
-            ends = AXES if key.partition(".")[0] in vectors else map(str, range(numbers.size))
+            ends = _ENTRIES.get(key.partition(".")[0], ())
             columns = [f"{key}_{end}" for end in ends] if numbers.size > 1 else [key]
             found |= {column: float(x) for column, x in zip(columns, numbers.flat, strict=False)}
     return found
 
 
 def _numbers(table: Mapping[str, Any], before: str = "") -> dict[str, Array]:
-    """Return the numbers and vectors in a table and the tables in it, by their dotted keys."""
+    """Return the numbers and lists of fixed length in a table and those in it, by dotted keys."""
     found: dict[str, Array] = {}
     for name, entry in table.items():
         key = f"{before}{name}"
@@ -163,7 +165,8 @@ def _numbers(table: Mapping[str, Any], before: str = "") -> dict[str, Array]:
             found |= _numbers(entry, f"{key}.")
         elif entry is not None:
             numbers = np.asarray(entry)
-            if numbers.dtype.kind in "biuf" and numbers.ndim < 2 and numbers.size:
+            fixed = not numbers.ndim or (numbers.ndim == 1 and key.partition(".")[0] in _ENTRIES)
+            if numbers.dtype.kind in "biuf" and fixed and numbers.size:
                 found[key] = numbers
     return found
 
@@ -238,7 +241,7 @@ def sweep(
     inputs = on_root(comm, lambda: [_input(case) for case in cases])
     kept = on_root(comm, lambda: _kept_rows(folder, names, columns, points[0], load))
     rows: list[dict[str, Any]] = []
-    tell(logger, 0.0, "%d cases", len(cases))
+    tell(logger, 0.0, "%s", counted(len(cases), "case"))
     with stop_on_signal(comm, monitor) as stop:
         runner = _Runner(comm, stop, warm)
         for point, case, given in zip(points, cases, inputs, strict=True):

@@ -329,6 +329,8 @@ class DerivedFields:
     def means(self) -> Array:
         """Return the cells' values around nodes, averaged by volume in each group. Collective.
 
+        Principal stresses are those of the averaged stress.
+
         Returns
         -------
         Shape (groups, local nodes, components); NaN at nodes of no cell of a group.
@@ -351,7 +353,12 @@ class DerivedFields:
             vector.scatter_forward()
             group[:] = vector.array.reshape(group.shape)
         with np.errstate(invalid="ignore"):
-            return np.asarray(sums[..., :-1] / sums[..., -1:])
+            means = np.asarray(sums[..., :-1] / sums[..., -1:])
+        known = np.isfinite(means[..., 0])
+        stress, principal = self.columns["stress"], self.columns["principal_stress"]
+        tensors = means[known, stress].reshape(-1, 3, 3)
+        means[known, principal] = np.linalg.eigvalsh(tensors)[:, ::-1]
+        return means
 
     def nodes(self) -> dict[str, fem.Function]:
         """Return the fields at the nodes: the cells' values, averaged by volume. Collective.

@@ -16,6 +16,7 @@ from contact.output.quantity import (
     ADAPT,
     AGAINST,
     BODY,
+    ENDS,
     HISTORY,
     NODES,
     OPPOSITE,
@@ -133,7 +134,7 @@ _RUN = (
         "are `null` where the equations are not solved.",
         lambda r: {
             "energy": _error(r), "effectivity": None, "intervals": r.intervals,
-        },
+        }, component=_VECTOR, entries=ENDS,
     ),
     Quantity(
         "max_pressure", "stress", "Largest contact pressure, -σ_ν >= 0.",
@@ -164,7 +165,7 @@ _RUN = (
     ),
     Quantity(
         "volume_ratio", "", "Least and largest deformed volume of a cell over its own.",
-        lambda r: r.deformation and [*r.deformation[1:]],
+        lambda r: r.deformation and [*r.deformation[1:]], component=_VECTOR, entries=ENDS,
     ),
     Quantity(
         "max_von_mises", "stress",
@@ -456,8 +457,14 @@ _BODY = (
     Quantity(
         "stress", "stress", "σ, nine components, row by row; tension is positive.", files=(BODY,),
     ),
-    Quantity("principal_stress", "stress", "σ1 ≥ σ2 ≥ σ3, its eigenvalues.", files=(BODY,)),
-    Quantity("von_mises", "stress", "Von Mises stress.", files=(BODY,)),
+    Quantity(
+        "principal_stress", "stress", "σ1 ≥ σ2 ≥ σ3, eigenvalues of `stress`: at nodes those of "
+        "the averaged tensor.", files=(BODY,),
+    ),
+    Quantity(
+        "von_mises", "stress", "Von Mises stress; at nodes the average of those of the cells, "
+        "which is not less than that of the averaged tensor.", files=(BODY,),
+    ),
     Quantity("strain", "", "ε, nine components as of the stress.", files=(BODY,)),
     Quantity("dev_strain", "", "|dev ε|, the norm of the strain deviator.", files=(BODY,)),
     Quantity(

@@ -16,16 +16,20 @@ NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
 BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
 #: Tables with a row per solution; the others have columns of arrays.
 ROWS = (STEPS, SWEEP, ADAPT)
+#: Names of the entries of a vector, and of an interval.
+AXES, ENDS = ("x", "y", "z"), ("least", "largest")
 #: Status of a node -> its number in ``contact.vtu``.
 STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
 
 
 def is_of(column: str, key: str) -> bool:
-    """Tell whether a column of a table is that of a key: itself, an entry or a component of it.
+    """Tell whether a column of a table is that of a key: itself, or an entry of it.
 
     ``reactions`` has ``reactions.left_x``, as have ``reactions.left`` and the column's own name.
     """
-    return re.fullmatch(rf"{re.escape(key)}(\..*)?(_([xyz]|\d+))?", column) is not None
+    return (
+        re.fullmatch(rf"{re.escape(key)}(\..*)?(_({'|'.join(AXES + ENDS)}))?", column) is not None
+    )
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,9 @@ class Quantity:
     files
         Where it stands; the first has the description.
     component
-        Of a vector, or of the vectors in a table: name of the column of a component.
+        Of a list of fixed length, or of those in a table: name of the column of an entry.
+    entries
+        Names of the entries.
     """
 
     name: str
@@ -56,6 +62,7 @@ class Quantity:
     value: Callable[[Any], Any] | None = None
     files: tuple[str, ...] = (SUMMARY,)
     component: str = ""
+    entries: tuple[str, ...] = AXES
 
     def in_file(self, file: str, given: Any) -> dict[str, Any]:
         """Return the keys, columns or field in a file; none where the quantity is absent."""
@@ -67,7 +74,7 @@ class Quantity:
         if table and isinstance(value, Mapping):
             return dict(value)
         if table and self.component and np.ndim(value) > (file not in ROWS):
-            names = (self.component.format(name=self.name, axis=axis) for axis in "xyz")
+            names = (self.component.format(name=self.name, axis=entry) for entry in self.entries)
             parts = np.asarray(value).T
             return dict(zip(names, parts.tolist() if file in ROWS else parts, strict=False))
         return {self.name: value}

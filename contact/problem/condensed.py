@@ -376,6 +376,7 @@ class Condensation:
             Its solution.
         """
         self.counters.linear_solves += 1
+        self.counters.linear_iterations += 1
         kept = np.concatenate(self.full.comm.allgather(x - condensed.equilibrium.at))
         q = np.zeros(self._constraint.free.size)
         q[self._free] = self._solve_q(self._on_q - self._border @ kept)

@@ -126,7 +126,15 @@ def test_the_smallest_of_several_regions_is_the_one_of_a_cell():
 
 def test_strains_and_principal_stresses():
     solution = solve(load_case(CASES / "hertz-small.toml"))
-    found = DerivedFields(solution.problem.equilibrium, solution.state).cells()
+    fields = DerivedFields(solution.problem.equilibrium, solution.state)
+    found, averaged = fields.cells(), fields.nodes()
+    nodal = averaged["stress"].x.array.reshape(-1, 3, 3)
+    known = np.linalg.eigvalsh(nodal)[:, ::-1].ravel()
+    apart = averaged["principal_stress"].x.array - known
+    assert np.abs(apart).max() <= 1e-12 * np.abs(known).max()
+    dev = nodal - np.trace(nodal, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3
+    of_average = np.sqrt(1.5 * np.sum(dev**2, axis=(1, 2)))
+    assert (averaged["von_mises"].x.array >= of_average * (1 - 1e-12)).all()
     stress, strain = (found[k].x.array.reshape(-1, 3, 3) for k in ("stress", "strain"))
     principal = found["principal_stress"].x.array.reshape(-1, 3)
     known = np.linalg.eigvalsh(stress)[:, ::-1]

@@ -35,7 +35,7 @@ from contact.output.figures.style import (
 )
 from contact.output.options import Units
 from contact.output.quantities import SUMMARY, SWEEP, quantities
-from contact.output.quantity import is_of
+from contact.output.quantity import AXES, ENDS, is_of
 from contact.ranks import refused
 from contact.typing import Array
 
@@ -177,14 +177,15 @@ class Swept:
 
     def label(self, name: str) -> str:
         """Return a column in words, with its unit: a component by its axis."""
-        base, axis = _parts(name)
+        base, entry = _parts(name)
         top = base.partition(".")[0]
         own = {each.name.removesuffix("_AXIS"): each.unit for each in quantities(SWEEP)}
         known = {each.name: each.unit for each in quantities(SUMMARY)}
         words = base.replace(".", ": ").replace("_", " ").replace("von mises", "von Mises stress")
         words = f"largest {words.removeprefix('max ')}" if base.startswith("max_") else words
         unit = unit_of(own.get(base, known.get(top, "")), self.units, self.plane)
-        return f"{words}{f', ${axis}$' if axis else ''}{unit}"
+        entry = f", ${entry}$" if entry in AXES else f", {entry}" if entry else ""
+        return f"{words}{entry}{unit}"
 
     def key(self, key: str, axis: str = "") -> str:
         """Return a swept key in words, with its unit: ``fixed.0.normal`` is fixed 0: normal."""
@@ -198,9 +199,9 @@ class Swept:
 
 
 def _parts(column: str) -> tuple[str, str]:
-    """Return the name of a column, and the axis of a component."""
+    """Return the name of a column, and that of an entry."""
     base, _, end = column.rpartition("_")
-    return (base, end) if end in {*"xyz"} or end.isdigit() else (column, "")
+    return (base, end) if end in AXES + ENDS else (column, "")
 
 
 def _read(folder: Path) -> Swept:
