@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,16 @@ from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
 from contact.mesh.geometry import facet_normals
 from contact.output.figures.body import rendered
-from contact.output.figures.style import BLUE, GREEN, ORANGE, SKY, STYLE, heading
+from contact.output.figures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, YELLOW, heading
 from contact.output.options import Units
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
-#: Colours of supports, electrodes, loads, contact parts and foundations.
-HELD, ELECTRODE, LOADED, TOUCHED, FOUNDATION = "#000000", GREEN, ORANGE, BLUE, SKY
+#: Colours of supports, loads, contact parts and foundations.
+HELD, LOADED, TOUCHED, FOUNDATION = "#000000", ORANGE, BLUE, SKY
+
+#: Colours of electrodes, one after the other.
+ELECTRODES = (GREEN, PURPLE, YELLOW)
 
 #: Lines of rollers, elastic supports, and bolts and electrodes of unknown potential.
 ROLLERS, ELASTIC, UNKNOWN = "-.", ":", "--"
@@ -58,6 +62,11 @@ class Role:
     words: str
     force: Array | None = None
     dashes: str = "-"
+
+    @property
+    def outlined(self) -> bool:
+        """Whether its facets are drawn by their edges in 3-D, so that others on them are seen."""
+        return self.colour in (HELD, *ELECTRODES)
 
     def arrows(self, middle: Array, reach: float) -> tuple[Array, Array]:
         """Return starts and steps of a load's arrows, the longest of a length, outside the body."""
@@ -119,7 +128,7 @@ def _foundation(problem: ContactProblem) -> Array:
 
 def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
     """Yield the conditions on each part, None on ranks other than 0. Collective."""
-    domain = problem.domain
+    domain, colours = problem.domain, cycle(ELECTRODES)
     for key, section in case.contacts:
         yield _role(domain, section.on, TOUCHED, _contact_words(case, key, section))
         if section.against is not None:
@@ -136,7 +145,7 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
             yield _role(domain, fixed.on, HELD, words, dashes=ROLLERS)
         if fixed.potential is not None:
             words = rf"$\varphi$ = {_said(fixed.potential)} on {fixed.on}"
-            yield _role(domain, fixed.on, ELECTRODE, words)
+            yield _role(domain, fixed.on, next(colours), words)
     for support in case.elastic:
         yield _role(domain, support.on, HELD, f"elastic support: {support.on}", dashes=ELASTIC)
     for bolt in case.bolt:
@@ -145,7 +154,7 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
         yield _role(domain, bolt.on, LOADED, words, dashes=UNKNOWN)
     for electrode in case.electrode:
         words = f"electrode of charge {_said(electrode.charge)}: {electrode.on}"
-        yield _role(domain, electrode.on, ELECTRODE, words, dashes=UNKNOWN)
+        yield _role(domain, electrode.on, next(colours), words, dashes=UNKNOWN)
     for part in case.rigid:
         yield _role(domain, part.on, HELD, f"rigid part: {part.on}")
     for given, load in zip(case.load, problem.body.loads, strict=True):
@@ -270,11 +279,12 @@ def _draw_plane(
         ax.add_collection(PolyCollection(list(cells[:, around]), facecolor="none", **thin))
     middle = cells.reshape(-1, 2).mean(axis=0)
     for role in roles:
-        wide = 1.5 if role.colour == LOADED and role.dashes == "-" else 3.0
+        wide, above = 1.5 if role.colour == LOADED and role.dashes == "-" else 3.0, 2.0
+        if role.colour in ELECTRODES:  # on both sides of other lines
+            wide, above = 7.0, 1.5
         # Whole lines, for dashes begin anew at each facet.
         lines = LineCollection(chains(role.facets), colors=role.colour, lw=wide, ls=role.dashes)
-        lines.set(label=role.words, capstyle="butt")
-        lines.set_alpha(0.6 if role.colour == ELECTRODE else 1.0)
+        lines.set(label=role.words, capstyle="butt", zorder=above)
         ax.add_collection(lines)
         start, step = role.arrows(middle, 0.12 * float(extent.max()))
         if start.size:
@@ -314,9 +324,10 @@ def _draw_space(
         edges = {"show_edges": len(boundary) <= MOST_CELLS, "edge_opacity": 0.4, "line_width": 0.5}
         plotter.add_mesh(facets(boundary), color="#EEEEEE", opacity=0.3, **edges)
         for role, (start, step) in zip(roles, arrows, strict=True):
-            if role.colour == HELD:
-                outline = {"style": "wireframe", "line_width": 2.5}
-                plotter.add_mesh(facets(role.facets), color=HELD, **outline)
+            if role.outlined:
+                wide = 2.5 if role.colour == HELD else 6.0
+                outline = {"style": "wireframe", "line_width": wide}
+                plotter.add_mesh(facets(role.facets), color=role.colour, **outline)
             else:
                 lit = {"opacity": 0.7, "ambient": 0.6, "diffuse": 0.4}
                 plotter.add_mesh(facets(role.facets), color=role.colour, **lit)
@@ -335,8 +346,7 @@ def _draw_space(
     sides = r" $\times$ ".join(f"{side:.4g}" for side in extent)
     ax.set_title(f"{sides} {units.length or ''}".rstrip(), y=-0.02, fontsize=8)
     for role in roles:
-        held = role.colour == HELD
-        edge, face = (HELD, "none") if held else ("0.6", role.colour)
+        edge, face = (role.colour, "none") if role.outlined else ("0.6", role.colour)
         ax.plot([], [], "s", color=edge, markerfacecolor=face, label=role.words)
     if surface.size:
         ax.plot([], [], "o", ms=3, color=FOUNDATION, label="foundation")

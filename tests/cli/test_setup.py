@@ -6,11 +6,13 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver
 
 from contact import build_problem, load_case, parse_case
 from contact.cli.main import main
 from contact.cli.setup import chains, draw_setup
+from contact.output.figures.style import BLUE
 from scripts.cases import CASES
 
 SMALL = {
@@ -120,6 +122,30 @@ def test_roles_of_one_colour_have_lines_of_their_own():
     assert [len(line.get_segments()) for name, line in lines.items() if "bolt" in name] == [1]
     (arrows,) = (each for each in collections if isinstance(each, Quiver))
     assert np.all(arrows.U == pytest.approx(0.0, abs=1e-12)) and np.all(arrows.V < 0)
+
+
+def test_electrodes_are_told_apart_and_hide_no_contact():
+    """Each has a colour of its own, below and beside the lines of other parts."""
+    case = parse_case(
+        {
+            "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [8, 2]},
+            "material": {"name": "PZT-4"},
+            "fixed": [
+                {"on": "left", "displacement": [0.0, 0.0]},
+                {"on": "bottom", "potential": 0.0},
+                {"on": "top", "potential": 1.0},
+            ],
+            "contact": {"on": "bottom"},
+        }
+    )
+    collections = draw_setup(case, build_problem(case)).axes[0].collections
+    lines = {c.get_label(): c for c in collections if isinstance(c, LineCollection)}
+    contact = lines["contact: bottom"]
+    below, above = (lines[rf"$\varphi$ = {k} on {on}"] for k, on in ((0, "bottom"), (1, "top")))
+    assert below.get_zorder() < contact.get_zorder()
+    assert below.get_linewidth()[0] > contact.get_linewidth()[0]
+    assert (contact.get_colors()[0] == to_rgba(BLUE)).all()
+    assert (below.get_colors()[0] != above.get_colors()[0]).any()
 
 
 def test_edges_are_joined_from_end_to_end():

@@ -372,17 +372,19 @@ def draw_surface(run: Run, look: Look) -> Figure:
             drawn = facets[known] if known.any() else facets
             below: dict[str, Any] = {"facecolor": ZONES["open"][0], "lw": 0, "zorder": -2}
             ax.add_collection(PolyCollection(list(flat[facets]), **below))
-            mesh = Triangulation(*flat.T, drawn)
-            smooth(ax, mesh, np.nan_to_num(skin["pressure"]), shown.norm, shown.cmap)
+            if touching.any():
+                mesh = Triangulation(*flat.T, drawn)
+                smooth(ax, mesh, np.nan_to_num(skin["pressure"]), shown.norm, shown.cmap)
         ax.set_aspect("equal")
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=x, ylabel=y)
         ax.set_title(textwrap.fill(name, letters), fontsize="medium")
         ax.label_outer()
     if not touching.any():
         _tell_open(lefts[0])
-    label = run.units.label(r"$-\sigma_\nu$", "stress")
-    bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
-    figure.colorbar(shown, ax=[*lefts, right], **bar)
+    else:
+        label = run.units.label(r"$-\sigma_\nu$", "stress")
+        bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
+        figure.colorbar(shown, ax=[*lefts, right], **bar)
     words = {zone: label for zone, (_, label) in ZONES.items()} if frictional else TOUCHING
     handles = [Patch(color=ZONES[zone][0], label=label) for zone, label in words.items()]
     figure.legend(handles=handles, ncols=3, loc="outside lower center")

@@ -15,7 +15,8 @@ from matplotlib.tri import Triangulation
 
 from contact.errors import InputError
 from contact.library.units import force_of
-from contact.output.options import Quantity, Units
+from contact.output.options import Units
+from contact.output.quantities import BODY, quantities
 from contact.typing import Array
 
 #: Settings of all figures.
@@ -40,20 +41,19 @@ NARROW = 4.5
 LONGEST_TITLE = 70
 #: Okabe and Ito's palette: told apart by colour-blind readers, and in grey.
 BLUE, SKY, ORANGE, GREEN, GREY = "#0072B2", "#56B4E9", "#D55E00", "#009E73", "#555555"
+PURPLE, YELLOW = "#CC79A7", "#F0E442"
 #: Status of a node -> colour of its zone, and its name in legends.
 ZONES = {
     "stick": ("#CDE7F0", "sticking"),
     "slip": ("#FBE3C8", "sliding"),
     "open": ("#F2F2F2", "open"),
 }
-#: Fields of the deformed body that are drawn by default: name of the figure, label, quantity.
-DEFORMED: dict[str, tuple[str, str, Quantity | None]] = {
-    "von_mises": ("deformed", "von Mises stress", "stress"),
-    "equivalent_plastic_strain": ("plastic", "equivalent plastic strain", None),
-    "potential": ("potential", r"potential $\varphi$", "potential"),
+#: Fields of the deformed body that are drawn by default: name of the figure, label.
+DEFORMED: dict[str, tuple[str, str]] = {
+    "von_mises": ("deformed", "von Mises stress"),
+    "equivalent_plastic_strain": ("plastic", "equivalent plastic strain"),
+    "potential": ("potential", r"potential $\varphi$"),
 }
-#: Other fields, with their components, whose unit may have a name.
-QUANTITIES: dict[str, Quantity] = {"displacement": "length", "stress": "stress"}
 #: Colours of a bar, from its least to its largest value.
 SHADES = 256
 #: Quantiles of the values at which colours end where some values lie far beyond.
@@ -147,11 +147,9 @@ def fitted(title: str) -> str:
 
 def named(field: str, units: Units) -> tuple[str, str]:
     """Return the name of the figure of a field, and the label of its colours."""
-    if field in DEFORMED:
-        name, words, quantity = DEFORMED[field]
-        return name, words if quantity is None else units.label(words, quantity)
-    words, base = field.replace("_", " "), field.partition("_")[0]
-    return field, units.label(words, QUANTITIES[base]) if base in QUANTITIES else words
+    name, words = DEFORMED.get(field, (field, field.replace("_", " ")))
+    known = [each for each in quantities(BODY) if f"{field}_".startswith(f"{each.name}_")]
+    return name, words + "".join(unit_of(each.unit, units, plane=False) for each in known)
 
 
 #: Quantities whose unit is a power of that of length, of some times that of force.
@@ -165,12 +163,15 @@ def unit_of(quantity: str, units: Units, plane: bool) -> str:
     Parameters
     ----------
     quantity
-        "length", "stress", ..., or one of `POWERS`.
+        "length", "stress", ..., one of `POWERS`, or a quotient of two.
     units
         The names of units.
     plane
         Whether the body is plane, of which all is that of a unit of thickness.
     """
+    if "/" in quantity:
+        names = [unit_of(part, units, plane)[2:-1] for part in quantity.split("/")]
+        return f" ({'/'.join(names)})" if all(names) else ""
     length, stress = units.length, units.stress
     if quantity not in POWERS:
         name = getattr(units, quantity, None)
@@ -194,16 +195,23 @@ def smooth(ax: Axes, mesh: Triangulation, values: Array, norm: Normalize, colour
     ax.set_rasterization_zorder(0)  # as they are, contours would stay shapes
 
 
+def uniform(low: float, high: float) -> bool:
+    """Tell whether a field with these ends is constant to rounding."""
+    return high - low <= 1e-6 * max(abs(low), abs(high))
+
+
 def widened(low: float, high: float) -> tuple[float, float]:
     """Return the ends of a colour bar: of a field that is constant to rounding a wide one."""
-    least = 1e-6 * max(abs(low), abs(high))
-    return (low, high) if high - low > least else (low - 0.05 * abs(low), high + 0.05 * abs(high))
+    more = 0.05 * max(abs(low), abs(high)) or 1.0
+    return (low - more, high + more) if uniform(low, high) else (low, high)
 
 
 def colour_range(values: Array, label: str) -> tuple[Normalize, str]:
     """Return the range of colours without singular peaks, and a label with the peaks cut off."""
     low, high = (float(end) for end in np.quantile(values, OUTLIERS))
     ends, peaks = [float(values.min()), float(values.max())], []
+    if uniform(*ends):
+        return Normalize(*widened(*ends)), f"{label}, {ends[1]:.4g} everywhere"
     if low - ends[0] > 0.2 * (high - low) > 0:
         peaks.append(f"least {ends[0]:.3g}")
         ends[0] = low
