@@ -1,9 +1,15 @@
-"""Errors that a user can mend."""
+"""Errors that a user can mend, and counts in messages."""
 
 import re
 
 #: How NumPy writes a number where Python's own writing is asked for.
 NUMBER = re.compile(r"\bnp\.(?:u?int|float|bool|str)\d*_?\(([^()]*)\)|\bnp\.(True|False)_?\b")
+
+
+def counted(number: float, noun: str) -> str:
+    """Return a number of things in words: ``1 node``, ``2 nodes``."""
+    text = f"{number:.3g}" if isinstance(number, float) else str(number)
+    return f"{text} {noun}" + ("" if text == "1" else "s")
 
 
 class InputError(ValueError):

@@ -18,6 +18,7 @@ from contact.case.text import to_toml
 from contact.cli.acting import acting
 from contact.cli.geometry import parts, regions
 from contact.cli.main import CONVERGED
+from contact.errors import counted
 from contact.mesh.cells import Shape, shape_of
 from contact.mesh.geometry import determinant, geometry_nodes, jacobians
 from contact.methods.options import NewtonOptions
@@ -66,8 +67,8 @@ def describe(case: Case, problem: ContactProblem) -> str:
     library, path = environment.blas()
     lines = [
         to_toml(case, domain.dim),
-        f"# mesh: {cells} cells in {domain.dim}-D on {comm.size} rank(s), largest extent "
-        f"{domain.size:g}",
+        f"# mesh: {counted(cells, 'cell')} in {domain.dim}-D on {counted(comm.size, 'rank')}, "
+        f"largest extent {domain.size:g}",
         *parts(domain),
         *regions(domain),
         *(f"# note: {note}" for note in (*domain.notes, *amplitude_notes(case))),

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from contact import _compat
 from contact.body.rollers import SMOOTH
+from contact.errors import counted
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
@@ -40,7 +41,7 @@ def parts(domain: Domain) -> list[str]:
         area, *rest = _integrals(domain, values, measure)
         count = domain.comm.allreduce(facets.size, op=MPI.SUM)
         if not area > 0:  # facets on the axis of revolution
-            rows.append([name, f"{count} facets", "on the axis", "", ""])
+            rows.append([name, counted(count, "facet"), "on the axis", "", ""])
             continue
         centroid, mean = np.reshape(rest, (2, d)) / area
         length = float(np.linalg.norm(mean))
@@ -53,7 +54,7 @@ def parts(domain: Domain) -> list[str]:
         if faces != 1:
             across = f"{f'plane faces in {faces} directions' if faces else 'curved'}, {across}"
         place = f"centroid {vector(domain.resultant(centroid))}"
-        rows.append([name, f"{count} facets", f"{_extent(domain)} {area:.6g}", place, across])
+        rows.append([name, counted(count, "facet"), f"{_extent(domain)} {area:.6g}", place, across])
     inside = [*table([_inside(domain, name) for name in sorted(domain.inside)])]
     return [
         "# parts of its boundary:",
@@ -99,7 +100,12 @@ def _inside(domain: Domain, name: str) -> list[str]:
     local = np.array([facets.size, areas.sum(), *np.einsum("fq,fqd->d", areas, points)])
     count, area, *moment = domain.comm.allreduce(local, op=MPI.SUM)
     centroid = vector(domain.resultant(np.array(moment) / area if area > 0 else np.zeros(d)))
-    return [name, f"{count:.0f} facets", f"{_extent(domain)} {area:.6g}", f"centroid {centroid}"]
+    return [
+        name,
+        counted(round(count), "facet"),
+        f"{_extent(domain)} {area:.6g}",
+        f"centroid {centroid}",
+    ]
 
 
 def regions(domain: Domain) -> list[str]:
@@ -111,7 +117,7 @@ def regions(domain: Domain) -> list[str]:
         (volume,) = _integrals(domain, [1.0], measure)
         count = domain.comm.allreduce(cells.size, op=MPI.SUM)
         word = "volume" if domain.dim == 3 or domain.revolved else "area"
-        rows.append([name, f"{count} cells", f"{word} {volume:.6g}"])
+        rows.append([name, counted(count, "cell"), f"{word} {volume:.6g}"])
     return ["# regions:", *table(rows)]
 
 

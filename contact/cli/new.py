@@ -67,6 +67,10 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
     except ValueError:
         name = str(mesh.resolve())
     parts = "".join(f"#   {part}\n" for part in sorted(domain.parts))
+    within = "".join(f"#   {part}\n" for part in sorted(domain.inside))
+    within = (
+        f"# Parts inside of it, for supports, electrodes and bolts:\n{within}" if within else ""
+    )
     regions = ", ".join(sorted(domain.regions))
     return f"""\
 # A case to begin with; every key is described in docs/case-file.md.
@@ -79,7 +83,7 @@ title = {literal(mesh.stem)}
 [mesh]
 file = {literal(name)}
 # Parts of its boundary, to be named below:
-{parts}# Regions: {regions}.
+{parts}{within}# Regions: {regions}.
 
 {_space(domain)}{_materials(domain)}
 [[fixed]]                     # the part that lies highest; "free" for a component that is not held

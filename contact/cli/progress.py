@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import platform
 import re
 import shlex
@@ -24,8 +25,10 @@ OFTEN, SELDOM = 0.2, 10.0
 #: Loggers, each within the next: the iterations of a solve, its steps, the cases of a sweep.
 RANKS = ("contact.inner", "contact.solver", "contact.steps", "contact.sweep")
 OUTER = "contact.solver"
-#: The bar of many solves.
+#: The bar of one solve, the bar of many, and its width where the terminal does not tell its own.
+COUNT = "iterations: {n_fmt}, {elapsed}{postfix}"
 SHARES = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
+WIDTH = 80
 #: Head of the table of iterations: linear solves, residuals and sizes of the active sets. Newton
 #: iterations on the condensed problem, within step 2, are 2.1, 2.2, ...
 HEAD = "   step solves  equilibrium  contact friction   open  stick   slip  note"
@@ -78,7 +81,9 @@ def progress(
         if not (quiet or verbose) and sys.stderr.isatty():
             from tqdm import tqdm
 
-            bar = tqdm(unit=" iterations", file=sys.stderr)
+            # tqdm takes a terminal that does not tell its width for one of width 0.
+            width = os.get_terminal_size(sys.stderr.fileno()).columns or WIDTH
+            bar = tqdm(file=sys.stderr, ncols=width, bar_format=COUNT, leave=False)
         monitor = Console(quiet, bar, verbose)
         handlers.append(monitor)
     logger = logging.getLogger("contact")
@@ -159,7 +164,7 @@ class Console(logging.Handler):
             self._bar.write(line, file=sys.stderr)
 
     def close(self) -> None:
-        """Leave the bar as it is."""
+        """Take the bar away."""
         if self._bar is not None:
             self._bar.close()
         super().close()

@@ -17,7 +17,7 @@ from contact.case.text import to_toml
 from contact.cli.check import amplitude_notes
 from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
-from contact.errors import InputError
+from contact.errors import InputError, counted
 from contact.methods.signals import SIGNALLED, Terminated, signals_held
 from contact.output.discretisation import locks
 from contact.output.files import write_outputs
@@ -164,5 +164,5 @@ def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     bad = sum(row["converged"] not in (True, "True") for row in rows)
     if comm.rank == 0 and not (options.quiet and bad == 0):
         words = f", {bad} of them not converged" if bad else ""
-        print(f"{len(rows)} rows{words}: {folder.path / TABLE}")
+        print(f"{counted(len(rows), 'row')}{words}: {folder.path / TABLE}")
     return NOT_CONVERGED if bad else CONVERGED

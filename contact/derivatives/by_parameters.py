@@ -33,7 +33,7 @@ from contact.arguments import expect
 from contact.case.build import build_problem
 from contact.case.text import number_at, with_number
 from contact.derivatives.differences import Family, Parameter, at, family_of
-from contact.errors import InputError
+from contact.errors import InputError, counted
 from contact.history import History
 from contact.linear.operator import Counters
 from contact.methods.complementarity_parameters import complementarity_parameters
@@ -167,8 +167,8 @@ def sensitivity(
         _tangent(path, asked, families, found)
     if found.weakly_active.size:
         logger.warning(
-            "%d contact nodes are between two states, the first at %s: derivatives are one-sided",
-            len(found.weakly_active),
+            "%s between two states, the first at %s: derivatives are one-sided",
+            counted(len(found.weakly_active), "contact node"),
             np.round(found.weakly_active[0], 6).tolist(),
         )
     return found

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from contact.arguments import naming
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.rollers import APART
-from contact.errors import InputError
+from contact.errors import InputError, counted
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, contact_directions
@@ -216,9 +216,9 @@ def _refuse_within(
     count = domain.comm.allreduce(np.count_nonzero(within))
     if count > 0:
         raise InputError(
-            f"foundation: {count} contact nodes lie within it, and the contact direction does not "
-            "lead back to its surface; accepted: a distance that is positive, or triangles whose "
-            "normals point, towards the body, and overlaps less deep than the shape"
+            f"foundation: {counted(count, 'contact node')} within it, and the contact direction "
+            "does not lead back to its surface; accepted: a distance that is positive, or "
+            "triangles whose normals point, towards the body, and overlaps less deep than the shape"
         )
 
 

@@ -10,6 +10,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
+from contact.errors import counted
 from contact.problem.residuals import Residuals
 
 logger = logging.getLogger("contact.solver")
@@ -112,10 +113,9 @@ class IterationHistory:
         self.records.append(record)
         logger.log(
             self.level,
-            "iteration %d: %d linear solve%s; equilibrium %.1e, contact %.1e, friction %.1e%s",
+            "iteration %d: %s; equilibrium %.1e, contact %.1e, friction %.1e%s",
             record.iteration,
-            record.inner,
-            "" if record.inner == 1 else "s",
+            counted(record.inner, "linear solve"),
             record.kkt.equilibrium,
             record.kkt.contact,
             record.kkt.friction,

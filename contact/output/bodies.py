@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import linalg
 
+from contact.errors import counted
 from contact.mesh.entities import cells_at, owned_among
 from contact.mesh.owners import Owners
 from contact.output.solution import Note, Remark, Solution
@@ -73,9 +74,9 @@ def choices(solution: Solution) -> Iterator[Remark]:
         count = problem.comm.allreduce(int(partly.sum()), op=MPI.SUM)
         if count:
             yield (
-                f"{sides}: {count} nodes in contact face the other side with less than half of "
-                "their area: the pressure there is a mean over the rest; facets that end where the "
-                "other side does avoid that"
+                f"{sides}: {counted(count, 'node')} in contact, of whose area less than half faces "
+                "the other side: the pressure there is a mean over the rest; facets that end where "
+                "the other side does avoid that"
             )
         states = [record.state for record in solution.steps] or [solution.state]
         slips = [_slip(problem, state, nodes) for state in states]

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.rigid import Rigid
+from contact.errors import counted
 from contact.interface.law import Conductor
 from contact.output import bodies, discretisation, foundations
 from contact.output.error_estimate import estimated
@@ -261,8 +262,8 @@ def resolution(solution: Solution) -> Iterator[Remark]:
         across, width = count, solution.contact_area
     if across < ACROSS:
         yield (
-            f"the mesh is too coarse for the pressures: {across:.3g} nodes across the contact "
-            f"zone; accepted: {ACROSS} at least, for instance elements of at most "
+            f"the mesh is too coarse for the pressures: {counted(across, 'node')} across the "
+            f"contact zone; accepted: {ACROSS} at least, for instance elements of at most "
             f"{width / ACROSS:.2g} there"
         )
 

@@ -13,7 +13,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import KDTree
 
-from contact.errors import InputError
+from contact.errors import InputError, counted
 from contact.interface.mortar.surface import surface_of
 from contact.interface.multipliers import Multipliers
 from contact.output.formats import in_pieces
@@ -157,7 +157,7 @@ class ContactResult:
     def __repr__(self) -> str:
         """Return how many nodes there are, and how many of them touch."""
         closed = np.count_nonzero(self.status != "open")
-        words = f"{self.status.size} nodes, {closed} in contact"
+        words = f"{counted(self.status.size, 'node')}, {closed} in contact"
         return f"<ContactResult: {words}, pressure up to {self.pressure.max(initial=0.0):.4g}>"
 
     @property

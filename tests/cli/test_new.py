@@ -105,6 +105,22 @@ def test_a_mesh_of_second_order_of_gmsh_is_one_of_degree_2(tmp_path: Path) -> No
     assert load_case(tmp_path / "disc.toml").space.degree == 2
 
 
+def test_parts_inside_of_a_body_are_listed(tmp_path: Path) -> None:
+    """They may be held, electrodes, or cut by a bolt."""
+    names = '1 1 "low"\n1 2 "high"\n1 3 "cut"\n2 4 "bar"\n'
+    nodes = "1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 1 2 0\n6 0 2 0\n"
+    cells = "1 1 2 1 1 1 2\n2 1 2 2 2 5 6\n3 1 2 3 3 3 4\n4 3 2 4 4 1 2 3 4\n5 3 2 4 4 4 3 5 6\n"
+    blocks = {"MeshFormat": "2.2 0 8\n", "PhysicalNames": f"4\n{names}", "Nodes": f"6\n{nodes}"}
+    blocks["Elements"] = f"5\n{cells}"
+    text = "".join(f"${name}\n{block}$End{name}\n" for name, block in blocks.items())
+    (tmp_path / "bar.msh").write_text(text)
+    assert main(["new", str(tmp_path / "bar.msh")]) == CONVERGED
+    made = (tmp_path / "bar.toml").read_text()
+    assert "#   low\n# Parts inside of it, for supports, electrodes and bolts:\n#   cut\n" in made
+    more = ["--set", 'bolt=[{on = "cut", shortening = 0.001}]']
+    assert main(["check", str(tmp_path / "bar.toml"), *more]) == CONVERGED
+
+
 def test_two_bodies(tmp_path: Path) -> None:
     """The case presses them onto each other; it passes check as it is, and solves."""
     mesh = tmp_path / "blocks.msh"

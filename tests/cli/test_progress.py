@@ -1,8 +1,13 @@
 """What is shown of a run: lines of what leads, a bar over steps on a terminal, a log of all."""
 
+import contextlib
 import json
 import logging
+import os
+import pty
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +79,22 @@ def test_a_sweep_has_a_line_a_case(tmp_path: Path, capsys: pytest.CaptureFixture
     shown = capsys.readouterr().err
     assert re.findall(r"^friction.mu=(\S+): all residuals", shown, re.M) == ["0.1", "0.3"]
     assert HEAD not in shown
+
+
+def test_a_terminal_of_unknown_width(tmp_path: Path) -> None:
+    """Numbers are short there, and nothing of the bar is left."""
+    out, master, slave = tmp_path / "out", *pty.openpty()
+    command = [sys.executable, "-m", "contact", "solve", str(CASES / "fretting.toml"), *STEPS]
+    done = subprocess.run([*command, "--out", str(out)], stderr=slave, stdout=slave, check=True)
+    os.close(slave)
+    shown = b""
+    with contextlib.suppress(OSError):  # at the end of what was written
+        while part := os.read(master, 65536):
+            shown += part
+    os.close(master)
+    bar, *_ = re.split(rb"converged: ", shown)
+    assert done.returncode == 0 and b"100%|" in bar and re.search(rb"\r +\r$", bar)
+    assert not re.search(rb"\d\.\d{6}", bar)
 
 
 class Tqdm:
