@@ -308,8 +308,12 @@ def find_nodes(
         _motion(body, part, points),
     )
     if jump.size == 0:
+        bare = domain.comm.allreduce(bool(((free > APART) & meets).any()), op=MPI.LOR)
         raise InputError(
-            f"{key}.on: part {part!r} has no node that is free to move towards the foundation"
+            f"{key}.on: of part {part!r} the axis of revolution alone meets the foundation, where "
+            "nodes carry no pressure; accepted: a finer mesh there"
+            if bare
+            else f"{key}.on: part {part!r} has no node that is free to move towards the foundation"
         )
     return jump, found.mixing
 

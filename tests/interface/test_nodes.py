@@ -6,6 +6,8 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Load
+from contact.case.build import build_problem
+from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Level, Plane, Sphere
@@ -131,6 +133,28 @@ def test_nodes_that_cannot_reach_the_foundation_are_left_out():
     nodes = ContactProblem(example.domain, example.body, Contact("bottom", away)).nodes
     assert nodes.points[:, 0].max() <= 2.0
     assert np.all(np.isfinite(nodes.gap))
+
+
+@pytest.mark.parametrize(
+    ("radius", "held", "words"),
+    [(0.2, "top", "the axis of revolution alone meets"), (0.6, "bottom", "no node that is free")],
+)
+def test_an_end_without_contact_nodes_says_why(radius, held, words):
+    """A ball below the first element sees the node on the axis alone, which has no pressure."""
+    tables = {
+        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
+        "space": {"kinematics": "axisymmetric"},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": held, "displacement": ["free", 0.0]}],
+        "contact": {
+            "on": "bottom",
+            "foundation": {"shape": "sphere", "centre": [0.0, -radius], "radius": radius},
+            "direction": "axis",
+            "axis": [0.0, -1.0],
+        },
+    }
+    with pytest.raises(InputError, match=words):
+        build_problem(parse_case(tables, source="tip"), MPI.COMM_SELF)
 
 
 def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
