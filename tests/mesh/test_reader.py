@@ -150,7 +150,7 @@ def test_check_lists_regions_and_notes():
     )
     lines = describe(case, build_problem(case, COMM)).splitlines()
     regions = lines.index("# regions:")
-    assert lines[regions + 1] == "#   body  1 cells  area 0.5"
+    assert lines[regions + 1] == "#   body  1 cell  area 0.5"
     assert any(line.startswith("# note: 1 cell(s) in no physical group") for line in lines)
 
 
