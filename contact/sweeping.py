@@ -18,6 +18,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -372,9 +373,10 @@ def _write(folder: Path, rows: Sequence[Mapping[str, Any]], first: Case) -> None
         )
     if not (folder / CASE).exists():
         (folder / CASE).write_text(to_toml(first, anchored=True), encoding="utf-8")
-    draft = folder / f".contact-{TABLE}"
-    write_csv(draft, rows[0], (row.values() for row in rows))
-    os.replace(draft, folder / TABLE)
+    with TemporaryDirectory(prefix=".contact-", dir=folder) as drafts:
+        draft = Path(drafts) / TABLE
+        write_csv(draft, rows[0], (row.values() for row in rows))
+        os.replace(draft, folder / TABLE)
 
 
 class _Runner:

@@ -242,6 +242,20 @@ def test_other_files_under_our_names_are_left_alone(tmp_path, capfd, name, kind)
     assert [*out.iterdir()] == [path]
 
 
+def test_files_that_begin_like_ours_are_kept(sweep, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    mine = [out / name for name in (".contact-sweep.csv", ".contact-figure-sweep.png")]
+    for path in mine:
+        path.write_text("mine")
+    status, rows = sweep("--over", "friction.mu=0.2,0.4", "--set", "material.law=linear")
+    assert (status, len(rows)) == (0, 2)
+    assert main(["plot", str(out)]) == 0
+    assert [path.read_text() for path in mine] == ["mine", "mine"]
+    left = {path.name for path in out.iterdir()} - {path.name for path in mine}
+    assert not [name for name in left if name.startswith(".")]
+
+
 def test_ranges():
     assert Axis.of("friction.mu=0.1:0.3:3").values == ("0.1", "0.2", "0.3")
     assert Axis.of("mesh.refine=0:2:3").values == ("0", "1", "2")

@@ -10,6 +10,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import matplotlib
@@ -91,10 +92,11 @@ def plot_sweep(
             figure = _figure(swept, chosen)
             for kind in formats:
                 files.append(folder / f"figure-sweep{ending}.{kind}")
-                draft = folder / f".contact-figure-sweep.{kind}"
                 try:
-                    draft.write_bytes(image(figure, kind))
-                    os.replace(draft, files[-1])
+                    with TemporaryDirectory(prefix=".contact-", dir=folder) as drafts:
+                        draft = Path(drafts) / files[-1].name
+                        draft.write_bytes(image(figure, kind))
+                        os.replace(draft, files[-1])
                 except OSError as error:
                     raise refused(error) from None
     return files
