@@ -12,13 +12,11 @@ import difflib
 import hashlib
 import itertools
 import logging
-import os
 import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -36,6 +34,7 @@ from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
 from contact.methods.signals import Interrupted, stop_on_signal
+from contact.output.folder import replace_whole
 from contact.output.formats import write_csv
 from contact.output.quantities import SUMMARY, SWEEP, quantities, values_of
 from contact.output.quantity import is_of
@@ -373,10 +372,8 @@ def _write(folder: Path, rows: Sequence[Mapping[str, Any]], first: Case) -> None
         )
     if not (folder / CASE).exists():
         (folder / CASE).write_text(to_toml(first, anchored=True), encoding="utf-8")
-    with TemporaryDirectory(prefix=".contact-", dir=folder) as drafts:
-        draft = Path(drafts) / TABLE
-        write_csv(draft, rows[0], (row.values() for row in rows))
-        os.replace(draft, folder / TABLE)
+    values = (row.values() for row in rows)
+    replace_whole(folder / TABLE, lambda draft: write_csv(draft, rows[0], values))
 
 
 class _Runner:

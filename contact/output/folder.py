@@ -31,6 +31,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from mpi4py import MPI
@@ -384,6 +385,14 @@ def listed(manifest: Path, pattern: re.Pattern[str] = _MEMBER) -> dict[str, str]
     sums = known if isinstance(known, dict) else {}
     names = known if isinstance(known, list | dict) else ()
     return {n: str(sums.get(n)) for n in names if isinstance(n, str) and pattern.fullmatch(n)}
+
+
+def replace_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Let a file be written into a folder of its own beside it, and move it there. On one rank."""
+    with TemporaryDirectory(prefix=".contact-", dir=path.parent) as drafts:
+        draft = Path(drafts) / path.name
+        write(draft)
+        os.replace(draft, path)
 
 
 def write_whole(path: Path, data: bytes, draft: Path) -> None:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import difflib
 import itertools
-import os
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import matplotlib
@@ -34,6 +33,7 @@ from contact.output.figures.style import (
     sheet,
     unit_of,
 )
+from contact.output.folder import replace_whole
 from contact.output.options import Units
 from contact.output.quantities import SUMMARY, SWEEP, quantities
 from contact.output.quantity import AXES, ENDS, is_of
@@ -93,10 +93,8 @@ def plot_sweep(
             for kind in formats:
                 files.append(folder / f"figure-sweep{ending}.{kind}")
                 try:
-                    with TemporaryDirectory(prefix=".contact-", dir=folder) as drafts:
-                        draft = Path(drafts) / files[-1].name
-                        draft.write_bytes(image(figure, kind))
-                        os.replace(draft, files[-1])
+                    drawn = image(figure, kind)
+                    replace_whole(files[-1], partial(Path.write_bytes, data=drawn))
                 except OSError as error:
                     raise refused(error) from None
     return files
