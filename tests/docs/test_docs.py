@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 import contact
+from contact import nesting
+from contact.linear import multigrid
 from contact.methods import (
     chord,
     complementarity_parameters,
@@ -20,8 +22,11 @@ from contact.methods import (
     load_stepping,
     newton,
     newton_step,
+    unconstrained_modes,
 )
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.thesis import fixed_point, outer_loop, uzawa
+from contact.problem import condensed
 from scripts import command_page
 from scripts.reporting import text
 from scripts.thesis import results_page
@@ -177,7 +182,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         "the forcing term [10⁻²]": newton_step.FORCING == 1e-2,
         "each three steps": newton_step.STAGNANT == 3,
         "[10^{-2}]\\,\\kappa$ is added": newton_step.REGULARISATION == 1e-2,
-        "to [10⁻³] of the residual before": condensed_step.CONTACT_PART == 1e-3,
+        "tolerance is [10⁻³] of the": condensed_step.CONTACT_PART == 1e-3,
         "has not fallen to [1/20]": condensed_step.UNSOLVED == 0.05,
         "below a residual of [0.05]": chord.RADIUS == 0.05,
         f"within [{chord.MOST_STEPS:g}] steps": True,
@@ -192,8 +197,33 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"down to [{continuation.LEAST_FACTOR}]": True,
         f"over [{FixedPointOptions().depth}] solves": True,
         f"up to [{load_stepping.HALVINGS}] times": True,
+        f"by the factor\n   [{load_stepping.FARTHEST:g}]": True,
+        f"k is at most [{condensed.LARGEST}]": True,
+        f"at most [{multigrid.DIRECT:,}] unknowns": True,
+        f"in 3-D from [{multigrid.LARGE[3, False]:,}] unknowns": True,
+        f"a potential from [{multigrid.LARGE[3, True]:,}] on": True,
+        f"in 2-D from\n  [{multigrid.LARGE[2, False]:,}] on": True,
+        f"k is at most [{condensed.ALWAYS}]": True,
+        f"less than [{condensed.DENSE_IS_FASTER:g}] sparse ones": True,
+        f"is [{unconstrained_modes.STUCK:g}] times all loads": True,
+        "is [10⁻²] f π²/d": interior_point.SHARE == 1e-2,
+        f"is [{interior_point.SHARE_UNSUPPORTED}] of that of the loads": True,
+        "below\n   [10⁻⁴]": interior_point.FORCING == 1e-4,
+        "below [half] of the least": interior_point.PROGRESS == 0.5,
+        f"by [{1 / interior_point.PROGRESS:g}] times the least factor": True,
+        f"stagnation limit [{newton.CONTINUATION_LIMIT}]": True,
+        f"after [{uzawa.STAGNATION_LIMIT}] iterations": True,
+        "reduce it by [1 %]": uzawa.PROGRESS == 0.99,
+        f"after [{fixed_point.FixedPoint.stagnation[0]}] iterations": True,
+        "by [10 %]": fixed_point.FixedPoint.stagnation[1] == 0.9,
+        "Below a residual of [10⁻²]": outer_loop.NEAR == 1e-2,
+        "to [10⁻³], and each": nesting.COARSE_TOLERANCE == 1e-3,
+        f"from [{nesting.MANY[3]:,}] unknowns on": True,
+        f"[{nesting.MANY[2]:,}] on": True,
     }
     assert [words for words, holds in said.items() if words not in page or not holds] == []
+    for number in re.findall(r"\[[\d.,/⁰¹²³⁴⁵⁶⁷⁸⁹⁻ %to]+\](?!\()", page):
+        assert any(number in words for words in said), f"{number} has no row"
 
 
 def test_every_public_name_has_its_place_in_the_reference() -> None:
