@@ -128,16 +128,16 @@ def agreement(report: Report, compared: Sequence[Compared]) -> None:
         "agreement",
         f"Newton's method and Uzawa block relaxation, both to residuals of {TOLERANCE:g}",
         columns,
-        "newton, uzawa: the largest residual at the end, computed from scratch. Then the linear "
-        "solves of the whole body, and the relative differences of the two: u and phi, largest "
-        "difference at a node; energy, |eps(u)| and |grad(phi)| in L2, the larger one; pressure "
-        "and friction stress in L2 of Gamma_3, both over the pressure. The verdict is `agree` "
-        f"where all are at most {AGREE:g}, else the letters of the two solutions in the last "
-        "table. solutions: how many different ones have been found by any start or method here; "
-        "warned: whether the program itself says that there may be several. Uzawa's method is "
-        f"given up after {SOLVES} solves, and the verdict is then `not converged`. Its counts hang "
-        "on rounding: `indent-ball` takes 595 to 811 solves where the displacement is up to 5e-10 "
-        "larger.",
+        "*newton*, *uzawa*: the largest residual at the end, computed from scratch. *solves*: "
+        "the linear solves of the whole body. The next columns are relative differences of the "
+        "two solutions. *u*, *phi*: the largest difference at a node. *energy*: the larger one "
+        "of |eps(u)| and |grad(phi)| in L2. *p*, *tau*: in L2 of Gamma_3, both over the "
+        f"pressure. The verdict is `agree` where all are at most {AGREE:g}, else the letters of "
+        "the two solutions in the last table. *solutions*: the number of different ones that any "
+        "start or method has found here. *warned*: whether the program warns of several "
+        f"solutions. Uzawa block relaxation is given up after {SOLVES} solves, and the verdict is "
+        "then `not converged`. Its counts depend on rounding: `indent-ball` takes 595 to 811 "
+        "solves where the displacement is up to 5e-10 larger.",
     )
 
 
@@ -173,15 +173,16 @@ def limits(report: Report, compared: Sequence[Compared]) -> None:
         "The penalty method as eps -> 0: distance to the solution with multipliers",
         columns,
         "eps is relative: the penetration at the largest pressure is eps max|u|, and so is the "
-        "slip length. The first eps is solved from zero displacement, each further one from "
-        f"the one before, to a residual of {PENALISED:g} of the penalised problem. limit: the "
-        "closest of the solutions in the last table, to which the distances belong; A is always "
-        "that of Newton's method from zero, and an arrow tells that smaller eps are closer to "
-        "another one. Then the largest relative difference of u and phi at a node; at the "
-        "smallest eps that of the pressure in L2 of Gamma_3; and the orders of the last step. "
-        "Without friction the order is 1 throughout. With friction it tends to 1 once eps is "
-        "below the slip of all sliding nodes: the friction law is rounded over the slip length, "
-        "so that nodes creep that ought to stick. Without a rigid part nothing is penalised.",
+        "slip length. The first eps is solved from zero displacement, each further one from the "
+        f"solution of the last, to a residual of {PENALISED:g} of the penalised problem. *limit*: "
+        "the closest of the solutions in the last table, to which the distances belong. A is "
+        "that of Newton's method from zero; an arrow means that smaller eps are closer to "
+        "another solution. The distances are the largest relative differences of u and phi at a "
+        "node. *p*: at the smallest eps, the difference of the pressure in L2 of Gamma_3. Orders "
+        "are those of the last step. Without friction the order is 1 throughout. With friction "
+        "it tends to 1 once eps is below the slip of all sliding nodes: the friction law is "
+        "rounded over the slip length, so that nodes creep that ought to stick. Without a rigid "
+        "part no term is penalised.",
     )
 
 
@@ -230,19 +231,18 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
             "agreement-branches",
             "Examples with several solutions, and who finds which",
             columns,
-            "Columns: contact nodes that stick, slide and are open, and those in another state "
-            "than in solution A; the largest relative difference to A; the largest residual, "
-            "computed from scratch. Then how far Newton's method and Uzawa block relaxation move "
-            "from the solution if they start there. Last, the solutions at which they end if each "
-            "node is disturbed by up to "
-            f"{DISTURBANCE:g} "
-            "of its values. nested: Newton's method by way of coarser meshes; eps: next to the "
-            "penalised solution. With (7.16) mu falls from 0.6 to 0.5 as soon as a node slides by "
+            "*stick*, *slide*, *open*: numbers of contact nodes; then those in another state "
+            "than in solution A. *distance to A*: the largest relative difference. *residual*: "
+            "the largest, computed from scratch. *newton from it*, *uzawa from it*: how far each "
+            "method moves from the solution if it starts there. *disturbed*: the solution at "
+            f"which it ends if each node is disturbed by up to {DISTURBANCE:g} of its values. "
+            "*nested*: Newton's method by way of coarser meshes; *eps*: the solution closest to "
+            "the penalised one. With (7.16) mu falls from 0.6 to 0.5 as soon as a node slides by "
             "a few 1/rho. A node where |sigma_tau| lies between 0.5 and 0.6 of the pressure may "
-            "therefore stick or slide. In Example 7.2 these are the node at the end of the bar and "
-            "those at the tip of the sliding zone, each on its own. Between sticking and sliding "
-            "there is a solution on the falling part of the law, which both methods leave if "
-            "disturbed.",
+            "therefore stick or slide. In Example 7.2 these are the node at the end of the bar "
+            "and those at the tip of the sliding zone, each independently of the others. Between "
+            "sticking and sliding there is a solution on the falling part of the law, which both "
+            "methods leave if disturbed.",
         )
 
 

@@ -40,13 +40,13 @@ def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
         report,
         "figure-7-6",
         "Figure 7.6: error against a reference solution, Example 7.2, rho = 1e4",
-        "The thesis's reference, 65536 triangles and 33153 nodes, is its finest tested mesh, so "
-        "that its last point means nothing. They are 256 x 128 cells: 1/256 of the bar's length, "
-        "1/64 mm, and not square. Here the reference is three levels finer than the finest mesh, "
-        "for with two the last order comes out about 0.05 too large. The solution is singular at "
-        "the corners of the bar, above all at (4, 0), which the load presses down and where the "
-        "pressure peaks, and at the clamped ones: P1 falls short of order 1 in H1, and P2 gains "
-        "accuracy but no order.",
+        "The thesis's reference has 65536 triangles and 33153 nodes. It is the finest mesh that "
+        "the thesis tests, so that its last point has no meaning. These are 256 x 128 cells that "
+        "are not square; their length is 1/256 of that of the bar, 1/64 mm. Here the reference is "
+        "three levels finer than the finest mesh; with two levels the last order would be about "
+        "0.05 too large. The solution is singular at the corners of the bar: most at (4, 0), "
+        "which the load presses down and where the pressure peaks, and at the clamped corners. P1 "
+        "therefore does not reach order 1 in H1, and P2 gains accuracy but no order.",
         variants,
     )
 
@@ -68,13 +68,13 @@ def graded_meshes(report: Report, coarse: bool) -> dict[str, Array]:
         "graded",
         "Example 7.2 on graded meshes, f2 = -0.005, rho = 1e4, against a reference three levels "
         "finer",
-        f"At the corners u ~ r^{power:.3f} by theory (next section). Grids are pulled towards the "
-        "sides and the end of the load with a power q: elements are of the size r^(1 - 1/q) h. "
-        f"P1 asks for q > 1/lambda = {1 / power:.2f} and then has order 1 in H1, which uniform "
-        f"meshes miss; P2 for q > 2/lambda = {2 / power:.2f}, and this remains in the body, "
-        "where contact begins and friction changes over (u ~ r^(3/2)), that then limits its "
-        "order to 3/2. References are graded alike; interpolation between meshes whose diagonals "
-        "differ adds a little to the errors.",
+        f"At the corners u ~ r^{power:.3f} by theory (next section). Grids are graded towards the "
+        "sides and the end of the load with a power q: elements have the size r^(1 - 1/q) h. "
+        f"With q > 1/lambda = {1 / power:.2f} P1 has order 1 in H1, which uniform meshes do not "
+        f"reach. P2 needs q > 2/lambda = {2 / power:.2f}. Its order is then limited to 3/2 by the "
+        "points where contact begins and where friction changes over, u ~ r^(3/2). References "
+        "are graded alike. Interpolation between meshes whose diagonals differ adds a little to "
+        "the errors.",
         variants,
     )
 
@@ -98,7 +98,7 @@ def theorem_4_3(report: Report, coarse: bool) -> dict[str, Array]:
         "theorem-4-3",
         "Theorem 4.3: the penalised solution as h -> 0, Example 7.2, rho = 1e4",
         "Both solutions belong to the same eps. A large eps smooths contact and friction, and "
-        "with them the solution; there remain the singular corners of the bar.",
+        "with them the solution. The corners of the bar remain singular.",
         variants,
     )
 
@@ -146,10 +146,10 @@ def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
         "known-solutions",
         "Errors against known solutions, with observed orders",
         columns,
-        "Hencky: a smooth displacement whose strain straddles the yield strain, with the body "
-        "force that belongs to it. Signorini: a half plane whose exact pressure is sqrt(x - x0); "
-        "its singularity limits the order in H1 to 1.5, and where x0 lies in its cell makes the "
-        "orders of P2 vary. The largest error is that of the nodes.",
+        "Hencky: a smooth displacement whose strain straddles the yield strain, with the "
+        "corresponding body force. Signorini: a half plane whose exact pressure is sqrt(x - x0). "
+        "Its singularity limits the order in H1 to 1.5, and the orders of P2 vary with the place "
+        "of x0 in its cell. The column *largest* is the largest error at a node.",
     )
     return results
 

@@ -57,14 +57,14 @@ def main(arguments: Sequence[str] | None = None) -> list[float]:
         "corner",
         "Exponent of the singular corner (4, 0) of Example 7.2, f2 = -0.005, rho = 1e4",
         columns,
-        "The last node sticks: the corner is one of 90 degrees with a side that is held and one "
-        "that is free, as those at the clamped end are too, and u ~ r^lambda there. The largest "
-        f"pressure thus grows like h^(lambda - 1), and P1 and P2 have order {theory:.3f} in H1 on "
-        "uniform meshes, which Figure 7.6 approaches from above, as long as the material does not "
-        "yield there: under f2 = -0.005 on all of these meshes. Under -0.05 it does, this theory "
-        "does not hold, and orders may be lower. A mesh graded "
-        f"like r^(1 - 1/q) with q > 1/lambda = {1 / theory:.2f} would give P1 its order 1 back, "
-        f"with q > 2/lambda = {2 / theory:.2f} P2 its order 2 as far as these corners go.",
+        "The last node sticks: the corner is one of 90 degrees with one side held and one free, "
+        "like those at the clamped end, and u ~ r^lambda there. The largest pressure therefore "
+        f"grows like h^(lambda - 1). P1 and P2 have order {theory:.3f} in H1 on uniform meshes, "
+        "which Figure 7.6 approaches from above. This holds as long as the material does not "
+        "yield at the corner: under f2 = -0.005 on all of these meshes. Under -0.05 it yields, "
+        "the theory does not apply, and orders may be lower. On a mesh graded like r^(1 - 1/q) "
+        f"these corners allow P1 the order 1 if q > 1/lambda = {1 / theory:.2f}, and P2 the order "
+        f"2 if q > 2/lambda = {2 / theory:.2f}.",
     )
     return fitted[1:]
 

@@ -129,9 +129,10 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
     axes[0].set_ylabel(r"$|u_n - u|$ in energy")
     note = (
         "Kacanov's bound is ln(t/xi_0)/(1 + ln(t/xi_0)) at the largest strain t of the body, the "
-        "local rate of the secant iteration there; the observed rate is smaller, as most of the "
-        "body is strained less, and larger only where friction converges last. "
-        "Friction: constant mu, for which no second solution has been found (last section)."
+        "local rate of the secant iteration there. The observed rate is smaller, since most of "
+        "the body is strained less. It is larger only where friction converges last. The friction "
+        "coefficient is constant; no second solution has been found for it ([methods "
+        "compared](thesis-studies.md#do-the-methods-agree-all-examples))."
     )
     caption = "Theorems 3.2 and 4.5: errors of the fixed points per iteration, Example 7.2"
     report.table("fixed-point-rates", caption, columns, note)

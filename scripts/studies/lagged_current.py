@@ -130,16 +130,16 @@ def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
     rates["threshold"] = low
     ends = errors(name, grid, 2.0, True, 60, changes=HYPOTHESES)[0][-2:]
     note = (
-        f"The lagged charge stops converging between k_e = {low:.3g} and {high:.3g} "
-        f"({grid[0]} x {grid[1]} cells); its rate is about proportional to k_e, where it is above "
-        "that of friction. Beyond, the iterates end in a cycle. At most 40 iterations are "
-        "shown. With phi implicit the rate is that of friction and does not grow with k_e. "
-        "Theorem 5.2 states convergence whatever k_e. Its proof takes a subsequence of x_n that "
-        "has a limit, and assumes that x_n-1 has the same limit. Bounded iterates need not have "
-        "that: with phi_L cut at L = 32 and R smoothing over 0.5, as the hypotheses require, the "
-        "iterates at k_e = 2 end in a cycle of two, at distances of "
-        f"{ends.min():.3g} and {ends.max():.3g} from x. For a small k_e, where the lagged charge "
-        "contracts, the theorem is right."
+        f"With the lagged charge the iteration stops converging between k_e = {low:.3g} and "
+        f"{high:.3g} ({grid[0]} x {grid[1]} cells). Its rate is about proportional to k_e, where "
+        "it is above that of friction. Beyond, the iterates end in a cycle. At most 40 "
+        "iterations are shown. With phi implicit the rate is that of friction and does not grow "
+        "with k_e. Theorem 5.2 states convergence for all k_e. Its proof takes a subsequence of "
+        "x_n that has a limit, and assumes that x_n-1 has the same limit. Bounded iterates need "
+        "not have this property. An example has phi_L cut at L = 32 and R smoothing over 0.5, as "
+        "the hypotheses require. At k_e = 2 its iterates end in a cycle of two, at distances of "
+        f"{ends.min():.3g} and {ends.max():.3g} from x. For a small k_e, where the iteration with "
+        "the lagged charge contracts, the theorem is right."
     )
     caption = "Theorem 5.2: errors of Algorithm 4 per iteration, Example 8.1, phi_F = 32"
     report.table("theorem-5-2-rates", caption, columns, note)

@@ -31,10 +31,13 @@ SMALLEST = TABLE_8_4[-1]
 VALUES = tuple(sorted({*TABLE_8_4, 2e-2, 1.5e-3, 2e-4, 6e-5, 4e-6}, reverse=True))
 
 #: The norms, and the theorem's assumptions.
-NORMS = "V: |eps(u)|, W: |grad(phi)| in L2(Omega), as differences; orders are those of both, in X."
+NORMS = (
+    "V: |eps(u)|, W: |grad(phi)| in L2(Omega), of the differences; orders are those of the norm "
+    "of both, in X."
+)
 OF_6_3 = (
-    "The bound of the proof has the limit L of phi_L in it; here phi_L is the identity, as it is "
-    "with any L from the largest |phi - phi_F| on, 32."
+    "The bound of the proof contains the limit L of phi_L. Here phi_L is the identity, as it is "
+    "for any L of at least 32, the largest |phi - phi_F|."
 )
 
 #: Where the layer of the pure compliance law is touched, and its stiffnesses and thicknesses.
@@ -224,7 +227,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "compliance-distance",
         caption,
         {far.name: far.parameter, "in V": far.norms[:, 0], "in W": far.norms[:, 1]},
-        f"Without rigid part the layer is pressed in by {depth:.4f}: farther away it is not met.",
+        f"Without a rigid part the layer is pressed in by {depth:.4f}; a rigid part farther away "
+        "than that is not touched.",
     )
 
 

@@ -25,8 +25,8 @@ NOTE = (
     "R smooths the pressure in the friction bound s = mu |R sigma_nu| alone. Where the pressure "
     "varies quickly, at the end of the bar and at the ends of the contact zones, the bound is "
     "spread over the radius. It is then positive on open nodes too, as in (3.6). For this law "
-    "existence is proved, and uniqueness where friction is small; the thesis computes with the "
-    "radius 0. A radius up to h is no smoothing on the mesh."
+    "existence is proved, and uniqueness if friction is small; the thesis computes with the "
+    "radius 0. A radius of at most h does not smooth on the mesh."
 )
 
 

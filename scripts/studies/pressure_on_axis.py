@@ -31,13 +31,14 @@ WAYS = "right", "left", "crossed", "left_right", "whole"
 CAPTION = "Contact pressure next to the axis of revolution: a rigid ball of radius 4 on a block"
 NOTE = (
     "Squares of 1/h a unit in a block of 0.5 x 0.5, cut by diagonals or whole (quadrilaterals); a "
-    "= 0.06 = 6, 12 and 24 h. Errors, in per cent, are relative to the fit p_0 (1 - r^2/a^2)^(1/2) "
-    "of degree 2 on the finest mesh. They are those of p_0, by a fit to the nodes with 1.5 h < r < "
-    "0.6 a, and of the nodes at r = h, 2 h, 3 h (degree 2: h/2, h, 3 h/2) and r = a/2. At degree 1 "
-    "on squares that are whole or cut by both diagonals the errors of nodes are C h^2/r: they fall "
-    "like h at a given number of cells from the axis, and like h^2 at a given radius. At degree 1 "
-    "no node on the axis carries a multiplier. By default a rectangle that reaches the axis is cut "
-    "by both diagonals at degree 1."
+    "= 0.06 = 6, 12 and 24 h. Errors, in per cent, are relative to the fit p_0 (1 - "
+    "r^2/a^2)^(1/2) of degree 2 on the finest mesh. The error of p_0 is that of a fit to the "
+    "nodes with 1.5 h < r < 0.6 a. The other columns are errors of the nodes at r = h, 2 h, 3 h "
+    "(degree 2: h/2, h, 3 h/2) and r = a/2. At degree 1, on squares that are whole or cut by both "
+    "diagonals, the errors of nodes are C h^2/r. At a given number of cells from the axis they "
+    "fall like h, and at a given radius like h^2. At degree 1 no node on the axis carries a "
+    "multiplier. By default a rectangle that reaches the axis is cut by both diagonals at degree "
+    "1."
 )
 
 

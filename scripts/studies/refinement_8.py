@@ -42,30 +42,32 @@ AWAY = 0.1
 COLUMNS = (
     "Newton's method from the zero initial guess. Moment: that of the pressure about x = 0. "
     "Patches: runs of neighbouring contact nodes. Charge: through the foundation. Several: "
-    "whether the program warns that there may be more solutions. Force inside: without a tenth "
-    "of the bar's length at either end of Gamma_3, where the pressure is singular at the "
-    "corners."
+    "whether the program warns of several solutions. Force inside: without a tenth of the bar's "
+    "length at either end of Gamma_3, where the pressure is singular at the corners."
 )
 ALL_CLOSED = (
-    "All of Gamma_3 is in contact, and the ramp of psi makes no difference. The largest "
-    "pressure is at the free end x = 8, where the bar stands on its edge; it grows without "
-    "bound. The force is as accurate as the reaction of the clamp, at whose corner x = 0 a node "
-    "is held. This error falls like h^0.5 only (-10.9, -7.6, -5.3 on 48, 96, 192 cells), and "
-    "has the sign opposite to the rest of the error: the force is within 0.4 % at once, and "
-    "then turns. The moment about x = 0 gives that node no weight; its changes are halved from "
-    "level to level, like those of the force inside and of the charge."
+    "All of Gamma_3 is in contact, and the ramp of psi makes no difference. The largest pressure "
+    "is at the free end x = 8, where the bar stands on its edge; it grows without bound. The "
+    "force is as accurate as the reaction of the clamp, and a node is fixed at its corner x = 0. "
+    "The error of this node falls only like h^0.5 (-10.9, -7.6, -5.3 on 48, 96, 192 cells), and "
+    "has the sign opposite to the rest of the error. The force is therefore within 0.4 % on the "
+    "first mesh, and its changes then turn their sign. In the moment about x = 0 that node has no "
+    "weight. Changes of the moment are halved from level to level, like those of the force inside "
+    "and of the charge."
 )
 NOTES = {
     "8.1": f"{COLUMNS} {ALL_CLOSED}",
     "8.2": "As in Example 8.1.",
-    "8.3": "Nothing is conducted.",
-    "8.4": "Diagonals are crossed, as symmetric as the bar. With the default ramp there is one "
-    "patch, and charge and potential converge like h. The force has converged to 0.06 %, and its "
-    "changes within that have no order yet. The largest pressure is in the middle, where the "
-    "bar sticks between slips to either side, in a zone 0.06 wide: one node sticks on 192 "
-    "cells, three on 384. On 576 cells force, charge and largest pressure are 50.55, -191.4 and "
-    "11.45. With the steep ramp nothing converges.",
-    "8.4, k_e = 0.6": "As before, with less charge; the changes of the force are 0.05 % of it.",
+    "8.3": "The foundation does not conduct.",
+    "8.4": "Diagonals are crossed, so that the mesh is as symmetric as the bar. With the default "
+    "ramp there is one patch, and charge and potential converge like h. The force has "
+    "converged to 0.06 %; its smaller changes have no order yet. The largest pressure is "
+    "in the middle, where the bar sticks between slips to either side. This zone is 0.06 "
+    "wide: one node sticks on 192 cells, three on 384. On 576 cells force, charge and "
+    "largest pressure are 50.55, -191.4 and 11.45. With the steep ramp no quantity "
+    "converges.",
+    "8.4, k_e = 0.6": "As in Example 8.4, with less charge; the changes of the force are 0.05 % "
+    "of it.",
 }
 
 #: Columns of which the table shows the change from level to level.

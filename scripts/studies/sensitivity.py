@@ -55,9 +55,11 @@ SWEEPS: Mapping[str, Sweep] = {
     "rho-7": Sweep(
         r"$\rho$ of (7.16)", "7.2, f2 = -0.005", "bar", "friction.mu.rho",
         (1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 6e7), (128, 32),
-        note="The thesis prints rho for its tables and for Figures 7.7 and 7.8; it decides 0.1 % "
-        "of the force and 0.2 % of the largest pressure. Of several solutions with a large rho "
-        "this is the one that Newton's method finds from the zero initial guess (last section).",
+        note="The thesis prints rho for its tables and for Figures 7.7 and 7.8. The choice of rho "
+             "changes the force by 0.1 % and the largest pressure by 0.2 %. With a large rho "
+             "there are several solutions; this is the one that Newton's method finds from the "
+             "zero initial guess ([methods "
+             "compared](thesis-studies.md#do-the-methods-agree-all-examples)).",
     ),
     "rho": Sweep(
         r"$\rho$ of (7.16)", "8.2", "piezo-8-2", "friction.mu.rho",
@@ -68,8 +70,8 @@ SWEEPS: Mapping[str, Sweep] = {
         r"$\delta$ of $\psi$", "8.4", "compliance-8-4", "electric.delta",
         (0.5, 1.0, 2.0, 10 / 3, 5.0, 8.0, 12.0), (192, 32),
         note="By default delta = 10/3. The thesis says that delta is small. Beyond 8 the ramp is "
-        "narrower than two spacings of the nodes: patches come and go with the mesh, and the "
-        "parameter has no meaning.",
+             "narrower than two spacings of the nodes: patches appear and vanish with the mesh, "
+             "and the parameter has no meaning.",
     ),
     "c_nu": Sweep(
         r"$c_\nu$", LAYERED, LAYER, "contact.stiffness", (0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0),
@@ -81,8 +83,8 @@ SWEEPS: Mapping[str, Sweep] = {
     ),
     "n_nu": Sweep(
         r"$n_\nu$", LAYERED, LAYER, "contact.limit", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (96, 16),
-        note="The case takes 0.1, the thickness of the layer, beyond which the limit "
-        "has no effect, for the rigid part is reached.",
+        note="The case takes 0.1, the thickness of the layer. A larger limit has no effect, for "
+             "the rigid part is reached first.",
     ),
     "radius": Sweep(
         r"radius of $R$", "8.4", "compliance-8-4", "friction.radius",

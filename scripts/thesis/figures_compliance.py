@@ -263,18 +263,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     data = "Example 8.4, mu = 0.6, k_e = 1"
     crossed = ["mesh.diagonal=crossed"]
     symmetric = (
-        "The mesh is symmetric, and so are bar, loads and this solution. The bump in the middle is "
-        "where slips to either side meet: friction changes its sign there within some nodes, and "
-        "on finer meshes the peak is 11.4 (*Chapter 8 on finer meshes*). The thesis has sticking "
-        "and sliding zones clearly identified; here this middle alone sticks, 0.06 wide."
+        "The mesh is symmetric, and so are bar, loads and this solution. The bump in the middle "
+        "is where slips to either side meet: friction changes its sign there over some nodes. "
+        "On finer meshes the peak is 11.4 ([Chapter 8 on finer "
+        "meshes](thesis-studies.md#chapter-8-on-finer-meshes)). The thesis shows clear zones of "
+        "sticking and sliding; here a zone of the width 0.06 in the middle sticks, and no other."
     )
     leaning = (
-        "All triangles lean to one side here; with the default ramp of psi the solution differs "
-        "little from that of the symmetric mesh, and less on finer ones."
+        "All triangles lean to one side here. With the default ramp of psi the solution differs "
+        "little from that of the symmetric mesh, and less on finer meshes."
     )
     steep = (
-        "A steep ramp of psi, delta = 1000 over the largest extent: its width is far below the "
-        "spacing of the nodes, and the mesh decides where the bar touches."
+        "A steep ramp of psi, delta = 1000 over the largest extent. Its width is far below the "
+        "spacing of the nodes, so that the mesh decides where the bar touches."
     )
     ramp, layer = [*crossed, "electric.delta=83.3333"], "layer of thickness 0.1"
     examples: list[tuple[Any, ...]] = [

@@ -26,11 +26,11 @@ PENALTY = ("solver.method=penalty", f"solver.eps_contact={EPS}")
 
 #: The unprinted values, and the appearance of the free end of the bar.
 OF_7_4 = (
-    "For Figures 7.4 to 7.6 the thesis prints no rho; taken is that of Figures 7.7 and 7.8. "
-    "At the corner x = 4 the bar stands on its edge and the stresses are singular: the value at "
-    "the last node grows as the mesh is refined (0.017, 0.021, 0.025 with 128, 256, 512 cells at "
-    "f2 = -0.005). The step down of the tangential stress at the node before it belongs to the "
-    "triangles that lean to the right: it is one node wide on each mesh, and is not there if they "
+    "For Figures 7.4 to 7.6 the thesis prints no rho; that of Figures 7.7 and 7.8 is taken. At "
+    "the corner x = 4 the bar stands on its edge, and the stresses are singular. The value at the "
+    "last node grows as the mesh is refined: 0.017, 0.021, 0.025 with 128, 256, 512 cells at f2 = "
+    "-0.005. At the node before it the tangential stress steps down. This step comes from "
+    "triangles that lean to the right: it is one node wide on each mesh, and is absent if they "
     "lean to the left or are crossed."
 )
 
@@ -107,11 +107,11 @@ def compare(report: Report, tables: Mapping[str, Table | None]) -> None:
         f"Augmented Lagrangian and penalty (eps = {EPS:g}) on one set of axes, Example 7.2",
         figure,
         data,
-        "The thesis finds both methods to give the same solution. Here the eye sees a difference "
-        "in the tangential stress, about where sticking meets sliding and most under the smaller "
-        "load: with the friction law rounded over the slip length eps, nodes creep there that "
-        "ought to stick. Table 7.2 says how far the solutions are apart. The peaks at the end of "
-        "the bar are cut off.",
+        "The thesis finds both methods to give the same solution. Here the tangential stresses "
+        "differ visibly where sticking meets sliding, most under the smaller load. The penalised "
+        "friction law is rounded over the slip length eps, so that nodes creep that ought to "
+        "stick. Table 7.2 has the distances of the solutions. The peaks at the end of the bar are "
+        "cut off.",
     )
 
 

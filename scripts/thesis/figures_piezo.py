@@ -96,7 +96,7 @@ def potentials(
     _, *found = data.values()
     rising = int(np.count_nonzero(np.all(np.diff(found, axis=0) > 0, axis=0)))
     claim = (
-        f"Where the thesis sees it rise from curve to curve, it does at {rising} of "
+        f"Where the thesis sees it rise from curve to curve, it rises here at {rising} of "
         f"{data['x'].size} nodes."
     )
     report.figure(
@@ -160,11 +160,12 @@ def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
             columns[norm] += errors[:, k].tolist()
             columns[f"order ({norm})"] += observed_orders(h, errors[:, k])
     note = (
-        "Relative errors; |eps(u)| and |grad(phi)| stand for the norms of H1. The thesis's "
-        "reference, 65536 triangles and 33153 nodes, 256 x 128 cells, is the finest mesh that it "
-        "tests, and its last point has no meaning; here it is three levels finer than the finest "
-        "mesh. The thesis's h = 1/256 is relative to the length of the bar. The clamped and "
-        "grounded corners are singular, which costs P1 its full order 1 in H1 and 2 in L2."
+        "Errors are relative; |eps(u)| and |grad(phi)| stand for the norms of H1. The thesis's "
+        "reference has 65536 triangles and 33153 nodes, 256 x 128 cells. It is the finest mesh "
+        "that the thesis tests, and its last point has no meaning; here the reference is three "
+        "levels finer than the finest mesh. The thesis's h = 1/256 is relative to the length of "
+        "the bar. The clamped and grounded corners are singular. P1 therefore does not reach "
+        "order 1 in H1 and order 2 in L2."
     )
     caption = "Figure 8.7: errors of u and phi against a reference solution"
     report.table("figure-8-7-table", caption, columns, note)

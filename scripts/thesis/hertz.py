@@ -153,11 +153,11 @@ def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], So
         "hertz-cylinder",
         "Cylinder on a plane (Example 7.1): half-width and peak pressure over Hertz's",
         columns,
-        "Example 7.1 is the load 1600, where b/R = 0.34 and the solution of linear elasticity is "
-        "no longer Hertz's; the small loads show the classical solution. (edge) is where p^2, "
-        "extrapolated in x^2, vanishes; (moment) is the half-width of the elliptic pressure with "
-        "the same second moment: both agree for Hertz's. Friction of a cylinder pressed once on "
-        "a rigid plane narrows the contact; Hertz knows none.",
+        "Example 7.1 is the load 1600. There b/R is 0.34, and the solution of linear elasticity "
+        "is no longer Hertz's; with the small loads it is. (edge) is where p^2, extrapolated in "
+        "x^2, vanishes. (moment) is the half-width of the elliptic pressure with the same second "
+        "moment. Both agree for Hertz's pressure. Friction of a cylinder that is pressed once on "
+        "a rigid plane narrows the contact; Hertz's theory has no friction.",
     )
     return solutions
 
@@ -204,17 +204,17 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         "Figure 7.2 (a): pressure and tangential stress on Gamma_3, Hertz's solution beside",
         figure,
         data,
-        "Example 7.1. Hertz's solution is one of small contact widths and without friction; "
-        "friction narrows the contact and raises the pressure. Over Hertz's half width b_H and "
-        "largest pressure p_H; the numbers are in the units of the case.",
+        "Example 7.1. Hertz's solution holds for small contact widths and without friction; "
+        "friction narrows the contact and raises the pressure. Axes are in units of Hertz's half "
+        "width b_H and largest pressure p_H; the numbers are in the units of the case.",
     )
     report.figure(
         "figure-7-2b",
         "Figure 7.2 (b): deformed quarter cylinder, von Mises stress",
         draw_plane(deformed),
         {"von Mises": [float(deformed.skin["values"].max())]},
-        "Coulomb friction (7.16), rho = 1e4, contact along the foundation's normal. The number "
-        "is the largest von Mises stress.",
+        "Coulomb friction (7.16) with rho = 1e4; the contact direction is the normal of the "
+        "foundation. The file of numbers has the largest von Mises stress.",
     )
 
 
@@ -269,15 +269,16 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
         "hertz-sphere",
         "Sphere on a plane over Hertz's solution",
         columns,
-        "Radius from the second moment of the pressure; peak pressure from p^2 as a linear "
-        "function of r^2 near the axis, and as the largest nodal value. The body is a half ball, "
-        "and the approach is that of the middle of its cut, at the depth R; beside it is Hertz's "
-        "displacement at that depth of the half space "
-        f"({hertz.axial(hertz.radius):.5f}; of infinitely distant points {hertz.approach:.5f}). "
-        "The load is scaled to the area of the polyhedral cut, so that the forces can balance. "
-        "At degree 2 all nodes carry pressures. With constraints at mid-edges alone a/a_H is 1 "
-        "and 1.001, p_0/p_H 1.006 and 0.9972 by fit and 1.037 and 1.008 at a node; how deep "
-        "vertices penetrate is not in these.",
+        "The radius a is that of the second moment of the pressure. The largest pressure p_0 is "
+        "given twice: by p^2 as a linear function of r^2 near the axis (fit), and as the largest "
+        "nodal value (node). The body is a half ball, and its approach is that of the middle of "
+        "its cut, at the depth R. It is compared with the displacement of Hertz's half space at "
+        f"that depth, {hertz.axial(hertz.radius):.5f}; that of infinitely distant points is "
+        f"{hertz.approach:.5f}. The load is scaled to the area of the polyhedral cut, so that the "
+        "forces can balance. At degree 2 all nodes carry pressures. With constraints at "
+        "mid-edges alone the last two rows have a/a_H = 1 and 1.001, and p_0/p_H = 1.006 and "
+        "0.9972 by fit, 1.037 and 1.008 at a node. These ratios do not show how deep vertices "
+        "then penetrate.",
     )
     return ratios
 

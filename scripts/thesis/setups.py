@@ -58,9 +58,9 @@ def constants(report: Report) -> None:
         "table-8-1",
         "Table 8.1: constants of PZT-5A, as printed and as the case files have them",
         columns,
-        "The axes x, y of the case files stand for X2, X3. Permittivities are 1e9 times the "
-        "printed eps_0 = 8.885e-12 times the printed ratios: C/(GV m). 8.885 is a misprint of "
-        "8.854; the printed number is kept.",
+        "The axes x, y of the case files stand for X2, X3. Permittivities in C/(GV m) are the "
+        "printed ratios times the printed eps_0 = 8.885e-12 times 1e9. The value 8.885 is a "
+        "misprint of 8.854; the printed number is kept.",
     )
 
 
@@ -78,8 +78,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 f"Figure {number.replace('-', '.')}: set-up of {topic}",
                 figure,
                 {"x": x, "y": y, "gap": gap},
-                f"Drawn from the case file `{name}.toml`, on a coarse mesh, by the function behind "
-                "`contact check --plot`. The numbers are the contact nodes and their gaps.",
+                f"Drawn from the case file `{name}.toml`, on a coarse mesh, by the function "
+                "behind `contact check --plot`. The file of numbers has the contact nodes and "
+                "their gaps.",
             )
     if MPI.COMM_WORLD.rank == 0:
         constants(report)

@@ -82,14 +82,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         f"Example 8.3: iterations of Algorithm 8 until (6.40) with eps_fp = 1e-5, {cells[0]} x "
         f"{cells[1]} cells",
         columns,
-        "By the thesis's words Algorithm 9 stops after 2 iterations: its inner loop, which (6.41) "
-        "ends. Table 8.4 counts outer ones, and 2 of Algorithm 8 follow from (6.40) here if "
-        "inner loops are solved; so the 2 is taken for these. By the letter it is found too, but "
-        "of the last inner loop: with r = 0.25 E and eps = 1e-5 it ends after 2 solves, as soon "
-        "as one moves little, and leaves its work to the outer loop. (6.40) asks for a relative "
-        "change of x = (u, phi) below eps_fp in L2(Omega). The thesis adds u and phi as they are, "
-        "so that the units decide which counts; the program measures phi in its own unit, in "
-        "which both are comparable. The first iteration is compared with rest.",
+        "The text of the thesis has 2 iterations of Algorithm 9, the inner loop, which (6.41) "
+        "ends. Table 8.4, however, counts outer iterations. By (6.40) Algorithm 8 takes 2 outer "
+        "iterations here, if inner loops are solved; the thesis's 2 is therefore compared with "
+        "outer iterations. Read literally the 2 is found as well, for the last inner loop. With r "
+        "= 0.25 E and eps = 1e-5 that loop ends after 2 solves, as soon as the change of a solve "
+        "is small, and leaves the rest to the outer loop. (6.40) requires a relative change of x "
+        "= (u, phi) below eps_fp in L2(Omega). The thesis adds the numbers of u and phi, so that "
+        "the units decide which of them counts. The program measures phi in a unit in which both "
+        "are comparable. The first iteration is compared with zero.",
     )
 
 

@@ -134,21 +134,21 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
                 "to 1e-8": of("converged", "outer"),
             }
         ),
-        "Counts leave out the frictionless start. First with the stopping rules of the thesis, "
-        "(3.45) and (3.46) with eps = eps_fp = 1e-5, and our r and acceleration. Then with inner "
-        "iterations to a residual of 1e-9: after how many outer ones (3.46) holds, — where all "
-        "residuals are below 1e-8 before; and after how many all are. In the column *square* the "
-        "right-hand side of (3.46) is eps_fp for eps_fp^2: a relaxation by 316 that was chosen "
-        "afterwards because its counts are of the thesis's size. It explains nothing: its counts "
-        "do not follow the thesis's, which rise with rho. Tried and not found to explain the size "
-        "of the counts either: the thesis's r read per metre, and per millimetre (--literal), with "
-        "plain and accelerated inner loops (next table). Counts rise "
-        "with rho as in the thesis are the counts under the rules (3.45), (3.46) "
-        "themselves: the inner loop is left early, and the bound creeps.",
+        "Counts leave out the frictionless start. *(3.45), (3.46)*: the stopping rules of the "
+        "thesis with eps = eps_fp = 1e-5, and r and acceleration of this program. The other "
+        "columns have inner iterations to a residual of 1e-9. *converged, (3.46)*: iterations "
+        "until (3.46) is met; — where all residuals are below 1e-8 before. *to 1e-8*: iterations "
+        "until all residuals are. *square*: as *converged*, with eps_fp in place of eps_fp^2 on "
+        "the right of (3.46). This relaxation by 316 was chosen afterwards, because its counts "
+        "are of the size of the thesis's. It explains nothing, for its counts do not rise with "
+        "rho. Nor do two other readings explain the size of the counts: the thesis's r read per "
+        "metre, and per millimetre (--literal), with plain and accelerated inner loops (next "
+        "table). Only under the rules (3.45), (3.46) do the counts rise with rho as in the "
+        "thesis: the inner loop is left early, and the friction bound creeps.",
     )
     report.table(
         "table-7-1-rules",
-        f"Residuals by the rules of the thesis, {where}",
+        f"Residuals at which the rules of the thesis end the iteration, {where}",
         columns(
             **{
                 "iterations": of("thesis", "outer"),
@@ -159,9 +159,9 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
                 "residual with it": of("printed", "residual"),
             }
         ),
-        "The residual of equilibrium, contact and friction after a run that (3.45) and (3.46) "
-        "have ended: with our r and acceleration, and with the plain Uzawa block relaxation and "
-        "the thesis's r read per metre, 25 E per mm.",
+        "The largest residual of equilibrium, contact and friction after a run that (3.45) and "
+        "(3.46) have ended. Left: r and acceleration of this program. Right: the plain Uzawa "
+        "block relaxation with the thesis's r read per metre, 25 E per mm.",
     )
     report.table(
         "table-7-1-converged",
@@ -177,8 +177,9 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
                 "its residual": of("single", "residual"),
             }
         ),
-        "Two loops with the inner one solved to 1e-9, and one loop that updates the bound in the "
-        "Uzawa block relaxation itself, with tangent instead of secant steps near the solution.",
+        "Left: two loops, the inner one solved to 1e-9. Right (*single loop*): one loop that "
+        "updates the bound in the Uzawa block relaxation itself, with tangent instead of secant "
+        "steps near the solution.",
     )
     report.table(
         "table-7-1-times",
@@ -194,10 +195,10 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
                 "converged solves": _ratios(of("converged", "inner")),
             }
         ),
-        "The thesis's seconds (5.09 in its first row) are those of another machine and code: only "
-        "how they grow can be compared. They grow like its iterations; ours, by the same rules, "
-        "more slowly, for later iterations take few inner ones. The ratios of times depend on "
-        "the load of the machine; those of the solves do not.",
+        "The thesis's seconds (5.09 in its first row) were measured on another machine with "
+        "another code; only their growth can be compared. They grow like the thesis's iterations. "
+        "By the same rules the times here grow more slowly, for later iterations take few inner "
+        "ones. Ratios of times depend on the load of the machine; those of solves do not.",
     )
 
 

@@ -120,25 +120,25 @@ def table(report: Report, n: int) -> None:
         "table-7-2",
         f"Table 7.2: outer iterations of Algorithm 3 on {where}",
         counts,
-        "Stopped as in the thesis, by the relative change (4.38) < 1e-5, with the [u_nu]^+ of the "
-        "new iterate solved by SNES, whose iterations are added up in the next column; the "
-        "residual at that point shows that a small change is no convergence. Then down to a "
-        "residual of 1e-8 of the penalised problem by Algorithm 3 alone, and with friction and "
-        "material implicit in SNES once the residual is below 1e-2 (the default). The thesis's "
-        "counts grow more slowly with 1/eps; it says neither how it treats [u_nu]^+ nor which "
-        "rho and mesh the table belongs to, and with lagged friction a count grows with the "
-        "number of nodes close to sliding.",
+        "*(4.38)*: stopped as in the thesis, by the relative change (4.38) < 1e-5. The [u_nu]^+ "
+        "of the new iterate is solved by SNES, whose iterations are added up in the next column. "
+        "The residual at that point shows that a small change is not convergence. *Algorithm 3 to "
+        "1e-8*: the same algorithm down to a residual of 1e-8 of the penalised problem. *with "
+        "implicit end*: friction and material are implicit in SNES once the residual is below "
+        "1e-2 (the default). The thesis's counts grow more slowly with 1/eps. It prints neither "
+        "its treatment of [u_nu]^+ nor the rho and the mesh of the table. With lagged friction a "
+        "count grows with the number of nodes close to sliding.",
     )
     report.table(
         "table-7-2-errors",
         f"Penalty solutions against the solution with multipliers, {where}",
         measured,
-        "The penalised problems are solved to 1e-8, the ones with multipliers to 1e-10. The "
-        "contact and friction residuals are those of the Signorini and Coulomb laws themselves. "
-        "The first is the penetration and falls like eps; the second, like the errors, falls more "
-        "slowly: eps is also the slip length of the friction law, and nodes that ought to stick "
-        "creep by about as much (Theorem 4.2 below has smaller eps). The last three columns are "
-        "relative errors of displacement and pressure (L2 of Gamma_3).",
+        "The penalised problems are solved to 1e-8, those with multipliers to 1e-10. The contact "
+        "and friction residuals are those of the laws of Signorini and Coulomb themselves. The "
+        "contact residual is the penetration, and falls like eps. The friction residual, like the "
+        "errors, falls more slowly, since eps is also the slip length of the friction law. Nodes "
+        "that ought to stick creep by about eps (Theorem 4.2 below has smaller eps). The last "
+        "three columns are relative errors of displacement and pressure (L2 of Gamma_3).",
     )
 
 
@@ -203,15 +203,15 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
         ax.set(xlabel=r"$\epsilon$ (mm³/daN, mm)", title=f"relative error of {quantity}")
         ax.legend()
     note = (
-        "Theorem 4.2 states convergence; the observed order is 1 without friction from the "
-        "start, and with friction once eps is below the slip of the slowest sliding node. The "
-        "solutions with multipliers have residuals of at most 1e-11. Theorem 4.4, (4.30), bounds "
-        "|sigma_nu(u^h) + [u_nu^h]^+/eps| in H^-1/2(Gamma_3) by C M_A |u^h - u_eps^h|_V. As "
-        "printed the second pressure is zero, for u^h does not penetrate: [u_eps,nu^h]^+ of the "
-        "penalised problem is meant. The last column is C M_A, in the norms "
-        "of the energy of the linear body. It does not grow as eps falls: both have one order. "
-        "Without friction it is the cosine between the error and the displacements that a "
-        "pressure alone makes, and 1 for a linear material."
+        "Theorem 4.2 states convergence. The observed order is 1: without friction for all eps, "
+        "with friction once eps is below the slip of the slowest sliding node. The solutions with "
+        "multipliers have residuals of at most 1e-11. Theorem 4.4, (4.30), bounds |sigma_nu(u^h) "
+        "+ [u_nu^h]^+/eps| in H^-1/2(Gamma_3) by C M_A |u^h - u_eps^h|_V. As printed the second "
+        "pressure is zero, for u^h does not penetrate; here it is [u_eps,nu^h]^+/eps of the "
+        "penalised problem. The last column is C M_A, in the norms of the energy of the linear "
+        "body. It does not grow as eps falls, so that both sides have the same order. Without "
+        "friction it is the cosine between the error and the displacements that a pressure alone "
+        "makes, and 1 for a linear material."
     )
     caption = "Penalty error against eps on Example 7.2, f2 = -0.005 (Theorems 4.2 and 4.4)"
     report.table("theorem-4-2-table", caption, columns, note)

@@ -41,10 +41,11 @@ LITERAL = (
 NOTES = {
     "": "With the default ramp of psi, 1/delta = 0.3, the counts of Algorithm 6 are those of the "
     "thesis except for 2 more in the first row and 1 less in the last. With a steep ramp "
-    "(delta = 83.3, next column; — : not met) they differ.",
-    "-layer": "The counts of Algorithm 6 are by 1 above the thesis's in the first rows, and do not "
-    "fall below 4: so many iterations the lagged layer takes by itself, without friction or "
-    "current (Example 8.3 with a layer, next section). Next column: a steep ramp of psi.",
+    "(column delta = 83.3; — : not met) they differ.",
+    "-layer": "In the first rows the counts of Algorithm 6 are 1 above the thesis's; they do not "
+    "fall below 4. The lagged layer takes so many iterations by itself, without "
+    "friction or current (Example 8.3 with a layer, next section). The column delta = "
+    "83.3 has a steep ramp of psi.",
 }
 
 #: Iterations end at a relative change of the friction bound of 1e-5, (3.46).
@@ -127,16 +128,16 @@ def table_8_4(
         f"table-8-4{suffix}",
         f"Table 8.4: iterations for mu = k_e, phi_F = 32, {topic}, {cells[0]} x {cells[1]} cells",
         columns,
-        "Alg. 6: layer and current lagged, with inner solves to 2e-12; counted to a relative "
-        "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: r = 0.25 "
-        "E and the thesis's rules in both loops (— : (3.46) is not met in 400 iterations), and "
-        "the residual at the end. The inner rule ends after two solves, where the change of a "
-        "solve is small but not the error; the bound therefore changes little from iteration to "
-        "iteration. Implicit: the layer solved with the constraint, phi in the operator; solves "
-        "and residual are its own. Newton: linear solves of the whole body, Newton iterations on "
-        "the condensed problem, and the relative difference of its solution to the implicit one "
-        "in the nodal unknowns; — where it does not converge. "
-        f"{NOTES[suffix]}",
+        "Alg. 6: layer and current lagged, inner solves to 2e-12; iterations to a relative "
+        "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: r = "
+        "0.25 E and the thesis's rules in both loops (— : (3.46) is not met in 400 iterations), "
+        "and the residual at the end. The inner rule ends after two solves, where the change of "
+        "a solve is small but not the error. The friction bound therefore changes little from "
+        "iteration to iteration. Implicit: the layer is solved with the constraint, and phi is "
+        "in the operator; the columns solves and residual belong to it. Newton: linear solves of "
+        "the whole body, Newton iterations on the condensed problem, and the relative difference "
+        "of its solution to the implicit one in the nodal unknowns; — where it does not "
+        f"converge. {NOTES[suffix]}",
     )
 
 
@@ -162,10 +163,9 @@ def examples(report: Report, cells: tuple[int, int]) -> None:
         "examples-8-3-8-4",
         f"Examples 8.3 and 8.4, {cells[0]} x {cells[1]} cells",
         columns,
-        "The Uzawa block relaxation with layer and phi implicit, to residuals of 1e-8. The "
-        "thesis's two iterations of Example 8.3, which has neither friction nor current, have a "
-        "section of their own. Nodes on the rigid part are those where the multiplier of the "
-        "constraint is positive.",
+        "The Uzawa block relaxation with layer and phi implicit, to residuals of 1e-8. The next "
+        "section is on the thesis's two iterations of Example 8.3, which has neither friction nor "
+        "current. Nodes on the rigid part are those with a positive multiplier of the constraint.",
     )
 
 

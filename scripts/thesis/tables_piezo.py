@@ -32,12 +32,13 @@ THESIS: Mapping[str, tuple[str, Sequence[int]]] = {
 
 #: Explained and unexplained differences.
 NOTES = {
-    "8.2": "The thesis's 4 or 5 iterations are near those of an implicit charge. That is no "
-    "evidence: rho of (7.16), which the thesis does not print for this chapter, was chosen so; "
-    "other values below.",
-    "8.3": "The thesis's counts are 4 above those of its Table 8.2, from which the material alone "
-    "differs. No rho that was tried shows it (below): next to nothing of the body is beyond "
-    "xi_0, and the counts of both examples are the same up to 1. Not explained.",
+    "8.2": "The thesis's 4 or 5 iterations are near those of an implicit charge. This agreement "
+    "is no evidence: the thesis does not print rho of (7.16) for this chapter, and the "
+    "value here was chosen for it. A table below has other values.",
+    "8.3": "The thesis's counts are 4 above those of its Table 8.2, although the material alone "
+    "differs. None of the tried values of rho (table below) shows this difference: hardly "
+    "any of the body is strained beyond xi_0, and the counts of both examples are equal up "
+    "to 1. The difference is not explained.",
 }
 
 #: Values of rho that are tried for Tables 8.2 and 8.3.
@@ -104,15 +105,14 @@ def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
         f"table-{number.replace('.', '-')}",
         f"Table {number}: iterations for k_e = 1, {cells[0]} x {cells[1]} cells",
         columns,
-        "Alg. 4: charge lagged and Kacanov's steps, with inner solves to 1e-9; counted to a "
-        "relative change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. "
-        "Literal: r = 0.25 E and the thesis's rules in both loops, — where they do not end them in "
-        "60 iterations. Implicit: phi of the charge "
-        "in the operator; to (3.46) with Kacanov's steps, to 1e-8 with tangent ones near the "
-        "solution. The lagged charge contracts slowly at k_e = 1 (see Theorem 5.2). "
-        f"{NOTES[number]} Newton: linear solves of the whole body; at "
-        "contact: dense ones at the contact nodes, onto which it is condensed. "
-        "Difference: of the implicit and Newton's solutions, relative in all unknowns.",
+        "Alg. 4: charge lagged, Kacanov's steps, inner solves to 1e-9; iterations to a relative "
+        "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: r = "
+        "0.25 E and the thesis's rules in both loops; — where these are not met in 60 "
+        "iterations. Implicit: phi of the charge is in the operator. Its steps are Kacanov's to "
+        "(3.46); to 1e-8 they are tangent steps near the solution. The lagged charge contracts "
+        f"slowly at k_e = 1 (see Theorem 5.2). {NOTES[number]} Newton: linear solves of the whole "
+        "body; at contact: Newton iterations on the condensed problem. Difference: of the "
+        "implicit and Newton's solutions, relative in all unknowns.",
     )
 
 

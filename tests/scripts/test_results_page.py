@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
+import re
+from collections.abc import Iterator
 
 import pytest
 
 from scripts.reporting import Report, subplots, text
 from scripts.studies import agreement
 from scripts.thesis import chapters, hertz, results_page, tables
+from tests.test_architecture import ROOT
 
 
 def test_page(tmp_path):
@@ -16,7 +20,8 @@ def test_page(tmp_path):
     report.table("one", "A table", {"|a|": [1, 2.5, float("nan")], "b": ["x", True, None]}, "Why.")
     figure, axes = subplots()
     axes.plot([0, 1], [0, 1])
-    report.figure("two", "A figure", figure, {"x": [0, 1], "y": [0]})
+    link = "See [two](thesis-studies.md#two)."
+    report.figure("two", "A figure", figure, {"x": [0, 1], "y": [0]}, link)
     (tmp_path / "results" / "hertz" / "three.csv").write_text("a,b\n1,2\n")
     page = tmp_path / "docs" / "page.md"
     results_page.gather(tmp_path / "results", page)
@@ -27,7 +32,7 @@ def test_page(tmp_path):
     assert "| — | — |" in words
     assert "Why." in words
     assert words.index("A table") < words.index("A figure") < words.index("three")
-    assert "](page/hertz/two.png)" in words
+    assert "](page/hertz/two.png)" in words and link in words
     assert (tmp_path / "docs" / "page" / "hertz" / "two.png").is_file()
     assert (tmp_path / "docs" / "page" / "hertz" / "one.csv").read_text().startswith("|a|,b")
     assert "Not computed yet: `make table_7_2`" in words
@@ -47,6 +52,42 @@ def test_one_section_is_renewed_and_the_others_stay(tmp_path):
     assert chapter.read_text() == whole.replace("corner, before", "corner, after")
     results_page.gather(tmp_path / "nothing", page)
     assert chapter.read_text() == whole.replace("corner, before", "corner, after")
+
+
+def remarks(node: ast.AST) -> Iterator[list[str | None]]:
+    """Give the sentences of a script, without docstrings, with None for each inserted value."""
+    inner = list(ast.iter_child_nodes(node))
+    if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node):
+        inner.remove(node.body[0])
+    if isinstance(node, ast.JoinedStr | ast.Constant):
+        values = node.values if isinstance(node, ast.JoinedStr) else [node]
+        parts = [part.value if isinstance(part, ast.Constant) else None for part in values]
+        said = "".join(part for part in parts if isinstance(part, str))
+        if len(said) > 60 and said.rstrip().endswith("."):
+            yield parts
+    else:
+        for child in inner:
+            yield from remarks(child)
+
+
+def test_remarks_on_pages_are_those_of_the_scripts():
+    pages = "".join((ROOT / "docs" / f"{name}.md").read_text() for name in chapters.PAGES)
+    studies = [part.script for part in chapters.PARTS if part.package == "studies"]
+    studies += ["fixed_point_rates", "lagged_current"]
+    thesis = sorted((ROOT / "scripts" / "thesis").glob("*.py"))
+    files = [path for path in thesis if path.name != "results_page.py"]  # compared as a whole
+    files += [ROOT / "scripts" / "studies" / f"{name}.py" for name in studies]
+    found, missing = 0, []
+    for path in files:
+        for parts in remarks(ast.parse(path.read_text())):
+            words = "".join(part or "\0" for part in parts).split()
+            said = r"\s+".join(".+?".join(map(re.escape, word.split("\0"))) for word in words)
+            found += 1
+            if not re.search(said, pages):
+                missing.append(f"{path.name}: {parts}")
+    assert found > 45
+    # That of a table which is made on request alone.
+    assert [text for text in missing if "inner and 6 outer iterations" not in text] == []
 
 
 def test_values_in_tables():
