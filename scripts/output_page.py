@@ -30,34 +30,35 @@ INTRODUCTION = """\
 | `contact.csv` | one row per contact node |
 | `history.csv` | one row per outer iteration |
 | `steps.csv` | of an evolution: one row per step |
-| `contact-steps.csv` | likewise: `contact.csv` of all steps, with a first column `t` |
+| `contact-steps.csv` | of an evolution: `contact.csv` of all steps, with a first column `t` |
+| `adapt.csv` | with `[mesh.adapt]`: one row per mesh |
 | `fields.vtu` | all fields of the body, for ParaView, pyvista and meshio |
 | `contact.vtu` | the contact part alone, a surface (in the plane a line) |
 | `contact-against.csv`, `.vtu` | between bodies: the master side, with its stresses |
 | `fields.pvd`, `contact.pvd` | of an evolution: steps of body and contact part, for ParaView |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
-| `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
+| `fields.xdmf`, `fields.h5` | the same with `output.fields = "xdmf"`: degree 1 at most |
 | `checkpoint.npz` | with `output.checkpoint = true`; on several ranks a file of each |
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `figure-*-step-N.png` | of a step of an evolution, by `contact plot DIR --step N` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
-The files replace those of an earlier run together, once they are complete; other files in DIR are
-not touched. Results of another problem are replaced with `--overwrite` only; the same problem may
-be solved again by another method, to another tolerance, with other outputs.
+Once all files are complete, they replace those of an earlier run; other files in DIR are not
+touched. Results of another problem are replaced with `--overwrite` only. The same problem may be
+solved again by another method, to another tolerance, with other outputs.
 
 **Large contacts.** With more than 100,000 contact nodes on several ranks, each rank writes a file
 of its own nodes, sorted by x, y and z: `contact.0000.csv`, `contact.0001.csv` and so on, and the
 pieces of `contact.pvtu`, which ParaView and pyvista open as one. `row` is the row in the file of
-the rank that has the node. `contact-steps` and `contact-against` are divided likewise, and so is a
-body with as many nodes, into the pieces of `fields.pvtu`. A point between two pieces is in both;
-`node` numbers the points of all pieces. Figures of the body are drawn from pieces, those of the
-contact are not.
+the rank that has the node. `contact-steps` and `contact-against` are divided in the same way, and
+so are the fields of a body with as many nodes, into the pieces of `fields.pvtu`. A point between
+two pieces is in both; `node` numbers the points of all pieces. Figures of the body can be drawn
+from pieces, those of the contact cannot.
 
 `contact sweep` writes `sweep.csv`, one row per case, and `sweep.toml`, the case that was swept.
 
 **Units** are those of the case: with millimetres and newtons, stresses are in MPa. In 2-D forces
-and charges are per unit of depth. Those of bodies of revolution are of the full turn, and
+and charges are per unit of depth. For bodies of revolution they are those of the full turn, and
 resultants along r are 0.
 
 **Signs.** ν points out of the body, to the foundation.
@@ -110,6 +111,7 @@ SECTIONS: Mapping[str, str] = {
     q.AGAINST: "",
     q.HISTORY: "",
     q.STEPS: "",
+    q.ADAPT: "",
     q.SWEEP: "",
     q.BODY: "At the nodes. All but displacement and potential are averages of the cells around a "
     "node, weighted by volume, within each region: a node between regions is a point of "

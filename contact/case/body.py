@@ -44,11 +44,12 @@ class Space(Section):
     """Degree of the Lagrange elements of the displacement and the potential."""
     element: Literal["standard", "mean_dilatation"] = "standard"
     """`"mean_dilatation"`: volumetric strains are averaged over each cell, so that nearly
-    incompressible bodies, and yielding ones, do not lock. With `degree = 2`: P2-P0."""
+    incompressible bodies, and yielding ones, do not lock. On triangles and tetrahedra with
+    `degree = 2` (P2-P0), on quadrilaterals and hexahedra with `degree = 1` (Q1-P0)."""
     kinematics: Literal["plane_strain", "plane_stress", "axisymmetric"] = "plane_strain"
     """The body of a mesh in 2-D: in plane strain; in plane stress, a sheet of unit thickness that
-    is free to grow thinner; or a body of revolution whose half plane the mesh is, x the radius and
-    y the axis. There displacements are 0 across the axis without being asked for, and loads, forces
+    is free to grow thinner; or a body of revolution, of which the mesh is the half plane x = r, y
+    along the axis. Displacements across the axis are then 0 without a support, and loads, forces
     and charges are those of the full turn."""
 
 

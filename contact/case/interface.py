@@ -244,7 +244,7 @@ class Electric(Section):
     """psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e in contact; `ramp`, as
     the thesis has it, zero where u_nu <= rho, with which no contact conducts."""
     k_e: NonNegative
-    """k_e of the foundation: a capacitance per area, for D.nu is a charge and has no memory."""
+    """k_e of the foundation: a capacitance per area, for D.nu is a charge."""
     phi_f: TimeFormula = Expression(0.0)
     """Potential phi_F of the foundation."""
     amplitude: AmplitudeName | None = None

@@ -226,9 +226,9 @@ class Material(Section):
     yield_strain: Positive | None = None
     """Yield strain xi_0, a limit on |dev eps|. Required by `log`, of no effect on `linear`."""
     argument: Annotated[Literal["norm", "square"], LOG] = "norm"
-    """Argument of g: |dev eps|, or its square as the thesis has it, which softens beyond e xi_0."""
+    """Argument of g: |dev eps|, or its square as in the thesis; that softens beyond e xi_0."""
     g_min: Annotated[NonNegative, LOG] = 0.0
-    """Floor of g (force/area); 0: none."""
+    """Lower bound of g (force/area); 0: none."""
     yield_stress: Annotated[Positive | None, J2] = None
     """Y in uniaxial tension (force/area). Required by `j2`, but where `hardening` is a list of
     points, which begins with it."""

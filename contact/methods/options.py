@@ -59,18 +59,18 @@ class LoopOptions(Options):
     Attributes
     ----------
     stopping
-        `residual`: the KKT residuals end the loops; `thesis`: the rules (3.45) and (3.46), with
-        a potential (5.38) and (6.40), by `penalty` (4.38), on the change between iterations do;
-        phi counts in its own unit sqrt(mu_1/beta), where the thesis adds u and phi as they are.
-        The residuals decide `converged` in any case.
+        `residual`: the KKT residuals end the loops. `thesis`: the rules on the change between
+        iterations end them, (3.45) and (3.46), with a potential (5.38) and (6.40), with `penalty`
+        (4.38); phi is measured in the unit sqrt(mu_1/beta), where the thesis adds the numbers of
+        u and phi. The residuals decide `converged` in any case.
     eps_fp
         Tolerance of (3.46), outer loop.
     max_inner
         Most inner iterations in an outer one.
     material_step
         Linearisation of the material: `secant` (Kacanov; Algorithms as printed), `tangent`, or
-        secant first and tangent from a residual of 1e-2 on as long as that reduces it. The
-        tangent of `penalty` is implicit in friction too.
+        `auto`: secant first, tangent below a residual of 1e-2 until it is twice the least one.
+        The tangent of `penalty` is implicit in friction too.
     """
 
     stopping: Literal["residual", "thesis"] = "residual"
@@ -161,10 +161,10 @@ class NewtonOptions(Options):
     ----------
     nested
         `true`: solve on coarser meshes first and start from there. Default: where that saves time
-        and there are coarser meshes: in 3-D from 40000 unknowns on, in 2-D from 100000 on
-        if the material yields.
+        and there are coarser meshes: in 3-D with multigrid from 40000 unknowns on, in 2-D with a
+        nonlinear material from 100000 on.
     nested_levels
-        Number of coarser meshes. Default: all that save time.
+        Number of meshes, the finest one included. Default: all that save time.
     max_iterations
         Number of steps allowed in each stage.
     gamma

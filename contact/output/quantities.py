@@ -96,14 +96,14 @@ _RUN = (
     Quantity("error", "", "`energy` of `error`.", _error, (ADAPT,)),
     Quantity(
         "contact_force", "force", "Force that the body exerts on the foundation, a vector; in 2-D "
-        "a unit of depth. Between bodies the one that the body with `on` exerts on the other; of "
-        "several contacts the sum, and `traction`, `weight` and `entry` of `contact.vtu` have the "
-        "force of each.", files=_MESHES, component=_VECTOR,
+        "per unit of depth. Between bodies the one that the body with `on` exerts on the other. "
+        "With several contacts their sum; `traction`, `weight` and `entry` of `contact.vtu` have "
+        "the force of each.", files=_MESHES, component=_VECTOR,
     ),
     Quantity(
-        "contact_moment", "force · length", "Moment of these about the origin of coordinates, of "
-        "points in the reference configuration: in 2-D a list of one, about z and "
-        "counter-clockwise, in 3-D a vector.", component=_VECTOR,
+        "contact_moment", "force · length", "Moment of the contact forces about the origin of "
+        "coordinates, at points of the reference configuration: in 2-D a list of one number, about "
+        "z and counter-clockwise, in 3-D a vector.", component=_VECTOR,
     ),
     Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(
@@ -113,25 +113,26 @@ _RUN = (
         lambda r: {part: held.force for part, held in r.supports.items()}, component=_VECTOR,
     ),
     Quantity(
-        "reaction_AXIS_PART", "force", "The same of each support: `reaction_x_left`, ...",
+        "reaction_AXIS_PART", "force", "Force of each support: `reaction_x_left`, ...",
         lambda r: r.reaction_columns, (STEPS,),
     ),
     Quantity(
-        "reaction_moments", "force · length", "Moments of these, as `contact_moment`.",
+        "reaction_moments", "force · length", "Moments of the reactions, as `contact_moment`.",
         lambda r: {part: held.moment for part, held in r.supports.items()}, component=_VECTOR,
     ),
     Quantity(
         "region", "", "Place of the cell's region among `regions` of the summary, from 0; of "
-        "several the one of fewest cells. In `fields.vtu`, in the cells.", _elsewhere, (BODY,),
+        "several regions that of the fewest cells. In `fields.vtu` alone, cell by cell.",
+        _elsewhere, (BODY,),
     ),
     Quantity(
         "error", "",
         "Estimated discretisation error. `energy`: relative, in the energy norm; displacements "
         "under given loads are off by about its square. `effectivity`: the estimate over the "
-        "error, `null` where that is not known. `intervals`: in which forces, the largest "
-        "displacement and pressure lie, by the last three meshes of `[mesh.adapt]` with "
-        "`fraction = 1`; `null` of one that does not converge, as a pressure at a corner. All "
-        "are `null` where the equations are not solved.",
+        "error, `null` where that is not known. `intervals`: bounds of forces, of the largest "
+        "displacement and of the largest pressure, by the last three meshes of `[mesh.adapt]` with "
+        "`fraction = 1`; `null` for one that does not converge, such as a pressure at a corner. "
+        "All are `null` where the equations are not solved.",
         lambda r: {
             "energy": _error(r), "effectivity": None, "intervals": r.intervals,
         }, component=_VECTOR, entries=ENDS,
@@ -144,9 +145,9 @@ _RUN = (
         "contact_nodes", "", "Number of contact nodes that touch: sticking and sliding ones.",
         lambda r: r.counts["stick"] + r.counts["slip"], _ALL,
     ),
-    Quantity("stick_nodes", "", "Number of those that stick.", lambda r: r.counts["stick"], _ALL),
+    Quantity("stick_nodes", "", "Number of nodes that stick.", lambda r: r.counts["stick"], _ALL),
     Quantity(
-        "slip_nodes", "", "Number of those that slide; without friction all that touch.",
+        "slip_nodes", "", "Number of nodes that slide; without friction all that touch.",
         lambda r: r.counts["slip"], _ALL,
     ),
     Quantity(
@@ -169,28 +170,29 @@ _RUN = (
     ),
     Quantity(
         "max_von_mises", "stress",
-        "Largest von Mises stress over the same. At sharp corners it grows with each refinement.",
+        "Largest von Mises stress, likewise. At sharp corners it grows with each refinement.",
         files=(SUMMARY, SWEEP),
     ),
     Quantity(
-        "plastic_share", "", "Share of the volume in the plastic range, |dev ε| above the "
-        "material's first yield, 0 to 1; with `j2` where plastic strain remains. `null` where no "
-        "material has such a limit.",
+        "plastic_share", "", "Share of the volume in the plastic range, 0 to 1: where |dev ε| is "
+        "above the yield strain, with `j2` where there is plastic strain. `null` where no material "
+        "yields.",
         lambda r: np.nan if r.plastic_share is None else r.plastic_share,
     ),
-    Quantity("plastic_volume", "volume", "The same as a volume, of bodies with `j2`."),
+    Quantity("plastic_volume", "volume", "Volume with plastic strain, of bodies with `j2`."),
     Quantity(
-        "equivalent_plastic_strain", "", "Largest equivalent plastic strain; likewise, as the next."
+        "equivalent_plastic_strain", "", "Largest equivalent plastic strain, of bodies with `j2`."
     ),
     Quantity(
         "contact_direction", "", "`[contact]` `direction`: whose normal ν is.",
         lambda r: ", ".join(dict.fromkeys(c.foundation.direction for c in r.problem.contacts)),
     ),
     Quantity(
-        "work", "work", "Of loads and supports in the step.", lambda r: r.energies.work, (STEPS,),
+        "work", "work", "Of loads, supports, electrodes, layer and charge in the step.",
+        lambda r: r.energies.work, (STEPS,),
     ),
     Quantity(
-        "energy", "work", "Stored in body and layer at its end.",
+        "energy", "work", "Stored in the body at the end of the step.",
         lambda r: r.energies.energy, (STEPS,),
     ),
     Quantity(
@@ -219,7 +221,7 @@ _RUN = (
         lambda r: r.counters.linear_iterations,
     ),
     Quantity(
-        "factorizations", "", "Factorisations of it, or set-ups of multigrid.",
+        "factorizations", "", "Factorisations of this matrix, or set-ups of multigrid.",
         lambda r: r.counters.factorizations, _ALL,
     ),
     Quantity(
@@ -234,18 +236,18 @@ _RUN = (
     ),
     Quantity("kkt", "", "The largest residual.", lambda r: r.outcome.kkt.largest, ROWS),
     Quantity(
-        "rounding", "", "Rounding floors of the same residuals, which are accepted up to them; of "
-        "`equilibrium` in an evolution the most in a step. More than the tolerance in slender "
-        "bodies alone, with a warning then.", lambda r: r.floors,
+        "rounding", "", "Rounding floors of the residuals in `kkt`, up to which they are accepted; "
+        "of `equilibrium` in an evolution the largest of all steps. Larger than the tolerance in "
+        "slender bodies alone, with a warning.", lambda r: r.floors,
     ),
     Quantity(
         "rigid", "", "The foundation that moves: its `displacement` and `rotation` (degrees), and "
-        "the `force` and `moment` on it from outside, given or reactions. Of several, one entry "
-        "per part.",
+        "the `force` and `moment` on it from outside, given or reactions. With several such "
+        "foundations one entry per part.",
         lambda r: r.movements.get("rigid"), component=_VECTOR,
     ),
     Quantity(
-        "rigid_parts", "", "The same of each part that moves as a rigid body, by part.",
+        "rigid_parts", "", "As `rigid`, of each part that moves as a rigid body.",
         lambda r: r.movements.get("rigid_parts"), component=_VECTOR,
     ),
     Quantity(
@@ -259,24 +261,26 @@ _RUN = (
     ),
     Quantity(
         "rigid_AXIS", "length",
-        "Displacement of a foundation that moves, `rigid_x`...; `rigid_rotation` in degrees. Of a "
-        "part that does, where there is no such foundation or with the part: `rigid_x_top`.",
+        "Displacement of a moving foundation, or of a rigid part, `rigid_x`...; `rigid_rotation` "
+        "in degrees. Names end with the part, `rigid_x_top`, of several foundations, and of rigid "
+        "parts unless there is one part alone.",
         lambda r: r.rigid["moved"], ROWS,
     ),
     Quantity(
         "rigid_force_AXIS", "force",
-        "Force on it; `rigid_moment`... Several end with their part, too.",
+        "Force on it, and `rigid_moment`..., with names like the displacement.",
         lambda r: r.rigid["acting"], ROWS,
     ),
     Quantity(
-        "potential_PART", "potential", "Of electrodes.", lambda r: r.rigid["potentials"], ROWS
+        "potential_PART", "potential", "Potential of an electrode.",
+        lambda r: r.rigid["potentials"], ROWS,
     ),
     Quantity(
         "bolt_KEY_PART", "length, force",
-        "Of bolts: `bolt_shortening_shank`, `bolt_force_shank`.", lambda r: r.rigid["bolts"], ROWS
+        "Of a bolt: `bolt_shortening_shank`, `bolt_force_shank`.", lambda r: r.rigid["bolts"], ROWS
     ),
     Quantity(
-        "charge_PART", "charge", "Likewise; `charge_foundation` through the contact part.",
+        "charge_PART", "charge", "Of an electrode; `charge_foundation` through the contact part.",
         lambda r: r.charge_columns, ROWS,
     ),
     Quantity(
@@ -288,7 +292,7 @@ _RUN = (
         "Force of its own supports and loads on it: with `driven_x` it makes the loop.",
         lambda r: _item(r.driven, 1), (STEPS,), _VECTOR,
     ),
-    Quantity("notes", "", "Assumptions that hold, or that were not checked, in words."),
+    Quantity("notes", "", "Assumptions that are met, or have not been checked, in words."),
     Quantity("warnings", "", "Reasons for care, in words."),
     Quantity(
         "phi_min", "potential", "Least potential at a node.", lambda r: _item(r.potential_range, 0),
@@ -337,10 +341,10 @@ _NODES = (
         files=(NODES, SURFACE),
     ),
     Quantity(
-        "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. Where "
-        "the foundation moves, relative to that; so are the tangential ones. At degree 2 in 3-D "
-        "mid-edges have (u - (u₁ + u₂)/5)/(3/5), u₁ and u₂ being at the ends of the edge, and so "
-        "has the gap: the pressure there acts against that, not against u.",
+        "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. If "
+        "the foundation moves, all displacements here are relative to it. At degree 2 in 3-D "
+        "mid-edges have (u - (u₁ + u₂)/5)/(3/5), with u₁ and u₂ at the ends of the edge, and a gap "
+        "likewise: the pressure there acts against this displacement, not against u.",
         lambda n: n.normal_displacement, (NODES,),
     ),
     Quantity(
@@ -365,8 +369,9 @@ _NODES = (
         "phi", "potential", "Potential; of piezoelectric bodies.", lambda n: n.potential, (NODES,),
     ),
     Quantity(
-        "d_n", "charge/area", "Charge D·ν that leaves through the foundation; likewise. Nodes "
-        "that supports hold conduct too, and have no row: `charges` of the summary has all.",
+        "d_n", "charge/area", "Charge D·ν that leaves through the foundation; of piezoelectric "
+        "bodies. Nodes that supports hold conduct too, but have no row: `charges` of the summary "
+        "includes them.",
         lambda n: n.charge, (NODES,),
     ),
     Quantity(
@@ -398,30 +403,30 @@ _HISTORY = (
         "iteration", "", "Number of the outer iteration; 0 is a frictionless start.",
         files=(HISTORY,),
     ),
-    Quantity("inner", "", "Linear solves that it took.", files=(HISTORY,)),
+    Quantity("inner", "", "Linear solves of the iteration.", files=(HISTORY,)),
     Quantity(
-        "equilibrium", "", "Residual after it, as in `kkt`.",
+        "equilibrium", "", "Residual after the iteration, as in `kkt`.",
         lambda r: r.kkt.equilibrium, (HISTORY,),
     ),
-    Quantity("contact", "", "The same.", lambda r: r.kkt.contact, (HISTORY,)),
-    Quantity("friction", "", "The same.", lambda r: r.kkt.friction, (HISTORY,)),
+    Quantity("contact", "", "Likewise.", lambda r: r.kkt.contact, (HISTORY,)),
+    Quantity("friction", "", "Likewise.", lambda r: r.kkt.friction, (HISTORY,)),
     Quantity(
         "change", "", "Relative change of the friction bound; `nan` where there is none.",
         files=(HISTORY,),
     ),
     Quantity("seconds", "s", "Since the solve began.", files=(HISTORY,)),
-    Quantity("note", "", "Its kind, for instance `tangent`.", files=(HISTORY,)),
+    Quantity("note", "", "Kind of the iteration, for instance `tangent`.", files=(HISTORY,)),
     Quantity(
-        "contact_solves", "", "Linear solves of the condensed problem that it took.",
+        "contact_solves", "", "Linear solves of the condensed problem in the iteration.",
         lambda r: r.contact, (HISTORY,),
     ),
     Quantity(
-        "active_set", "", "Numbers of open, stick and slip nodes after it, for instance `3/5/1`; "
+        "active_set", "", "Numbers of open, stick and slip nodes at its end, for instance `3/5/1`; "
         "empty where the active set is not known.", _sizes, (HISTORY,),
     ),
     Quantity(
-        "steps", "", "The same after each of its inner steps, Newton iterations on the condensed "
-        "problem, one after the other with blanks between; `-` where it is not known.",
+        "steps", "", "The active sets after each Newton iteration on the condensed problem, "
+        "separated by blanks; `-` where one is not known.",
         lambda r: " ".join(_sizes(step) or "-" for step in r.steps), (HISTORY,),
     ),
 )  # fmt: skip
@@ -472,15 +477,15 @@ _BODY = (
         _elsewhere, (BODY,),
     ),
     Quantity(
-        "equivalent_plastic_strain", "", "Of `j2`; a field of each other internal variable too.",
+        "equivalent_plastic_strain", "", "Of `j2`; other internal variables have fields too.",
         _elsewhere, (BODY,),
     ),
     Quantity("electric_displacement", "charge/area", "D; of piezoelectric bodies.", files=(BODY,)),
     Quantity("electric_field", "potential/length", "E = -grad φ; likewise.", files=(BODY,)),
     Quantity(
         "error", "",
-        "Estimated discretisation error of the cell, over the energy norm of all: the squares add "
-        "up to that of `error` in the summary. In `fields.vtu`, cell by cell alone.",
+        "Estimated discretisation error of the cell over the energy norm of the solution: the "
+        "squares add up to that of `error` in the summary. In `fields.vtu` alone, cell by cell.",
         _elsewhere, (BODY,),
     ),
 )  # fmt: skip

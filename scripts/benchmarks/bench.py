@@ -83,9 +83,10 @@ def against_one_solve(bench: Bench) -> None:
         "bench-ratio",
         "Nonlinear solve against one linear elasticity solve",
         columns(rows),
-        "Example 7.2 with Hencky's law and friction, and a block in 3-D, from zero. Cold: on the "
-        "mesh itself alone; as it chooses: where that is faster from coarser meshes, whose time "
-        "counts. `one` is assembly, set-up and solve of linear elasticity with the same solver.",
+        "Example 7.2 with Hencky's law and friction, and a block in 3-D, from a zero initial "
+        "guess. *cold*: on the mesh itself alone. *as it chooses*: by way of coarser meshes where "
+        "that is faster; their time counts. `one`: assembly, set-up and solve of linear "
+        "elasticity with the same solver.",
     )
     draw_ratios(bench.report, rows)
 
@@ -157,8 +158,8 @@ def memory(bench: Bench) -> None:
         "bench-memory",
         "Memory of all ranks together",
         columns(held),
-        "Peaks of the whole run, beyond that of the libraries once they are loaded; and those of "
-        "one linear solve by dolfinx and PETSc alone.",
+        "Peaks of the whole run beyond the memory of the loaded libraries, and those of one "
+        "linear solve by dolfinx and PETSc alone.",
     )
 
 
@@ -181,11 +182,11 @@ def against_getfem(bench: Bench) -> None:
         "bench-getfem",
         "Against GetFEM: Example 7.2 with a linear material, Example 7.1, and a block in 3-D",
         columns(rows),
-        "Cells a unit length of the bar and the block, and on Hertz's half-width. Seconds of the "
-        f"whole Newton solve, both warm; a run of GetFEM that took more than {TIMEOUT:.0f} s is "
-        "shown as inf. GetFEM: integral contact brick, augmented Lagrangian, r = E, residual "
-        "1e-10; its contact integrals and our nodal multipliers are different discretisations of "
-        "order h.",
+        "*cells*: per unit length of the bar and the block, and on Hertz's half-width. Seconds "
+        "of the whole Newton solve, both warm; a run of GetFEM that took more than 150 s is "
+        "shown as inf. GetFEM has its integral contact brick, an augmented Lagrangian, r = E, "
+        "and a residual of 1e-10. Its contact integrals and the nodal multipliers of this code "
+        "are different discretisations of order h.",
     )
     bench.script("peer_pair")
 
@@ -234,7 +235,7 @@ def phases(bench: Bench) -> None:
             f"Where the time goes, {found['unknowns']} unknowns in "
             f"{'the plane' if dimension == 2 else 'space'}",
             {name: [row.get(name) for row in rows] for name in rows[0]},
-            "One linear solve and the nonlinear one beside each other, of one process.",
+            "One linear solve and the nonlinear one in one process.",
         )
 
 

@@ -128,8 +128,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "peer-pair",
         "A block pressed on another one and pushed along: GetFEM and this code on the same meshes",
         {name: [row[name] for row in rows] for name in rows[0]},
-        "Seconds of the processor for the solve, one thread. Largest difference of the "
-        "displacements over the largest of them.",
+        "Seconds of the processor for the solve, one thread. *apart*: the largest difference of "
+        "the displacements over the largest displacement.",
     )
 
 

@@ -189,11 +189,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "peer-plain",
         "Plain dolfinx with a penalty beside this code, on the same meshes",
         {name: [row[name] for row in rows] for name in rows[0]},
-        "Seconds of the processor for the nonlinear solve, forms compiled, one thread. Penetration "
-        "and displacements over the largest displacement; the contact force and, in L2 of the "
-        "contact boundary, the pressure, relative. Ours meets equilibrium, contact and friction to "
-        "1e-8. Newton's steps are halved there, for whole ones diverge even with small parts of "
-        "the load; those of load steps that fail count, 60 each.",
+        "Seconds of the processor for the nonlinear solve, forms compiled, one thread. "
+        "Penetration and displacement are over the largest displacement. The contact force is "
+        "relative, and so is the pressure, in L2 of the contact boundary. This code meets "
+        "equilibrium, contact and friction to 1e-8. In plain dolfinx Newton's steps are halved, "
+        "for whole steps diverge even with small parts of the load. Those of load steps that fail "
+        "are counted, 60 each.",
     )
 
 
