@@ -36,7 +36,8 @@ plt.ylabel("force that drives it")
 plt.show()
 
 # %% [markdown]
-# The area of the loop equals the dissipation up to an error of the order of the steps:
+# The area of the loop is the dissipation of the cycle. Their difference tends to zero as the steps
+# are refined:
 
 # %%
 dissipated = np.array([row["dissipation"] for row in rows])

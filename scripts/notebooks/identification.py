@@ -110,8 +110,8 @@ print(f"right: 113 and 13.84; correlation {constants.correlation[0, 1]:.2f}")
 # ## The shape that gives a wanted pressure
 #
 # The 500 heights of a foundation under a block are sought for which the pressure is a half sine.
-# The misfit and its gradient by all heights take one solution and one adjoint. The quantity states
-# its value and its derivatives by the unknowns and by the contact forces.
+# The misfit and its gradient by all heights take one solution and one adjoint. `Misfit` returns its
+# value, and its derivatives by the unknowns and by the contact forces.
 
 # %%
 count = 500
@@ -156,9 +156,9 @@ class Misfit:
 
 
 # %% [markdown]
-# Pressure is like a derivative of the height: the effect of a wave of the foundation grows with its
-# wave number k. With the coefficients times 1 + k as unknowns a quasi-Newton method (L-BFGS) needs
-# few iterations. An open node has no derivative: those at the ends stay open.
+# The pressure behaves like a derivative of the height: a wave of the foundation has an effect that
+# grows with its wave number k. With the coefficients times 1 + k as unknowns a quasi-Newton method
+# (L-BFGS) needs few iterations. An open node has no derivative: the ends stay open.
 
 # %%
 scale, misfit = 0.01 / (1 + np.arange(count)), Misfit()

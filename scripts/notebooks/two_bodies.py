@@ -28,8 +28,8 @@ print(solution.outcome.reason)
 solution.plot()
 
 # %% [markdown]
-# Both sides, deformed, each with its own nodes: beneath the cylinder they are one line, beyond it
-# they separate.
+# Both sides in the deformed state, each with its own nodes: in the contact they are one line, and
+# beyond it they separate.
 
 # %%
 with TemporaryDirectory() as folder:

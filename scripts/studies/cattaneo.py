@@ -248,12 +248,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "cattaneo",
         "Two bodies pressed by P and moved along by Q: displacement, stick zone, derivatives",
         columns,
-        "Displacements of balls over k P/a, k = sum (2 - nu)/G, of cylinders beyond the line of "
-        "full stick over 2 (1 - nu^2) P/(pi E); the radius c of the stick zone, by the friction in "
-        "the middle, over a. Means over nine steps from Q/(mu P) = 0.61 to 0.73, as multiples of "
-        "the closed form at Q = 2/3 mu P; scatter: standard deviation of the multiples of d "
-        "delta_x/d mu. Elements on the contact radius a where it slips, linear in the balls; the "
-        "closed forms are those of half spaces.",
+        "Displacements: of balls over k P/a, k = sum (2 - nu)/G; of cylinders beyond the line of "
+        "full stick over 2 (1 - nu^2) P/(pi E). The radius c of the stick zone, by the friction "
+        "in the middle, is over a. Values are means over nine steps from Q/(mu P) = 0.61 to 0.73, "
+        "as multiples of the closed form at Q = 2/3 mu P. scatter: standard deviation of the "
+        "multiples of d delta_x/d mu. elements: on the contact radius a where it slips, linear in "
+        "the balls. The closed forms are those of half spaces.",
     )
 
 

@@ -49,19 +49,19 @@ ASKED = 0.01
 ORDERS = (
     "Displacements and pressures of known contacts on distorted cells, straight and curved",
     "Unit square or cube (Hertz: a half or a quarter by symmetry), cut out of the half space with "
-    "the exact displacements prescribed where it is cut; n cells along each edge, whose nodes a "
-    "smooth map has moved that keeps the sides flat. Geometry 2 has curved cells inside. Errors of "
-    "displacements in L2 (of the ball where z > 1/4), of nodal pressures in the lumped L2 of the "
-    "contact part, relative, on the finest mesh; root mean squares over three places in a cell "
-    "where contact ends. Orders are least squares over all meshes (`known-contacts-meshes.csv`). "
-    "The pressure goes to zero like the root of the distance there: approximation alone gives it "
-    "order 1.",
+    "the exact displacements prescribed where it is cut. Each edge has n cells, whose nodes are "
+    "moved by a smooth map that keeps the sides flat. Geometry 2 has curved cells inside. Errors "
+    "are relative, on the finest mesh: of displacements in L2 (of the ball where z > 1/4), of "
+    "nodal pressures in the lumped L2 of the contact part. They are root mean squares over three "
+    "places in a cell where contact ends. Orders are least squares over all meshes "
+    "(`known-contacts-meshes.csv`). The pressure goes to zero like the root of the distance "
+    "there: approximation alone gives it order 1.",
 )
 TIMES = (
     "Time to an error of 1 % in the energy norm",
-    "Against the exact solution; seconds of the processor for problem and solve on one rank, forms "
-    "compiled, the least of three runs. n grows by a quarter from mesh to mesh; shown is the first "
-    "one below 1 %.",
+    "Against the exact solution. Seconds of the processor for problem and solve on one rank, "
+    "forms compiled, the least of three runs. n grows by a quarter from mesh to mesh; the first "
+    "mesh below 1 % is shown.",
 )
 
 

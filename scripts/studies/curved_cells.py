@@ -22,17 +22,17 @@ from scripts.studies.lame_rings import Lame, error, rings
 
 CAPTION = "Displacements of round bodies on straight and on curved cells"
 NOTE = (
-    "Lame's ring between the radii 1 and 2, plane strain (in 3-D one deep), nu = 0.3. shaft: "
+    "Lame's ring between the radii 1 and 2, plane strain (in 3-D of depth 1), nu = 0.3. shaft: "
     "pressed on a rigid shaft. two rings: cut at the radius 1.5 into two bodies whose meshes do "
-    "not match, under a pressure inside. Errors in L2, relative; the order is that between this "
-    "mesh and the one before; pressure: the largest error of a nodal pressure, relative."
+    "not match, under an inner pressure. Errors are relative, in L2; the order is that from the "
+    "next coarser mesh; pressure: the largest relative error of a nodal pressure."
 )
 
 RIM = (
     "Tetrahedra of second order on a shaft, and under the same pressure as a load",
-    "The ring of the table before, degree 2 on curved tetrahedra. shaft: pressed on it. load: the "
-    "pressure is given, the discretisation of the body alone. Errors in L2, relative; orders are "
-    "those between this mesh and the one before.",
+    "Lame's ring of the first table, degree 2 on curved tetrahedra. shaft: pressed on a rigid "
+    "shaft. load: the pressure is given, and the error is that of the discretisation of the body "
+    "alone. Errors are relative, in L2; orders are those from the next coarser mesh.",
 )
 
 LAME = Lame()

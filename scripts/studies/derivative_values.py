@@ -120,8 +120,9 @@ def exponents(report: Report, fineness: float) -> None:
         "exponents",
         "Exponents of the force on a ball: d ln P/d ln m at a given depth",
         columns,
-        f"Quadratic elements in a body of revolution, {fineness:g} of them on the contact radius a "
-        "= 0.1 R. The error by the box is of first order in a over its size, and is extrapolated.",
+        "Quadratic elements in a body of revolution, 12 of them on the contact radius a = 0.1 R. "
+        "The error caused by the finite box is of first order in a over its size, and is "
+        "extrapolated.",
     )
 
 
@@ -276,8 +277,9 @@ def cost(report: Report, coarse: bool) -> None:
         "cost",
         "Cost of derivatives of one result beside that of the solution",
         columns,
-        "Factorisations, back-substitutions and seconds of the processor on one thread. Two "
-        "residuals a parameter and step, and the two problems beside it, are in the time.",
+        "Factorisations, back-substitutions and seconds of the processor on one thread. The time "
+        "includes two residuals per parameter and step, and the problems of the two changed "
+        "values.",
     )
 
 

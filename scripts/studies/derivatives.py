@@ -481,11 +481,11 @@ def tabulate(report: Report) -> None:
         columns,
         "Largest relative difference of the tangent to the adjoint, and to central differences of "
         "solutions (apart). Differences are by each parameter, or, where they are fewer than the "
-        "derivatives, along one random way of all. Derivatives are compared relative to "
-        "themselves, but to not less than a hundredth of the result (apart) or the result "
-        "(adjoint) over the parameter. Kinks: differences between whose ends a node begins to "
-        "touch, stick or slip, and which were taken over a smaller part of the way; "
-        "problems-1.csv names their parameters.",
+        "derivatives, along one random direction of all parameters. Derivatives are compared "
+        "relative to themselves, but to not less than the result (adjoint), or a hundredth of the "
+        "result (apart), over the parameter. Kinks: differences between whose ends a node begins "
+        "to touch, stick or slip; they were taken over a smaller part of the way. problems-1.csv "
+        "names their parameters.",
     )
 
 

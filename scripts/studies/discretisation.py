@@ -133,10 +133,10 @@ def limits(report: Report, coarse: bool) -> None:
         "limits",
         "Limits that elements of degree 1 do not reach",
         columns,
-        "Cook's membrane in plane strain, ν = 0.4999, cells along an edge: the rise of its corner, "
-        "beside that of P2 on 64 cells. Prandtl's smooth punch, cells a unit of its half width, "
-        "J2 without hardening, pressed by 0.08: the mean pressure over the yield stress, beside "
-        "(2 + π)/√3.",
+        "Cook's membrane in plane strain, ν = 0.4999, cells along an edge: the rise of its "
+        "corner, compared with that of P2 on 64 cells. Prandtl's smooth punch, cells per unit of "
+        "its half width, J2 without hardening, pressed by 0.08: the mean pressure over the yield "
+        "stress, compared with (2 + π)/√3.",
     )
 
 
@@ -211,7 +211,8 @@ def per_second(report: Report, coarse: bool) -> None:
         "per-second",
         "Error and time by element",
         columns,
-        "Compiled forms at hand, one thread; the whole of `solve`, mesh and review included.",
+        "One thread; seconds of the whole `solve`, with mesh and review, without the compilation "
+        "of forms.",
     )
 
 
@@ -253,10 +254,11 @@ def adaptive(report: Report, coarse: bool) -> None:
         "adapted",
         "Adapted beside uniform meshes",
         columns,
-        "Unknowns for an estimated error: by the line through the meshes next to it, extended "
-        "where no mesh has it. Rates: of the error by the unknowns, over the last three meshes or "
-        "factor of ten. Seconds of the processor: of the whole `solve`, all meshes, and of the "
-        "last mesh alone from zero; forms compiled before, one thread.",
+        "Unknowns for an estimated error follow from the line through the meshes next to it, "
+        "extended where no mesh has this error. Rates are those of the error by the unknowns, "
+        "over the last three meshes or a factor of ten. Seconds are those of the processor: of "
+        "the whole `solve` with all meshes, and of the last mesh alone from zero; forms compiled "
+        "before, one thread.",
     )
 
 

@@ -208,13 +208,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 NOTE = (
     "Known by manufactured solutions: smooth displacements and potentials (Hencky's law, also in "
-    "plane stress, on quadrilaterals and hexahedra; PZT-5A; nearly isochoric), two layers of "
-    "PZT-5A poled up and down that slide on a conductive foundation, blocks whose contact is open, "
-    "sticks and slips, on a foundation or on each other; Lamé's rings: a tube under a pressed-on "
-    "casing, a tube in another one (of one body with two materials, or two bodies whose meshes do "
-    "not match), revolved; Williams' series at the end of a contact without friction; Hertz's "
-    "cylinder in a half plane. P2, n: beside P2 on n cells a unit: bars, cylinder (Hencky's law "
-    "and friction, revolved), and a block (3-D, clamped at an end)."
+    "plane stress, on quadrilaterals and hexahedra; PZT-5A; nearly isochoric); two layers of "
+    "PZT-5A poled up and down that slide on a conductive foundation; blocks whose contact is "
+    "open, sticks and slips, on a foundation or on each other. Lamé's rings: a tube under a "
+    "pressed-on casing; a tube in another one (one body with two materials, or two bodies whose "
+    "meshes do not match), revolved. Williams' series: the end of a contact without friction. "
+    "Hertz: a cylinder in a half plane. P2, n: compared with P2 on n cells a unit: bars, cylinder "
+    "(Hencky's law and friction, revolved), and a block (3-D, clamped at an end)."
 )
 
 

@@ -301,7 +301,8 @@ def limits(report: Report, sizes: Sequence[int]) -> None:
         "sphere-limit",
         f"Limit pressure of the hollow sphere beside 2 Y ln(b/a) = {LIMIT:.6g} MPa",
         columns,
-        "The inside is moved until the whole sphere flows, and its reaction divided by the area.",
+        "The inner surface is moved until the whole sphere flows; p is its reaction divided by "
+        "the area.",
     )
 
 

@@ -138,8 +138,8 @@ def tilted_punch(report: Report, coarse: bool) -> None:
     for (n, extent, unknowns, theta, took), order in zip(rows, [*orders, np.nan], strict=True):
         append(columns, n, extent, unknowns, theta, order, *took)
     note = (
-        "Rotations over the closed form's, Newton's solves of the whole body and the processor's "
-        "time with solver.linear = auto and lu, meshes included."
+        "Rotations over the closed form's; solves of the whole body by Newton's method, and "
+        "seconds of the processor, with solver.linear = auto and lu, meshes included."
     )
     report.table("tilted-punch", "A circular punch under force and moment", columns, note)
 

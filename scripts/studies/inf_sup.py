@@ -36,14 +36,14 @@ from scripts.studies.dual_norm import DualNorm
 
 CAPTION = "Inf-sup constant of the nodal multipliers"
 NOTE = (
-    "The least ratio, over all multipliers, of the supremum over the displacements of the mesh to "
-    "that over the displacements of the mesh after `refined` bisections of all edges; norms are "
-    "elastic energies (nu = 0.3). alternating: edges of Gamma_3 by turns in the ratio 8 to 1, in "
-    "cells of one height. graded: unstructured, by the factor of 100 towards the end of Gamma_3. "
-    "crosspoints: the ends, in 3-D the rim, of Gamma_3 are fixed, and carry no multiplier. "
-    "Degree 2 in 3-D has the change of basis with alpha = 1/5. More refinements lower beta a "
-    "little: uniform, degree 1, 8 cells, 2, 3, 4 of them: 0.656, 0.626, 0.617; uniform, 3-D, "
-    "degree 2, 2 cells, 1 and 2: 0.558, 0.474."
+    "The least ratio, over all multipliers, of two suprema: that over the displacements of the "
+    "mesh, and that over the displacements of the mesh after `refined` bisections of all edges. "
+    "Norms are elastic energies (nu = 0.3). alternating: edges of Gamma_3 alternate in the ratio "
+    "8 to 1, in cells of one height. graded: unstructured, by the factor of 100 towards the end "
+    "of Gamma_3. crosspoints: the ends, in 3-D the rim, of Gamma_3 are fixed, and carry no "
+    "multiplier. Degree 2 in 3-D has the change of basis with alpha = 1/5. More refinements lower "
+    "beta a little: uniform, degree 1, 8 cells, with 2, 3, 4 refinements 0.656, 0.626, 0.617; "
+    "uniform, 3-D, degree 2, 2 cells, with 1 and 2 refinements 0.558, 0.474."
 )
 
 #: How much longer every other edge is than its neighbours.

@@ -58,10 +58,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "mindlin",
         "Two balls: area of the loop, and dissipation, over the closed form",
         rows,
-        "a/h: elements in Hertz's a where the contact slips; sectors: of the half turn. Twelve "
-        "steps per cycle, of which the trapezoidal rule for the area loses 3 %. The closed form is "
-        "that of half spaces (a/R = 0), and takes all friction to act along x, which is exact for "
-        "nu = 0.",
+        "a/h: elements in Hertz's a where the contact slips; sectors: of the half turn. A cycle "
+        "has twelve steps, with which the trapezoidal rule underestimates the area by 3 %. The "
+        "closed form is that of half spaces (a/R = 0). It takes all friction to act along x, "
+        "which is exact for nu = 0.",
     )
     draw(report, shown)
     plane: dict[str, list[Any]] = {"degree": [], "a/h": [], "dissipation": []}

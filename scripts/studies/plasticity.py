@@ -107,9 +107,9 @@ def prandtl(report: Report, coarse: bool) -> None:
         "prandtl",
         "Limit pressure of a flat punch without friction beside (2 + pi) Y/sqrt(3) = 2.9685 Y",
         columns,
-        "Plane strain, half width 1, no hardening, pressed in by 0.04 in 16 steps; elements of the "
-        "given size beside the punch, of a twentieth at its edge. More steps: some were halved. "
-        "P1 locks, and its force goes on to grow.",
+        "Plane strain, half width 1, no hardening, pressed in by 0.04 in 16 steps, or more where "
+        "some were halved. Elements have the given size beside the punch, and a twentieth of it "
+        "at its edge. P1 locks, and its force continues to grow.",
     )
 
 
@@ -237,8 +237,9 @@ def ball_and_cylinder(report: Report, coarse: bool) -> None:
         "first-yield",
         "First yield under a rigid ball and a rigid cylinder",
         columns,
-        "The largest Hertzian pressure of the force at which the first point yields, and its "
-        "depth; P2, elements on the contact radius. The force grows in steps of 0.01 Y.",
+        "The largest Hertzian pressure at the force at which the first point yields, and the "
+        "depth of this point; P2, elements on the contact radius. The force grows in steps of "
+        "0.01 Y.",
     )
 
 
@@ -307,9 +308,9 @@ def pressed_ball(report: Report, coarse: bool) -> None:
         "A ball that is lifted off the steel, beside Hertz's law for the radius of its mark",
         lifted,
         "Depth of the mark on the axis over that of the ball, beside the fit of Etsion, Kligerman "
-        "and Kadin, Int. J. Solids Struct. 42 (2005) 3716, for a deformable ball. Of Hertz the "
-        "exponent of the force in the rise above the mark is 1.5, and the rise 3 P/(4 E* a) with "
-        "the contact radius a at its deepest.",
+        "and Kadin, Int. J. Solids Struct. 42 (2005) 3716, for a deformable ball. By Hertz's law "
+        "the exponent of the force in the rise above the mark is 1.5, and the rise is 3 P/(4 E* "
+        "a) with the contact radius a at the deepest indentation.",
     )
 
 

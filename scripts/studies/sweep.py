@@ -28,8 +28,9 @@ COUNTS = {"bar": 120, "piezo": 60, "layer": 40, "hertz": 30, "block": 50}
 SEED = 20240229
 NOTE = (
     "Problems are drawn with a fixed seed: loads, friction, cells, degrees and geometries. A "
-    "fallback is any way that Newton's method takes beside its own steps; solves are linear ones. "
-    "The difference is that of displacements to those of the first method, over the largest one."
+    "fallback is any method that Newton's method takes beside its own steps; solves are linear "
+    "ones. The difference is that of displacements to those of the first method, over the largest "
+    "displacement."
 )
 #: Difference from which on two methods are said not to agree.
 AGREE = 1e-7

@@ -95,9 +95,9 @@ def hertz(report: Report, sizes: Sequence[float]) -> None:
         "two-bodies-hertz",
         "Cylinder on a block (NAFEMS R0094-1): a and p_0 over Hertz's, stick ratio, depth",
         rows,
-        "At the load 1 of 35 kN/mm Hertz has a = 6.215 mm. a by the second moment of the "
-        "pressure; stick is the share of the contact that does. u_y (mm) is that of the middle of "
-        "the block's top.",
+        "At the load 1, 35 kN/mm, Hertz has a = 6.215 mm. a: by the second moment of the "
+        "pressure. stick: the share of the contact that sticks. u_y (mm): displacement of the "
+        "middle of the block's top.",
     )
 
 
@@ -227,8 +227,9 @@ def round_bodies(report: Report, counts: Sequence[float]) -> None:
         "two-bodies-round",
         "Two equal balls (SSNV104) and cylinders over Hertz",
         rows,
-        "a by the second moment of the pressure, p_0 by the ellipse fitted to it, at the force "
-        "that acts; the approach by two forces, without the cuts' effect far from the contact.",
+        "a: by the second moment of the pressure; p_0: by an ellipse fitted to it, at the "
+        "computed force. The approach follows from two forces, without the effect of the cuts far "
+        "from the contact.",
     )
 
 
