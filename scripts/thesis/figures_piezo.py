@@ -63,8 +63,8 @@ def figure_8_2a(report: Report, cells: tuple[int, int]) -> None:
         with_forces(deformed),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
         f"{remark(solution, table)} The body presses on the foundation with ({along:.4g}, "
-        f"{across:.4g}): to the right, as the thesis says of the contact force; the arrows are "
-        "its reaction on the body.",
+        f"{across:.4g}): to the right, as the thesis says of the contact force. The arrows are "
+        "the reaction on the body.",
     )
 
 

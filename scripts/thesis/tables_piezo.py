@@ -138,7 +138,7 @@ def other_rho(report: Report, cells: tuple[int, int]) -> None:
         columns,
         "Charge lagged as in Algorithm 4, and implicit; Kacanov's steps, inner solves to 1e-9; — "
         "where (3.46) is not met in 100 iterations. From Table 8.2 to 8.3 the thesis's counts "
-        "grow by 4, ours for no rho.",
+        "grow by 4; with no rho do the counts here.",
     )
 
 
@@ -167,10 +167,10 @@ def series(report: Report, number: str, cells: tuple[int, int]) -> None:
         f"series-k-e-{example.replace('.', '-')}",
         f"Example {example}, load -15x, phi_F = 32: series of k_e, {cells[0]} x {cells[1]} cells",
         columns,
-        "Newton's method. phi on Gamma_3. Charges are integrals of D.nu; imbalances are relative "
-        "to the absolute nodal charges and to the resultant forces. Beyond xi_0 = 1.8 are only "
-        "some cells at corners of the bar, where the strain is singular and grows as the mesh is "
-        "refined: Example 8.2 differs from 8.1 by next to nothing.",
+        "Newton's method. The potentials are those on Gamma_3. Charges are integrals of D.nu; "
+        "imbalances are relative to the absolute nodal charges and to the resultant forces. Only "
+        "some cells at corners of the bar are strained beyond xi_0 = 1.8. The strain is singular "
+        "there and grows as the mesh is refined. Example 8.2 therefore hardly differs from 8.1.",
     )
 
 
@@ -229,7 +229,8 @@ def iterative(report: Report, coarse: bool) -> None:
         "piezo-linear-iterations",
         "MINRES iterations to 1e-10: diag(GAMG, hypre) on displacement and potential",
         columns,
-        "The coupling alone asks for 23 iterations, with exact blocks; the rest is multigrid's.",
+        "With exact solves of both blocks the coupling takes 23 iterations; multigrid causes the "
+        "others.",
     )
 
 

@@ -25,8 +25,9 @@ from contact.methods import (
     unconstrained_modes,
 )
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.thesis import fixed_point, outer_loop, uzawa
+from contact.methods.thesis import fixed_point, outer_loop, penalty, uzawa
 from contact.problem import condensed
+from contact.tolerances import LARGEST_VIOLATION
 from scripts import command_page
 from scripts.reporting import text
 from scripts.thesis import results_page
@@ -206,15 +207,17 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"k is at most [{condensed.ALWAYS}]": True,
         f"less than [{condensed.DENSE_IS_FASTER:g}] sparse ones": True,
         f"is [{unconstrained_modes.STUCK:g}] times all loads": True,
-        "is [10⁻²] f π²/d": interior_point.SHARE == 1e-2,
+        "is [10⁻²] f b²/d": interior_point.SHARE == 1e-2,
         f"is [{interior_point.SHARE_UNSUPPORTED}] of that of the loads": True,
         "below\n   [10⁻⁴]": interior_point.FORCING == 1e-4,
         "below [half] of the least": interior_point.PROGRESS == 0.5,
         f"by [{1 / interior_point.PROGRESS:g}] times the least factor": True,
         f"stagnation limit [{newton.CONTINUATION_LIMIT}]": True,
         f"after [{uzawa.STAGNATION_LIMIT}] iterations": True,
-        "reduce it by [1 %]": uzawa.PROGRESS == 0.99,
+        "by [1 %]": uzawa.PROGRESS == 0.99,
         f"after [{fixed_point.FixedPoint.stagnation[0]}] iterations": True,
+        f"after [{penalty.Penalty.stagnation[0]}] iterations that do not reduce its": True,
+        f"more than [{LARGEST_VIOLATION}] the run": penalty.Penalty.stagnation[1] == 0.99,
         "by [10 %]": fixed_point.FixedPoint.stagnation[1] == 0.9,
         "Below a residual of [10⁻²]": outer_loop.NEAR == 1e-2,
         "to [10⁻³], and each": nesting.COARSE_TOLERANCE == 1e-3,
