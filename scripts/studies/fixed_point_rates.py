@@ -132,7 +132,7 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
         "local rate of the secant iteration there. The observed rate is smaller, since most of "
         "the body is strained less. It is larger only where friction converges last. The friction "
         "coefficient is constant; no second solution has been found for it ([methods "
-        "compared](thesis-studies.md#do-the-methods-agree-all-examples))."
+        "compared](thesis-studies.md#agreement-of-the-methods))."
     )
     caption = "Theorems 3.2 and 4.5: errors of the fixed points per iteration, Example 7.2"
     report.table("fixed-point-rates", caption, columns, note)

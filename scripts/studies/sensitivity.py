@@ -59,7 +59,7 @@ SWEEPS: Mapping[str, Sweep] = {
              "changes the force by 0.1 % and the largest pressure by 0.2 %. With a large rho "
              "there are several solutions; this is the one that Newton's method finds from the "
              "zero initial guess ([methods "
-             "compared](thesis-studies.md#do-the-methods-agree-all-examples)).",
+             "compared](thesis-studies.md#agreement-of-the-methods)).",
     ),
     "rho": Sweep(
         r"$\rho$ of (7.16)", "8.2", "piezo-8-2", "friction.mu.rho",

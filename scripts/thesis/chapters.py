@@ -130,7 +130,7 @@ PARTS = (
     ),
     Part("refinement_8", "Chapter 8 on finer meshes", figures=False, package="studies"),
     Part("sensitivity", "Parameters that the thesis does not print", package="studies"),
-    Part("agreement", "Do the methods agree? All examples", figures=False, package="studies"),
+    Part("agreement", "Agreement of the methods", figures=False, package="studies"),
 )
 
 

@@ -68,7 +68,7 @@ class Shape(ABC):
     along
         That direction, from the body towards the foundation, of any length.
     shape
-        Name of the shape in the case file, where it has one.
+        Name of the shape, by which the case file selects it.
     """
 
     direction: Annotated[str, Internal()] = "foundation"
