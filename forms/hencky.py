@@ -102,7 +102,7 @@ class Log(Isotropic):
         "norm": xi_0 limits t = |dev eps|, so that d(g t)/dt = mu1 xi_0/t > 0.
         "square": xi_0 limits t^2, as (7.8) is printed; it softens beyond e xi_0.
     g_min
-        A floor of g (stress), so that assumption (h1) holds uniformly; 0 for none.
+        A lower bound of g (stress), so that assumption (h1) is met uniformly; 0 for none.
 
     Raises
     ------

@@ -62,7 +62,7 @@ class Identified:
         0.95 by default.
     covariance, correlation
         Of the parameters in this order, shape (k, k), from the derivatives at the solution and the
-        scatter that is left.
+        scatter of the residuals.
     undetermined
         Parameters that the measurements do not determine, alone or in a combination with the others
         here: infinite interval, infinite variance, covariances nan.

@@ -39,7 +39,7 @@ class Conductor:
     psi
         Conductivity law.
     phi_f
-        Potential of the foundation; several conductors as one have one value a node.
+        Potential of the foundation; of several conductors in one, one value per node.
     phi_l
         Truncation of the potential difference.
     lagged

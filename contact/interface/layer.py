@@ -28,8 +28,8 @@ class Layer:
     ----------
     thickness
         rho - rho_0 >= 0: the layer is touched before the rigid part (length). Infinity: there
-        is no rigid part, law (1.27), and the contact's gap is that of the first touch. Several
-        layers as one have one value a node.
+        is no rigid part, law (1.27), and the contact's gap is that of the first touch. Of
+        several layers in one, one value per node.
     p_nu, h_nu
         Penetration law and stiffness of section 8.1.2, or any others with their derivative.
         They are vectorised functions; p_nu must vanish for negative arguments.

@@ -227,7 +227,7 @@ def read_data(path: str | Path) -> dict[str, Array]:
     Raises
     ------
     InputError
-        If it is none.
+        If the file is no such table.
     """
     path = Path(path)
     try:

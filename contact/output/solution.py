@@ -99,11 +99,11 @@ class Solution(Solved):
     deformation
         How large strains and changes of volume are; None before the solution is reviewed.
     error
-        The estimated discretisation error; None likewise.
+        The estimated discretisation error; None before the solution is reviewed.
     adaptation
         The rows of ``adapt.csv``, one a mesh; none without `[mesh.adapt]`.
     intervals
-        In which its quantities lie; None unless there are three nested uniform meshes.
+        Intervals of its quantities; None unless there are three nested uniform meshes.
     start
         The initial guess, in words.
     critical_factor
@@ -263,7 +263,7 @@ class Solution(Solved):
 
     @property
     def contact_moment(self) -> Array:
-        """The moment of these about the origin, shape (1,) in 2-D and (3,) in 3-D. Collective."""
+        """The moment of the contact forces about the origin, shape (1,) or (3,). Collective."""
         return contact_resultant(self.problem, self.state).moment
 
     @property

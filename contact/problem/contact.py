@@ -30,7 +30,7 @@ class Contact:
     layer
         The compliant layer in front of it.
     friction, conductor
-        Friction and electric contact; None for those that the problem is given for all.
+        Friction and electric contact; None: those that the problem has for all contacts.
     press
         Whether the obstacle may cut the undeformed body, and presses it out.
     against
