@@ -10,6 +10,8 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -17,8 +19,70 @@ import pytest
 import contact
 from tests.docs.pages import ROOT
 
-#: Of a clone, all that a build needs.
-NEEDED = ("contact", "forms", "meshes", "scripts/cases", "README.md", "LICENSE", "pyproject.toml")
+#: Folders of a clone that are packages.
+PACKAGES = ("contact", "forms", "meshes")
+
+#: Of a clone, all that a build takes something of, or is to leave out.
+NEEDED = (
+    *PACKAGES,
+    *("scripts/cases", "tests", "README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE"),
+    *("pyproject.toml", "MANIFEST.in"),
+)
+
+#: Names that pip, conda and Debian do not share: of pip -> of the others.
+CONDA = {"matplotlib": "matplotlib-base", "gmsh": "python-gmsh"}
+DEBIAN = {"fenics-dolfinx": "dolfinx-real", "petsc4py": "petsc4py-real"}
+#: Debian counts these versions from 1 anew.
+EPOCHS = ("fenics-dolfinx", "numpy")
+PACKAGING = ROOT / "scripts/packaging"
+
+
+def _wanted() -> tuple[dict[str, str], dict[str, str]]:
+    """Return what the program needs and what reads meshes, name -> bounds, as pip has them."""
+    given = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    project = given["project"]
+    lists = (
+        [f"python{project['requires-python']}", *project["dependencies"]],
+        [*given["build-system"]["requires"], *project["optional-dependencies"]["meshes"]],
+    )
+    needed, further = ([re.fullmatch(r"([\w-]+)(.*)", line) for line in each] for each in lists)
+    return {m[1]: m[2] for m in needed if m}, {m[1]: m[2] for m in further if m}
+
+
+@pytest.mark.parametrize("file", ["environment.yml", "scripts/packaging/conda/recipe.yaml"])
+def test_conda_has_the_dependencies(file: str) -> None:
+    needed, further = _wanted()
+    lines = re.findall(r"^ +- (.*)$", (ROOT / file).read_text(), re.M)
+    said = {name: bounds.strip() for name, _, bounds in (line.partition(" ") for line in lines)}
+    recipe = file.endswith("recipe.yaml")
+    wanted = needed | ({"setuptools": further["setuptools"]} if recipe else further)
+    for name, bounds in wanted.items():
+        if name == "petsc4py":
+            assert f"{name} * real*" in lines or f"{name}=*=real*" in lines
+        elif recipe or name != "setuptools":
+            assert said[CONDA.get(name, name)] == bounds, name
+
+
+def test_debian_has_the_dependencies() -> None:
+    needed, further = _wanted()
+    text = (PACKAGING / "debian/control").read_text()
+    fields = {
+        key: [line.strip(" ,") for line in lines.splitlines()]
+        for key, lines in re.findall(r"^([\w-]+):\n((?: .*\n)+)", text, re.M)
+    }
+
+    def packages(name: str, bounds: str) -> list[str]:
+        package = "python3" if name == "python" else f"python3-{DEBIAN.get(name, name)}"
+        epoch = "1:" if name in EPOCHS else ""
+        found = re.findall(r"(>=|<)([\d.]+)", bounds)
+        signs = {">=": ">=", "<": "<<"}
+        return [f"{package} ({signs[sign]} {epoch}{v})" for sign, v in found] or [package]
+
+    for name, bounds in needed.items():
+        assert {*packages(name, bounds)} <= {*fields["Depends"]}, name
+    assert packages("setuptools", further.pop("setuptools"))[0] in fields["Build-Depends"]
+    for name, bounds in further.items():
+        assert packages(name, bounds)[0] in fields["Recommends"], name
 
 
 def test_one_version() -> None:
@@ -64,7 +128,15 @@ def test_the_source_distribution_has_all_that_the_wheel_has(built: Path) -> None
     (archive,) = built.glob("*.tar.gz")
     with tarfile.open(archive) as files:
         names = {name.partition("/")[2] for name in files.getnames()}
-    assert {"contact/cases/bar.toml", "contact/__init__.pyi", "forms/j2.py", "LICENSE"} <= names
+    (wheel,) = built.glob("*.whl")
+    installed = {n for n in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in n}
+    clone = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
+    clone += (ROOT / "contact/cases").glob("*.toml")  # a link, which rglob does not follow
+    kinds = (".py", ".pyi", ".toml", ".typed")
+    sources = {str(path.relative_to(ROOT)) for path in clone if path.suffix in kinds}
+    assert sources <= installed <= names
+    assert {"LICENSE", "CHANGELOG.md", "CITATION.cff", "README.md"} <= names
+    assert not any(name.startswith("tests") for name in names)  # not a part of them alone
     assert archive.name.startswith(f"contact_fenicsx-{contact.__version__}")
 
 
