@@ -186,6 +186,13 @@ RAMP = 0.1
 COMPLIANT = ReadWith("law", "compliance")
 
 
+#: Of a number that may be infinite: JSON has no such number, and editors pass null for it.
+INFINITE: dict[str, Any] = {
+    "allow_inf_nan": True,
+    "json_schema_extra": {"type": ["number", "null"]},
+}
+
+
 class SlipLaw(Section):
     """`mu = { law = "slip", ... }`: coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
 
@@ -315,14 +322,14 @@ class Contact(Section):
     rigid: Rigid | None = None
     """Motion of the foundation: `[contact.rigid]`. Absent: it is fixed."""
     layer: Annotated[
-        float, Field(ge=0, allow_inf_nan=True), COMPLIANT, Accepted("a number >= 0, or inf")
+        float, Field(ge=0, **INFINITE), COMPLIANT, Accepted("a number >= 0, or inf")
     ] = 0.0
     """Thickness of the layer, which is touched at gap - layer. A layer thicker than the gap presses
     on the undeformed body. `inf`: no rigid part, touched at gap."""
     stiffness: Annotated[NonNegative, COMPLIANT] = 10.0
     """c_nu."""
     limit: Annotated[
-        float, Field(gt=0, allow_inf_nan=True), COMPLIANT, Accepted("a number > 0, or inf")
+        float, Field(gt=0, **INFINITE), COMPLIANT, Accepted("a number > 0, or inf")
     ] = 0.1
     """n_nu: depth at which the layer's pressure saturates; `inf`: never."""
     potential_factor: Annotated[float, Field(ge=1), COMPLIANT, Accepted("a number >= 1")] = 2.0

@@ -155,7 +155,7 @@ class Mesh(Section):
     cell: Literal["triangle", "quadrilateral", "tetrahedron", "hexahedron"] | None = None
     """Shape of the cells of a generator: in 2-D "triangle" or "quadrilateral", in 3-D "tetrahedron"
     or "hexahedron". Default: the first of them."""
-    order: Literal[1, 2] = 1
+    order: Annotated[int, Field(ge=1, le=2), Accepted("1 or 2")] = 1
     """Order of the cells of a parametric mesh generator: those of 2 are curved where the body is
     round."""
     rotation: Number = 0.0

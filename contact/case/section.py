@@ -77,7 +77,7 @@ class Section(BaseModel):
 
 
 @cache
-def _conditions(of: type) -> tuple[tuple[str, FieldInfo, ReadWith], ...]:
+def conditions(of: type) -> tuple[tuple[str, FieldInfo, ReadWith], ...]:
     """Return the keys of a kind of table that are read under a condition."""
     return tuple(
         (key, field, mark)
@@ -90,13 +90,13 @@ def _conditions(of: type) -> tuple[tuple[str, FieldInfo, ReadWith], ...]:
 def without_effect(table: Any) -> set[str]:
     """Return the keys of a table that are not read, given the others."""
     of: Any = type(table)
-    return {key for key, _, needs in _conditions(of) if not needs.met(getattr(table, needs.key))}
+    return {key for key, _, needs in conditions(of) if not needs.met(getattr(table, needs.key))}
 
 
 def check_conditions(table: Table) -> Table:
     """Return a table, if no key is without effect and none is missing."""
     of: Any = type(table)
-    for key, field, needs in _conditions(of):
+    for key, field, needs in conditions(of):
         value, other = getattr(table, key), getattr(table, needs.key)
         if not needs.met(other):
             if value != field.default:
@@ -245,6 +245,11 @@ OneOrSome: TypeAlias = Either[One, Some[One]]
 #: Marks of a part of the mesh, and of a name below evolution.amplitudes.
 PART, AMPLITUDE = "part", "amplitude"
 
+#: Kinds of values that functions read, for the JSON schema: names, and a formula.
+_NAME = {"type": "string", "minLength": 1}
+_NAMES = WithJsonSchema({**_NAME, "type": ["string", "array"], "minItems": 1, "items": _NAME})
+_FORMULA = {"type": ["number", "string"], "minLength": 1}
+
 Text: TypeAlias = Annotated[str, Accepted("a text")]
 Name: TypeAlias = Annotated[str, Field(min_length=1), Accepted("the name of a part")]
 Names: TypeAlias = Annotated[
@@ -253,7 +258,7 @@ Names: TypeAlias = Annotated[
     BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
     as_tuple,
     Accepted("a name, or a list of names"),
-    WithJsonSchema({"type": ["string", "array"], "minItems": 1, "items": {"type": "string"}}),
+    _NAMES,
 ]
 #: A file, whose path a dump writes by the function ``path`` of its context.
 File: TypeAlias = Annotated[str, AfterValidator(_placed), PlainSerializer(_path)]
@@ -263,6 +268,7 @@ Part: TypeAlias = Annotated[
     PlainSerializer(_members),
     PART,
     Accepted(together.ACCEPTED),
+    _NAMES,
 ]
 AmplitudeName: TypeAlias = Annotated[
     str,
@@ -284,10 +290,17 @@ Axis: TypeAlias = Annotated[
 ]
 
 Formula: TypeAlias = Annotated[
-    Expression, PlainValidator(_expression), _as_source, Accepted("a number or a formula")
+    Expression,
+    PlainValidator(_expression),
+    _as_source,
+    Accepted("a number or a formula"),
+    WithJsonSchema(_FORMULA),
 ]
 NonNegativeFormula: TypeAlias = Annotated[
-    Formula, AfterValidator(_not_negative), Accepted("a number >= 0 or a formula")
+    Formula,
+    AfterValidator(_not_negative),
+    Accepted("a number >= 0 or a formula"),
+    WithJsonSchema({**_FORMULA, "minimum": 0}),
 ]
 TimeFormula: TypeAlias = Annotated[
     Formula, AfterValidator(_of_time), Accepted("a number or a formula in t")
@@ -297,6 +310,7 @@ Component: TypeAlias = Annotated[
     PlainValidator(_component),
     _as_source,
     Accepted('a number, a formula or "free"'),
+    WithJsonSchema(_FORMULA),
 ]
 TimeComponent: TypeAlias = Annotated[
     Component, AfterValidator(_of_time), Accepted('a number, a formula in t or "free"')

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Self, TypeAlias
 
 from annotated_types import Predicate
-from pydantic import BeforeValidator, Discriminator, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Tag, WithJsonSchema, model_validator
 
 from contact.case.messages import Words, either, fault, listed, shown
 from contact.case.section import FromTable, Section, Text
@@ -18,6 +18,8 @@ from contact.settings import Accepted
 Case: TypeAlias = Any
 
 NAMES = either(map(shown, systems.SYSTEMS))
+#: A name of these, for the JSON schema.
+BY_NAME = {"enum": [*systems.SYSTEMS]}
 
 #: Quantities that the constants of a material have: elastic, and piezoelectric.
 ELASTIC, ELECTRIC = ("length", "stress"), ("length", "stress", "potential", "charge")
@@ -52,7 +54,7 @@ class UnitSystem(Section):
 
 
 SystemOfUnits: TypeAlias = Annotated[
-    Annotated[str, Predicate(systems.SYSTEMS.__contains__), Tag("name")]
+    Annotated[str, Predicate(systems.SYSTEMS.__contains__), WithJsonSchema(BY_NAME), Tag("name")]
     | Annotated[UnitSystem, Tag("table")],
     Discriminator(lambda given: "table" if isinstance(given, Mapping | Section) else "name"),
     Accepted(f"{NAMES}, or a table {{ length, force, potential }}"),
