@@ -1,6 +1,7 @@
 # Every target works on a fresh machine: scripts/fx finds FEniCSx or makes a place for it, once.
 FX := scripts/fx
-SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py) scripts/examples/explore_forms.py scripts/gallery.py
+SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py) scripts/examples/explore_forms.py scripts/gallery.py \
+	scripts/pictures.py
 NAMES := $(notdir $(basename $(SCRIPTS)))
 # a test that hangs on some ranks is ended, and fails
 MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \

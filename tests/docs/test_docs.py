@@ -29,6 +29,7 @@ from contact.methods.thesis import fixed_point, outer_loop, penalty, uzawa
 from contact.problem import condensed
 from contact.tolerances import LARGEST_VIOLATION
 from scripts import command_page
+from scripts.pictures import RUNS
 from scripts.reporting import text
 from scripts.thesis import results_page
 from scripts.thesis.chapters import PARTS
@@ -168,6 +169,18 @@ def test_files_that_pages_name_are_there() -> None:
     assert len(named) > 20
     missing = [name for name in sorted(named) if not (ROOT / name).exists()]
     assert not [name for name in missing if "NAME" not in name]
+
+
+def test_every_picture_is_on_a_page() -> None:
+    pages = [path.read_text() for path in (*DOCS.rglob("*.md"), ROOT / "README.md")]
+    kinds = (".png", ".gif", ".svg")
+    made = ("_build", "notebooks")  # by `make docs`
+    pictures = [p for p in DOCS.rglob("*") if p.suffix in kinds and p.parent.name not in made]
+    lost = [str(p) for p in pictures if not any(p.name in page for page in pages)]
+    assert len(pictures) > 80 and lost == []
+    drawn = {name for run in RUNS.values() for name in run.pictures}
+    by_others = {"two-bodies-slip.png", "two-bodies-loop.png", "architecture.svg"}
+    assert drawn | by_others == {path.name for path in (DOCS / "images").iterdir()}
 
 
 def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
