@@ -1,15 +1,11 @@
-"""The names that the package offers: documented, importable, of one version."""
+"""The names that the package offers: documented, importable."""
 
 import pydoc
 import re
-import tomllib
-from pathlib import Path
 
 import pytest
 
 import contact
-
-ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize("name", contact.__all__)
@@ -26,14 +22,6 @@ def test_help_lists_them_all() -> None:
         assert name.strip("_") in text.lower() or name in text
         if name not in ("__version__", "GapFunction", "solve"):
             assert re.search(rf"\b{name}\b", head), name
-
-
-def test_one_version() -> None:
-    given = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    assert given["project"]["dynamic"] == ["version"]
-    assert given["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "contact.__version__"}
-    cited = re.search(r"^version: *\"?([\d.]+)", (ROOT / "CITATION.cff").read_text(), re.M)
-    assert cited is None or cited[1] == contact.__version__
 
 
 def test_unknown_name() -> None:

@@ -91,7 +91,9 @@ def test_one_version() -> None:
     assert re.search(
         rf"^## {re.escape(contact.__version__)}$", (ROOT / "CHANGELOG.md").read_text(), re.M
     )
-    assert 'dynamic = ["version"]' in (ROOT / "pyproject.toml").read_text()
+    given = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert given["project"]["dynamic"] == ["version"]
+    assert given["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "contact.__version__"}
     changes = (ROOT / "scripts/packaging/debian/changelog").read_text()
     assert changes.startswith(f"contact-fenicsx ({contact.__version__}-1)")
     recipe = (ROOT / "scripts/packaging/conda/recipe.yaml").read_text()
