@@ -12,10 +12,11 @@ import pytest
 from pydantic import ValidationError
 
 import meshes
-from contact.case.file import Case, parse_case
+from contact.case.file import Case, load_case, parse_case
 from contact.case.messages import keys_of, sections_of
 from contact.case.schema import below, schema
 from contact.case.section import FromTable, Section
+from contact.case.text import to_toml
 from contact.errors import InputError
 from scripts.cases import CASES
 
@@ -46,6 +47,7 @@ def test_it_is_a_schema() -> None:
 @pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
 def test_it_takes_the_case_files(path: Path) -> None:
     assert valid(SCHEMA, tomllib.loads(path.read_text()))
+    assert valid(SCHEMA, tomllib.loads(to_toml(load_case(path))))  # with all defaults
 
 
 def test_it_takes_what_editors_make_of_infinity() -> None:
