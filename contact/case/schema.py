@@ -46,7 +46,7 @@ def schema() -> dict[str, Any]:
         tables[name]["additionalProperties"] = False  # pydantic says so of models alone
         rules = _material_rules() if section is Material else _rules(section, _defaults(section))
         if rules:
-            tables[name]["allOf"] = rules
+            tables[name] |= _unseen({"allOf": rules})
         key, kinds = kinds_of([section])
         if kinds and section is not type(DEFAULT):  # the key tells sections of a place apart
             required = tables[name].setdefault("required", [])
@@ -54,7 +54,13 @@ def schema() -> dict[str, Any]:
     about = tables["About"]["properties"]
     about["units"] = _or(about["units"], BY_NAME)
     _add_generators(tables["Mesh"])
+    made = _guided(made, tables)
     return {"$schema": DIALECT, **made, "title": "Case file of contact-fenicsx"}
+
+
+def _unseen(rule: dict[str, Any]) -> dict[str, Any]:
+    """Return a rule that is checked, but in which Taplo looks for no keys to complete."""
+    return {"if": {}, "then": rule}
 
 
 def _plain(node: Any) -> Any:
@@ -74,6 +80,50 @@ def _plain(node: Any) -> Any:
     if len(made.get("anyOf", ())) == 1:
         made |= made.pop("anyOf")[0]
     return made
+
+
+def _guided(node: Any, tables: Mapping[str, Any]) -> Any:
+    """Return a schema whose errors in tables name the key: those of `anyOf` name the table alone.
+
+    `anyOf` stays for completion, with a kind that takes all.
+    """
+    if isinstance(node, list):
+        return [_guided(entry, tables) for entry in node]
+    if not isinstance(node, dict):
+        return node
+    made = {key: _guided(value, tables) for key, value in node.items()}
+    kinds = made.get("anyOf", [])
+    if any("$ref" in kind for kind in kinds):
+        made |= {"anyOf": [*kinds, True], **_unseen(_meant(kinds, tables))}
+    return made
+
+
+def _meant(kinds: list[dict[str, Any]], tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the kinds of values, each asked for where the value looks like it."""
+    read = [kind for kind in kinds if "$ref" in kind]
+    lists = [kind for kind in kinds if kind.get("type") == "array"]
+    rest: dict[str, Any] = {"anyOf": [kind for kind in kinds if kind not in read + lists]}
+    if not rest["anyOf"]:
+        rest = {"type": ["object", "array"] if lists else "object"}
+    if lists:
+        rest = {"if": {"type": "array"}, "then": {"anyOf": lists}, "else": rest}
+    return {"if": {"type": "object"}, "then": _told_apart(read, tables), "else": rest}
+
+
+def _told_apart(read: list[dict[str, Any]], tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return tables of which the value of one key tells which it is."""
+    if len(read) == 1:
+        return read[0]
+    named, key = {}, ""
+    for kind in read:
+        table = tables[kind["$ref"].rpartition("/")[2]]
+        key, value = next((k, v["const"]) for k, v in table["properties"].items() if "const" in v)
+        named[value] = kind, {"required": [key] if key in table.get("required", ()) else []}
+    rest: dict[str, Any] = {"required": [key], "properties": {key: {"enum": [*named]}}}
+    for value, (kind, told) in named.items():
+        this = {**told, "properties": {key: {"const": value}}}
+        rest = {"if": this, "then": kind, "else": rest}
+    return rest
 
 
 def below(section: type) -> dict[str, type]:
@@ -131,20 +181,21 @@ def _add_generators(mesh: dict[str, Any]) -> None:
         said = f"Parameter of {', '.join(name for name in own if key in own[name])}."
         keys[key] = _or(keys[key], LENGTH) if key in keys else {"description": said, **LENGTH}
     keys["generator"]["enum"] = [*grid.SIDES, *own]
-    mesh["oneOf"] = [{"required": ["generator"]}, {"required": ["file"]}]
+    rules: list[Any] = [{"oneOf": [{"required": ["generator"]}, {"required": ["file"]}]}]
     none = {"parameters": {"maxProperties": 0}}
     of_file = {*COMMON, "parameters"} - {"generator", "cell"}
-    mesh["allOf"] = [{"if": {"required": ["file"]}, "then": _keys(of_file, none)}]
+    rules.append({"if": {"required": ["file"]}, "then": _keys(of_file, none)})
     for name in grid.SIDES:
         taken = {"required": ["size", "cells"], **_keys({*keys_of(Mesh)} - {"file"}, none)}
         taken["properties"]["size"] = {"type": "array"}
-        mesh["allOf"].append({"if": _with_generator(name), "then": taken})
+        rules.append({"if": _with_generator(name), "then": taken})
     for name, parameters in own.items():
         taken = _keys(
             {*COMMON, "parameters", *parameters} - {"file"},
             {"size": LENGTH, "parameters": _keys(parameters)},
         )
-        mesh["allOf"].append({"if": _with_generator(name), "then": taken})
+        rules.append({"if": _with_generator(name), "then": taken})
+    mesh |= _unseen({"allOf": rules})
 
 
 def _with_generator(name: str) -> dict[str, Any]:

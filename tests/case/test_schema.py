@@ -58,6 +58,20 @@ def test_it_takes_what_editors_make_of_infinity() -> None:
 
 
 @pytest.mark.parametrize(
+    ("table", "key", "value", "said"),
+    [
+        ("material", "poisson", "0.3", "'0.3' is not of type 'number'"),
+        ("solver", "tolerence", 1e-8, "'tolerence' was unexpected"),
+        ("contact", "foundation", {"shape": "plane", "point": 1}, "1 is not of type 'array'"),
+    ],
+)
+def test_its_errors_name_the_key(table: str, key: str, value: object, said: str) -> None:
+    case = {**BAR, table: {**BAR[table], key: value}}
+    errors = jsonschema.Draft202012Validator(SCHEMA).iter_errors(case)
+    assert said in " ".join(error.message for error in errors)
+
+
+@pytest.mark.parametrize(
     ("table", "key", "value"),
     [
         ("mesh", "cell_count", 3),
@@ -108,6 +122,7 @@ def test_keys_and_kinds_are_those_of_the_program(name: str) -> None:
     generators = {key for generator in meshes.GENERATORS for key in meshes.parameters(generator)}
     assert {*said} - (generators if name == "Mesh" else set()) <= {*keys_of(section)} <= {*said}
     assert TABLES[name]["additionalProperties"] is False
+    assert "allOf" not in TABLES[name]  # Taplo completes no keys beside it
     for key in keys_of(section):
         numbers = valid(said[key], 0.5)
         for value in PROBES:
