@@ -132,14 +132,14 @@ def no_solution(pc: PETSc.PC, prefix: str) -> InputError:
 
 def _functions_vanish(pc: PETSc.PC) -> bool:
     """Whether functions on coarse levels are zero, as no motion of a body is. Collective."""
-    if pc.getType() != "gamg":
+    if pc.getType() not in ("gamg", "mg"):
         return False
     for level in range(pc.getMGLevels() - 1):
         diagonal = pc.getMGSmoother(level).getOperators()[0].getDiagonal()
         diagonal.abs()
         if diagonal.min()[1] <= VANISHES * diagonal.max()[1]:
             return True
-    return False
+    return pc.getType() == "mg" and _functions_vanish(pc.getMGCoarseSolve().getPC())
 
 
 def out_of_memory(pc: PETSc.PC) -> bool:

@@ -1,12 +1,14 @@
 """Algebraic multigrid for contact problems: GAMG with the rigid-body modes as near null space.
 
-Two things are added to it: interpolation that knows contact nodes (`StiffNodes`), and coarse levels
-that are renewed when iterations say so (`Hierarchy`).
+Three things are added to it: a first coarse level that ranks make of their own rows
+(`aggregation`), interpolation that knows contact nodes (`StiffNodes`), and coarse levels that are
+renewed when iterations say so (`Hierarchy`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from math import ceil, log10
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from contact._compat import keeps_inverted_blocks
+from contact.linear.aggregation import AGGREGATES, Aggregation, rows_of, tentative
 from contact.linear.faults import petsc_options
 from contact.linear.krylov import Components, refine
 from contact.linear.layout import Layout
@@ -102,6 +105,19 @@ def set_defaults(prefix: str, values: Mapping[str, str]) -> None:
             options[name] = value
 
 
+@contextmanager
+def options(prefix: str, values: Mapping[str, str]) -> Iterator[None]:
+    """Have options of PETSc under a prefix for a while, where the user gives none."""
+    known = PETSc.Options(prefix)
+    own = [name for name in values if not known.hasName(name)]
+    set_defaults(prefix, values)
+    try:
+        yield
+    finally:
+        for name in own:
+            known.delValue(name)
+
+
 def rigid_motions(layout: Layout) -> PETSc.NullSpace:
     """Return the rigid motions of the displacement, orthonormalised, fixed or not. Collective."""
     d, index_map = layout.dim, layout.index_map
@@ -158,22 +174,23 @@ class StiffNodes:
 
     Parameters
     ----------
-    pc
-        GAMG, set up with the body's operator.
+    interpolation
+        This rank's rows of the interpolation, made with the body's operator; None without one.
+    block_size
+        Unknowns of a node.
     nodes
         Owned nodes that may have contact blocks, local numbers, shape (n,).
     """
 
-    def __init__(self, pc: PETSc.PC, nodes: NDArray[np.int32]) -> None:
-        self._nodes = nodes
-        self._interpolation: PETSc.Mat | None = None
-        if pc.getMGLevels() == 1:
+    def __init__(
+        self, interpolation: PETSc.Mat | None, block_size: int, nodes: NDArray[np.int32]
+    ) -> None:
+        self._nodes, self._interpolation = nodes, interpolation
+        if interpolation is None:
             return
-        finest = self._interpolation = pc.getMGInterpolation(pc.getMGLevels() - 1)
-        first, bs = finest.getOwnershipRange()[0], finest.getBlockSizes()[0]
-        self._rows = (first + bs * nodes[:, None] + np.arange(bs)).astype(PETSc.IntType).ravel()
-        chosen = PETSc.IS().createGeneral(self._rows, finest.comm)
-        of_body = finest.createSubMatrix(chosen, None)
+        rows = block_size * nodes[:, None] + np.arange(block_size)
+        self._rows = rows.astype(PETSc.IntType).ravel()
+        of_body = rows_of(interpolation, self._rows)
         self._starts, self._columns, self._values = of_body.getValuesCSR()
 
     def follow(self, own: Array, blocks: Array) -> None:
@@ -225,6 +242,9 @@ class StiffNodes:
         return vector
 
 
+#: Unknowns a rank from which on ranks make the next coarse level as well, in place of GAMG.
+MANY = 10_000
+
 #: Cost of renewing the coarse levels, in iterations (seen in `scripts.benchmarks.phases`).
 PRICE = 8
 
@@ -243,7 +263,7 @@ class Hierarchy:
     Parameters
     ----------
     ksp
-        A solver with GAMG, set up with the body's operator.
+        A solver with GAMG, and the body's operator. It is not set up.
     nodes
         Owned nodes that may have contact blocks, local numbers, shape (n,).
     components
@@ -254,12 +274,45 @@ class Hierarchy:
         self, ksp: PETSc.KSP, nodes: NDArray[np.int32], components: Components | None = None
     ) -> None:
         self._ksp, self._components = ksp, components
-        self._stiff = StiffNodes(ksp.getPC(), nodes)
+        #: Options of PETSc for the levels below the first coarse one.
+        self._below: dict[str, str] = {}
+        self._levels: list[Aggregation] = []
+        self._make_levels()
+        rows = self._levels[0].rows if self._levels else None
+        self._stiff = StiffNodes(rows, ksp.getOperators()[0].getBlockSize(), nodes)
         self._most = ksp.getTolerances()[3]
         self._lost = np.inf
         #: Iterations a digit with coarse levels of the operator itself, and whether they are that.
         self._rate, self._fresh = 0.0, False
         self._taken, self._renewed = 0, False
+
+    def _make_levels(self) -> None:
+        """Make coarse levels while ranks have many unknowns; GAMG makes those below. Collective."""
+        pc, prefix = self._ksp.getPC(), self._ksp.getOptionsPrefix() or ""
+        matrix = self._ksp.getOperators()[0]
+        known, kinds = PETSc.Options(prefix), ("pc_gamg_", "pc_mg_", "mg_")
+        # Read one by one: PETSc warns of options that nobody has read.
+        named = {name: known.getString(name) for name in known.getAll() if name.startswith(kinds)}
+        squared = int(named["pc_gamg_aggressive_coarsening"])
+        while True:
+            with petsc_options(prefix), options(f"{prefix}aggregates_", named | AGGREGATES):
+                found = tentative(matrix, f"{prefix}aggregates_")
+            if found is None:
+                break
+            self._levels.append(Aggregation(matrix, found))
+            squared = max(squared - 1, 0)
+            named["pc_gamg_aggressive_coarsening"] = str(squared)
+            if self._levels[-1].interpolation.getSize()[1] <= MANY * matrix.comm.size:
+                break
+            matrix = self._levels[-1].update()
+        if not self._levels:
+            return
+        self._below = named | {"ksp_type": "preonly", "pc_type": "gamg"}
+        pc.setType("mg")
+        pc.setMGLevels(1 + len(self._levels))
+        for k, level in enumerate(reversed(self._levels), start=1):
+            pc.setMGInterpolation(k, level.interpolation)
+        pc.getMGCoarseSolve().setOptionsPrefix(f"{prefix}coarse_")
 
     def follow(self, own: Array, blocks: Array) -> bool:
         """Follow the operator, and tell whether its coarse levels are renewed. Collective.
@@ -282,13 +335,18 @@ class Hierarchy:
         return False
 
     def _renew(self) -> None:
-        self._ksp.getPC().setReusePreconditioner(False)
+        pc = self._ksp.getPC()
+        pc.setReusePreconditioner(False)
+        for k, level in enumerate(self._levels, start=1):
+            operator = level.update()
+            pc.getMGSmoother(len(self._levels) - k).setOperators(operator, operator)
         self._set_up()
         self._lost, self._rate, self._fresh, self._renewed = 0.0, 0.0, True, True
 
     def _set_up(self) -> None:
         self._ksp.setOperators(*self._ksp.getOperators())
-        with petsc_options(self._ksp.getOptionsPrefix()):
+        prefix = self._ksp.getOptionsPrefix() or ""
+        with petsc_options(prefix), options(f"{prefix}coarse_", self._below):
             self._ksp.setUp()
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> tuple[int, bool]:

@@ -189,7 +189,8 @@ class SparseOperator:
         if self._multigrid and self._hierarchy is None:
             if inserts:
                 insert_blocks(self.matrix, nodes, own + TOUCH * rest)
-            self._set_up(symmetric=True)
+            self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+            self.ksp.setOperators(self.system, self.matrix)
             self._hierarchy = Hierarchy(self.ksp, nodes, self._components)
         if inserts:
             insert_blocks(self.matrix, nodes, own + rest)

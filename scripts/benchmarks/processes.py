@@ -17,10 +17,8 @@ def command(script: str) -> list[str]:
     return [sys.executable, "-m", f"scripts.benchmarks.{script}"]
 
 
-def started(
-    words: Sequence[str], ranks: int = 1, limit: float | None = None, options: str = ""
-) -> str:
-    """Return the output of a process, within a limit (seconds), with options of PETSc.
+def started(words: Sequence[str], ranks: int = 1, limit: float | None = None) -> str:
+    """Return the output of a process, within a limit (seconds).
 
     Raises
     ------
@@ -28,7 +26,6 @@ def started(
         If it fails.
     """
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
-    environment["PETSC_OPTIONS"] = f"{environment.get('PETSC_OPTIONS', '')} {options}".strip()
     parallel = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
     done = subprocess.run(
         [*parallel, *words], env=environment, capture_output=True, text=True, timeout=limit
@@ -38,11 +35,9 @@ def started(
     return done.stdout
 
 
-def measured(
-    words: Sequence[str], ranks: int = 1, limit: float | None = None, options: str = ""
-) -> Run:
+def measured(words: Sequence[str], ranks: int = 1, limit: float | None = None) -> Run:
     """Return the JSON in the last line of a process's output."""
-    found: Run = json.loads(started(words, ranks, limit, options).strip().splitlines()[-1])
+    found: Run = json.loads(started(words, ranks, limit).strip().splitlines()[-1])
     return found
 
 

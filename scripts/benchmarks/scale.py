@@ -17,20 +17,15 @@ import numpy as np
 from scripts.benchmarks.processes import Run, command, measured, started
 from scripts.reporting import Report, parser
 
-#: How PETSc multiplies out the coarse levels of multigrid, and its option for that.
-PRODUCTS = {"in two products": "", "all at once": "-matptap_via allatonce_merged"}
-
 
 def weak(coarse: bool) -> list[Run]:
-    """Return memory and messages of slices, one a rank, by each way to make the coarse levels."""
+    """Return memory and messages of slices, one a rank."""
     rows, n = list[Run](), 19 if coarse else 43
     for ranks in (1, 2, 4):
         counted = measured([*command("weak"), "1", str(n)], ranks)
-        for products, options in PRODUCTS.items() if ranks > 1 else [("on one rank", "")]:
-            solved = measured([*command("weak"), "1", str(n), "--solve"], ranks, options=options)
-            rows.append(counted | {"products": products} | solved)
-            rows[-1]["memory over one rank"] = rows[-1]["memory"] / rows[0]["memory"]
-            rows[-1]["arrays over one rank"] = rows[-1]["python"] / rows[0]["python"]
+        rows.append(counted | measured([*command("weak"), "1", str(n), "--solve"], ranks))
+        rows[-1]["memory over one rank"] = rows[-1]["memory"] / rows[0]["memory"]
+        rows[-1]["arrays over one rank"] = rows[-1]["python"] / rows[0]["python"]
     return rows
 
 
@@ -65,7 +60,6 @@ SHOWN: dict[str, dict[str, tuple[str, float]]] = {
     "weak": {
         "ranks": ("ranks", 1),
         "unknowns": ("unknowns", 1),
-        "coarse levels": ("products", 1),
         "memory per rank (MB)": ("memory", 1e6),
         "over one rank": ("memory over one rank", 1),
         "arrays of Python (MB)": ("python", 1e6),
@@ -82,7 +76,6 @@ SHOWN: dict[str, dict[str, tuple[str, float]]] = {
         "a linear solve (s)": ("a linear solve", 1),
         "pairing over a solve": ("pairing over a solve", 1),
         "coupling per rank (kB)": ("coupling", 1e3),
-        "memory per rank (MB)": ("memory", 1e6),
     },
     "read": {
         "ranks": ("ranks", 1),

@@ -1,0 +1,291 @@
+"""Smoothed aggregation whose coarse operator is a sum of products of each rank's own rows.
+
+GAMG multiplies as well, but of matrices that ranks share PETSc keeps K P, the rank's rows of P,
+its transpose and all summands of P^T K P from one set-up to the next: more than K itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
+from contact.ranks import exchanged
+
+Integers = NDArray[np.integer[Any]]
+
+#: P = (I - w D^-1 K) P0, where w is this number over the largest eigenvalue of D^-1 K (as in GAMG).
+DAMPING = 1.4
+
+#: Steps of CG that estimate that eigenvalue (as in GAMG).
+STEPS = 10
+
+#: Parts in which a rank copies its rows: a copy of all takes as much memory as the matrix.
+PARTS = 8
+
+#: Options of the GAMG that finds aggregates: it neither smooths them nor solves.
+AGGREGATES = {
+    "pc_gamg_agg_nsmooths": "0",
+    "pc_gamg_parallel_coarse_grid_solver": "true",
+    "mg_levels_ksp_type": "richardson",
+    "mg_levels_pc_type": "none",
+    "mg_coarse_ksp_type": "preonly",
+    "mg_coarse_pc_type": "none",
+}
+
+
+def tentative(matrix: PETSc.Mat, prefix: str) -> PETSc.Mat | None:
+    """Return the tentative interpolation P0 of the aggregates that GAMG finds. Collective.
+
+    Its columns are the near null space on each aggregate, orthonormal. None where GAMG makes no
+    coarse level, for the matrix is small.
+
+    Parameters
+    ----------
+    matrix
+        An operator with its near null space.
+    prefix
+        Prefix of PETSc options.
+    """
+    pc = PETSc.PC().create(matrix.comm)
+    pc.setOptionsPrefix(prefix)
+    pc.setOperators(matrix)
+    pc.setType("gamg")
+    pc.setGAMGLevels(2)
+    pc.setFromOptions()
+    pc.setUp()
+    found = pc.getMGInterpolation(1) if pc.getMGLevels() > 1 else None
+    pc.destroy()
+    return found
+
+
+class Aggregation:
+    """The first coarse level of an operator K: the interpolation P, and P^T K P.
+
+    P is smoothed aggregation (Vanek, Mandel and Brezina 1996). Each rank has its rows of P in a
+    sequential matrix, with the columns that these reach. P^T K P is the sum of sequential
+    products: on each rank that of its own columns of K, and a thin one of those of others, for
+    which their owners send rows of P.
+
+    Parameters
+    ----------
+    matrix
+        The operator K.
+    tentative
+        The tentative interpolation P0, which is destroyed.
+    """
+
+    def __init__(self, matrix: PETSc.Mat, tentative: PETSc.Mat) -> None:
+        self._matrix, self._comm = matrix, matrix.comm.tompi4py()
+        self._bs = tentative.getBlockSizes()[1]
+        self._modes = _restricted(matrix.getNearNullSpace(), tentative)
+        sizes, self._range = tentative.getSizes(), tentative.getOwnershipRangeColumn()
+        self._find_others()
+        starts, columns, values = _smoothed(matrix, tentative)
+        #: Lengths of the rows that others ask for.
+        self._counts = np.diff(starts)[self._asked]
+        sent = columns[_places(starts, self._asked)].astype(np.int64)
+        _, there = exchanged(self._comm, np.repeat(self._asking, self._counts), sent)
+        _, counts = exchanged(self._comm, self._asking, self._counts)
+        low, high = (number // self._bs for number in self._range)
+        aside = [part[self._aside(part)] // self._bs for part in (columns, there)]
+        # Ascending as in the whole matrix, so that rows stay sorted.
+        self._blocks = np.unique(np.concatenate([np.arange(low, high), *aside]))
+        csr = starts, self._local(columns).astype(PETSc.IntType), values
+        #: This rank's rows of P.
+        self.rows = PETSc.Mat().createAIJWithArrays(
+            (starts.size - 1, self._width), csr, comm=PETSc.COMM_SELF
+        )
+        self.rows.setBlockSizes(matrix.getBlockSize(), self._bs)
+        pattern = np.append(0, np.cumsum(counts)), self._local(there)
+        #: Starts and columns of rows of P that others own.
+        self._theirs = tuple(part.astype(PETSc.IntType) for part in pattern)
+        here = np.arange(*matrix.getOwnershipRange(), dtype=PETSc.IntType)
+        blocks = self._blocks.astype(PETSc.IntType)
+        self._map = PETSc.LGMap().create(blocks, bsize=self._bs, comm=matrix.comm)
+        maps = PETSc.LGMap().create(here, comm=matrix.comm), self._map
+        #: P as it multiplies vectors.
+        self.interpolation = PETSc.Mat().createIS(sizes, None, *maps, matrix.comm)
+        self.interpolation.setISLocalMat(self.rows)
+        self.interpolation.assemble()
+        self._product: PETSc.Mat | None = None
+        #: The coarse operator of the last update.
+        self.coarse: Any = None
+
+    @property
+    def _width(self) -> int:
+        """The number of columns of `rows`."""
+        return int(self._blocks.size * self._bs)
+
+    def _find_others(self) -> None:
+        """Find columns of K that others own, the rows that have them, and who asks for own ones.
+
+        Collective.
+        """
+        first, last = self._matrix.getOwnershipRange()
+        columns, beside = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        alone = self._comm.size == 1
+        for rows in () if alone else np.array_split(np.arange(first, last), PARTS):
+            chosen = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), self._comm)
+            part = self._matrix.createSubMatrix(chosen, None)
+            starts, found, _ = part.getValuesCSR()
+            part.destroy()
+            chosen.destroy()
+            beyond = (found < first) | (found >= last)
+            columns.append(np.unique(found[beyond]))
+            beside.append(rows[np.diff(np.append(0, np.cumsum(beyond))[starts]) > 0] - first)
+        self._others, self._beside = np.unique(np.concatenate(columns)), np.concatenate(beside)
+        owners = np.searchsorted(self._matrix.getOwnershipRanges()[1:], self._others, side="right")
+        self._asking, asked = exchanged(self._comm, owners, self._others.astype(np.int64))
+        self._asked = asked - first
+
+    def _aside(self, columns: Integers) -> NDArray[np.bool_]:
+        """Tell which columns of P others own."""
+        low, high = self._range
+        return (columns < low) | (columns >= high)
+
+    def _local(self, columns: Integers) -> Integers:
+        """Return the columns' numbers on this rank."""
+        low, aside = self._range[0], self._aside(columns)
+        before = np.searchsorted(self._blocks, low // self._bs) * self._bs
+        found = columns + columns.dtype.type(before - low)
+        others = columns[aside]
+        places = np.searchsorted(self._blocks, others // self._bs)
+        found[aside] = places * self._bs + others % self._bs
+        return found
+
+    def _chosen(self, rows: Integers) -> sparse.csr_array:
+        """Return some of this rank's rows of P."""
+        return _scipy(rows_of(self.rows, rows))
+
+    def _thin(self) -> Iterator[sparse.csr_array]:
+        """Give the part of the product of columns of K that others own, in pieces. Collective."""
+        to, sent = np.repeat(self._asking, self._counts), self._chosen(self._asked).data
+        _, values = exchanged(self._comm, to, sent)
+        starts, columns = self._theirs
+        size = self._others.size, self._width
+        theirs = sparse.csr_array((values, columns, starts), shape=size)
+        del to, sent
+        first = self._matrix.getOwnershipRange()[0]
+        index = _index(self._beside + first), _index(self._others)
+        beside = _scipy(*self._matrix.createSubMatrices(*index))
+        for part in np.array_split(np.arange(self._beside.size), PARTS):
+            own = self._chosen(self._beside[part])
+            yield sparse.csr_array(own.T @ (beside[part] @ theirs))
+
+    def update(self) -> PETSc.Mat:
+        """Return P^T K P of K and P as they are. Collective."""
+        own = self._matrix.getDiagonalBlock().ptap(self.rows, result=self._product)
+        self._product = own
+        if self._comm.size == 1:
+            self.coarse = own
+        elif self.coarse is None:
+            self.coarse = self._summed()
+        else:
+            self.coarse.zeroEntries()
+            for rows in np.array_split(np.arange(self._width), PARTS):
+                self._add(rows, _scipy(rows_of(own, rows)))
+            for part in self._thin():
+                self._add(np.arange(self._width), part)
+            self.coarse.assemble()
+        self.coarse.setNearNullSpace(self._modes)
+        return self.coarse
+
+    def _add(self, rows: Integers, part: sparse.csr_array) -> None:
+        """Add values in some rows to the coarse operator."""
+        self.coarse.setValuesLocalIJV(
+            part.indptr.astype(PETSc.IntType),
+            part.indices.astype(PETSc.IntType),
+            part.data,
+            addv=PETSc.InsertMode.ADD_VALUES,
+            rowmap=rows.astype(PETSc.IntType),
+        )
+
+    def _summed(self) -> PETSc.Mat:
+        """Return the coarse operator, with a pattern for the sums to come. Collective."""
+        thin = sum(self._thin(), sparse.csr_array((self._width, self._width)))
+        thin.sort_indices()
+        csr = thin.indptr.astype(PETSc.IntType), thin.indices.astype(PETSc.IntType), thin.data
+        own = PETSc.Mat().createAIJ(thin.shape, bsize=self._bs, csr=csr, comm=PETSc.COMM_SELF)
+        own.axpy(1.0, self._product)
+        size = self._range[1] - self._range[0]
+        whole = PETSc.Mat().createIS(
+            ((size, None), (size, None)), self._bs, self._map, self._map, self._comm
+        )
+        whole.setISLocalMat(own)
+        whole.assemble()
+        # Without a matrix to convert to, PETSc would convert this one.
+        made = whole.convert("aij", PETSc.Mat())
+        whole.destroy()
+        made.setLGMap(self._map, self._map)
+        return made
+
+
+def _restricted(modes: PETSc.NullSpace, tentative: PETSc.Mat) -> PETSc.NullSpace:
+    """Return a near null space on the coarse level: P0 keeps lengths and angles. Collective."""
+    found = []
+    for mode in modes.getVecs():
+        found.append(tentative.createVecRight())
+        tentative.multTranspose(mode, found[-1])
+    return PETSc.NullSpace().create(vectors=found, comm=tentative.comm)
+
+
+def _smoothed(matrix: PETSc.Mat, tentative: PETSc.Mat) -> tuple[Integers, Integers, Any]:
+    """Return the owned rows of P: starts, global columns, values. Destroys P0. Collective."""
+    diagonal = matrix.getDiagonal()
+    diagonal.reciprocal()
+    made = matrix.matMult(tentative)
+    made.diagonalScale(L=diagonal)
+    factor = -DAMPING / _largest_eigenvalue(matrix)
+    made.aypx(factor, tentative, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    rows = made.getValuesCSR()
+    # On several ranks Python would not free them before all come to it.
+    for each in (made, tentative, diagonal):
+        each.destroy()
+    return rows  # type: ignore[no-any-return]
+
+
+def _largest_eigenvalue(matrix: PETSc.Mat) -> float:
+    """Return an estimate for D^-1 K by CG with the diagonal D (Lanczos). Collective.
+
+    It is infinite where numbers overflow, of which the solver will tell.
+    """
+    ksp = PETSc.KSP().create(matrix.comm)
+    ksp.setType("cg")
+    ksp.getPC().setType("jacobi")
+    ksp.setOperators(matrix)
+    ksp.setTolerances(rtol=1e-12, max_it=STEPS)
+    ksp.setComputeEigenvalues(True)
+    solution, rhs = matrix.createVecs()
+    rhs.setRandom()
+    ksp.solve(rhs, solution)
+    found = float(ksp.computeEigenvalues().real.max(initial=0.0))
+    for each in (ksp, solution, rhs):
+        each.destroy()
+    return found if found > 0 else np.inf
+
+
+def _places(starts: Integers, rows: Integers) -> Integers:
+    """Return the places of all entries of rows of a sparse matrix."""
+    counts = np.diff(starts)[rows]
+    ends = np.cumsum(counts)
+    return np.repeat(starts[rows] - (ends - counts), counts) + np.arange(counts.sum())
+
+
+def rows_of(matrix: PETSc.Mat, rows: Integers) -> PETSc.Mat:
+    """Return rows of a matrix of one rank."""
+    every = PETSc.IS().createStride(matrix.getSize()[1], step=1, comm=PETSc.COMM_SELF)
+    return matrix.createSubMatrix(_index(rows), every)
+
+
+def _index(numbers: Integers) -> PETSc.IS:
+    return PETSc.IS().createGeneral(numbers.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+
+
+def _scipy(matrix: PETSc.Mat) -> sparse.csr_array:
+    starts, columns, values = matrix.getValuesCSR()
+    return sparse.csr_array((values, columns, starts), shape=matrix.getSize())
