@@ -83,12 +83,8 @@ logger = logging.getLogger("contact.solver")
 RIGID_MOTION = "rigid motion"
 FALLBACKS = CONTINUATION, RIGID_MOTION, INTERIOR_POINT
 
-#: Stagnation limit where another stage follows, or has gone before: of the whole body where it can
-#: be condensed, and of Newton's last steps.
-SHORT = 4
-
-#: The same in a continuation: condensed steps cost little beside another value of the parameter,
-#: and Example 8.4 with its steep ramp needs them.
+#: Stagnation limit in a continuation: condensed steps cost little beside another value of the
+#: parameter, and Example 8.4 with ten times its conductivity needs them.
 CONTINUATION_LIMIT = 20
 
 #: Why an iteration ends whose complementarity parameter overestimates the stiffness.
@@ -149,10 +145,9 @@ class Newton:
         if self._condensed is None:
             assert isinstance(self.problem, ContactProblem) and self.modes is not None
             body = Condensation(self.problem, self.counters)
-            short = replace(self.options, stagnation_limit=SHORT)
             self._condensed = CondensedStep(
                 body,
-                self.options if self._pays else short,
+                self.options,
                 self._parameters,
                 partial(_solve_condensed, modes=self.modes),
                 self.history,
@@ -268,9 +263,8 @@ class Newton:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
             return self.whole_loop().run(iterate)
-        loop = self.whole_loop(SHORT if self._condensable else None)
         give_up = partial(overestimates_stiffness, self.problem, self._parameters)
-        return replace(loop, give_up=give_up).run(iterate)
+        return replace(self.whole_loop(), give_up=give_up).run(iterate)
 
     def _condensed_loop(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate over the material, with contact solved on the condensed body."""
@@ -341,11 +335,11 @@ class Newton:
 
     def last_steps(self, state: State) -> tuple[Iterate, Outcome]:
         """Take Newton's last steps from the state that a fallback has reached. Collective."""
-        return self.whole_loop(SHORT).run(self.iterate_at(state), INTERIOR_POINT)
+        return self.whole_loop().run(self.iterate_at(state), INTERIOR_POINT)
 
-    def whole_loop(self, stagnation_limit: int | None = None) -> NewtonLoop:
+    def whole_loop(self) -> NewtonLoop:
         """Return the iteration on the problem's own body."""
-        return NewtonLoop(self.iteration, self.whole, stagnation_limit)
+        return NewtonLoop(self.iteration, self.whole)
 
 
 def _solve_condensed(

@@ -162,8 +162,6 @@ DEVICES = (
            ((complementarity, "at_bound", lambda _, friction, *__: friction),), (), _steep),
     Device("derivative of the conductivity by the gap", (conductivity_derivative,), "-",
            ((conductivity_derivative.ConductivityDerivative, "__call__", lambda *_: False),)),
-    Device("stagnation limit of the steps after a fallback", (), "-",
-           ((newton, "SHORT", NewtonOptions().stagnation_limit),)),
     Device("stagnation limit of the continuation", (), "-",
            ((newton, "CONTINUATION_LIMIT", None),)),
     Device("Anderson acceleration of chord steps", (chord.Chord.accelerated,),
