@@ -150,6 +150,21 @@ def _slender() -> Case:
     return _named(parse_case(tables), "beam-1000")
 
 
+def _dragged() -> Case:
+    """Return a long strip that friction alone holds, pulled with 97 % of the friction."""
+    tables = {
+        "mesh": {"generator": "rectangle", "size": [200.0, 1.0], "cells": [200, 1]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "load": [
+            {"on": "top", "traction": [0.0, -1e-6]},
+            {"on": "right", "traction": [1.94e-4, 0.0]},
+        ],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 1.0},
+    }
+    return _named(parse_case(tables), "dragged-strip")
+
+
 def _spheres() -> Case:
     """Return a ball that another one alone holds, pushed aside; solved by multigrid."""
     tables = {
@@ -226,7 +241,7 @@ DEVICES = (
     Device("updates of the friction bound", (), "Haslinger 1983",
            ((interior_point, "UPDATES", 1),)),
     Device("sticking start where friction alone restrains", (UnconstrainedModes.stuck_bound,), "-",
-           ((UnconstrainedModes, "stuck_bound", _nothing),)),
+           ((UnconstrainedModes, "stuck_bound", _nothing),), (), _dragged),
     Device("continuation in the conductivity", (continuation,), "Allgower and Georg 2003",
            ((Newton, "_continuation", _nothing),)),
     Device("estimate of the stiffness from the first step",
