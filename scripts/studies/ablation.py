@@ -170,7 +170,7 @@ def _spheres() -> Case:
     tables = {
         "mesh": {
             **{"generator": "two_spheres", "quarters": 2, "size": 25.0},
-            **{"contact_size": 2.5, "contact_width": 5.0},
+            **{"contact_size": 1.25, "contact_width": 5.0},
         },
         "material": {"young": 20e3, "poisson": 0.3},
         "fixed": [
