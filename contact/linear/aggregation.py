@@ -18,12 +18,6 @@ from contact.ranks import exchanged
 
 Integers = NDArray[np.integer[Any]]
 
-#: P = (I - w D^-1 K) P0, where w is this number over the largest eigenvalue of D^-1 K (as in GAMG).
-DAMPING = 1.4
-
-#: Steps of CG that estimate that eigenvalue (as in GAMG).
-STEPS = 10
-
 #: Parts in which a rank copies its rows: a copy of all takes as much memory as the matrix.
 PARTS = 8
 
@@ -235,12 +229,16 @@ def _restricted(modes: PETSc.NullSpace, tentative: PETSc.Mat) -> PETSc.NullSpace
 
 
 def _smoothed(matrix: PETSc.Mat, tentative: PETSc.Mat) -> tuple[Integers, Integers, Any]:
-    """Return the owned rows of P: starts, global columns, values. Destroys P0. Collective."""
+    """Return the owned rows of P = (I - w D^-1 K) P0: starts, global columns, values. Collective.
+
+    With w = 4/3 over the largest eigenvalue of D^-1 K (Vanek, Mandel and Brezina 1996). P0 is
+    destroyed.
+    """
     diagonal = matrix.getDiagonal()
     diagonal.reciprocal()
     made = matrix.matMult(tentative)
     made.diagonalScale(L=diagonal)
-    factor = -DAMPING / _largest_eigenvalue(matrix)
+    factor = -4 / (3 * _largest_eigenvalue(matrix))
     made.aypx(factor, tentative, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
     rows = made.getValuesCSR()
     # On several ranks Python would not free them before all come to it.
@@ -258,7 +256,8 @@ def _largest_eigenvalue(matrix: PETSc.Mat) -> float:
     ksp.setType("cg")
     ksp.getPC().setType("jacobi")
     ksp.setOperators(matrix)
-    ksp.setTolerances(rtol=1e-12, max_it=STEPS)
+    # As many steps as GAMG takes.
+    ksp.setTolerances(rtol=1e-12, max_it=10)
     ksp.setComputeEigenvalues(True)
     solution, rhs = matrix.createVecs()
     rhs.setRandom()

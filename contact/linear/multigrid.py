@@ -242,9 +242,6 @@ class StiffNodes:
         return vector
 
 
-#: Unknowns a rank from which on ranks make the next coarse level as well, in place of GAMG.
-MANY = 10_000
-
 #: Cost of renewing the coarse levels, in iterations (seen in `scripts.benchmarks.phases`).
 PRICE = 8
 
@@ -302,7 +299,8 @@ class Hierarchy:
             self._levels.append(Aggregation(matrix, found))
             squared = max(squared - 1, 0)
             named["pc_gamg_aggressive_coarsening"] = str(squared)
-            if self._levels[-1].interpolation.getSize()[1] <= MANY * matrix.comm.size:
+            # Of small matrices GAMG leaves some ranks without rows.
+            if self._levels[-1].interpolation.getSize()[1] <= LARGE[3, False] * matrix.comm.size:
                 break
             matrix = self._levels[-1].update()
         if not self._levels:
