@@ -55,6 +55,13 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
     asked for. `Domain.notes` and the log say so. Plane meshes may be stored in any plane
     z = const.
 
+    Parameters
+    ----------
+    comm
+        Communicator of the ranks of the mesh.
+    path
+        The file.
+
     Returns
     -------
     The mesh with its parts and regions.

@@ -220,6 +220,11 @@ def write_csv(
 def read_data(path: str | Path) -> dict[str, Array]:
     """Read measurements from a CSV file with a row of names.
 
+    Parameters
+    ----------
+    path
+        The file; columns are separated by commas, numbers have a decimal point.
+
     Returns
     -------
     Column -> values, shape (n,).

@@ -245,8 +245,12 @@ def test_every_public_name_has_its_place_in_the_reference() -> None:
     pages = "".join(page.read_text() for page in DOCS.glob("api-*.md"))
     listed = set(re.findall(r"^\.\. auto\w+:: (\S+)$", pages, re.M))
     members = set(re.findall(r"\w+", "".join(re.findall(r":members:(.*)$", pages, re.M))))
+    shown = [block for page in DOCS.glob("api-*.md") for block in blocks(page)]
+    code = "".join(block.text for block in shown if block.language == "python")
+    examples = set(re.findall(r"\w+", code))
     for name, (module, there) in contact._PUBLIC.items():
         assert f"{module}.{there}" in listed or there in members, name
+        assert name in examples, f"no example has {name}"
         made = getattr(contact, name)
         if inspect.isfunction(made) and made.__annotations__["return"] != "None":
             assert re.search(r"^ *(Returns|Yields)\n *-{6,7}$", made.__doc__ or "", re.M), name
