@@ -16,11 +16,11 @@
    stagnation: the active sets cycle. On the whole body it also ends after a first step whose
    penetration shows that c is far above the stiffness of the body, as on slender ones.
 
-Where a stage has ended without convergence and the supports constrain all rigid-body modes, the
-state with all nodes open is tried, by one linear solve. If it is no solution the fallbacks follow,
-in this order:
+Where steps on the condensed body have ended without convergence, those on the whole body follow.
+Then the state with all nodes open is tried, by one linear solve, where the supports constrain all
+rigid-body modes. If it is no solution the fallbacks follow, in this order:
 
-1. the condensed body in place of the whole one, or the whole in place of the condensed one;
+1. the condensed body, where the whole one has come first;
 2. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
    foundation (`continuation`);
 3. on a condensed body that the supports do not constrain, a rigid motion to a state in which

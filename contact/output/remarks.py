@@ -364,7 +364,7 @@ def sliding(solution: Solution) -> Iterator[Remark]:
     else:
         yield (
             f"several solutions may exist, and this is one reached from {solution.start}: {text}; "
-            "a mu that falls more slowly (a smaller rho) has fewer of them"
+            "a mu that falls more slowly with the slip has fewer of them"
         )
 
 
