@@ -61,3 +61,5 @@ def test_the_run_prints_what_is_shown(
         for text in (printed.out, shown[shown.index("converged") :])
     ]
     assert numbers[0] == pytest.approx(numbers[1], rel=1e-3)
+    errors = [float(re.findall(r"error ([\d.]+) %", text)[0]) for text in (printed.out, shown)]
+    assert errors[0] == pytest.approx(errors[1], rel=0.05)
