@@ -138,11 +138,12 @@ class SparseOperator:
         self.iterative = multigrid.is_chosen(kind, self.layout)
         self._split: BlockPreconditioner | None = None
         self._hierarchy: Hierarchy | None = None
+        self._modes: PETSc.NullSpace | None = None
         self._prefix = prefix
         if self.iterative and self.layout.coupled:
             self._split = BlockPreconditioner(self.ksp, self.layout, symmetric)
         elif self.iterative:
-            self.matrix.setNearNullSpace(held_motions(self.layout))
+            self._modes = held_motions(self.layout)
             multigrid.configure(self.ksp, symmetric)
         else:
             self.ksp.setType("preonly")
@@ -181,6 +182,9 @@ class SparseOperator:
         self._kind, self._blocks = kind, blocks.copy()
         if not same:
             self.bulk.assemble(self.matrix, kind, state)
+            if self._modes is not None:
+                # A matrix that others are copied into does not keep them.
+                self.matrix.setNearNullSpace(self._modes)
             balance(self.matrix, self.layout)
             self._own = nodal_blocks(self.matrix, nodes)
         rest, own = masked_blocks(*self.layout.at(nodes), blocks), self._own

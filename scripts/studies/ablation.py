@@ -233,6 +233,10 @@ def _unloaded() -> Case:
     return _named(parse_case(tables), "two-blocks-unloaded")
 
 
+def _plane() -> Case:
+    return _named(bench_one.problem_case(2, 256, "solver.nested=false"), "plane-256")
+
+
 def _steep() -> Case:
     return sweep.on_cells(
         next(case for _, case in sweep.problems(False, "bar-67")), "quadrilateral"
@@ -265,10 +269,11 @@ DEVICES = (
     Device("stagnation limit of the continuation", (), "-",
            ((newton, "CONTINUATION_LIMIT", None),), (), _conducting),
     Device("Anderson acceleration of chord steps", (chord.Chord.accelerated,),
-           "Walker and Ni 2011", ((chord.Chord, "accelerated", _unaccelerated),)),
+           "Walker and Ni 2011", ((chord.Chord, "accelerated", _unaccelerated),), (),
+           _large("piezo-8-2")),
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
            _block),
-    Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
+    Device("chord steps", (chord,), "Kelley 1995", (), (("keep", "never"),), _plane),
     Device("zero displacement where nothing acts", (stagnation.undeformed_equilibrium,), "-",
            ((newton.NewtonLoop, "_loss_of_contact", _nothing),), (), _unloaded),
     Device("no contact forces where supports hold a body", (Newton._without_forces,), "-",
@@ -300,8 +305,9 @@ def cases(coarse: bool, every: int, only: str | None) -> Iterator[Case]:
 def run(case: Case, options: NewtonOptions) -> tuple[Solution, float]:
     """Solve a problem; return the seconds of the processor too."""
     begin = time.process_time()
-    given = {"tolerance": case.solver.tolerance, "linear": case.solver.linear}
-    solution = solve(case, replace(options, **given))
+    given = {name: getattr(case.solver, name) for name in ("tolerance", "linear")}
+    nested = getattr(case.solver, "nested", None)
+    solution = solve(case, replace(options, nested=nested, **given))
     return solution, time.process_time() - begin
 
 
@@ -319,6 +325,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]
     problems = list(cases(given.coarse, given.every, given.only))
     own = {device.name: device.problem() for device in chosen if device.problem is not None}
+    for case in own.values():
+        run(case, NewtonOptions())  # loads its forms
     whole = {case.source: run(case, NewtonOptions()) for case in [*problems, *own.values()]}
     keys = ("device", "lines", "failed", "slow", "seconds", "problems that need it", "literature")
     rows: dict[str, list[Any]] = {key: [] for key in keys}

@@ -408,7 +408,7 @@ def cost(report: Report, coarse: bool) -> None:
     columns: dict[str, list[Any]] = {name: [] for name in (*names, "ratio to Hencky's")}
     for degree, cells in ((2, 8),) if coarse else ((2, 24), (1, 64)):
         mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [2 * cells, cells]}
-        for words, keep in (("few (chord steps)", "auto"), ("each iteration", "never")):
+        for words, keep in (("few (chord steps)", "within"), ("each iteration", "never")):
             settings, hencky_takes = replace(NewtonOptions(), keep=keep), np.nan
             for name, parameters in HARDENINGS.items():
                 given, law = ("j2", None) if parameters else ("linear", hencky(4e3))
