@@ -58,7 +58,7 @@ def build_problem(
     ------
     InputError
         If the case does not fit the mesh, a formula has no value at a node or a wrong sign,
-        or the body is not held.
+        or a rigid-body mode is not constrained.
     """
     with named(case.source):
         given = {"domain": domain, "law": law, "coefficient": coefficient, "friction": friction}

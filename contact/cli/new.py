@@ -86,11 +86,11 @@ file = {literal(name)}
 {parts}{within}# Regions: {regions}.
 
 {_space(domain)}{_materials(domain)}
-[[fixed]]                     # the part that lies highest; "free" for a component that is not held
+[[fixed]]                     # the part that lies highest; "free": no support in this direction
 {f"on = {literal(highest)}":<30}# or a list of parts
 displacement = {pressed}
 {_held(domain, lowest) if pairs else ""}
-# [[load]]                    # force on any part but those of contacts, spread evenly
+# [[load]]                    # a resultant on any part but those of contacts
 # on = {literal(highest)}
 # force = {_along(d, -1.0)}
 
@@ -119,7 +119,7 @@ def _materials(domain: Domain) -> str:
     apart = sum(counts) == domain.mesh.topology.index_map(domain.dim).size_global
     names = sorted(domain.regions) if apart and len(counts) > 1 else [""]
     more = """\
-# law = "log"                 # beyond this strain the material gives way:
+# law = "log"                 # Hencky's law, plastic beyond this strain:
 # yield_strain = 0.002
 """
     return "\n".join(

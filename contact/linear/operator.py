@@ -237,7 +237,7 @@ class SparseOperator:
         Raises
         ------
         InputError
-            If the operator is singular, for the body is not held, or its numbers overflow.
+            If the operator is singular, for a rigid-body mode is free, or its numbers overflow.
         """
         self._rhs.array[:] = self.layout.mask(rhs)
         if rtol is not None:
