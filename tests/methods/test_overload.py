@@ -55,7 +55,7 @@ def test_a_block_at_a_wall_is_held_or_not(dim):
     held, lost = (solve(wall(dim, part), comm=MPI.COMM_WORLD) for part in (0.99, 1.01))
     assert held.converged and not held.outcome.overloaded
     assert not lost.converged and lost.outcome.overloaded
-    assert lost.counters.linear_solves + lost.counters.contact_solves <= 130
+    assert lost.counters.linear_solves + lost.counters.contact_solves <= 140
     assert lost.outcome.reason.startswith("the friction of the pressures that were found does not")
     (said,) = [text for text in lost.warnings if "[not-held]" in text]
     assert f"friction cannot hold the body (translation along {'xyz'[dim - 1]})" in said
