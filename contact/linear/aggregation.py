@@ -156,8 +156,11 @@ class Aggregation:
         """Return some of this rank's rows of P."""
         return _scipy(rows_of(self.rows, rows))
 
-    def _thin(self) -> Iterator[sparse.csr_array]:
-        """Give the part of the product of columns of K that others own, in pieces. Collective."""
+    def _thin(self, pattern: bool = False) -> Iterator[sparse.csr_array]:
+        """Give the part of the product of columns of K that others own, in pieces. Collective.
+
+        For its pattern all entries count as ones: SciPy leaves out sums that are zero.
+        """
         to, sent = np.repeat(self._asking, self._counts), self._chosen(self._asked).data
         _, values = exchanged(self._comm, to, sent)
         starts, columns = self._theirs
@@ -169,6 +172,8 @@ class Aggregation:
         beside = _scipy(*self._matrix.createSubMatrices(*index))
         for part in np.array_split(np.arange(self._beside.size), PARTS):
             own = self._chosen(self._beside[part])
+            for factor in (own, beside, theirs) if pattern else ():
+                factor.data[:] = 1.0
             yield sparse.csr_array(own.T @ (beside[part] @ theirs))
 
     def update(self) -> PETSc.Mat:
@@ -177,9 +182,9 @@ class Aggregation:
         self._product = own
         if self._comm.size == 1:
             self.coarse = own
-        elif self.coarse is None:
-            self.coarse = self._summed()
         else:
+            if self.coarse is None:
+                self.coarse = self._empty()
             self.coarse.zeroEntries()
             for rows in np.array_split(np.arange(self._width), PARTS):
                 self._add(rows, _scipy(rows_of(own, rows)))
@@ -199,9 +204,9 @@ class Aggregation:
             rowmap=rows.astype(PETSc.IntType),
         )
 
-    def _summed(self) -> PETSc.Mat:
-        """Return the coarse operator, with a pattern for the sums to come. Collective."""
-        thin = sum(self._thin(), sparse.csr_array((self._width, self._width)))
+    def _empty(self) -> PETSc.Mat:
+        """Return a matrix with the pattern of the coarse operator. Collective."""
+        thin = sum(self._thin(pattern=True), sparse.csr_array((self._width, self._width)))
         thin.sort_indices()
         csr = thin.indptr.astype(PETSc.IntType), thin.indices.astype(PETSc.IntType), thin.data
         own = PETSc.Mat().createAIJ(thin.shape, bsize=self._bs, csr=csr, comm=PETSc.COMM_SELF)
