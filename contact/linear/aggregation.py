@@ -7,6 +7,7 @@ its transpose and all summands of P^T K P from one set-up to the next: more than
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -178,7 +179,8 @@ class Aggregation:
 
     def update(self) -> PETSc.Mat:
         """Return P^T K P of K and P as they are. Collective."""
-        own = self._matrix.getDiagonalBlock().ptap(self.rows, result=self._product)
+        with _without("matptap_via"):
+            own = self._matrix.getDiagonalBlock().ptap(self.rows, result=self._product)
         self._product = own
         if self._comm.size == 1:
             self.coarse = own
@@ -222,6 +224,19 @@ class Aggregation:
         whole.destroy()
         made.setLGMap(self._map, self._map)
         return made
+
+
+@contextmanager
+def _without(name: str) -> Iterator[None]:
+    """Hide an option of the user for a while: of a sequential matrix it has other values."""
+    known = PETSc.Options()
+    given = known.getString(name) if known.hasName(name) else None
+    known.delValue(name)
+    try:
+        yield
+    finally:
+        if given is not None:
+            known[name] = given
 
 
 def _restricted(modes: PETSc.NullSpace, tentative: PETSc.Mat) -> PETSc.NullSpace:

@@ -120,3 +120,19 @@ def test_multigrid_knows_rigid_motions_with_inclined_supports() -> None:
         found[kind] = operator.solve(problem.equilibrium.external())
     norm = problem.equilibrium.norm
     assert norm(found["iterative"] - found["lu"]) <= 1e-8 * norm(found["lu"])
+
+
+@pytest.mark.parallel
+def test_how_petsc_multiplies_on_several_ranks_is_no_matter_of_one() -> None:
+    """The option of the user stays, and was unknown to the product of one rank."""
+    known = PETSc.Options()
+    problem = mechanics.leaning_block(WORLD, 4)
+    _, level = level_of(problem)
+    expected = level.update().norm()
+    _, level = level_of(problem)
+    known["matptap_via"] = "nonscalable"
+    try:
+        assert abs(level.update().norm() - expected) <= 1e-12 * expected
+        assert known.getString("matptap_via") == "nonscalable"
+    finally:
+        known.delValue("matptap_via")
