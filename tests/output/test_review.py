@@ -159,7 +159,9 @@ def test_pressures_that_the_tolerance_leaves_open_are_warned_of() -> None:
         solver={"linear": "iterative"},
     )
     solution = solve(case)
-    off = np.abs(solution.pressure / 1e-10 - 1.0).max()
+    # In the norm in which residuals are told: single nodes are off by up to .005.
+    weight = solution.problem.nodes.weight
+    off = np.sqrt(weight @ (solution.pressure / 1e-10 - 1.0) ** 2 / weight.sum())
     assert solution.converged
     (said,) = [text for text in solution.warnings if "contact forces are known to" in text]
     assert 1e-4 < off < float(said.split("known to ")[1].split()[0])
