@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from contact.linear import multigrid
-from contact.linear.layout import Layout
+from contact.linear.layout import Layout, set_defaults
 from contact.linear.multigrid import rigid_motions
 
 #: Options of the displacement's block where the user gives none, under ``fieldsplit_u_``. The
@@ -66,10 +66,10 @@ class BlockPreconditioner:
         pc.setFieldSplitIS(("u", mechanical), ("phi", electric))
         pc.setFieldSplitType(PETSc.PC.CompositeType.ADDITIVE)
         prefix = ksp.getOptionsPrefix() or ""
-        multigrid.set_defaults(f"{prefix}fieldsplit_u_", MECHANICAL)
+        set_defaults(f"{prefix}fieldsplit_u_", MECHANICAL)
         hypre = PETSc.Sys.hasExternalPackage("hypre")
         electric_options = {"pc_type": "hypre"} if hypre else ELECTRIC
-        multigrid.set_defaults(f"{prefix}fieldsplit_phi_", electric_options)
+        set_defaults(f"{prefix}fieldsplit_phi_", electric_options)
 
     def set_goal(self, rhs: PETSc.Vec | None) -> None:
         """Let MINRES end where its residual is as small as from zero, for a right-hand side.

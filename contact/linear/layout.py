@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -188,15 +190,30 @@ def congruent(matrix: PETSc.Mat, basis: PETSc.Mat, result: PETSc.Mat | None = No
         The matrix of an earlier call with the same Q and a K of the same pattern, to be
         computed again; None for a new matrix.
     """
-    options = PETSc.Options()
-    chosen = matrix.comm.size > 1 and not options.hasName("matptap_via")
-    if chosen:
-        options["matptap_via"] = "allatonce_merged"
-    try:
+    via = {"matptap_via": "allatonce_merged"} if matrix.comm.size > 1 else {}
+    with options("", via):
         return matrix.ptap(basis, result=result)
+
+
+def set_defaults(prefix: str, values: Mapping[str, str]) -> None:
+    """Set options of PETSc under a prefix where the user gives none."""
+    options = PETSc.Options(prefix)
+    for name, value in values.items():
+        if not options.hasName(name):
+            options[name] = value
+
+
+@contextmanager
+def options(prefix: str, values: Mapping[str, str]) -> Iterator[None]:
+    """Have options of PETSc under a prefix for a while, where the user gives none."""
+    known = PETSc.Options(prefix)
+    own = [name for name in values if not known.hasName(name)]
+    set_defaults(prefix, values)
+    try:
+        yield
     finally:
-        if chosen:
-            options.delValue("matptap_via")
+        for name in own:
+            known.delValue(name)
 
 
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:

@@ -7,8 +7,6 @@ renewed when iterations say so (`Hierarchy`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from math import ceil, log10
 
 import numpy as np
@@ -20,7 +18,7 @@ from contact._compat import keeps_inverted_blocks
 from contact.linear.aggregation import AGGREGATES, Aggregation, rows_of, tentative
 from contact.linear.faults import petsc_options
 from contact.linear.krylov import Components, refine
-from contact.linear.layout import Layout
+from contact.linear.layout import Layout, options, set_defaults
 from contact.typing import Array
 
 #: Unknowns from which an iterative solver pays, by dimension and whether the body is piezoelectric
@@ -95,27 +93,6 @@ def iterate(ksp: PETSc.KSP, method: str) -> None:
     if method == "minres":
         set_defaults(ksp.getOptionsPrefix() or "", MINRES)
     ksp.setTolerances(rtol=TOLERANCE, max_it=500)
-
-
-def set_defaults(prefix: str, values: Mapping[str, str]) -> None:
-    """Set options of PETSc under a prefix where the user gives none."""
-    options = PETSc.Options(prefix)
-    for name, value in values.items():
-        if not options.hasName(name):
-            options[name] = value
-
-
-@contextmanager
-def options(prefix: str, values: Mapping[str, str]) -> Iterator[None]:
-    """Have options of PETSc under a prefix for a while, where the user gives none."""
-    known = PETSc.Options(prefix)
-    own = [name for name in values if not known.hasName(name)]
-    set_defaults(prefix, values)
-    try:
-        yield
-    finally:
-        for name in own:
-            known.delValue(name)
 
 
 def rigid_motions(layout: Layout) -> PETSc.NullSpace:

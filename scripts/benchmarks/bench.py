@@ -183,10 +183,10 @@ def against_getfem(bench: Bench) -> None:
         "Against GetFEM: Example 7.2 with a linear material, Example 7.1, and a block in 3-D",
         columns(rows),
         "*cells*: per unit length of the bar and the block, and on Hertz's half-width. Seconds "
-        "of the whole Newton solve, both warm; a run of GetFEM that took more than 150 s is "
-        "shown as inf. GetFEM has its integral contact brick, an augmented Lagrangian, r = E, "
-        "and a residual of 1e-10. Its contact integrals and the nodal multipliers of this code "
-        "are different discretisations of order h.",
+        "of the whole Newton solve, both warm; a run of GetFEM that took more than "
+        f"{TIMEOUT:.0f} s is shown as inf. GetFEM has its integral contact brick, an augmented "
+        "Lagrangian, r = E, and a residual of 1e-10. Its contact integrals and the nodal "
+        "multipliers of this code are different discretisations of order h.",
     )
     bench.script("peer_pair")
 

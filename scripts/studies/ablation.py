@@ -123,8 +123,9 @@ def _large(name: str, *changes: str) -> Callable[[], Case]:
     return lambda: load_case(CASES / f"{name}.toml", changes)
 
 
-def _lifted() -> Case:
-    return next(case for _, case in sweep.problems(False, "lifted-8", hard=True))
+def _of_sweep(name: str, hard: bool = False) -> Callable[[], Case]:
+    """Return how a problem of the sweeps is made."""
+    return lambda: next(case for _, case in sweep.problems(False, name, hard=hard))
 
 
 def _named(case: Case, name: str) -> Case:
@@ -210,10 +211,6 @@ def _pair() -> Case:
     return _named(parse_case(tables), "piezoelectric-pair")
 
 
-def _falling() -> Case:
-    return next(case for _, case in sweep.problems(False, "bar-80"))
-
-
 def _conducting() -> Case:
     changes = "solver.method=newton", "electric.k_e=6.0", "electric.delta=8.3333"
     return _named(case_of("compliance-8-4", (48, 8), *changes), "compliance-8-4 with k_e = 6")
@@ -238,9 +235,7 @@ def _plane() -> Case:
 
 
 def _steep() -> Case:
-    return sweep.on_cells(
-        next(case for _, case in sweep.problems(False, "bar-67")), "quadrilateral"
-    )
+    return sweep.on_cells(_of_sweep("bar-67")(), "quadrilateral")
 
 
 DEVICES = (
@@ -261,7 +256,8 @@ DEVICES = (
            "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "STAGNANT", 10**9),), (), _pair),
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
-    Device("limited softening", (), "-", (), (("softening", float("inf")),), _falling),
+    Device("limited softening", (), "-", (), (("softening", float("inf")),),
+           _of_sweep("bar-80")),
     Device("sliding nodes at their bound", (complementarity.at_bound,), "-",
            ((complementarity, "at_bound", lambda _, friction, *__: friction),), (), _steep),
     Device("derivative of the conductivity by the gap", (conductivity_derivative,), "-",
@@ -280,7 +276,7 @@ DEVICES = (
            ((Newton, "_without_forces", _nothing),)),
     Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
-           ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _lifted),
+           ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _of_sweep("lifted-8", hard=True)),
     Device("coarse levels kept from step to step", (multigrid.Hierarchy,),
            "Karlin, Manasse, Rudolph and Sleator 1988", ((multigrid, "PRICE", 0),), (), _block),
     Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",

@@ -11,7 +11,8 @@ from contact.body.description import Body, Fixed, Load
 from contact.interface.obstacle import Plane
 from contact.linear import aggregation
 from contact.linear.aggregation import Aggregation, tentative
-from contact.linear.multigrid import DEFAULTS, held_motions, options
+from contact.linear.layout import options
+from contact.linear.multigrid import DEFAULTS, held_motions
 from contact.linear.operator import SparseOperator
 from contact.mesh.grid import box
 from contact.problem.contact import Contact
