@@ -137,7 +137,7 @@ def below(section: type) -> dict[str, type]:
 
 def _or(known: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     """Return a schema that takes another kind of value too."""
-    described = {key: known[key] for key in ("description", "default") if key in known}
+    described: dict[str, Any] = {k: known[k] for k in ("description", "default") if k in known}
     kinds = known.get("anyOf") or [{k: v for k, v in known.items() if k not in described}]
     return {**described, "anyOf": [*kinds, other]}
 

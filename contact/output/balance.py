@@ -127,13 +127,13 @@ def balancing(body: BodyEquilibrium, residual: Array, unknown: NDArray[np.bool_]
         diagonal[:, ends] += (2.0 * coupled[:, facet] + outside[:, facet])[:, None]
     pairs = np.zeros((onto.shape[0], residual.shape[2]))
     pairs[sides.places] = coupled[:, :, None]
-    diagonal = diagonal.reshape(-1, residual.shape[2])
+    weight = diagonal.reshape(-1, residual.shape[2])
 
     def image(of_cells: Array) -> Array:
         """Return the moments into each cell of the differences of both sides."""
-        return np.asarray(diagonal * of_cells - back @ (pairs * sides.exchanged(onto @ of_cells)))
+        return np.asarray(weight * of_cells - back @ (pairs * sides.exchanged(onto @ of_cells)))
 
-    found = _solved(body.comm, image, residual.reshape(diagonal.shape)).reshape(residual.shape)
+    found = _solved(body.comm, image, residual.reshape(weight.shape)).reshape(residual.shape)
     own = found[:, corners]
     between = 2 * own - sides.sums(own)
     through = np.where(coupled[:, :, None], between, outside[:, :, None] * own)
