@@ -189,10 +189,10 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
     said = {
         f"after [{options.stagnation_limit}] steps in which": newton.PROGRESS == 0.5,
         f"after [{options.max_iterations}] steps;": True,
-        "is [10³] times all loads": complementarity_parameters.OVERESTIMATE == 1e3,
+        "is [10³] times\n   all loads": complementarity_parameters.OVERESTIMATE == 1e3,
         "limited to [1/4] κ": options.softening == 0.25,
         "10^4 \\max(c, \\kappa)": options.gamma == 1e4,
-        "below [1/10] of the largest residual": newton_step.SMALL == 0.1,
+        "below [1/10] of the\n   largest one": newton_step.SMALL == 0.1,
         "the forcing term [10⁻²]": newton_step.FORCING == 1e-2,
         "each three steps": newton_step.STAGNANT == 3,
         "[10^{-2}]\\,\\kappa$ is added": newton_step.REGULARISATION == 1e-2,
@@ -215,7 +215,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"at most [{multigrid.DIRECT:,}] unknowns": True,
         f"in 3-D from [{multigrid.LARGE[3, False]:,}] unknowns": True,
         f"a potential from [{multigrid.LARGE[3, True]:,}] on": True,
-        f"in 2-D from\n  [{multigrid.LARGE[2, False]:,}] on": True,
+        f"in 2-D from [{multigrid.LARGE[2, False]:,}] on": True,
         f"k is at most [{condensed.ALWAYS}]": True,
         f"less than [{condensed.DENSE_IS_FASTER:g}] sparse ones": True,
         f"is [{unconstrained_modes.STUCK:g}] times all loads": True,
@@ -231,14 +231,18 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"after [{penalty.Penalty.stagnation[0]}] iterations that do not reduce its": True,
         f"more than [{LARGEST_VIOLATION}] the run": penalty.Penalty.stagnation[1] == 0.99,
         "by [10 %]": fixed_point.FixedPoint.stagnation[1] == 0.9,
+        f"by more than [{LARGEST_VIOLATION}] of the largest displacement": True,
         "Below a residual of [10⁻²]": outer_loop.NEAR == 1e-2,
+        "the residual is below [10⁻²], friction": outer_loop.NEAR == 1e-2,
         "to [10⁻³], and each": nesting.COARSE_TOLERANCE == 1e-3,
         f"from [{nesting.MANY[3]:,}] unknowns on": True,
         f"[{nesting.MANY[2]:,}] on": True,
     }
     assert [words for words, holds in said.items() if words not in page or not holds] == []
-    for number in re.findall(r"\[[\d.,/⁰¹²³⁴⁵⁶⁷⁸⁹⁻ %to]+\](?!\()", page):
-        assert any(number in words for words in said), f"{number} has no row"
+    rows = [found.span() for words in said for found in re.finditer(re.escape(words), page)]
+    for number in re.finditer(r"\[[\d.,/⁰¹²³⁴⁵⁶⁷⁸⁹⁻ %to]+\](?!\()", page):
+        begin, end = number.span()
+        assert any(a <= begin and end <= b for a, b in rows), f"{number[0]} at {begin} has no row"
 
 
 def test_every_public_name_has_its_place_in_the_reference() -> None:
