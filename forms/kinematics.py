@@ -7,7 +7,6 @@ a piece of the mesh stands for, is stated by a `Kinematics`.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Protocol
@@ -169,42 +168,42 @@ class MeanDilatation:
 class MultilinearMean:
     """The same on quadrilaterals and hexahedra of degree 1: Q1-P0 with the pressure condensed.
 
-    All but `base` are functions: of UFL's own Jacobian no form can be differentiated.
+    The mean of tr grad u is a sum of weights times the displacements of the corners, and these are
+    sums over sets of axes of the cell: the derivative of u along the axes of the set, times the way
+    to the corner along each of them. All but `base` are functions: of UFL's own Jacobian no form
+    can be differentiated.
 
     Parameters
     ----------
     base
         The kinematics without the mean.
-    ways
-        From a point to the corners of the cell, in the coordinates of the reference cell, a row
-        each.
     jacobian
-        The derivatives of x by these coordinates.
-    weights
-        The mean of tr grad u as a sum over the displacements of the corners, a row each.
+        The derivatives of x by the coordinates of the reference cell.
+    moments
+        The sum over the corners of weights times ways from the point, a row for each set of
+        `axes_of`.
     """
 
     base: Kinematics
-    ways: Expr
     jacobian: Expr
-    weights: Expr
+    moments: Expr
 
     def gradient(self, u: Expr) -> Expr:
         """Return the displacement gradient with the mean of its trace."""
-        gradient = self.base.gradient(u)
-        corners, dim = self.ways.ufl_shape
-        # u of a corner is the sum over sets of axes of its derivatives along these, times the way.
-        sets = [axes for size in range(dim + 1) for axes in combinations(range(dim), size)]
+        gradient, dim = self.base.gradient(u), self.moments.ufl_shape[1]
         derivatives: dict[tuple[int, ...], Expr] = {(): u}
         mean = 0
-        for axes in sets:
+        for row, axes in enumerate(axes_of(dim)):
             if axes:
                 slope = ufl.as_vector([self.jacobian[i, axes[-1]] for i in range(dim)])
                 derivatives[axes] = ufl.dot(ufl.grad(derivatives[axes[:-1]]), slope)
-            ways = [math.prod(self.ways[a, i] for i in axes) for a in range(corners)]
-            moment = [sum(ways[a] * self.weights[a, i] for a in range(corners)) for i in range(dim)]
-            mean += ufl.dot(ufl.as_vector(moment), derivatives[axes])
+            mean += sum(self.moments[row, i] * derivatives[axes][i] for i in range(dim))
         return gradient + (mean - ufl.tr(gradient)) / 3 * ufl.Identity(3)
+
+
+def axes_of(dim: int) -> list[tuple[int, ...]]:
+    """Return all sets of axes, each behind those that are parts of it."""
+    return [axes for size in range(dim + 1) for axes in combinations(range(dim), size)]
 
 
 def _way(u: Expr, centroid: Expr) -> Expr:

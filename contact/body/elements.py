@@ -12,7 +12,14 @@ from contact.mesh.cells import Shape, rule, shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures
 from contact.typing import Array
-from forms.kinematics import Axisymmetric, Kinematics, MeanDilatation, MultilinearMean, Strained
+from forms.kinematics import (
+    Axisymmetric,
+    Kinematics,
+    MeanDilatation,
+    MultilinearMean,
+    Strained,
+    axes_of,
+)
 
 #: Elements by the names that the case file has for them.
 STANDARD, MEAN_DILATATION = ELEMENTS = ("standard", "mean_dilatation")
@@ -99,20 +106,26 @@ def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean
         functions = shape.lagrange(1, at)
         mean[..., 0] += (extent / (of[..., 0] @ functions.T)) @ functions
     mean /= extent.sum(axis=1)[:, None, None]
-    ways = np.broadcast_to(
-        corners - corners[:, None], (len(of), *corners.shape[:1], *corners.shape)
-    )
+    ways = corners - corners[:, None]
+    along = np.array([ways[..., axes].prod(axis=-1) for axes in axes_of(domain.dim)])
     return MultilinearMean(
         kinematics,
-        _in_cells(domain, 1, ways),
-        _in_cells(domain, 1, jacobians(shape, of, corners)),
-        _in_cells(domain, 0, mean[:, None]),
+        _in_cells(domain, jacobians(shape, of, corners)),
+        _in_cells(domain, np.einsum("spk,ckd->cpsd", along, mean)),
     )
 
 
-def _in_cells(domain: Domain, degree: int, values: Array) -> fem.Function:
-    """Return a discontinuous function with values at its nodes, (cells, nodes, ...). Collective."""
-    space = fem.functionspace(domain.mesh, ("DG", degree, values.shape[2:]))
+def _in_cells(domain: Domain, values: Array) -> fem.Function:
+    """Return a function that is linear along each axis of a cell by its corners. Collective.
+
+    Parameters
+    ----------
+    domain
+        The mesh.
+    values
+        At the corners, shape (cells, corners, ...).
+    """
+    space = fem.functionspace(domain.mesh, ("DG", 1, values.shape[2:]))
     made, dofs = fem.Function(space), space.dofmap.list[: len(values)]
     made.x.array.reshape(-1, space.dofmap.index_map_bs)[dofs] = values.reshape(*dofs.shape, -1)
     made.x.scatter_forward()
