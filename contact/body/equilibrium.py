@@ -457,12 +457,6 @@ class BodyEquilibrium:
         own, n = np.dot(one[: self.owned], other[: self.owned]), self.owned
         return float(summed(self.comm, own) + np.dot(one[n:], other[n:]))
 
-    def products(self, ones: Array, others: Array) -> Array:
-        """Return the inner products of columns of local values, as a matrix. Collective."""
-        n, behind = self.owned, ones.shape[0] - self.global_unknowns.size
-        own = summed(self.comm, ones[:n].T @ others[:n])
-        return np.asarray(own + ones[behind:].T @ others[behind:])
-
     def sizes(self, values: Array) -> Array:
         """Return the norms of forces, and of charges, of each component apart. Collective."""
         return self.component_norms.sizes(values)

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.chord import MOST_STEPS, Chord
 from contact.methods.conductivity_derivative import ConductivityDerivative
@@ -72,10 +71,8 @@ class CondensedStep:
         self.condensation, self.options, self.parameters = condensation, options, parameters
         self.counters, self.conductivity_derivative = counters, ConductivityDerivative()
         self._solve, self._history, self._fallbacks = solve, history, fallbacks
-        inner = condensation.full.equilibrium.products
-        self._chord = Chord(
-            options.tolerance, inner, MOST_STEPS if options.keep != "never" else 0.0
-        )
+        worth = MOST_STEPS if options.keep != "never" else 0.0
+        self._chord = Chord(options.tolerance, worth)
 
     def set_load_step(self, problem: ContactProblem, history: IterationHistory) -> None:
         """Go on with another step of the same problem."""
@@ -124,9 +121,7 @@ class CondensedStep:
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)
         if not body.linear:
-            new = self._chord.accelerated(state, new)
-            jump, mixed = self.condensation.full.interface.jump, new.forces
-            new = replace(new, forces=Multipliers.of(jump, mixed.pressure, mixed.friction))
+            self._chord.taken()
         notes = [record.note for record in history.records]
         taken = [word for word in self._fallbacks if any(word in note for note in notes)]
         note = ", ".join([*["chord step"] * keep, *taken])

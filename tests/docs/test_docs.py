@@ -200,7 +200,6 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         "has not fallen to [1/20]": condensed_step.UNSOLVED == 0.05,
         "below a residual of [0.05]": chord.RADIUS == 0.05,
         f"within [{chord.MOST_STEPS:g}] steps": True,
-        f"the last [{chord.DEPTH}] steps": True,
         f"at most [{interior_point.LIMIT}] times": True,
         f"at most [{interior_point.UPDATES}] times": True,
         "below [10⁻¹⁰] of the work": interior_point.CLOSED == 1e-10,

@@ -1,7 +1,5 @@
 """A factorisation that is kept while the material moves on."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -54,7 +52,7 @@ def test_loads_that_follow_each_other_need_hardly_any():
     fresh, _ = Newton(problem, NewtonOptions(tolerance=1e-10)).solve()
     assert np.allclose(start.x, fresh.x, rtol=0, atol=1e-8 * np.abs(fresh.x).max())
     assert method.counters.factorizations <= 4
-    assert max(solves[1:]) <= 10
+    assert max(solves[1:]) <= 11
 
 
 def test_a_solve_does_not_depend_on_those_before_unless_that_is_asked_for():
@@ -76,21 +74,13 @@ def test_a_body_that_flies_away_is_not_said_to_be_free():
     assert not outcome.converged
 
 
-class Body:
-    """Stands for increments that are all of one rank."""
-
-    @staticmethod
-    def products(ones, others):
-        return ones.T @ others
-
-
 def begun(reached: float) -> tuple[Chord, Iterate]:
     """Return the rule after one step with a new factorisation, which led to a residual."""
     state = yielding().start()
-    kept = Chord(1e-8, Body.products, 10.0)
+    kept = Chord(1e-8, 10.0)
     iterate, keep = kept.choose(Iterate(state), 1.0)
     assert not keep
-    kept.accelerated(state, replace(state, x=state.x + 1.0))
+    kept.taken()
     iterate, keep = kept.choose(Iterate(state), reached)
     assert keep
     return kept, iterate
@@ -108,19 +98,7 @@ def test_a_step_that_makes_things_worse_is_taken_back():
     assert again is iterate and not keep
 
 
-def test_the_acceleration_solves_what_is_linear_in_as_many_steps_as_there_are_rates():
-    """The fixed point x = a - D x has two rates: its third step is exact."""
-    state = yielding().start()
-    rates = np.where(np.arange(state.x.size) % 2, 0.3, 0.6)
-    goal = np.linspace(1.0, 2.0, state.x.size)
-    kept = Chord(1e-8, Body.products, 10.0)
-    for _ in range(3):
-        end = replace(state, x=goal + rates * (state.x - goal))
-        state = kept.accelerated(state, end)
-    assert np.allclose(state.x, goal, rtol=0, atol=1e-9)
-
-
-@pytest.mark.parametrize(("name", "solves"), [("yielding-0", 12), ("yielding-1", 14)])
+@pytest.mark.parametrize(("name", "solves"), [("yielding-0", 12), ("yielding-1", 15)])
 def test_steps_far_in_the_plastic_range_are_taken_whole(name, solves):
     """Strains of 8, and of 3e4; the method on the whole body agrees."""
     ((_, case),) = problems(False, name, True)

@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from contact.methods.chord import least_squares
 from contact.typing import Array
 
 #: Trial lengths of a Gauss-Newton step, between two points, and beyond the newest one.
@@ -151,3 +150,14 @@ class ResidualMinimiser:
         sizes = self._sizes(trials)
         level = (1 + 1e-6) * np.min(sizes)
         return trials[int(np.flatnonzero(sizes <= level)[-1])]
+
+
+def least_squares(gram: Array, load: Array) -> Array:
+    """Solve the normal equations of directions of length 1.
+
+    Combinations that change the residual less than a millionth of their length are left out:
+    they act by rounding, as where a body moves that touches nothing.
+    """
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > 1e-12
+    return vectors[:, kept] @ ((vectors[:, kept].T @ load) / values[kept])
