@@ -35,9 +35,9 @@ python3 -m contact solve CASE.toml --out DIR [--set path.to.key=value]... [PETSc
 ```
 
 `check` prints the case with all defaults, the parts of the mesh with area, centroid and normal, the
-volume of its regions, the number of unknowns, and the resultant of the loads. Each `--set` replaces
-a value of the file: its path is dotted, entries of lists are numbered from 0
-(`--set load.0.traction='[0, -0.05]'`), its value is TOML, and a bare word is a text.
+volume of its regions, the number of unknowns, and the resultant of the loads. `--set` replaces
+a value of the file. The names of nested keys are joined by dots, and entries of lists are numbered
+from 0 (`--set load.0.traction='[0, -0.05]'`). The value is TOML; a bare word is a text.
 
 Any consistent system of [units](model.md#units) may be used. An unknown key is an error.
 `contact schema` prints a JSON schema of the file, by which
@@ -145,8 +145,11 @@ def _default(field: FieldInfo) -> str:
 
 def _generators() -> Iterator[str]:
     yield from ("", "### Parametric mesh generators", "")
-    yield "Further values of `generator`, meshed by Gmsh. Their parameters are keys of `[mesh]`."
-    yield from ("", "| generator | body and parts | parameters and defaults |", "|---|---|---|")
+    yield (
+        "Further values of `generator`, meshed by Gmsh. Their parameters are keys of `[mesh]`. "
+        "`contact check` lists the parts that they name."
+    )
+    yield from ("", "| generator | body | parameters and defaults |", "|---|---|---|")
     for name, generator in meshes.GENERATORS.items():
         summary = " ".join((inspect.getdoc(generator) or "").split("\n\n")[0].split())
         defaults = ", ".join(f"`{k} = {v:g}`" for k, v in meshes.parameters(name).items())

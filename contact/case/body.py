@@ -132,7 +132,7 @@ class Elastic(Section):
     ) = None
     """Force per area and displacement along each axis: traction -k u."""
     normal: NonNegativeFormula | None = None
-    """The same along the normal of the part: it resists no motion in its plane."""
+    """The same along the normal of the part alone, which is free to move along itself."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

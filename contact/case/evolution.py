@@ -132,9 +132,9 @@ class Evolution(Section):
     """Number of equal steps in each stage."""
     amplitudes: dict[Text, Amplitude] = Field(default={})
     """Factors by name, for the key `amplitude` of `[[fixed]]`, `[[load]]`, `[electric]`,
-    `[contact.rigid]`, `[[rigid]]`, `[[electrode]]`. Without one the values of an entry grow from 0
-    to their size over the first stage, and are constant afterwards, unless one of them is a formula
-    in t. With `"constant"` they act from the beginning."""
+    `[contact.rigid]`, `[[rigid]]`, `[[electrode]]`, `[[bolt]]`. Without one the values of an entry
+    grow from 0 to their size over the first stage, and are constant afterwards, unless one of them
+    is a formula in t. With `"constant"` they act from the beginning."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

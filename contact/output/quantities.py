@@ -108,8 +108,8 @@ _RUN = (
     Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(
         "reactions", "force", "Force of the support of each part on the body, a vector per part. "
-        "A node of two parts counts for the first of them in the case. The sum with the loads and "
-        "minus `contact_force`, without forces between bodies, is zero.",
+        "A node of two parts counts for the first of them in the case. Their sum plus the loads "
+        "minus `contact_force` is zero, if forces between bodies are left out of the latter.",
         lambda r: {part: held.force for part, held in r.supports.items()}, component=_VECTOR,
     ),
     Quantity(
@@ -128,11 +128,11 @@ _RUN = (
     Quantity(
         "error", "",
         "Estimated discretisation error. `energy`: relative, in the energy norm; displacements "
-        "under given loads are off by about its square. `effectivity`: the estimate over the "
-        "error, `null` where that is not known. `intervals`: bounds of forces, of the largest "
-        "displacement and of the largest pressure, by the last three meshes of `[mesh.adapt]` with "
-        "`fraction = 1`; `null` for one that does not converge, such as a pressure at a corner. "
-        "All are `null` where the equations are not solved.",
+        "under given loads are off by about its square. `effectivity`: `null`, for it is the "
+        "estimate over the error, which a run does not know. `intervals`: bounds of forces, of the "
+        "largest displacement and of the largest pressure, by the last three meshes of "
+        "`[mesh.adapt]` with `fraction = 1`; `null` for one that does not converge, such as a "
+        "pressure at a corner. All are `null` where the equations are not solved.",
         lambda r: {
             "energy": _error(r), "effectivity": None, "intervals": r.intervals,
         }, component=_VECTOR, entries=ENDS,
@@ -170,7 +170,8 @@ _RUN = (
     ),
     Quantity(
         "max_von_mises", "stress",
-        "Largest von Mises stress, likewise. At sharp corners it grows with each refinement.",
+        "Largest von Mises stress over the cells (at degree 2 their nodes). At sharp corners it "
+        "grows with each refinement.",
         files=(SUMMARY, SWEEP),
     ),
     Quantity(
@@ -342,9 +343,9 @@ _NODES = (
     ),
     Quantity(
         "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. If "
-        "the foundation moves, all displacements here are relative to it. At degree 2 in 3-D "
-        "mid-edges have (u - (u₁ + u₂)/5)/(3/5), with u₁ and u₂ at the ends of the edge, and a gap "
-        "likewise: the pressure there acts against this displacement, not against u.",
+        "the foundation moves, all displacements here are relative to it. At degree 2 on "
+        "triangular facets it is (u - (u₁ + u₂)/5)/(3/5) at mid-edge nodes, with u₁ and u₂ at the "
+        "ends of the edge, and gaps likewise: the pressure there acts on it, not on u.",
         lambda n: n.normal_displacement, (NODES,),
     ),
     Quantity(

@@ -32,10 +32,10 @@ class Contact:
     friction, conductor
         Friction and electric contact; None: those that the problem has for all contacts.
     press
-        Whether the obstacle may cut the undeformed body, and presses it out.
+        Whether the obstacle may overlap the undeformed body; contact then removes the overlap.
     against
-        The part of another body that it may touch, instead of a foundation, whose gap is then
-        added to that between the bodies; None for a rigid one.
+        The part of another body that `on` may touch instead of a rigid foundation; the gap of
+        `foundation` is then added to that between the bodies. None for a foundation.
     gap
         The same as a gap for `foundation`, by its name in the case file.
 

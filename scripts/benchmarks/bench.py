@@ -86,7 +86,8 @@ def against_one_solve(bench: Bench) -> None:
         "Example 7.2 with Hencky's law and friction, and a block in 3-D, from a zero initial "
         "guess. *cold*: on the mesh itself alone. *as it chooses*: by way of coarser meshes where "
         "that is faster; their time counts. `one`: assembly, set-up and solve of linear "
-        "elasticity with the same solver.",
+        "elasticity with the same solver. The memory is the peak of the process, with the loaded "
+        "libraries and the linear solve.",
     )
     draw_ratios(bench.report, rows)
 

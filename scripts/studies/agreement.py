@@ -231,10 +231,11 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
             "agreement-branches",
             "Examples with several solutions, and who finds which",
             columns,
-            "*stick*, *slide*, *open*: numbers of contact nodes; then those in another state "
-            "than in solution A. *distance to A*: the largest relative difference. *residual*: "
-            "the largest, computed from scratch. *newton from it*, *uzawa from it*: how far each "
-            "method moves from the solution if it starts there. *disturbed*: the solution at "
+            "*stick*, *slide*, *open*: numbers of contact nodes; then the number of nodes "
+            "that are in another state than in solution A. *distance to A*: the largest relative "
+            "difference. *residual*: the largest, computed from scratch. *newton from it*, "
+            "*uzawa from it*: how far each method moves from the solution if it starts there. "
+            "*disturbed*: the solution at "
             f"which it ends if each node is disturbed by up to {DISTURBANCE:g} of its values. "
             "*nested*: Newton's method by way of coarser meshes; *eps*: the solution closest to "
             "the penalised one. With (7.16) mu falls from 0.6 to 0.5 as soon as a node slides by "

@@ -71,12 +71,12 @@ NOTE = (
     "Rings: Lame's solutions, an interference of 0.001 radii, and an inner pressure of 1. Hertz's "
     "cylinder: nodes within 0.7 a. All others: the body shrinks by 0.001 under hydrostatic "
     "pressure. Pressures have the errors of the gaps times E/h. At degree 2 gaps in the middle of "
-    "edges are those of curves fitted to the vertices, or to the gaps there. The triangles are "
-    "chords of the sphere, with a deviation of 5e-7, and cause the errors of their rows. "
-    "Triangles twice and four times as large have, at degree 1 and h = 0.1, the least and largest "
-    "ratios 0.966, 1.030 and 0.886, 1.106. Geometry: the degree of the cells' edges, straight or "
-    "of second order. Off: the share of the area, in per cent, whose nodes are off by more than "
-    "10 %."
+    "edges are those of curves fitted to the vertices, or to the gaps there. The "
+    "triangles of the rows *triangles* are chords of the sphere; their deviation of 5e-7 causes "
+    "the errors of these rows. With triangles twice and four times as large, the least and largest "
+    "ratios at degree 1 and h = 0.1 are 0.966, 1.030 and 0.886, 1.106. Geometry: the degree of "
+    "the cells' edges, straight or of second order. Off: the share of the "
+    "area, in per cent, whose nodes are off by more than 10 %."
 )
 
 #: Ratios and weights of the nodes, given a mesh size, a degree, and that of the geometry.

@@ -1,7 +1,7 @@
 """Derivatives beside closed forms and published values, and their cost.
 
 `python3 -m scripts.studies.derivative_values [--out DIR] [--coarse]`: exponents of indentation,
-the current through a column, the bar of Example 7.2; remainders of Taylor's series, transposed
+the charge of a column, the bar of Example 7.2; remainders of Taylor's series, transposed
 solves, and the cost beside that of a solution.
 """
 
@@ -143,7 +143,7 @@ def known(report: Report) -> None:
     slope = sensitivity(column, ["charge_foundation"], ["electric.k_e"])["charge_foundation"]
     sign = np.sign(slope["electric.k_e"])
     exact = top / (k * height / b + 1) ** 2
-    append(columns, "column", "d current/d k", sign * slope["electric.k_e"], exact)
+    append(columns, "column", "d charge/d k", sign * slope["electric.k_e"], exact)
     shown = {name: [f"{x:.9g}" if isinstance(x, float) else x for x in column]
              for name, column in columns.items()}  # fmt: skip
     report.table(

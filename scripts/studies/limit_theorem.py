@@ -88,7 +88,7 @@ def fixed_point_errors(
     Parameters
     ----------
     name
-        Case file; its layer and its current are taken from the previous iterate.
+        Case file; its layer and its charge are taken from the previous iterate.
     cells
         Of the mesh.
     changes
@@ -105,7 +105,7 @@ def fixed_point_errors(
 
 
 def with_layer(problem: ContactProblem, c: float, thickness: float = np.inf) -> ContactProblem:
-    """Return the problem without friction and current, on a layer that is touched at TOUCH.
+    """Return the problem without friction and charge, on a layer that is touched at TOUCH.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         label: fixed_point_errors(name, cells, changes)
         for label, (name, changes) in FIXED_POINTS.items()
     }
-    caption = "Theorems 6.4 and 6.5: errors of Algorithms 8 and 6, layer and current lagged"
+    caption = "Theorems 6.4 and 6.5: errors of Algorithms 8 and 6, layer and charge lagged"
     report.figure("figure-theorems-6-4-6-5", caption, draw_iterations(iterations), iterations)
 
     stiff = stiffness_limit(cells, stiffness)

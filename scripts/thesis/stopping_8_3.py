@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "The text of the thesis has 2 iterations of Algorithm 9, the inner loop, which (6.41) "
         "ends. Table 8.4, however, counts outer iterations. By (6.40) Algorithm 8 takes 2 outer "
         "iterations here, if inner loops are solved; the thesis's 2 is therefore compared with "
-        "outer iterations. Read literally the 2 is found as well, for the last inner loop. With r "
+        "outer iterations. The last inner loop takes 2 iterations too, as the text says. With r "
         "= 0.25 E and eps = 1e-5 that loop ends after 2 solves, as soon as the change of a solve "
         "is small, and leaves the rest to the outer loop. (6.40) requires a relative change of x "
         "= (u, phi) below eps_fp in L2(Omega). The thesis adds the numbers of u and phi, so that "

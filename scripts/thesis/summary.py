@@ -146,7 +146,7 @@ ROWS = (
         "Table 8.2",
         "iterations of Algorithm 4, Example 8.1",
         "tables_piezo",
-        "lagged charge contracts slowly; counts with an implicit charge are near the thesis's",
+        "slow with lagged charge; counts with an implicit charge are near the thesis's",
         "table-8-2.csv",
         "thesis",
         "Alg. 4, (3.46)",

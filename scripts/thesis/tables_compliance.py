@@ -44,7 +44,7 @@ NOTES = {
     "(column delta = 83.3; — : not met) they differ.",
     "-layer": "In the first rows the counts of Algorithm 6 are 1 above the thesis's; they do not "
     "fall below 4. The lagged layer takes so many iterations by itself, without "
-    "friction or current (Example 8.3 with a layer, next section). The column delta = "
+    "friction or charge (Example 8.3 with a layer, next section). The column delta = "
     "83.3 has a steep ramp of psi.",
 }
 
@@ -128,7 +128,7 @@ def table_8_4(
         f"table-8-4{suffix}",
         f"Table 8.4: iterations for mu = k_e, phi_F = 32, {topic}, {cells[0]} x {cells[1]} cells",
         columns,
-        "Alg. 6: layer and current lagged, inner solves to 2e-12; iterations to a relative "
+        "Alg. 6: layer and charge lagged, inner solves to 2e-12; iterations to a relative "
         "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: r = "
         "0.25 E and the thesis's rules in both loops (— : (3.46) is not met in 400 iterations), "
         "and the residual at the end. The inner rule ends after two solves, where the change of "
@@ -165,7 +165,7 @@ def examples(report: Report, cells: tuple[int, int]) -> None:
         columns,
         "The Uzawa block relaxation with layer and phi implicit, to residuals of 1e-8. The next "
         "section is on the thesis's two iterations of Example 8.3, which has neither friction nor "
-        "current. Nodes on the rigid part are those with a positive multiplier of the constraint.",
+        "charge. Nodes on the rigid part are those with a positive multiplier of the constraint.",
     )
 
 

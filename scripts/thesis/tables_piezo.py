@@ -109,10 +109,10 @@ def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
         "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: r = "
         "0.25 E and the thesis's rules in both loops; — where these are not met in 60 "
         "iterations. Implicit: phi of the charge is in the operator. Its steps are Kacanov's to "
-        "(3.46); to 1e-8 they are tangent steps near the solution. The lagged charge contracts "
-        f"slowly at k_e = 1 (see Theorem 5.2). {NOTES[number]} Newton: linear solves of the whole "
-        "body; at contact: Newton iterations on the condensed problem. Difference: of the "
-        "implicit and Newton's solutions, relative in all unknowns.",
+        "(3.46); to 1e-8 they are tangent steps near the solution. With the lagged charge the "
+        f"iteration contracts slowly at k_e = 1 (see Theorem 5.2). {NOTES[number]} Newton: linear "
+        "solves of the whole body; at contact: Newton iterations on the condensed problem. "
+        "Difference: of the implicit and Newton's solutions, relative in all unknowns.",
     )
 
 
