@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -92,7 +91,7 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
     return solution
 
 
-def missed(asked: Adapt, rows: Sequence[Mapping[str, Any]]) -> Iterator[Remark]:
+def missed(asked: Adapt, rows: Sequence[Mapping[str, float]]) -> Iterator[Remark]:
     """Say that the error that was asked for has not been reached."""
     error = rows[-1]["error"] if rows else 0.0
     if asked.error is not None and error > asked.error:

@@ -41,10 +41,16 @@ SAMPLES = np.logspace(-9, 3, 49, dtype=np.float64)
 PRESSURES = np.logspace(-6, 6, 13, dtype=np.float64)
 
 
-def expect(name: str, given: Any, accepted: str, fits: object) -> None:
+def expect(name: str, given: object, accepted: str, fits: object) -> None:
     """Raise an InputError that shows a value and the accepted ones in words, unless it fits."""
     if not fits:
         raise InputError(f"{name}: given {shorten(repr(given))}; accepted: {accepted}")
+
+
+def fill(made: object, **values: object) -> None:
+    """Set the attributes of a frozen object that is being made."""
+    for name, value in values.items():
+        object.__setattr__(made, name, value)
 
 
 def check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
@@ -70,7 +76,7 @@ def several(name: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...
     return every
 
 
-def is_law(given: Any) -> bool:
+def is_law(given: object) -> bool:
     """Tell whether an object has the constants of a law of the stress."""
     try:
         return all(np.isfinite(float(getattr(given, name))) for name in CONSTANTS)
@@ -191,7 +197,10 @@ def sampled(name: str, shape: tuple[int, ...], *calls: Callable[[], Any]) -> lis
 
 
 def check_slope(
-    name: str, function: Callable[[Array], Array], slope: Callable[[Array], Array], at: Array
+    name: str,
+    function: Callable[[Array], Array | float],
+    slope: Callable[[Array], Array | float],
+    at: Array,
 ) -> None:
     """Refuse a derivative that the differences of its function contradict.
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from mpi4py import MPI
 from scipy.spatial import cKDTree
 
-from contact.case.build import build_problem
+from contact.case.build import Replacements, build_problem
 from contact.case.file import Case
 from contact.case.mesh import Mesh
 from contact.errors import InputError
@@ -54,7 +54,9 @@ def pays(case: Case, problem: ContactProblem) -> bool:
     return slow and enough and case.evolution is None and has_coarser(case)
 
 
-def nested_start(case: Case, problem: ContactProblem, **replacements: Any) -> State:
+def nested_start(
+    case: Case, problem: ContactProblem, **replacements: Unpack[Replacements]
+) -> State:
     """Solve on all coarser meshes, each from the one before, and carry that to a problem's.
 
     Collective.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, TypeAlias
 
 from annotated_types import Ge, Gt, Le, Len, Lt, Predicate
 
@@ -42,7 +42,7 @@ class ReadWith:
     value: str | bool | tuple[str, ...] | None = None
     required: bool = False
 
-    def met(self, value: Any) -> bool:
+    def met(self, value: object) -> bool:
         """Tell whether a value of the other setting is one of these."""
         if self.value is None:
             return value is not None

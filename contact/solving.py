@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from mpi4py import MPI
@@ -21,7 +21,13 @@ from mpi4py import MPI
 from contact._compat import destroy_unused
 from contact.adapting import adapted
 from contact.arguments import expect
-from contact.case.build import REPLACEMENTS, build_problem, named, replaced_by
+from contact.case.build import (
+    REPLACEMENTS,
+    Replacements,
+    build_problem,
+    named,
+    replaced_by,
+)
 from contact.case.digest import check_restart, digest
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
@@ -114,7 +120,7 @@ def solve(
     restart: str | Path | None = None,
     start: State | Solution | None = None,
     times: Sequence[float] | None = None,
-    **replacements: Any,
+    **replacements: Unpack[Replacements],
 ) -> Solution:
     """Build and solve a case, in load steps where it has them. Collective.
 
@@ -138,7 +144,8 @@ def solve(
         For a problem: the ends of load steps, as in `evolve`. The solution's `steps` have the
         results of each.
     replacements
-        Objects that take the place of parts of the case; see `build.build_problem`.
+        Objects that take the place of parts of the case: `domain`, `law`, `coefficient`,
+        `friction`, `foundation`, `layer`; see `build_problem`.
 
     Returns
     -------
@@ -148,8 +155,9 @@ def solve(
     Raises
     ------
     InputError
-        If the case does not fit its mesh, a rigid-body mode is not constrained, or an argument
-        is given that would be ignored.
+        If the case does not fit its mesh, a rigid-body mode is not constrained, the potential is
+        not determined, a linear system is singular, or an argument is none of these or would be
+        ignored.
     SolveInterrupted
         After a SIGINT or SIGTERM, with the last iterate; a second signal ends the program.
     """
@@ -198,9 +206,11 @@ def solve(
         problem: ContactProblem,
         start: State | None = None,
         reviewed: bool = True,
-        **schedule: Any,
+        guess: str = GIVEN,
+        kept: Sequence[StepRecord] = (),
+        keep: Callable[[StepRecord], None] | None = None,
     ) -> Solution:
-        planned = Schedule(ends, begin, start, **schedule)
+        planned = Schedule(ends, begin, start, guess, kept, keep)
         return run_schedule(problem, settings, monitor, planned, reviewed)
 
     problem = None if adapt else build_problem(case, comm, **replacements)
@@ -269,8 +279,8 @@ def evolve(
     Raises
     ------
     InputError
-        If times do not increase, loads and supports contradict each other or leave a rigid-body
-        mode unconstrained, or a linear system is singular.
+        If an argument is none of these, times do not increase, loads and supports contradict each
+        other or leave a rigid-body mode unconstrained, or a linear system is singular.
     NotConvergedError
         If a step fails; the states before have been given.
     """
@@ -409,7 +419,7 @@ def _uninterrupted(solution: Solution) -> Solution:
     return solution
 
 
-def _refuse(given: Mapping[str, Any], beside: str) -> None:
+def _refuse(given: Mapping[str, object], beside: str) -> None:
     """Refuse arguments that would be ignored."""
     for name, value in given.items():
         if value is not None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 import ufl
@@ -43,10 +43,10 @@ class Hencky(Protocol):
         """Initial shear modulus mu1 = E / (2 + 2 nu), equation (7.9)."""
 
     def secant_modulus(self, q: Value) -> Value:
-        """Return g at q = |dev eps|^2."""
+        """Return g (stress) at q = |dev eps|^2, a number, an array or a UFL expression."""
 
     def shear_energy(self, q: Value) -> Value:
-        """Return int_0^t 2 g(s) s ds with t = sqrt(q)."""
+        """Return int_0^t 2 g(s) s ds with t = sqrt(q) (energy/volume), likewise."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,20 @@ class Isotropic:
 
 @dataclass(frozen=True)
 class Linear(Isotropic):
-    """Linear isotropic elasticity: g = mu1."""
+    """Linear isotropic elasticity: g = mu1.
+
+    Parameters
+    ----------
+    young
+        Young's modulus E > 0 (stress).
+    poisson
+        Poisson's ratio, -1 < nu < 1/2.
+
+    Examples
+    --------
+    >>> round(Linear(young=210e3, poisson=0.3).bulk)
+    175000
+    """
 
     def secant_modulus(self, q: Value) -> Value:
         """Return g = mu1, whatever the strain."""
@@ -95,7 +108,7 @@ class Log(Isotropic):
     Parameters
     ----------
     young, poisson
-        Elastic constants.
+        Elastic constants: E > 0 (stress), -1 < nu < 1/2.
     yield_strain
         The limit xi_0 > 0 (no unit).
     argument
@@ -111,7 +124,7 @@ class Log(Isotropic):
     """
 
     yield_strain: float = field(kw_only=True)
-    argument: str = field(default="norm", kw_only=True)
+    argument: Literal["norm", "square"] = field(default="norm", kw_only=True)
     g_min: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -181,9 +194,10 @@ class UserLaw(Isotropic):
     Parameters
     ----------
     young, poisson
-        Elastic constants of small strains; g should tend to mu1 = E/(2+2 nu) at t = 0.
+        Elastic constants of small strains (stress, no unit); g should tend to mu1 = E/(2+2 nu) at
+        t = 0.
     modulus
-        The function g(t); it must accept UFL expressions and NumPy arrays.
+        The function g(t) (stress); it must accept UFL expressions and NumPy arrays.
 
     Raises
     ------

@@ -6,18 +6,22 @@ variational forms and on arrays of nodal values.
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import ufl
+from numpy.typing import NDArray
 from ufl.algebra import Abs
 from ufl.core.expr import Expr
 
 #: A number, a NumPy array or a UFL expression.
-Value: TypeAlias = Any
+Value: TypeAlias = float | NDArray[np.float64] | Expr
+
+#: A condition on one, true or false at each of its places.
+Condition: TypeAlias = bool | NDArray[np.bool_] | Expr
 
 
-def is_symbolic(*values: Value) -> bool:
+def is_symbolic(*values: Value | Condition) -> bool:
     """Tell whether any of the values is a UFL expression."""
     return any(isinstance(value, Expr) for value in values)
 
@@ -52,34 +56,34 @@ def positive_part(a: Value) -> Value:
     return maximum(a, 0.0)
 
 
-def where(condition: Value, a: Value, b: Value) -> Value:
+def where(condition: Condition, a: Value, b: Value) -> Value:
     """Choose ``a`` where the condition holds and ``b`` elsewhere, pointwise."""
     if is_symbolic(condition, a, b) or isinstance(condition, ufl.classes.Condition):
         return ufl.conditional(condition, a, b)
     return np.where(condition, a, b)
 
 
-def less_equal(a: Value, b: Value) -> Value:
+def less_equal(a: Value, b: Value) -> Condition:
     """Return the condition a <= b."""
     return ufl.le(a, b) if is_symbolic(a, b) else np.less_equal(a, b)
 
 
-def less(a: Value, b: Value) -> Value:
+def less(a: Value, b: Value) -> Condition:
     """Return the condition a < b."""
     return ufl.lt(a, b) if is_symbolic(a, b) else np.less(a, b)
 
 
-def equal(a: Value, b: Value) -> Value:
+def equal(a: Value, b: Value) -> Condition:
     """Return the condition a == b."""
     return ufl.eq(a, b) if is_symbolic(a, b) else np.equal(a, b)
 
 
-def not_equal(a: Value, b: Value) -> Value:
+def not_equal(a: Value, b: Value) -> Condition:
     """Return the condition a != b."""
     return ufl.ne(a, b) if is_symbolic(a, b) else np.not_equal(a, b)
 
 
-def both(a: Value, b: Value) -> Value:
+def both(a: Condition, b: Condition) -> Condition:
     """Return the condition that two conditions hold together."""
     return ufl.And(a, b) if is_symbolic(a, b) else np.logical_and(a, b)
 

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import InitVar, dataclass, replace
-from dataclasses import field as default
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import TypeVar, cast
 
 import numpy as np
 from dolfinx.fem import Function
-from ufl.core.expr import Expr
 
-from contact.arguments import CONSTANTS, expect, is_law, several
+from contact.arguments import CONSTANTS, expect, fill, is_law, several
 from contact.body.fields import (
     Amplitude,
-    Given,
+    Field,
+    FreeVector,
+    GivenAmplitude,
     Moving,
     Number,
+    Scalar,
+    Static,
+    Vector,
     amplitude_of,
     field,
     knows_time,
@@ -34,21 +37,13 @@ from forms.history import HistoryLaw
 from forms.piezo import Piezo
 from forms.plane_stress import PlaneStressElastic, PlaneStressHistory, in_plane_stress
 
+T = TypeVar("T")
+
 #: For scripts that are older than the meaning of the word.
 CHANGED = (
     "Load(force=...) is the resultant, spread evenly over the part; the force per area, which it "
     "was in scripts from before the first release, is traction=..."
 )
-
-
-class Field(Protocol):
-    """A given function of position, for instance `contact.case.formula.Expression`."""
-
-    def ufl(self, x: Expr) -> Expr:
-        """Return the function as a UFL expression of the coordinates."""
-
-    def numpy(self, points: Array) -> Array:
-        """Return the values at points of shape (n, d)."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +55,9 @@ class Fixed:
     on
         Name of the part, or a list of names.
     displacement
-        A list with one value per component, each as `fields.field` takes it: a number, a function
-        of x, UFL, a dolfinx Function; None or "free" leaves a component free. Or one UFL
-        expression or Function of vectors.
+        A list with one value per component (length), each as `fields.field` takes it: a number, a
+        function of x, UFL (`ufl.core.expr.Expr`), a `dolfinx.fem.Function`; None or "free" leaves a
+        component free. Or one UFL expression or Function of vectors.
     potential
         Of a piezoelectric body, likewise; None leaves it free.
     normal
@@ -76,23 +71,38 @@ class Fixed:
     Raises
     ------
     InputError
-        If a value is nothing of these.
+        If a value is nothing of these, nothing is prescribed, or both a displacement and a normal
+        one are.
+
+    Examples
+    --------
+    >>> Fixed("left", [0.0, "free"]).on
+    'left'
     """
 
-    on: Given
-    displacement: Given = None
-    potential: Given = None
-    amplitude: Amplitude | None = None
-    normal: Given = default(default=None, kw_only=True)
+    on: str
+    displacement: tuple[Field | Moving | None, ...] | None
+    potential: Field | Moving | None
+    amplitude: Amplitude | None
+    normal: Field | Moving | None
 
-    def __post_init__(self) -> None:
-        """Make fields of the given values."""
-        object.__setattr__(self, "on", part(self.on))
-        object.__setattr__(self, "displacement", vector(self.displacement, free=True))
-        object.__setattr__(self, "normal", field(self.normal))
-        object.__setattr__(self, "potential", field(self.potential))
-        amplitude = own_amplitude(f"Fixed on {self.on!r}", self.amplitude)
-        object.__setattr__(self, "amplitude", amplitude)
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        displacement: FreeVector | None = None,
+        potential: Scalar | None = None,
+        amplitude: GivenAmplitude | None = None,
+        *,
+        normal: Scalar | None = None,
+    ) -> None:
+        fill(
+            self,
+            on=part(on),
+            displacement=vector(displacement, free=True),
+            normal=field(normal),
+            potential=field(potential),
+        )
+        fill(self, amplitude=own_amplitude(f"Fixed on {self.on!r}", amplitude))
         if all(value is None for value in self.given.values()):
             raise InputError(
                 f"Fixed on {self.on!r}: nothing is prescribed; accepted: a displacement with a "
@@ -105,7 +115,7 @@ class Fixed:
             )
 
     @property
-    def given(self) -> dict[str, Given]:
+    def given(self) -> dict[str, Field | Moving | None]:
         """All that may be prescribed, by key; None where free."""
         found = {f"displacement.{k}": value for k, value in enumerate(self.displacement or ())}
         return found | {"normal": self.normal, "potential": self.potential}
@@ -116,12 +126,32 @@ class Fixed:
         return amplitude_of(self.amplitude, knows_time([*self.given.values()]))
 
 
+def _resultant(
+    force: Sequence[float | Moving] | Array | None,
+) -> tuple[Number | Moving, ...] | None:
+    """Return the components of the resultant of a load, which have no place."""
+    found = vector(force)
+    for component in found or ():
+        accepted = "numbers, the resultant of the part; traction=... is per area, and may vary"
+        expect("Load: force", force, accepted, isinstance(component, Number | Moving))
+    if found is not None:
+        warnings.warn(CHANGED, FutureWarning, stacklevel=3)
+    return cast(tuple[Number | Moving, ...] | None, found)
+
+
+def _one_of(**given: T | None) -> T | None:
+    """Return which of several names for the same is given."""
+    names = [name for name, value in given.items() if value is not None]
+    expect("Load", names, f"one of {', '.join(given)}", len(names) < 2)
+    return given[names[0]] if names else None
+
+
 @dataclass(frozen=True)
 class Load:
     """Given forces and charges: on a part, or in the whole body where `on` is None.
 
-    Each value is a number, a function of x, UFL or a dolfinx Function, as `fields.field` takes
-    it.
+    Each value is a number, a function of x, UFL (`ufl.core.expr.Expr`) or a `dolfinx.fem.Function`,
+    as `fields.field` takes it.
 
     Parameters
     ----------
@@ -132,7 +162,8 @@ class Load:
     pressure
         Pressure against the outward normal of the part (force/area).
     charge
-        Surface charge q_2 = D.nu on a part, body charge q_0 in the body.
+        Surface charge q_2 = D.nu on a part (charge/area), body charge q_0 in the body
+        (charge/volume).
     amplitude
         Function of time that multiplies all of them, as of `Fixed`.
     traction, body_force, body_charge
@@ -147,66 +178,59 @@ class Load:
         If nothing is given, or a load that does not act there.
     """
 
-    on: Given = None
-    density: Given = None
-    pressure: Given = None
-    charge: Given = None
-    amplitude: Amplitude | None = None
-    traction: InitVar[Given] = None
-    body_force: InitVar[Given] = None
-    body_charge: InitVar[Given] = None
-    force: Given = default(default=None, kw_only=True)
+    on: str | None
+    density: tuple[Field | Moving, ...] | None
+    pressure: Field | Moving | None
+    charge: Field | Moving | None
+    amplitude: Amplitude | None
+    force: tuple[Number | Moving, ...] | None
 
-    def __post_init__(self, traction: Given, body_force: Given, body_charge: Given) -> None:
-        """Make fields of the given values."""
-        object.__setattr__(self, "on", None if self.on is None else part(self.on))
+    def __init__(
+        self,
+        on: str | Sequence[str] | None = None,
+        density: Vector | None = None,
+        pressure: Scalar | None = None,
+        charge: Scalar | None = None,
+        amplitude: GivenAmplitude | None = None,
+        traction: Vector | None = None,
+        body_force: Vector | None = None,
+        body_charge: Scalar | None = None,
+        *,
+        force: Sequence[float | Moving] | Array | None = None,
+    ) -> None:
+        fill(self, on=None if on is None else part(on))
         inside = self.on is None
-        density = self._one(density=self.density, traction=traction, body_force=body_force)
-        charge = self._one(charge=self.charge, body_charge=body_charge)
+        density = _one_of(density=density, traction=traction, body_force=body_force)
+        charge = _one_of(charge=charge, body_charge=body_charge)
         for name, given, fits in (
             ("traction", traction, not inside),
-            ("pressure", self.pressure, not inside),
-            ("force", self.force, not inside),
+            ("pressure", pressure, not inside),
+            ("force", force, not inside),
             ("body_force", body_force, inside),
             ("body_charge", body_charge, inside),
         ):
             accepted = "it in the whole body, on=None" if not inside else "it on a part"
             expect(f"Load: {name}", given, accepted, given is None or fits)
-        object.__setattr__(self, "density", vector(density))
-        object.__setattr__(self, "force", self._resultant())
-        object.__setattr__(self, "pressure", field(self.pressure))
-        object.__setattr__(self, "charge", field(charge))
-        object.__setattr__(
-            self, "amplitude", own_amplitude(f"Load on {self.on or 'the body'!r}", self.amplitude)
+        fill(
+            self,
+            density=vector(density),
+            force=_resultant(force),
+            pressure=field(pressure),
+            charge=field(charge),
+            amplitude=own_amplitude(f"Load on {self.on or 'the body'!r}", amplitude),
         )
         if not self.named:
             raise InputError(
                 "Load: nothing is given; accepted: force, traction, pressure or charge"
             )
 
-    def _resultant(self) -> tuple[Any, ...] | None:
-        """Return the components of the resultant, which have no place."""
-        found = vector(self.force)
-        for component in found or ():
-            accepted = "numbers, the resultant of the part; traction=... is per area, and may vary"
-            expect("Load: force", self.force, accepted, isinstance(component, Number | Moving))
-        if found is not None:
-            warnings.warn(CHANGED, FutureWarning, stacklevel=4)
-        return found
-
-    @staticmethod
-    def _one(**given: Given) -> Given:
-        """Return which of several names for the same is given."""
-        names = [name for name, value in given.items() if value is not None]
-        expect("Load", names, f"one of {', '.join(given)}", len(names) < 2)
-        return given[names[0]] if names else None
-
     @property
     def named(self) -> dict[str, Field | Moving]:
         """All that is given, by the keys that the case file has for it."""
         inside = self.on is None
         density, charge = ("body_force", "body_charge") if inside else ("traction", "charge")
-        given = {f"{density}.{i}": component for i, component in enumerate(self.density or ())}
+        given: dict[str, Field | Moving | None] = {}
+        given |= {f"{density}.{i}": component for i, component in enumerate(self.density or ())}
         given |= {f"force.{i}": component for i, component in enumerate(self.force or ())}
         given |= {"pressure": self.pressure, charge: self.charge}
         return {name: field for name, field in given.items() if field is not None}
@@ -236,15 +260,17 @@ class Elastic:
         If nothing is given, or something else.
     """
 
-    on: Given
-    stiffness: Given = None
-    normal: Given = None
+    on: str
+    stiffness: tuple[Field | Moving, ...] | None
+    normal: Field | Moving | None
 
-    def __post_init__(self) -> None:
-        """Make fields of the given values."""
-        object.__setattr__(self, "on", part(self.on))
-        object.__setattr__(self, "stiffness", vector(self.stiffness))
-        object.__setattr__(self, "normal", field(self.normal))
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        stiffness: Vector | None = None,
+        normal: Scalar | None = None,
+    ) -> None:
+        fill(self, on=part(on), stiffness=vector(stiffness), normal=field(normal))
         if self.stiffness is None and self.normal is None:
             raise InputError(
                 f"Elastic on {self.on!r}: nothing is given; accepted: stiffness or normal"
@@ -255,10 +281,10 @@ class Elastic:
 class Material:
     """A material and where it is.
 
-    Attributes
+    Parameters
     ----------
     law
-        Law of the stress.
+        Law of the stress: `Linear`, `Log`, `UserLaw`, `J2`, or an object like these.
     piezo
         Piezoelectric tensors in the body's axes, or None.
     on
@@ -267,19 +293,30 @@ class Material:
         A function of position > 0 that its stresses are multiplied by, as `fields.field` takes it
         (no unit): Young's modulus as a field, of which the law has a mean. A Function is copied.
         None for 1.
+
+    Raises
+    ------
+    InputError
+        If an argument is nothing of these, or a factor is given with coupling, internal variables
+        or a time.
     """
 
     law: Law
-    piezo: Piezo | None = None
-    on: Given = ()
-    factor: Given = None
+    piezo: Piezo | None
+    on: tuple[str, ...]
+    factor: Field | None
 
-    def __post_init__(self) -> None:
-        """Refuse anything but materials."""
-        factor = self.factor.copy() if isinstance(self.factor, Function) else self.factor
-        object.__setattr__(self, "factor", field(factor))
-        names = several("on", self.on, str, "the name of a region, or a list of names")
-        object.__setattr__(self, "on", names)
+    def __init__(
+        self,
+        law: Law,
+        piezo: Piezo | None = None,
+        on: str | Sequence[str] = (),
+        factor: Static | None = None,
+    ) -> None:
+        fill(self, law=law, piezo=piezo)
+        factor = factor.copy() if isinstance(factor, Function) else factor
+        names = several("on", on, str, "the name of a region, or a list of names")
+        fill(self, factor=field(factor), on=names)
         accepted = (
             "Linear(young, poisson), Log, UserLaw, forms.elasticity.Anisotropic(stiffness), of a "
             "crystal in 2-D with .in_plane(), or an object with the numbers "
@@ -324,13 +361,13 @@ def _leading(materials: Sequence[Material]) -> tuple[Law, Piezo | None]:
 class Body:
     """A body, or several: materials, supports and loads.
 
-    Attributes
+    Parameters
     ----------
     law
         Law of the stress, a `Material`, or several of them with their regions; the attribute is
         then the law of the softest one, which determines the scales of the problem.
     fixed, loads
-        Supports and loads, one or several.
+        Supports and loads, one or several; the attributes are tuples, as those below.
     piezo
         Piezoelectric tensors in the body's axes, or None; of several materials those of the first
         that has some, whose permittivity determines the unit of the potential.
@@ -342,43 +379,58 @@ class Body:
         Elastic supports.
     bolts
         Cuts whose sides are drawn together.
+
+    Raises
+    ------
+    InputError
+        If something else is given, a law beside several materials, a bolt in a body with internal
+        variables, or an electrode on one without coupling.
     """
 
-    law: Given
-    fixed: Sequence[Fixed]
-    loads: Sequence[Load] = default(default_factory=tuple)
-    piezo: Piezo | None = None
-    regions: tuple[Material, ...] = ()
-    rigid: tuple[Rigid, ...] = ()
-    electrodes: tuple[Electrode, ...] = ()
-    elastic: Sequence[Elastic] = default(default_factory=tuple)
-    bolts: tuple[Bolt, ...] = ()
+    law: Law
+    fixed: tuple[Fixed, ...]
+    loads: tuple[Load, ...]
+    piezo: Piezo | None
+    regions: tuple[Material, ...]
+    rigid: tuple[Rigid, ...]
+    electrodes: tuple[Electrode, ...]
+    elastic: tuple[Elastic, ...]
+    bolts: tuple[Bolt, ...]
 
-    def __post_init__(self) -> None:
-        """Refuse other arguments; accept one support or one load without a list."""
-        if isinstance(self.law, Material | list | tuple):
+    def __init__(
+        self,
+        law: Law | Material | Sequence[Material],
+        fixed: Fixed | Sequence[Fixed],
+        loads: Load | Sequence[Load] = (),
+        piezo: Piezo | None = None,
+        regions: Material | Sequence[Material] = (),
+        rigid: Rigid | Sequence[Rigid] = (),
+        electrodes: Electrode | Sequence[Electrode] = (),
+        elastic: Elastic | Sequence[Elastic] = (),
+        bolts: Bolt | Sequence[Bolt] = (),
+    ) -> None:
+        if isinstance(law, Material | list | tuple):
             accepted = "a law, Material(...), or a list of materials"
-            given = several("law", self.law, Material, accepted)
-            expect("law", self.law, accepted, given and self.piezo is None and not self.regions)
-            law, piezo = _leading(given)
-            for name, value in (("law", law), ("piezo", piezo), ("regions", given)):
-                object.__setattr__(self, name, value)
+            given = several("law", law, Material, accepted)
+            expect("law", law, accepted, given and piezo is None and not regions)
+            (law, piezo), regions = _leading(given), given
+        fill(self, law=law, piezo=piezo)
         Material(self.law, self.piezo)
-        for name, kind in (
-            ("fixed", Fixed),
-            ("loads", Load),
-            ("regions", Material),
-            ("rigid", Rigid),
-            ("electrodes", Electrode),
-            ("elastic", Elastic),
-            ("bolts", Bolt),
+        for name, every, kind in (
+            ("fixed", fixed, Fixed),
+            ("loads", loads, Load),
+            ("regions", regions, Material),
+            ("rigid", rigid, Rigid),
+            ("electrodes", electrodes, Electrode),
+            ("elastic", elastic, Elastic),
+            ("bolts", bolts, Bolt),
         ):
             words = f"{kind.__name__}(...), or a list of them"
-            object.__setattr__(self, name, several(name, getattr(self, name), kind, words))
+            fill(self, **{name: several(name, every, kind, words)})
         if self.regions:  # as `dataclasses.replace` hands them on
-            law, piezo = _leading(self.regions)
+            first, tensors = _leading(self.regions)
             accepted = "all materials as the law, Body([Material(...), Material(...)], ...)"
-            fits = self.law is law and self.piezo is piezo
+            fits = self.law is first and self.piezo is tensors
             expect("regions beside a law", self.regions, accepted, fits)
         history = any(isinstance(m.law, HistoryLaw) for m in self.materials)
         if self.bolts and history:
@@ -414,6 +466,11 @@ class Body:
 
     def check(self, dim: int) -> None:
         """Refuse constants that are none of a material, or none of a plane body.
+
+        Parameters
+        ----------
+        dim
+            Dimension of space, 2 or 3.
 
         Raises
         ------

@@ -159,7 +159,7 @@ class BodyEquilibrium:
         """Whether there is a potential."""
         return self.body.piezo is not None
 
-    def split(self, x: Any) -> tuple[Expr, Expr | None]:
+    def split(self, x: Expr) -> tuple[Expr, Expr | None]:
         """Split a function or argument into displacement and scaled-back potential."""
         return self.forms.split(x)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, TypeAlias, runtime_checkable
+from typing import Literal, Protocol, TypeAlias, cast, runtime_checkable
 
 import numpy as np
 import ufl
@@ -23,6 +23,9 @@ from contact.typing import Array
 
 #: A factor as a function of time.
 Amplitude: TypeAlias = Callable[[float], float]
+
+#: An amplitude as it is given: "constant" for values that always act.
+GivenAmplitude: TypeAlias = Amplitude | Literal["constant"]
 
 
 @dataclass(frozen=True)
@@ -50,15 +53,39 @@ def steady(time: float) -> float:
     return 1.0
 
 
+class Field(Protocol):
+    """A given function of position, for instance `contact.case.formula.Expression`."""
+
+    def ufl(self, x: Expr) -> Expr | float:
+        """Return the function as a UFL expression of the coordinates, or a number."""
+
+    def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d), shape (n,)."""
+
+
 @runtime_checkable
 class Moving(Protocol):
     """A given function of position and time."""
 
-    def at(self, time: Any) -> Any:
+    def at(self, time: float | fem.Constant) -> Field:
         """Return the function of position at a time: a number, or a constant of a form."""
 
 
-def at_time(field: Any, time: Any) -> Any:
+#: A given function of position: a number, a function of x of shape (3, n) that returns n values, a
+#: scalar UFL expression (`dolfinx.fem.Function` is one), or an object.
+Static: TypeAlias = float | Callable[[Array], Array | float] | Expr | Field
+
+#: The same, perhaps with a time: all that `field` takes.
+Scalar: TypeAlias = Static | Moving
+
+#: A given vector, as `vector` takes it: its components, or one UFL expression of vectors.
+Vector: TypeAlias = Sequence[Scalar] | Array | Expr
+
+#: A given vector some of whose components may be free.
+FreeVector: TypeAlias = Sequence[Scalar | Literal["free"] | None] | Array | Expr
+
+
+def at_time(field: Field | Moving, time: float | fem.Constant) -> Field:
     """Return a given function of position at a time, whether it depends on that or not."""
     return field.at(time) if isinstance(field, Moving) else field
 
@@ -67,7 +94,7 @@ def at_time(field: Any, time: Any) -> Any:
 CONSTANT = "constant"
 
 
-def own_amplitude(name: str, given: Any) -> Amplitude | None:
+def own_amplitude(name: str, given: GivenAmplitude | None) -> Amplitude | None:
     """Return a given function of time so that it says whose amplitude it is where it fails."""
     if isinstance(given, str) and given == CONSTANT:
         return steady
@@ -75,7 +102,8 @@ def own_amplitude(name: str, given: Any) -> Amplitude | None:
     accepted = f'a function of time, such as lambda t: 2 * t, or "{CONSTANT}"'
     expect(f"{name}: amplitude", given, accepted, fits)
     plain = given is None or given is steady or isinstance(given, Ramp)
-    return given if plain else OfTime(given, f"{name}: amplitude")
+    made = given if plain else OfTime(cast(Amplitude, given), f"{name}: amplitude")
+    return cast(Amplitude | None, made)
 
 
 def amplitude_of(given: Amplitude | None, known: bool) -> Amplitude:
@@ -88,12 +116,14 @@ def amplitude_of(given: Amplitude | None, known: bool) -> Amplitude:
     return given
 
 
-def knows_time(fields: Sequence[Any]) -> bool:
+def knows_time(fields: Sequence[Field | Moving | None]) -> bool:
     """Tell whether any of some fields is a function of time."""
     return any(isinstance(field, Moving) for field in fields)
 
 
-def values_at(field: Any, points: Array, time: float, name: str, comm: MPI.Intracomm) -> Array:
+def values_at(
+    field: Field | Moving, points: Array, time: float, name: str, comm: MPI.Intracomm
+) -> Array:
     """Return the values of a field at points of shape (n, d) and a time, shape (n,). Collective.
 
     Raises
@@ -113,17 +143,24 @@ def constant(mesh: Mesh, value: float) -> fem.Constant:
     return fem.Constant(mesh, np.float64(value))
 
 
-#: Anything that `field` takes.
-Given: TypeAlias = Any
-
 ACCEPTED = (
     "a number, a function of x as dolfinx interpolates it (x[0], x[1], ... are arrays), a scalar "
     "UFL expression or dolfinx Function, or an object with the methods ufl(x) and numpy(points)"
 )
 
 
-def field(value: Given) -> Any:
+def field(value: Scalar | None) -> Field | Moving | None:
     """Return a given function of position as a `Field` or `Moving`; None as it is.
+
+    Parameters
+    ----------
+    value
+        A number, a function of x as dolfinx interpolates it, a scalar `ufl.core.expr.Expr` or
+        `dolfinx.fem.Function`, or an object that is a `Field` or `Moving`.
+
+    Returns
+    -------
+    The value as an object that is evaluated at points and in forms.
 
     Raises
     ------
@@ -143,14 +180,16 @@ def field(value: Given) -> Any:
         everywhere = not ufl.domain.extract_domains(value)
         return Number(float(value)) if everywhere else Ufl(value)
     if hasattr(value, "ufl") and hasattr(value, "numpy"):
-        return value
+        return cast(Field, value)
     if callable(value):
         return Callback(value)
     raise InputError(f"given {value!r} for a function of position; accepted: {ACCEPTED}")
 
 
-def vector(value: Given, free: bool = False) -> tuple[Any, ...] | None:
-    """Return the components of a vector.
+def vector(
+    value: FreeVector | None, free: bool = False
+) -> tuple[Field | Moving | None, ...] | None:
+    """Return the components of a vector; None as it is.
 
     Parameters
     ----------
@@ -158,6 +197,11 @@ def vector(value: Given, free: bool = False) -> tuple[Any, ...] | None:
         A list of arguments of `field`, or a UFL expression or Function of vectors.
     free
         Whether None or "free" leaves a component free.
+
+    Raises
+    ------
+    InputError
+        If it is no vector, or a component is nothing of the kind.
     """
     if value is None:
         return None
@@ -202,9 +246,9 @@ class Callback:
     `forms.ops`), else interpolated by quadratics.
     """
 
-    function: Callable[[Any], Any]
+    function: Callable[[Array], Array | float]
 
-    def ufl(self, x: Expr) -> Any:
+    def ufl(self, x: Expr) -> Expr | float:
         """Return the function as UFL of the coordinates. Collective."""
         try:
             found = self.function(x)

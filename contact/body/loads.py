@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as default
-from typing import Any
 
 import numpy as np
 import ufl
@@ -17,8 +16,8 @@ from ufl.core.expr import Expr
 from ufl.corealg.traversal import traverse_unique_terminals
 
 from contact.arguments import check_finite, naming, real
-from contact.body.description import Body, Field, Load
-from contact.body.fields import Amplitude, Moving, at_time, constant
+from contact.body.description import Body, Load
+from contact.body.fields import Amplitude, Field, Moving, at_time, constant
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.ranks import on_all_ranks
@@ -138,7 +137,9 @@ def _works(
     return works
 
 
-def expression(domain: Domain, value: Field | Moving, x: Expr, time: Any, key: str) -> Expr:
+def expression(
+    domain: Domain, value: Field | Moving, x: Expr, time: float | fem.Constant, key: str
+) -> Expr:
     """Return a given function at a time as UFL; a number becomes a form constant. Collective.
 
     Raises

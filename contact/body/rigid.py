@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.arguments import OfTime, expect
-from contact.body.fields import Amplitude, amplitude_of, own_amplitude
+from contact.arguments import OfTime, expect, fill
+from contact.body.fields import Amplitude, GivenAmplitude, amplitude_of, own_amplitude
 from contact.errors import InputError
 from contact.mesh.together import part
 from contact.typing import Array
 
 #: A number, which grows with an amplitude, or a function of time.
 Timed: TypeAlias = float | Amplitude
+
+#: The same, or a component that is determined by its force.
+FreeTimed: TypeAlias = Timed | Literal["free"] | None
+
+#: Components as they are given, or one.
+Given: TypeAlias = FreeTimed | Sequence[FreeTimed] | Array
 
 
 def _timed(name: str, value: Timed | None) -> Timed | None:
@@ -32,12 +38,13 @@ def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) ->
     return factor * np.array(numbers)
 
 
-def _listed(given: Any) -> tuple[Any, ...]:
+def _listed(given: Given) -> tuple[FreeTimed, ...]:
     """Return a vector's components, or the one component."""
-    return tuple(given) if isinstance(given, list | tuple | np.ndarray) else (given,)
+    every = tuple(given) if isinstance(given, list | tuple | np.ndarray) else (given,)
+    return cast(tuple[FreeTimed, ...], every)
 
 
-def _components(name: str, given: Any, size: int, free: bool = False) -> tuple[Any, ...]:
+def _components(name: str, given: Given, size: int, free: bool = False) -> tuple[Timed | None, ...]:
     """Return components, None for those that are free, and 0 where none are given."""
     found: list[Timed | None] = []
     accepted = "a number" if size == 1 else f"a list of {size}: numbers"
@@ -46,10 +53,11 @@ def _components(name: str, given: Any, size: int, free: bool = False) -> tuple[A
     for value in every:
         unset = value is None or (isinstance(value, str) and value == "free")
         number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        fits = number and np.isfinite(value)
+        fits = number and np.isfinite(cast(float, value))
         expect(name, given, accepted, (unset and free) or fits or callable(value))
         key = f"{name}.{len(found)}"
-        found.append(None if unset else float(value) if number else _timed(key, value))
+        given_one = float(cast(float, value)) if number else _timed(key, cast(Amplitude, value))
+        found.append(None if unset else given_one)
     expect(name, given, accepted, len(every) in (0, size))
     return tuple(found) or (0.0,) * size
 
@@ -70,12 +78,14 @@ class Motion:
     rotation
         Rotation about the centre (radians), likewise: one angle in 2-D, a list of three in 3-D.
     force, moment
-        Force and moment on the free components; lists as above. Default: 0.
+        Force on the free components (of the full turn for a body of revolution, per unit of depth
+        for a plane body), and moment; lists as above. Default: 0.
     centre
-        Centre of rotation, about which moments are taken; required where something turns.
+        Centre of rotation, about which moments are taken (length), shape (d,); required where
+        something turns.
     amplitude
-        Function of time that multiplies all of them; by default
-        numbers grow from 0 at time 0 to all at time 1, and stay; "constant": they always act.
+        Function of time that multiplies all of them; by default numbers grow from 0 at time 0 to
+        all at time 1, and stay; "constant": they always act.
 
     Raises
     ------
@@ -84,48 +94,57 @@ class Motion:
         centre is missing.
     """
 
-    displacement: Any = ()
-    rotation: Any = ()
-    force: Any = ()
-    moment: Any = ()
-    centre: Any = ()
-    amplitude: Amplitude | None = None
+    displacement: tuple[Timed | None, ...]
+    rotation: tuple[Timed | None, ...]
+    force: tuple[Timed, ...]
+    moment: tuple[Timed, ...]
+    centre: tuple[float, ...]
+    amplitude: Amplitude | None
 
-    def __post_init__(self) -> None:
-        """Make components of the given values, and let functions of time be named."""
-        d = self._dimension()
-        for name, size in self._sizes(d).items():
-            free = name in ("displacement", "rotation")
-            given = _components(f"Motion: {name}", getattr(self, name), size, free)
-            object.__setattr__(self, name, given)
-        for key, name in (("force", "displacement"), ("moment", "rotation")):
-            for force, move in zip(getattr(self, key), getattr(self, name), strict=True):
-                fits = move is None or force == 0.0
-                expect(f"Motion: {key}", getattr(self, key), f"a {key} where {name} is None", fits)
-        turns = any(turn != 0.0 for turn in self.rotation)
+    def __init__(
+        self,
+        displacement: Sequence[FreeTimed] | Array = (),
+        rotation: Given = (),
+        force: Sequence[Timed] | Array = (),
+        moment: Timed | Sequence[Timed] | Array = (),
+        centre: Sequence[float] | Array = (),
+        amplitude: GivenAmplitude | None = None,
+    ) -> None:
+        d = _dimension(
+            {"displacement": displacement, "force": force, "centre": centre},
+            {"rotation": rotation, "moment": moment},
+        )
+        moves = {
+            "displacement": _components("Motion: displacement", displacement, d, free=True),
+            "rotation": _components("Motion: rotation", rotation, 2 * d - 3, free=True),
+        }
+        acting = {
+            "force": _components("Motion: force", force, d),
+            "moment": _components("Motion: moment", moment, 2 * d - 3),
+        }
+        for (key, on), (name, given) in zip(acting.items(), moves.items(), strict=True):
+            for one, move in zip(on, given, strict=True):
+                fits = move is None or one == 0.0
+                expect(f"Motion: {key}", on, f"a {key} where {name} is None", fits)
+        turns = any(turn != 0.0 for turn in moves["rotation"])
         accepted = f"a point about which it turns, a list of {d} numbers"
-        fixed = not any(callable(x) or x is None for x in _listed(self.centre))
-        expect("Motion: centre", self.centre, accepted, fixed and (len(self.centre) or not turns))
-        object.__setattr__(self, "centre", _components("Motion: centre", self.centre, d))
-        object.__setattr__(self, "amplitude", own_amplitude("Motion", self.amplitude))
+        fixed = not any(callable(x) or x is None for x in _listed(centre))
+        expect("Motion: centre", centre, accepted, fixed and (len(centre) or not turns))
+        middle = _components("Motion: centre", centre, d)
+        fill(self, **moves, **acting, centre=middle, amplitude=own_amplitude("Motion", amplitude))
 
-    @staticmethod
-    def _sizes(d: int) -> dict[str, int]:
-        """Return the numbers of components in d dimensions."""
-        return {"displacement": d, "rotation": 2 * d - 3, "force": d, "moment": 2 * d - 3}
 
-    def _dimension(self) -> int:
-        """Return the dimension of the vectors that are given."""
-        for name in ("displacement", "force", "centre"):
-            given = getattr(self, name)
-            size = len(_listed(given))
-            accepted = "a list with an entry a component, 2 in 2-D and 3 in 3-D"
-            expect(f"Motion: {name}", given, accepted, size in (0, 2, 3))
-            if size:
-                return size
-        sizes = [len(_listed(given)) for given in (self.rotation, self.moment)]
-        expect("Motion", "nothing", "a displacement, a rotation or a force", any(sizes))
-        return 3 if 3 in sizes else 2
+def _dimension(vectors: dict[str, Given], turns: dict[str, Given]) -> int:
+    """Return the dimension of the vectors, and turns, of a motion that are given."""
+    for name, given in vectors.items():
+        size = len(_listed(given))
+        accepted = "a list with an entry a component, 2 in 2-D and 3 in 3-D"
+        expect(f"Motion: {name}", given, accepted, size in (0, 2, 3))
+        if size:
+            return size
+    sizes = [len(_listed(given)) for given in turns.values()]
+    expect("Motion", "nothing", "a displacement, a rotation or a force", any(sizes))
+    return 3 if 3 in sizes else 2
 
 
 @dataclass(frozen=True)
@@ -138,16 +157,29 @@ class Rigid:
 
     It is given to the body by ``Body(law, fixed, rigid=plate)``; ``Rigid("bottom", motion,
     foundation=True)`` is the foundation in front of the contact part ``bottom``.
+
+    Parameters
+    ----------
+    on
+        Name of the part, or a list of names.
+    motion
+        How it moves.
+    foundation
+        Whether it is the foundation in front of the part, and not the part itself.
+
+    Raises
+    ------
+    InputError
+        If `on` is no name, or `motion` none.
     """
 
-    on: Any
+    on: str
     motion: Motion
-    foundation: bool = False
+    foundation: bool
 
-    def __post_init__(self) -> None:
-        """Make one name of several."""
-        object.__setattr__(self, "on", part(self.on))
-        expect("Rigid: motion", self.motion, "Motion(...)", isinstance(self.motion, Motion))
+    def __init__(self, on: str | Sequence[str], motion: Motion, foundation: bool = False) -> None:
+        fill(self, on=part(on), motion=motion, foundation=foundation)
+        expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
 
     name = "rigid"
 
@@ -162,23 +194,48 @@ class Rigid:
         return (*self.motion.force, *self.motion.moment)
 
     def at(self, values: Sequence[Timed | None], time: float) -> Array:
-        """Return some of these at a time."""
+        """Return some of these at a time, 0 for None, shape (n,)."""
         return _at(values, self.motion.amplitude, time)
 
 
 @dataclass(frozen=True)
 class Electrode:
-    """A part, or a list of parts, with one unknown potential, and its charge."""
+    """A part, or a list of parts, with one unknown potential, and its charge.
 
-    on: Any
-    charge: Timed = 0.0
-    amplitude: Amplitude | None = None
+    Parameters
+    ----------
+    on
+        Name of the part, or a list of names.
+    charge
+        The charge on it (of the full turn for a body of revolution, per unit of depth for a plane
+        body), a number or a function of time.
+    amplitude
+        Function of time that multiplies it, or "constant"; by default it grows from 0 at time 0 to
+        all at time 1.
 
-    def __post_init__(self) -> None:
-        """Make one name of several."""
-        object.__setattr__(self, "on", part(self.on))
-        object.__setattr__(self, "charge", _timed("Electrode: charge", self.charge))
-        object.__setattr__(self, "amplitude", own_amplitude("Electrode", self.amplitude))
+    Raises
+    ------
+    InputError
+        If `on` is no name, or the amplitude no function.
+
+    Examples
+    --------
+    >>> Electrode(["left", "right"], charge=1e-6).on
+    'left+right'
+    """
+
+    on: str
+    charge: Timed
+    amplitude: Amplitude | None
+
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        charge: Timed = 0.0,
+        amplitude: GivenAmplitude | None = None,
+    ) -> None:
+        fill(self, on=part(on), charge=_timed("Electrode: charge", charge))
+        fill(self, amplitude=own_amplitude("Electrode", amplitude))
 
     name = "electrode"
     values = (None,)
@@ -189,7 +246,7 @@ class Electrode:
         return (self.charge,)
 
     def at(self, values: Sequence[Timed | None], time: float) -> Array:
-        """Return some of these at a time."""
+        """Return some of these at a time, 0 for None, shape (n,)."""
         return _at(values, self.amplitude, time)
 
 
@@ -207,25 +264,30 @@ class Bolt:
     shortening
         Instead of it the length by which the sides are drawn together, likewise.
     amplitude
-        Function of time that multiplies it; by default it grows from 0 to all at time 1.
+        Function of time that multiplies it, or "constant"; by default it grows from 0 to all at
+        time 1.
 
     Raises
     ------
     InputError
-        If both or neither are given.
+        If both or neither are given, `on` is no name, or the amplitude no function.
     """
 
-    on: Any
-    force: Timed | None = None
-    shortening: Timed | None = None
-    amplitude: Amplitude | None = None
+    on: str
+    force: Timed | None
+    shortening: Timed | None
+    amplitude: Amplitude | None
 
-    def __post_init__(self) -> None:
-        """Let functions of time be named where they fail."""
-        object.__setattr__(self, "on", part(self.on))
-        for name in ("force", "shortening"):
-            object.__setattr__(self, name, _timed(f"Bolt: {name}", getattr(self, name)))
-        object.__setattr__(self, "amplitude", own_amplitude("Bolt", self.amplitude))
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        force: Timed | None = None,
+        shortening: Timed | None = None,
+        amplitude: GivenAmplitude | None = None,
+    ) -> None:
+        fill(self, on=part(on), force=_timed("Bolt: force", force))
+        fill(self, shortening=_timed("Bolt: shortening", shortening))
+        fill(self, amplitude=own_amplitude("Bolt", amplitude))
         if (self.force is None) == (self.shortening is None):
             raise InputError(f"Bolt on {self.on!r}: accepted: one of force and shortening")
 
@@ -242,7 +304,7 @@ class Bolt:
         return (self.force,)
 
     def at(self, values: Sequence[Timed | None], time: float) -> Array:
-        """Return some of these at a time."""
+        """Return some of these at a time, 0 for None, shape (n,)."""
         return _at(values, self.amplitude, time)
 
 

@@ -11,8 +11,8 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.description import Body, Field
-from contact.body.fields import Amplitude, Moving, values_at
+from contact.body.description import Body
+from contact.body.fields import Amplitude, Field, Moving, values_at
 from contact.errors import InputError
 from contact.linear.layout import Inclined
 from contact.mesh.cells import shape_of

@@ -12,8 +12,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact._compat import collapse, lasting
-from contact.body.description import Body, Field
-from contact.body.fields import Amplitude, Moving, steady, values_at
+from contact.body.description import Body
+from contact.body.fields import Amplitude, Field, Moving, steady, values_at
 from contact.errors import InputError
 from contact.mesh.domain import Domain, on_axis
 from contact.typing import Array

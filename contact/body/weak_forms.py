@@ -55,7 +55,7 @@ def _elastic(domain: Domain, body: Body) -> Iterator[tuple[list[Expr], Expr, Mea
         yield parts, expression(domain, normal, x, 0.0, f"{key}.normal"), domain.ds(support.on)
 
 
-def _check_stiffness(domain: Domain, on: Any, value: Any, key: str) -> None:
+def _check_stiffness(domain: Domain, on: str, value: Any, key: str) -> None:
     """Refuse a stiffness that is negative, or no number, somewhere on a part. Collective."""
     mesh, facets = domain.mesh, domain.facets(on)
     points = compute_midpoints(mesh, domain.dim - 1, facets)
@@ -150,7 +150,7 @@ class WeakForms:
             for part in parts
         ]
 
-    def split(self, x: Any) -> tuple[Expr, Expr | None]:
+    def split(self, x: Expr) -> tuple[Expr, Expr | None]:
         """Split a function or argument into displacement and scaled-back potential."""
         u = ufl.as_vector([x[i] for i in range(self._dim)])
         return u, (None if self._body.piezo is None else self._body.phi_scale * x[self._dim])
@@ -169,7 +169,11 @@ class WeakForms:
         return fem.form(forms)
 
     def _internal(
-        self, secant_at: Any, history_at: Any, test: Any = None, functions: Any = 1
+        self,
+        secant_at: fem.Function,
+        history_at: fem.Function,
+        test: tuple[Expr, Expr | None] | None = None,
+        functions: Expr | int = 1,
     ) -> list[ufl.Form]:
         """Return the forces at `at`, secants and the stiffness at points being those elsewhere.
 
@@ -189,7 +193,11 @@ class WeakForms:
         return u + (self._cuts.jump if at is self.at else self._cuts.secant_jump)
 
     def _stresses(
-        self, secant_at: Any, history_at: Any, test: Any, functions: Any = 1
+        self,
+        secant_at: fem.Function,
+        history_at: fem.Function,
+        test: tuple[Expr, Expr | None],
+        functions: Expr | int = 1,
     ) -> list[ufl.Form]:
         """Return the forces of the stresses; see `_internal`."""
         u, phi, (v, xi) = self._displacement(self.at), self.split(self.at)[1], test

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias, cast
 
 import numpy as np
 from dolfinx.mesh import entities_to_geometry
@@ -12,7 +12,7 @@ from mpi4py import MPI
 from pydantic import Field, model_validator
 
 from contact.body import description, rigid
-from contact.case.formula import Expression, as_field, as_number
+from contact.case.formula import Expression, TimeField, as_field, as_number
 from contact.case.messages import Words, fault
 from contact.case.section import (
     AmplitudeName,
@@ -246,7 +246,7 @@ class Load(Section):
         density, charge = VOLUME if self.everywhere else ("traction", "charge")
         components = getattr(self, density)
         force = [
-            f.value if f.is_constant else as_field(f"{key}.force.{k}", f, comm)
+            f.value if f.is_constant else cast(TimeField, as_field(f"{key}.force.{k}", f, comm))
             for k, f in enumerate(self.force or ())
         ]
         with warnings.catch_warnings():  # the word has always had this meaning in a case

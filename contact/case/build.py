@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import TypedDict
 
 from mpi4py import MPI
 
@@ -23,8 +23,20 @@ from contact.problem.problem import ContactProblem
 from forms.hencky import Law
 from forms.laws import FrictionCoefficient, FrictionLaw
 
-#: Arguments of `build_problem` that replace parts of a case.
-REPLACEMENTS = ("domain", "law", "coefficient", "friction", "foundation", "layer")
+
+class Replacements(TypedDict, total=False):
+    """Objects that take the place of parts of a case, as `build_problem` takes them by name."""
+
+    domain: Domain | None
+    law: Law | None
+    coefficient: FrictionCoefficient | None
+    friction: FrictionLaw | None
+    foundation: Obstacle | None
+    layer: Layer | None
+
+
+#: Their names.
+REPLACEMENTS = tuple(Replacements.__annotations__)
 
 
 def build_problem(
@@ -77,8 +89,7 @@ def build_problem(
             electrodes=tuple(electrode.build(case) for electrode in case.electrode),
             bolts=tuple(bolt.build(case) for bolt in case.bolt),
         )
-        own = {"coefficient": coefficient, "law": friction}
-        contacts = _contacts(case, domain, foundation, layer, own)
+        contacts = _contacts(case, domain, foundation, layer, coefficient, friction)
         problem = ContactProblem(
             domain, body, contacts, degree=case.space.degree, element=case.space.element
         )
@@ -104,7 +115,7 @@ def replaced_by(arguments: Collection[str]) -> tuple[str, ...]:
     return tuple(key for key, names in REPLACEABLE.items() if {*names} & {*arguments})
 
 
-def _check_replaced(filled: Collection[str], arguments: Mapping[str, Any]) -> None:
+def _check_replaced(filled: Collection[str], arguments: Mapping[str, object]) -> None:
     """Raise an InputError if a key that was filled in is replaced by nothing."""
     for key in filled:
         names = REPLACEABLE[key]
@@ -144,11 +155,11 @@ def _contacts(
     domain: Domain,
     foundation: Obstacle | None,
     layer: Layer | None,
-    own: Mapping[str, Any],
+    coefficient: FrictionCoefficient | None,
+    law: FrictionLaw | None,
 ) -> list[Contact]:
     """Return the contacts of a case; objects replace those of its only one."""
-    own = {name: law for name, law in own.items() if law is not None}
-    replaced = own or foundation is not None or layer is not None
+    replaced = any(given is not None for given in (coefficient, law, foundation, layer))
     if len(case.contacts) > 1 and replaced:
         raise InputError(
             "contact: foundation, layer, coefficient and friction given beside the case "
@@ -163,7 +174,7 @@ def _contacts(
                 contact.on,
                 contact.obstacle(key, domain.comm) if foundation is None else foundation,
                 contact.compliant_layer() if layer is None else layer,
-                friction.build(place, domain.comm, **own),
+                friction.build(place, domain.comm, coefficient, law),
                 None if electric is None else electric.build(case, domain, contact.on),
                 contact.overlap == "press",
                 contact.against,

@@ -278,7 +278,7 @@ def load_case(
 
 
 def parse_case(
-    data: Mapping[str, Any],
+    data: Mapping[str, object],
     folder: str | Path = ".",
     source: str = "case",
     without: Collection[str] = (),
@@ -288,7 +288,7 @@ def parse_case(
     Parameters
     ----------
     data
-        Tables of the case file; it is not changed.
+        Tables of the case file, as `tomllib` reads them; it is not changed. Each value is checked.
     folder
         Folder that relative names of files in it belong to.
     source
@@ -321,8 +321,8 @@ def parse_case(
 
 
 def _stand_ins(
-    data: Mapping[str, Any], without: Collection[str]
-) -> tuple[dict[str, Any], list[str]]:
+    data: Mapping[str, object], without: Collection[str]
+) -> tuple[dict[str, object], list[str]]:
     """Fill in missing keys that will be replaced, so that the rest can be checked.
 
     Returns

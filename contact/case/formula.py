@@ -27,6 +27,7 @@ from contact.typing import Array
 from forms import ops
 
 if TYPE_CHECKING:
+    from dolfinx import fem
     from ufl.core.expr import Expr
 
 #: Contents of a formula, for messages and the reference page.
@@ -158,7 +159,7 @@ class Expression:
             raise InputError(f"{self} is not finite at ({place}); accepted: a formula that is")
         return values
 
-    def ufl(self, x: Expr, time: Any = None) -> Expr:
+    def ufl(self, x: Expr, time: float | fem.Constant | None = None) -> Expr:
         """Return the scalar UFL expression at ``x``, a vector of length 2 or 3, and a time."""
         (dimension,) = x.ufl_shape
         return ops.symbolic(self._evaluate(x, dimension, time))
@@ -211,7 +212,7 @@ class NodalField:
     expression: Expression
     comm: MPI.Intracomm
     minimum: float = -np.inf
-    time: Any = None
+    time: float | fem.Constant | None = None
 
     @property
     def is_zero(self) -> bool:
@@ -246,7 +247,7 @@ class TimeField:
     expression: Expression
     comm: MPI.Intracomm
 
-    def at(self, time: Any) -> NodalField:
+    def at(self, time: float | fem.Constant) -> NodalField:
         """Return the field at a time: a number, or a constant of a form."""
         return NodalField(self.key, self.expression, self.comm, time=time)
 

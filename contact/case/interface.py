@@ -230,10 +230,16 @@ class Friction(Section):
     radius: Annotated[NonNegative, ReadWith("law", "coulomb")] = 0.0
     """Radius of the smoothing operator R; 0: the pressure itself."""
 
-    def build(self, key: str, comm: MPI.Intracomm, **replacements: Any) -> friction.Friction:
+    def build(
+        self,
+        key: str,
+        comm: MPI.Intracomm,
+        coefficient: laws.FrictionCoefficient | None = None,
+        law: laws.FrictionLaw | None = None,
+    ) -> friction.Friction:
         """Return the friction itself; a law or a coefficient may replace the section's."""
-        if replacements:
-            return friction.Friction(radius=self.radius, **replacements)
+        if coefficient is not None or law is not None:
+            return friction.Friction(coefficient, radius=self.radius, law=law)
         if self.law == "tresca":
             return friction.Friction(tresca=as_field(f"{key}.bound", self.bound, comm, 0.0))
         if isinstance(self.mu, Section):

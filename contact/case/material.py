@@ -28,7 +28,7 @@ from contact.errors import InputError
 from contact.library import units as systems
 from contact.library.materials import PACKAGED, Entry, find
 from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
-from contact.typing import Array
+from contact.typing import Array, TableValue
 from forms import j2
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis
 from forms.elasticity import Anisotropic, hexagonal, moduli
@@ -429,7 +429,7 @@ class Material(Section):
             )
 
 
-def make_material(dim: int, **keys: Any) -> description.Material:
+def make_material(dim: int, **keys: TableValue | NDArray[np.float64]) -> description.Material:
     """Return the material that `[material]` of a case file with some keys describes.
 
     Parameters
@@ -437,8 +437,9 @@ def make_material(dim: int, **keys: Any) -> description.Material:
     dim
         Dimension of the body, whose axes crystals are turned into: 2 or 3.
     keys
-        Keys of the section: ``name="PZT-4"`` with ``poling``, or ``young``, ``poisson`` and
-        ``piezo={"e31": ..., ...}``; ``on``, a region or a list of regions.
+        Keys of the section `[material]` of a case file, with its units: ``name="PZT-4"`` with
+        ``poling``, or ``young``, ``poisson`` and ``piezo={"e31": ..., ...}``; ``on``, a region or a
+        list of regions. Matrices are lists of rows, or arrays.
 
     Returns
     -------
@@ -447,7 +448,13 @@ def make_material(dim: int, **keys: Any) -> description.Material:
     Raises
     ------
     InputError
-        As for a case file.
+        As for a case file: if a key is missing, unknown or has another value than is accepted; or
+        if the dimension is neither, or the axis of a crystal is none of it.
+
+    Examples
+    --------
+    >>> make_material(2, young=210e3, poisson=0.3).law
+    Linear(young=210000.0, poisson=0.3)
     """
     expect("make_material: dim", dim, "2 or 3", dim in (2, 3))
     plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in keys.items()}

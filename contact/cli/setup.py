@@ -17,6 +17,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contact import _compat
+from contact.body.fields import Field, Moving, at_time
 from contact.case.file import Case
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
@@ -198,17 +199,17 @@ def _role(
     part: str,
     colour: str,
     words: str,
-    given: Sequence[Any] | None = None,
-    pressure: Any = None,
+    given: Sequence[Field | Moving] | None = None,
+    pressure: Field | Moving | None = None,
     dashes: str = "-",
 ) -> Role | None:
     """Return a part on rank 0, None elsewhere; given are its traction and pressure. Collective."""
     corners, force = _corners(domain, domain.facets_anywhere(part)), None
     middle = corners.mean(axis=1)
 
-    def values(field: Any) -> Array:
+    def values(field: Field | Moving) -> Array:
         """Return those of a field; of one that moves at the end of an evolution."""
-        return np.asarray((field.at(1.0) if hasattr(field, "at") else field).numpy(middle))
+        return np.asarray(at_time(field, 1.0).numpy(middle))
 
     if given is not None:
         force = np.column_stack([values(field) for field in given])

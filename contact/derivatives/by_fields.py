@@ -106,7 +106,8 @@ def field_gradient(
     Raises
     ------
     InputError
-        As `sensitivity`, and where the parameter is none of a material.
+        As `sensitivity`, and where the parameter is none of a material, the degree neither, or the
+        body has bolts.
 
     Examples
     --------

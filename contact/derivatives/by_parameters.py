@@ -31,6 +31,7 @@ import numpy as np
 
 from contact.arguments import expect
 from contact.case.build import build_problem
+from contact.case.file import Case
 from contact.case.text import number_at, with_number
 from contact.derivatives.differences import Family, Parameter, at, family_of
 from contact.errors import InputError, counted
@@ -194,7 +195,7 @@ def parameters_of(
     if isinstance(given, Mapping):
         return [*given.items()]
     case = solution.source
-    if case is None:
+    if not isinstance(case, Case):
         raise InputError(
             "parameters: given keys of a case, for a problem that was built in Python; accepted: "
             "{name: Parameter(value, problem)}"

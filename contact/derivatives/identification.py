@@ -130,8 +130,8 @@ def identify(
     Raises
     ------
     InputError
-        If a key, a column or a time does not fit, there are fewer measurements than parameters, or
-        the first run does not converge.
+        If a key, a column, a bound or a time does not fit, there are no more measurements than
+        parameters, or the first run does not converge.
 
     Examples
     --------

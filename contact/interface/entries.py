@@ -312,7 +312,7 @@ def _joined_conductors(
 
     def phi_f(time: float) -> Array:
         """Return the potentials of the foundations at a time."""
-        values = [conductor.at(time).phi_f for conductor in conductors]
+        values = [float(conductor.at(time).phi_f) for conductor in conductors]
         return np.repeat(values, np.diff(bounds))
 
     moving = any(conductor.phi_f_at is not None for conductor in conductors)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from mpi4py import MPI
@@ -14,11 +15,12 @@ from contact.arguments import (
     check_finite,
     check_slope,
     expect,
+    fill,
     naming,
     real,
     sampled,
 )
-from contact.body.fields import Given, field, values_at
+from contact.body.fields import Field, Moving, Scalar, field, values_at
 from contact.errors import InputError
 from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
@@ -37,55 +39,64 @@ LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 class Friction:
     """Friction on a contact part, by one of `mu`, `coefficient`, `tresca` and `law`; or none.
 
-    Attributes
+    Parameters
     ----------
     coefficient
-        Coulomb's mu(|u_tau|).
+        Coulomb's mu(|u_tau|) (no unit), for instance `SlipCoefficient`.
     tresca
         A fixed bound S (stress), used instead of mu times the pressure: a number, a function of
-        x, UFL or a dolfinx Function.
+        x, UFL (`ufl.core.expr.Expr`) or a `dolfinx.fem.Function`.
     radius
-        Radius of the smoothing operator R; 0 for R = identity.
+        Radius of the smoothing operator R (length); 0 for R = identity.
     mu
         Coulomb's mu, a number or function of position likewise; or a `coefficient`, which it then
         becomes.
     law
-        Any other law, for instance with a coefficient that depends on the pressure.
+        Another law s(|u_tau|, p), for instance with a coefficient that depends on the pressure.
 
     Raises
     ------
     InputError
         If several are given, or something else, or the radius is none.
+
+    Examples
+    --------
+    >>> Friction(mu=0.3).given
+    True
     """
 
-    coefficient: FrictionCoefficient | None = None
-    tresca: Given = None
-    radius: float = 0.0
-    mu: Given = None
-    law: FrictionLaw | None = None
+    coefficient: FrictionCoefficient | None
+    tresca: Field | Moving | None
+    radius: float
+    mu: Field | Moving | None
+    law: FrictionLaw | None
 
-    def __post_init__(self) -> None:
-        """Make fields of the given values."""
-        if isinstance(self.coefficient, int | float):
+    def __init__(
+        self,
+        coefficient: FrictionCoefficient | None = None,
+        tresca: Scalar | None = None,
+        radius: float = 0.0,
+        mu: Scalar | FrictionCoefficient | None = None,
+        law: FrictionLaw | None = None,
+    ) -> None:
+        if isinstance(coefficient, int | float):
             raise InputError(
-                f"Friction({self.coefficient}): accepted: Friction(mu={self.coefficient}), a "
+                f"Friction({coefficient}): accepted: Friction(mu={coefficient}), a "
                 "coefficient, or Friction(tresca=...), a bound"
             )
-        size = isinstance(self.radius, int | float | np.number) and 0 <= self.radius < np.inf
-        expect("Friction: radius", self.radius, "a length >= 0", size)
-        if sum(law is not None for law in self._laws) > 1:
+        size = isinstance(radius, int | float | np.number) and 0 <= radius < np.inf
+        expect("Friction: radius", radius, "a length >= 0", size)
+        if sum(one is not None for one in (coefficient, tresca, mu, law)) > 1:
             raise InputError("Friction: accepted: one of coefficient, tresca, mu and law")
         # A coefficient that lacks something is no function of position.
-        if any(hasattr(self.mu, name) for name in COEFFICIENT if name != "__call__"):
-            object.__setattr__(self, "coefficient", self.mu)
-            object.__setattr__(self, "mu", None)
-        for name, methods in (("coefficient", COEFFICIENT), ("law", LAW)):
-            given = getattr(self, name)
+        if any(hasattr(mu, name) for name in COEFFICIENT if name != "__call__"):
+            coefficient, mu = cast(FrictionCoefficient, mu), None
+        for name, given, methods in (("coefficient", coefficient, COEFFICIENT), ("law", law, LAW)):
             fits = given is None or all(hasattr(given, method) for method in methods)
             words = f"an object with {', '.join(methods)}"
             expect(f"Friction: {name}", given, words, fits)
-        object.__setattr__(self, "tresca", field(self.tresca))
-        object.__setattr__(self, "mu", field(self.mu))
+        fill(self, coefficient=coefficient, tresca=field(tresca), radius=radius)
+        fill(self, mu=field(cast(Scalar | None, mu)), law=law)
 
     @property
     def _laws(self) -> tuple[object, ...]:
@@ -179,7 +190,7 @@ def _check_constants(name: str, symbol: str, law: FrictionLaw) -> None:
         )
 
 
-def _at(name: str, given: Given, nodes: ContactNodes) -> Array:
+def _at(name: str, given: Field | Moving, nodes: ContactNodes) -> Array:
     """Return a bound or coefficient at contact nodes. Collective."""
     values = values_at(given, nodes.points, 1.0, f"Friction: {name}", nodes.comm)
     _check(name, values, nodes)

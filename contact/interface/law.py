@@ -24,7 +24,6 @@ from contact.interface.layer import Layer, NormalLaw
 from contact.interface.nodes import ContactNodes
 from contact.typing import Array
 from forms.laws import Conductivity, PotentialLaw, Truncation
-from forms.ops import Value
 
 #: A pressure above zero.
 TINY = np.finfo(float).tiny
@@ -32,16 +31,16 @@ TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True)
 class Conductor:
-    """A conductive foundation at the potential phi_f.
+    """A conductive foundation at the potential phi_f: D.nu = psi(u_nu - rho) phi_L(phi - phi_f).
 
-    Attributes
+    Parameters
     ----------
     psi
-        Conductivity law.
+        Conductivity law (capacitance/area), for instance `ShiftedConductivity`.
     phi_f
-        Potential of the foundation; of several conductors in one, one value per node.
+        Potential of the foundation; of several conductors in one, one value per node, shape (n,).
     phi_l
-        Truncation of the potential difference.
+        Truncation phi_L of the potential difference; by default there is none.
     lagged
         Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
         thesis does: it then converges for small k_e only (Theorem 5.2). Else phi is implicit,
@@ -53,10 +52,10 @@ class Conductor:
     """
 
     psi: Conductivity
-    phi_f: Value
+    phi_f: float | Array
     phi_l: PotentialLaw = field(default_factory=lambda: Truncation(np.inf))
     lagged: bool = False
-    phi_f_at: Callable[[float], Value] | None = None
+    phi_f_at: Callable[[float], float | Array] | None = None
     share: float = 1.0
 
     def check(self) -> None:
@@ -168,7 +167,8 @@ class InterfaceLaw:
         """Return the pressure of the layer at nodal unknowns of shape (n, block size)."""
         if self.layer is None:
             return np.zeros(x.shape[0])
-        return self.layer.h_nu(self._difference(x)) * self.layer.p_nu(self._depth(x))
+        stiffness = self.layer.h_nu(self._difference(x))
+        return np.asarray(stiffness * self.layer.p_nu(self._depth(x)), dtype=float)
 
     def _depth(self, x: Array) -> Array:
         """Return how deep the layer is pressed in: not deeper than to the rigid part.
@@ -265,7 +265,7 @@ class InterfaceLaw:
             # The contact flag of the perfect conductor is kept; at kinks a one-sided derivative.
             closing = conductor.psi.gap_slope(self._penetration(x), self._pressed(x, pressure))
             closing = self.phi_scale * conductor.share * closing * conductor.phi_l(difference)
-            total[:, -1, :d] = -closing[:, None] * self.jump.normal
+            total[:, -1, :d] = -np.asarray(closing)[:, None] * self.jump.normal
         return total
 
     def block(self, x: Array, pressure: Array, full: bool = False) -> Array:

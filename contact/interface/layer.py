@@ -14,7 +14,6 @@ from contact.errors import InputError
 from contact.tolerances import EPS
 from contact.typing import Array
 from forms.laws import PenetrationLaw, StiffnessLaw
-from forms.ops import Value
 
 #: Values that a law of a layer returns.
 EACH = "one number for each penetration or difference"
@@ -22,14 +21,14 @@ EACH = "one number for each penetration or difference"
 
 @dataclass(frozen=True)
 class Layer:
-    """A compliant layer in front of the rigid part.
+    """A compliant layer in front of the rigid part, which presses with h_nu(phi - phi_F) p_nu(s).
 
-    Attributes
+    Parameters
     ----------
     thickness
         rho - rho_0 >= 0: the layer is touched before the rigid part (length). Infinity: there
         is no rigid part, law (1.27), and the contact's gap is that of the first touch. Of
-        several layers in one, one value per node.
+        several layers in one, one value per node, shape (n,).
     p_nu, h_nu
         Penetration law and stiffness of section 8.1.2, or any others with their derivative.
         They are vectorised functions; p_nu must vanish for negative arguments.
@@ -37,7 +36,7 @@ class Layer:
         Whether the force is taken from the previous outer iterate, as in the thesis.
     """
 
-    thickness: Value
+    thickness: float | Array
     p_nu: PenetrationLaw
     h_nu: StiffnessLaw
     lagged: bool = False
@@ -92,7 +91,7 @@ class Layer:
         size
             Of the body.
         """
-        return min(self.thickness, size) * np.concatenate([[0.0], np.logspace(-6, 0, 73)])
+        return min(float(self.thickness), size) * np.concatenate([[0.0], np.logspace(-6, 0, 73)])
 
     def falls(self, size: float) -> bool:
         """Tell whether p_nu falls somewhere: several solutions may then exist.

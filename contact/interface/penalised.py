@@ -73,7 +73,7 @@ class PenalisedLaw:
         """Return the pressures, and their derivative in u_nu: 1/eps also at first touch."""
         jump = self._interface.jump
         normal = jump.normal_component(nodal)
-        pressure = penalty_pressure(normal, jump.gap, self._eps.contact)
+        pressure = np.asarray(penalty_pressure(normal, jump.gap, self._eps.contact))
         forces = Multipliers(pressure, np.zeros(jump.normal.shape))
         return forces, (normal >= jump.gap) / self._eps.contact
 

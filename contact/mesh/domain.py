@@ -78,7 +78,8 @@ class Domain:
     Attributes
     ----------
     mesh
-        Mesh of cells of one of `contact.mesh.cells.SHAPES`, straight or of second order.
+        Mesh of cells of one of `contact.mesh.cells.SHAPES`, straight or of second order; a
+        `dolfinx.mesh.Mesh`.
     parts
         Name of a part of the boundary -> its facets that this rank owns. The same names in the
         same order on all ranks.
@@ -114,7 +115,7 @@ class Domain:
     notes: tuple[str, ...] = ()
     revolved: bool = False
     inside: Mapping[str, Indices] = field(default_factory=dict)
-    space: Mapping[str, Any] = field(default_factory=dict)
+    space: Mapping[str, int | str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the names, not the facets of each part."""
@@ -144,6 +145,10 @@ class Domain:
             Likewise of the regions; by default there is one, ``body``.
         inside
             As `names`, of facets inside of the body: cuts of bolts, electrodes, supports.
+
+        Returns
+        -------
+        The domain; the mesh is not copied.
 
         Raises
         ------
@@ -180,7 +185,14 @@ class Domain:
     def facets(self, name: str) -> Indices:
         """Local indices of the facets of a part that this rank owns, ascending.
 
-        Several parts may stand `together.Together`.
+        Parameters
+        ----------
+        name
+            Name of the part; several may stand `together.Together`.
+
+        Returns
+        -------
+        The indices, shape (n,), of type int32.
 
         Raises
         ------
@@ -202,7 +214,16 @@ class Domain:
         return found[0] if len(found) == 1 else np.unique(np.concatenate(found))
 
     def cells(self, name: str) -> Indices:
-        """Local indices of the cells of region ``name`` that this rank owns, ascending.
+        """Local indices of the cells of a region that this rank owns, ascending.
+
+        Parameters
+        ----------
+        name
+            Name of the region.
+
+        Returns
+        -------
+        The indices, shape (n,), of type int32.
 
         Raises
         ------
@@ -217,7 +238,22 @@ class Domain:
         return Axisymmetric() if self.revolved else CARTESIAN
 
     def ds(self, name: str) -> Measure:
-        """Measure over the facets of part ``name``; raises as `facets`. Collective."""
+        """Measure over the facets of a part. Collective.
+
+        Parameters
+        ----------
+        name
+            Name of the part.
+
+        Returns
+        -------
+        The `ufl.Measure`; of a body of revolution one over the full turn.
+
+        Raises
+        ------
+        InputError
+            If there is no such part, as `facets`.
+        """
         self.facets(name)
         every = list(self.parts)
         wanted = {every.index(one) for one in members(name)}

@@ -76,7 +76,7 @@ class Model:
     regions: dict[str, Ints]
     parts: dict[str, Ints]
     notes: tuple[str, ...] = ()
-    space: Mapping[str, Any] = field(default_factory=dict)
+    space: Mapping[str, int | str] = field(default_factory=dict)
 
     @property
     def dim(self) -> int:
@@ -139,7 +139,7 @@ class Contents:
     nodes: dict[str, Ints] = field(default_factory=dict)
     surfaces: dict[str, Ints] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    space: dict[str, Any] = field(default_factory=dict)
+    space: dict[str, int | str] = field(default_factory=dict)
 
 
 def letters(given: bytes) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -85,7 +84,7 @@ class Cells:
     unusable: dict[str, str]
     notes: tuple[str, ...]
     inside: tuple[str, ...] = ()
-    space: Mapping[str, Any] = field(default_factory=dict)
+    space: Mapping[str, int | str] = field(default_factory=dict)
 
     def without_rows(self) -> Cells:
         """Return the names alone, for ranks that read nothing."""

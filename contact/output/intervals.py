@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,7 +22,7 @@ SAFETY = 1.25
 AXES = ("_x", "_y", "_z")
 
 
-def intervals(rows: Sequence[Mapping[str, Any]]) -> Intervals | None:
+def intervals(rows: Sequence[Mapping[str, float]]) -> Intervals | None:
     """Return the interval of each quantity; None unless the error falls on the last three meshes.
 
     The grid convergence index (Roache, J. Fluids Eng. 116, 1994) with |Q - Q_h| <= C e, e being the

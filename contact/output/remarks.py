@@ -162,7 +162,8 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
             continue
         yield _monotonicity(law, place, strain, dim)
         # g(0) and mu_1, which stands for it wherever a size is asked for.
-        modulus, shear = float(law.secant_modulus(np.zeros(1))[0]), float(law.shear)
+        found = np.asarray(law.secant_modulus(np.zeros(1)))
+        modulus, shear = float(found[0]), float(law.shear)
         if abs(modulus - shear) > OFF * abs(shear):
             yield (
                 f"the secant modulus{place} is {modulus:.4g} without strain, and Young's modulus "

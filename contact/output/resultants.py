@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypedDict, cast
 
 import numpy as np
 import ufl
@@ -164,10 +164,11 @@ class DrivenPart:
             return None
         parts, body = set(members(on)), problem.equilibrium
         held = [at for part, at in holding(problem, electric=False).items() if part in parts]
-        own = [load for load in problem.body.loads if load.on and parts >= set(members(load.on))]
+        loads = problem.body.loads
+        own = tuple(load for load in loads if load.on and parts >= set(members(load.on)))
         test = body.forms.split(ufl.TestFunction(body.space))
-        loads = Loads(problem.domain, replace(problem.body, loads=own), *test, body.owned)
-        return DrivenPart(on, nodes_of(problem, on), held, loads)
+        acting = Loads(problem.domain, replace(problem.body, loads=own), *test, body.owned)
+        return DrivenPart(on, nodes_of(problem, on), held, acting)
 
     def way(self, problem: ContactProblem, state: State) -> Array:
         """Return the mean displacement of its nodes, shape (d,). Collective."""
@@ -334,7 +335,42 @@ def _sum(problem: ContactProblem, values: Array) -> float:
     return float(problem.comm.allreduce(float(np.sum(values)), op=MPI.SUM))
 
 
-def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
+class RigidMovement(TypedDict):
+    """How a rigid body has moved: displacement (length) and rotation (degrees), force and moment.
+
+    Vectors are lists of d components; rotations and moments are numbers in the plane.
+    """
+
+    displacement: list[float]
+    rotation: float | list[float]
+    force: list[float]
+    moment: float | list[float]
+
+
+class ElectrodeState(TypedDict):
+    """Potential and charge of an electrode."""
+
+    potential: float
+    charge: float
+
+
+class BoltState(TypedDict):
+    """Shortening (length) and section force of a bolt, tension positive."""
+
+    shortening: float
+    force: float
+
+
+class Movements(TypedDict, total=False):
+    """How rigid bodies have moved, and the state of electrodes and bolts, by part."""
+
+    rigid: RigidMovement | dict[str, RigidMovement]
+    rigid_parts: dict[str, RigidMovement]
+    electrodes: dict[str, ElectrodeState]
+    bolts: dict[str, BoltState]
+
+
+def movements(problem: ContactProblem, state: State) -> Movements:
     """Return how rigid bodies have moved, and the potentials of electrodes. Collective.
 
     ``rigid`` is the foundation that moves; of several it has one entry each, by part.
@@ -343,8 +379,8 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
     Forces, moments and charges act from outside: those given, or the reactions of components that
     are given. The force of a bolt is that in its section, tension positive.
     """
-    foundations, parts, electrodes = dict[str, Any](), dict[str, Any](), dict[str, Any]()
-    bolts: dict[str, Any] = {}
+    foundations, parts = dict[str, RigidMovement](), dict[str, RigidMovement]()
+    electrodes, bolts = dict[str, ElectrodeState](), dict[str, BoltState]()
     body = problem.equilibrium
     global_unknowns, q = body.global_unknowns, body.motion(state.x)
     if global_unknowns.size == 0:
@@ -367,42 +403,40 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
             own = np.where(np.arange(own.size) == 1, own, 0.0)
         own, d = own / member.units, len(member.description.motion.displacement)
         (foundations if member.foundation else parts)[part] = {
-            "displacement": values[:d].tolist(),
+            "displacement": [float(value) for value in values[:d]],
             "rotation": _one_or_more(np.rad2deg(values[d:])),
-            "force": own[:d].tolist(),
+            "force": [float(value) for value in own[:d]],
             "moment": _one_or_more(own[d:]),
         }
     rigid = next(iter(foundations.values())) if len(foundations) == 1 else foundations
     found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes, "bolts": bolts}
-    return {key: value for key, value in found.items() if value}
+    return cast(Movements, {key: value for key, value in found.items() if value})
 
 
-def _one_or_more(values: Array) -> Any:
-    return float(values[0]) if values.size == 1 else values.tolist()
+def _one_or_more(values: Array) -> float | list[float]:
+    return float(values[0]) if values.size == 1 else cast(list[float], values.tolist())
 
 
-def rigid_columns(moving: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+def rigid_columns(moving: Movements) -> dict[str, dict[str, float]]:
     """Return the columns of rigid bodies and of electrodes, from their `movements`.
 
     They are `moved` (displacements and rotations), `acting` (forces and moments), `potentials`, and
     `bolts`. Of several foundations the names have that of the part behind them, and so have
     those of rigid parts, but where there is one and no foundation moves.
     """
-    foundations, electrodes = moving.get("rigid", {}), moving.get("electrodes", {})
-    bolts = moving.get("bolts", {})
-    parts = moving.get("rigid_parts", {})
+    electrodes = moving.get("electrodes", {})
+    bolts = cast(dict[str, dict[str, float]], moving.get("bolts", {}))
+    rigid: Mapping[str, object] = moving.get("rigid", {})
+    single = isinstance(rigid.get("displacement"), list)
+    foundations = {"": rigid} if single else rigid
+    parts: Mapping[str, object] = moving.get("rigid_parts", {})
     found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}}
     found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
     found["bolts"] = {
         f"bolt_{key}_{part}": bolt[key] for part, bolt in bolts.items() for key in bolt
     }
-    if isinstance(foundations.get("displacement"), list):  # a single one
-        foundations = {"": foundations}
-    for body, end in zip(
-        (*foundations.values(), *parts.values()),
-        name_ends([*foundations], [*parts]),
-        strict=True,
-    ):
+    bodies = cast(list[dict[str, list[float]]], [*foundations.values(), *parts.values()])
+    for body, end in zip(bodies, name_ends([*foundations], [*parts]), strict=True):
         for kind, (key, name) in zip(KINDS, NAMES.items(), strict=True):
             for column, value in zip(
                 columns_of(name, np.size(body[key]), end), np.atleast_1d(body[key]), strict=True

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from dolfinx import fem
@@ -21,9 +21,10 @@ from contact.methods.report import IterationHistory, Outcome
 from contact.output.error_estimate import Estimate
 from contact.output.fields import Deformation, DerivedFields, unknowns
 from contact.output.intervals import Intervals
-from contact.output.options import OutputOptions, Units
+from contact.output.options import OutputOptions, Source, Units
 from contact.output.resultants import (
     ChargeBalance,
+    Movements,
     Resultant,
     charge_balance,
     contact_resultant,
@@ -83,12 +84,18 @@ class Solution(Solved):
 
     Attributes
     ----------
+    problem, state
+        The problem, and its state: unknowns, contact forces, time and history.
     outcome
         Whether it has converged, why it ended, and the residuals.
     history, counters
         The outer iterations; factorisations and linear solves.
+    method
+        Name of the method.
     seconds
         Spent on setup, solve and output.
+    notes, warnings
+        Remarks in words that are no reason for care, and those that are, each with its identifier.
     max_dev_strain, max_von_mises
         The largest |dev eps| and von Mises stress over the cells (their nodes, for degree 2).
     plastic_share
@@ -114,9 +121,12 @@ class Solution(Solved):
     case
         The case as `contact check` prints it, empty where there is none.
     source
-        The case itself; None of a problem that was built in Python, or with objects in its places.
+        The case itself, a `Case`; None of a problem that was built in Python, or with objects in
+        its places.
     energies, driven
         Of a step: its energies, and displacement and force of the part that is moved or loaded.
+    title, units
+        Title of the case, and the names of its units.
     output
         The files that are written besides the summary and the tables.
     steps
@@ -139,13 +149,13 @@ class Solution(Solved):
     equivalent_plastic_strain: float | None = None
     deformation: Deformation | None = None
     error: Estimate | None = None
-    adaptation: list[dict[str, Any]] = field(default_factory=list)
+    adaptation: list[dict[str, float]] = field(default_factory=list)
     intervals: Intervals | None = None
     start: str = "zero slip"
     critical_factor: float = np.inf
     jammed: bool = False
     case: str = ""
-    source: Any = None
+    source: Source | None = None
     energies: Balance | None = None
     driven: tuple[Array, Array] | None = None
     title: str = ""
@@ -214,6 +224,15 @@ class Solution(Solved):
             contact part, von Mises stress and potential are drawn.
         width
             Of the figures (inches).
+
+        Returns
+        -------
+        The figures.
+
+        Raises
+        ------
+        InputError
+            If there is no such field.
         """
         from contact.output.figures.figures import Look, figures_of  # which take a while to load
 
@@ -286,6 +305,15 @@ class Solution(Solved):
     def reaction(self, part: str) -> Array:
         """Return the force that a support exerts on the body, shape (d,). Collective.
 
+        Parameters
+        ----------
+        part
+            Name of the part with prescribed displacements.
+
+        Returns
+        -------
+        The force, of a plane body per unit of depth, of one of revolution over the full turn.
+
         Raises
         ------
         InputError
@@ -299,7 +327,7 @@ class Solution(Solved):
         return self.supports[part].force
 
     @cached_property
-    def movements(self) -> Mapping[str, Any]:
+    def movements(self) -> Movements:
         """Rigid bodies, and electrodes of unknown potential, as in summary.json. Collective.
 
         Its keys are `rigid`, `rigid_parts`, `electrodes` and `bolts`, as far as there are any.

@@ -31,8 +31,11 @@ class Solved:
 
     Attributes
     ----------
+    problem
+        The problem, of a load step that of its time and history.
     state
-        A value, which nothing that is done with the problem changes.
+        Unknowns, contact forces, time and history: a value, which nothing that is done with the
+        problem changes.
     """
 
     problem: ContactProblem
@@ -79,7 +82,7 @@ class Solved:
         return self.problem.nodes.tangential_component(self.nodal)
 
     @property
-    def status(self) -> Array:
+    def status(self) -> NDArray[np.str_]:
         """The active set by names: "open", "stick" or "slip", shape (n,). Collective.
 
         A node is in contact where p - c (gap - u_nu) > 0 for the multiplier p, or where the
@@ -147,7 +150,7 @@ class ContactResult:
     friction: Array
     traction: Array
     friction_bound: Array
-    status: NDArray[Any]
+    status: NDArray[np.str_]
     entry: NDArray[np.intp]
     node: NDArray[np.int64]
     _problem: ContactProblem

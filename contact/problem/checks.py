@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations, product
-from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -17,7 +16,7 @@ from scipy import linalg
 
 from contact.arguments import check_range
 from contact.body.description import Fixed
-from contact.body.fields import values_at
+from contact.body.fields import Field, Moving, values_at
 from contact.body.loads import to_blame
 from contact.errors import InputError
 from contact.interface.law import Conductor
@@ -211,7 +210,7 @@ def _differing(
     values = np.zeros((len(points), 2))
     for k, number in enumerate(pair):
         fixed, key = problem.body.fixed[number], f"fixed.{number}.{name}"
-        given = values_at(fixed.given[name], points, problem.time, key, problem.comm)
+        given = values_at(_prescribed(fixed)[name], points, problem.time, key, problem.comm)
         values[:, k] = fixed.factor(problem.time) * given
     size = problem.comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX)
     # Rounding of a zero, such as sin(pi), is no value.
@@ -224,7 +223,7 @@ def _differing(
     return found[0] if found.size > 0 else None
 
 
-def _prescribed(fixed: Fixed) -> dict[str, Any]:
+def _prescribed(fixed: Fixed) -> dict[str, Field | Moving]:
     """Return the fields of a support by their keys."""
     return {name: field for name, field in fixed.given.items() if field is not None}
 

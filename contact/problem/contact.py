@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import InitVar, dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
-from contact.arguments import expect
-from contact.body.fields import Given
+from contact.arguments import expect, fill
+from contact.body.fields import Static
 from contact.interface.friction import Friction
 from contact.interface.law import Conductor
 from contact.interface.layer import Layer
-from contact.interface.obstacle import GapFunction
+from contact.interface.obstacle import GapFunction, Obstacle
 from contact.mesh.together import part
 
 
@@ -25,8 +26,9 @@ class Contact:
     on
         The part, or a list of parts.
     foundation
-        The obstacle; or a gap to a rigid foundation along the body's normal: a number, a function
-        of x, UFL or a dolfinx Function. By default the body lies on it.
+        The obstacle; or a gap to a rigid foundation along the body's normal (length): a number, a
+        function of x, UFL (`ufl.core.expr.Expr`) or a `dolfinx.fem.Function`. By default the body
+        lies on it.
     layer
         The compliant layer in front of it.
     friction, conductor
@@ -43,35 +45,47 @@ class Contact:
     ------
     InputError
         If something else is given.
+
+    Examples
+    --------
+    >>> Contact(["left", "right"], gap=0.01).on
+    'left+right'
     """
 
-    on: Given
-    foundation: Given = 0.0
-    layer: Layer | None = None
-    friction: Friction | None = None
-    conductor: Conductor | None = None
-    press: bool = False
-    against: Given = None
-    gap: InitVar[Given] = None
+    on: str
+    foundation: Obstacle
+    layer: Layer | None
+    friction: Friction | None
+    conductor: Conductor | None
+    press: bool
+    against: str | None
 
-    def __post_init__(self, gap: Given) -> None:
-        """Make an obstacle of a gap."""
-        object.__setattr__(self, "on", part(self.on))
-        if self.against is not None:
-            object.__setattr__(self, "against", part(self.against))
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        foundation: Obstacle | Static = 0.0,
+        layer: Layer | None = None,
+        friction: Friction | None = None,
+        conductor: Conductor | None = None,
+        press: bool = False,
+        against: str | Sequence[str] | None = None,
+        gap: Static | None = None,
+    ) -> None:
+        fill(self, on=part(on), against=None if against is None else part(against))
         if gap is not None:
-            alone = isinstance(self.foundation, float) and self.foundation == 0.0
-            expect("Contact: foundation", self.foundation, "this, or a gap", alone)
-            object.__setattr__(self, "foundation", gap)
-        if not hasattr(self.foundation, "measure"):
-            object.__setattr__(self, "foundation", GapFunction.of(self.foundation))
-        layer, press = self.layer, self.press
+            alone = isinstance(foundation, float) and foundation == 0.0
+            expect("Contact: foundation", foundation, "this, or a gap", alone)
+            foundation = gap
+        if not hasattr(foundation, "measure"):
+            foundation = GapFunction.of(cast(Static, foundation))
+        fill(self, foundation=foundation)
         expect("Contact: layer", layer, "Layer(...), or None", isinstance(layer, Layer | None))
         expect("Contact: press", press, "True or False", isinstance(press, bool | np.bool_))
-        check_laws("Contact", self.friction, self.conductor)
+        check_laws("Contact", friction, conductor)
+        fill(self, layer=layer, friction=friction, conductor=conductor, press=press)
 
 
-def check_laws(name: str, friction: Any, conductor: Any) -> None:
+def check_laws(name: str, friction: object, conductor: object) -> None:
     """Refuse objects that are no friction, or no electric contact."""
     fits = isinstance(friction, Friction | None)
     expect(f"{name}: friction", friction, "Friction(mu=...), or None", fits)

@@ -127,8 +127,8 @@ class ContactProblem:
     Raises
     ------
     InputError
-        If a part is missing, a vector has the wrong length, nothing can touch, or a law of the
-        layer is not one.
+        If an argument is none of these, a part is missing, a vector has the wrong length, nothing
+        can touch, or a law of the layer is not one.
     """
 
     def __init__(
@@ -178,6 +178,10 @@ class ContactProblem:
             a body to which nothing has been done.
         since
             Beginning of the step; None where nothing has acted before.
+
+        Returns
+        -------
+        The problem of the step; its forms and its interface's nodes are shared.
         """
         step = copy(self)
         step.time, step.since = time, since

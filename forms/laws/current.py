@@ -7,7 +7,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from forms.ops import Value, absolute, clip, is_unlimited, less, less_equal, where
+from forms.ops import Condition, Value, absolute, clip, is_unlimited, less, less_equal, where
 
 
 class PotentialLaw(Protocol):
@@ -52,7 +52,7 @@ class Conductivity(Protocol):
     def follows_gap(self) -> bool:
         """Whether it is a function of the gap that Newton's method can follow."""
 
-    def at(self, s: Value, pressed: Value, loaded: Value) -> Value:
+    def at(self, s: Value, pressed: Condition, loaded: Condition) -> Value:
         """Return the conductivity at nodes, k_e at most.
 
         Parameters
@@ -65,7 +65,7 @@ class Conductivity(Protocol):
             Whether any pressure acts, the layer's included.
         """
 
-    def gap_slope(self, s: Value, pressed: Value) -> Value:
+    def gap_slope(self, s: Value, pressed: Condition) -> Value:
         """Return the derivative by s, 0 where the rigid part presses."""
 
 
@@ -74,6 +74,13 @@ class RampConductivity:
     """psi(s) = k_e clip(delta s, 0, 1), equation (1.34) as printed, s = u_nu - rho.
 
     With a unilateral constraint s never exceeds 0 and the ramp never conducts.
+
+    Parameters
+    ----------
+    k_e
+        Largest conductivity k_e >= 0 (capacitance/area).
+    delta
+        Slope of psi over k_e (1/length).
     """
 
     k_e: float
@@ -96,11 +103,11 @@ class RampConductivity:
         height, slope = self.at_closing + self.delta * s, self.k_e * self.delta
         return where(less(0.0, height), where(less(height, 1.0), slope, 0.0), 0.0)
 
-    def at(self, s: Value, pressed: Value, loaded: Value) -> Value:
+    def at(self, s: Value, pressed: Condition, loaded: Condition) -> Value:
         """Return the conductivity: that of s = 0 where the rigid part presses."""
         return self(where(pressed, 0.0, s))
 
-    def gap_slope(self, s: Value, pressed: Value) -> Value:
+    def gap_slope(self, s: Value, pressed: Condition) -> Value:
         """Return the generalised derivative by s, 0 where the rigid part presses."""
         return where(pressed, 0.0, self.derivative(s))
 
@@ -111,6 +118,18 @@ class ShiftedConductivity(RampConductivity):
     Full conductivity in contact, none beyond the distance 1/delta. Bounded and Lipschitz, as
     (h~5)(b) and (e) of the thesis ask; but (h~5)(d), psi = 0 for s <= 0, is given up: with it no
     contact conducts, for s never exceeds 0.
+
+    Parameters
+    ----------
+    k_e
+        Largest conductivity k_e >= 0 (capacitance/area).
+    delta
+        Slope of psi over k_e (1/length).
+
+    Examples
+    --------
+    >>> float(ShiftedConductivity(k_e=2.0, delta=10.0)(-0.05))  # half way into the ramp
+    1.0
     """
 
     at_closing = 1.0
@@ -118,17 +137,23 @@ class ShiftedConductivity(RampConductivity):
 
 @dataclass(frozen=True)
 class PerfectConductivity:
-    """psi = k_e where the node is in contact, 0 elsewhere, equation (1.33)."""
+    """psi = k_e where the node is in contact, 0 elsewhere, equation (1.33).
+
+    Parameters
+    ----------
+    k_e
+        Conductivity k_e >= 0 of the contact (capacitance/area).
+    """
 
     k_e: float
 
     follows_gap = False
     delta = np.inf
 
-    def at(self, s: Value, pressed: Value, loaded: Value) -> Value:
+    def at(self, s: Value, pressed: Condition, loaded: Condition) -> Value:
         """Return k_e where any pressure acts."""
         return where(loaded, self.k_e, 0.0)
 
-    def gap_slope(self, s: Value, pressed: Value) -> Value:
+    def gap_slope(self, s: Value, pressed: Condition) -> Value:
         """Return 0: the contact flag is kept."""
         return 0.0 * s

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from forms.ops import Value
 
@@ -32,7 +33,7 @@ class FrictionCoefficient(Protocol):
 class ConstantCoefficient:
     """A coefficient that does not depend on the slip: a number, or one value a node."""
 
-    value: Value
+    value: float | NDArray[np.float64]
 
     @property
     def maximum(self) -> float:
@@ -56,7 +57,7 @@ class ConstantCoefficient:
 
 @dataclass(frozen=True)
 class SlipCoefficient:
-    """mu(s) = a + b / (rho s + 2), equation (7.16): a = 0.5, b = 0.2.
+    """mu(s) = a + b / (rho s + 2), equation (7.16), there with a = 0.5, b = 0.2.
 
     Parameters
     ----------
@@ -69,6 +70,11 @@ class SlipCoefficient:
     ------
     ValueError
         If mu is negative at zero slip or for large slip, or rho is.
+
+    Examples
+    --------
+    >>> SlipCoefficient(0.5, 0.2, rho=1e4)(0.0)
+    0.6
     """
 
     a: float
@@ -91,11 +97,11 @@ class SlipCoefficient:
         return abs(self.b) * self.rho / 4
 
     def __call__(self, slip: Value) -> Value:
-        """Return mu at the slip."""
+        """Return mu at slips s = |u_tau| >= 0 (length)."""
         return self.a + self.b / (self.rho * slip + 2)
 
     def derivative(self, slip: Value) -> Value:
-        """Return d mu / ds."""
+        """Return d mu / ds (1/length)."""
         return -self.b * self.rho / (self.rho * slip + 2) ** 2
 
 
@@ -125,7 +131,18 @@ class FrictionLaw(Protocol):
 
 @dataclass(frozen=True)
 class Coulomb:
-    """Coulomb's law s = mu(|u_tau|) p, (1.36)."""
+    """Coulomb's law s = mu(|u_tau|) p, (1.36).
+
+    Parameters
+    ----------
+    coefficient
+        mu(|u_tau|) (no unit), for instance `SlipCoefficient`.
+
+    Examples
+    --------
+    >>> Coulomb(SlipCoefficient(0.5, 0.2, rho=1e4))(0.0, 10.0)
+    6.0
+    """
 
     coefficient: FrictionCoefficient
 
@@ -140,15 +157,15 @@ class Coulomb:
         return self.coefficient.lipschitz
 
     def __call__(self, slip: Value, pressure: Value) -> Value:
-        """Return mu p."""
+        """Return mu p (stress) at slips >= 0 (length) and pressures >= 0 (stress)."""
         return self.coefficient(slip) * pressure
 
     def by_slip(self, slip: Value, pressure: Value) -> Value:
-        """Return mu' p."""
+        """Return the derivative mu' p by the slip."""
         return self.coefficient.derivative(slip) * pressure
 
     def by_pressure(self, slip: Value, pressure: Value) -> Value:
-        """Return mu."""
+        """Return the derivative mu by the pressure."""
         return self.coefficient(slip)
 
 
@@ -156,7 +173,7 @@ class Coulomb:
 class Tresca:
     """Tresca's law: a bound S that depends on nothing, a number or one value a node."""
 
-    bound: Value
+    bound: float | NDArray[np.float64]
 
     maximum = np.inf
     lipschitz = 0.0

@@ -50,7 +50,7 @@ class Compliance:
 
     def derivative(self, s: Value) -> Value:
         """Return the generalised derivative: 1 for 0 < s < n_nu, else 0."""
-        inside = 1.0
+        inside: Value = 1.0
         if not is_unlimited(self.limit):
             inside = where(less_equal(s, self.limit), 1.0, 0.0)
         return where(less_equal(s, 0.0), 0.0, inside)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Protocol
+from typing import Annotated, ClassVar, Protocol, cast
 
 import numpy as np
 from mpi4py import MPI
 
 from contact.arguments import LEAST, OFF, SHARE, SMOOTH, STEP, expect, naming, real
-from contact.body.fields import Given, field
+from contact.body.fields import Field, Static, field
 from contact.errors import InputError
 from contact.ranks import on_all_ranks
 from contact.settings import Internal
@@ -223,9 +223,22 @@ class GapFunction:
     gap: Callable[[Array], Array]
 
     @staticmethod
-    def of(value: Given) -> GapFunction:
-        """Return the gap that is given as `contact.body.fields.field` takes it."""
-        return GapFunction(field(value).numpy)
+    def of(value: Static) -> GapFunction:
+        """Return the gap that is given as `contact.body.fields.field` takes it.
+
+        Parameters
+        ----------
+        value
+            The gap (length), as of `Contact`: a number, a function of x of shape (3, n), a scalar
+            `ufl.core.expr.Expr` or `dolfinx.fem.Function`, or an object with ufl(x) and
+            numpy(points).
+
+        Raises
+        ------
+        InputError
+            If it is nothing of these.
+        """
+        return GapFunction(cast(Field, field(value)).numpy)
 
     direction = "body"
     is_shape = False
