@@ -36,7 +36,7 @@ from contact.body.pointwise import Pointwise
 from contact.body.rollers import Rollers
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
-from contact.history import BodyState, Evaluated, InternalVariables
+from contact.history import BodyState, Evaluated
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout, congruent, masked, projectors, times
 from contact.linear.operator import Counters, SparseOperator
@@ -211,79 +211,15 @@ class BodyEquilibrium:
         """Return unknowns plus an increment of the owned ones. Collective."""
         return self.local(self.owned_part(x) + increment)
 
-    def commit(self, state: Evaluated) -> InternalVariables | None:
-        """Return the internal variables at the end of the step of a state. Collective."""
-        return self.laws.commit(state, self.nodal(state.x).ravel())
+    def forces_of_laws(self) -> Array:
+        """Return the forces of the stresses that the laws with history were given. Collective."""
+        self.forms.at.x.array[:] = 0.0  # no other material has stresses
+        return self._assembled()
 
-    def commit_along(
-        self, state: Evaluated, along: Array, change: InternalVariables
-    ) -> InternalVariables:
-        """Return how the internal variables at the end of a step change. Collective.
-
-        Parameters
-        ----------
-        state
-            The end of the step.
-        along, change
-            Changes of the owned unknowns there, and of the variables at the beginning.
-        """
-        x, along = (self.nodal(values).ravel() for values in (state.x, self.local(along)))
-        return self.laws.commit_along(state, x, along, change)
-
-    def before_along(self, state: Evaluated, change: InternalVariables) -> Array:
-        """Return how the internal forces on the owned unknowns change. Collective.
-
-        Parameters
-        ----------
-        state
-            The end of a step.
-        change
-            Changes of the internal variables at its beginning.
-        """
-        self.laws.before_along(state, self.nodal(state.x).ravel(), change)
-        return self._forces_of_laws()
-
-    def commit_transposed(self, state: Evaluated, after: InternalVariables) -> Array:
-        """Return the derivatives of a quantity by the owned unknowns at the end of a step.
-
-        Collective.
-
-        Parameters
-        ----------
-        state
-            The end of the step.
-        after
-            Its derivatives by the internal variables there.
-        """
-        self.laws.commit_transposed(state, self.nodal(state.x).ravel(), after)
-        return self._forces_of_laws()
-
-    def _forces_of_laws(self) -> Array:
-        """Return the forces of the stresses that the laws with history have been given."""
-        return self._assembled_at(0.0)  # no other material has stresses
-
-    def _assembled_at(self, x: Array | float) -> Array:
-        """Return the forces at local unknowns of the nodes, by laws with history as they stand."""
-        self.forms.at.x.array[:] = x
+    def _assembled(self) -> Array:
+        """Return the owned nodal forces at `forms.at`, by laws with history as they stand."""
         forces = sum(assembled(form, self.owned) for form in self.forms.law_forces)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
-
-    def before_transposed(
-        self, state: Evaluated, along: Array, after: InternalVariables | None
-    ) -> InternalVariables | None:
-        """Return the derivatives of a quantity by the internal variables before a step. Collective.
-
-        Parameters
-        ----------
-        state
-            The end of the step.
-        along
-            Its derivatives by the internal forces on the owned unknowns.
-        after
-            Its derivatives by the variables at the end; None for a last step.
-        """
-        x, along = (self.nodal(values).ravel() for values in (state.x, self.local(along)))
-        return self.laws.before_transposed(state, x, along, after)
 
     def tangent_transposed(self, state: Evaluated, weights: Array) -> Array:
         """Return the derivatives of weighted internal forces by the owned unknowns. Collective.
@@ -302,20 +238,11 @@ class BodyEquilibrium:
         matrix.destroy()
         return found
 
-    def energies(self, state: Evaluated) -> tuple[float, float | None]:
-        """Return the energies of the materials with internal variables. Collective.
-
-        Returns
-        -------
-        The energy dissipated in the step of a state, and that stored there: None without any, and
-        where one of them does not state it.
-        """
-        return self.laws.energies(state, self.nodal(state.x).ravel())
-
     def forces_without_history(self, state: Evaluated) -> Array:
         """Return the owned nodal forces of all materials without internal variables. Collective."""
         self.laws.silence()
-        forces = self._assembled_at(self.forms.put(self.nodal(state.x), self.motion(state.x)))
+        self.forms.put(self.nodal(state.x), self.motion(state.x))
+        forces = self._assembled()
         forces[self.owned :] += self.forms.on_global(self.global_unknowns.size)
         return forces
 
@@ -332,11 +259,13 @@ class BodyEquilibrium:
         """
         destroy_unused(self.comm, self.domain.mesh.comm)
         forms, secant = self.forms, secant_at is not None and not self.linear
-        at = forms.put(self.nodal(state.x), self.motion(state.x))
+        forms.put(self.nodal(state.x), self.motion(state.x))
         if secant:
             assert secant_at is not None
-            at = forms.put(self.nodal(secant_at), self.motion(secant_at), secant=True)
-        self.laws.set(state, at, "secant" if secant else "")
+            forms.put(self.nodal(secant_at), self.motion(secant_at), secant=True)
+            self.laws.set(BodyState(secant_at, state.history), "secant")
+        else:
+            self.laws.set(state)
         chosen = forms.secant_forces if secant else forms.law_forces
         forces = sum(assembled(form, self.owned) for form in chosen)
         return np.concatenate([forces, forms.on_global(self.global_unknowns.size, secant)])
@@ -402,8 +331,8 @@ class BodyEquilibrium:
         """
         forms, conditions = self.forms, [s.condition for s in self.supports] if held else []
         for secant in (False, True):
-            at = forms.put(self.nodal(state.x), self.motion(state.x), secant)
-        self.laws.set(state, at, kind)
+            forms.put(self.nodal(state.x), self.motion(state.x), secant)
+        self.laws.set(state, kind)
         matrix.zeroEntries()
         for form in forms.secant if kind == "secant" else forms.tangent:
             assemble_matrix(matrix, form, bcs=conditions)

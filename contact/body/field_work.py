@@ -53,10 +53,9 @@ class FieldWork:
             nodal = body.nodal(values).copy()
             nodal[:, body.dim :] *= phi_scale / body.phi_scale
             into.x.array[:] = nodal.ravel()
-        x = body.forms.at.x.array
-        body.laws.set(state, x)
+        body.laws.set(state)
         found = sum(assembled(form, self._owned) for form in self._forms)
         if after is not None:
-            body.laws.weigh(state, x, after)
+            body.laws.weigh(state, after)
             found = found + assembled(self._weighted, self._owned)
         return np.asarray(found)

@@ -176,19 +176,17 @@ class QuadratureLaws:
         u = ufl.as_vector([at[i] for i in range(self._domain.dim)])
         return to_vector(strain(u, self._kinematics), self._size)
 
-    def _responses(
-        self, state: Evaluated, x: Array, kind: str = ""
-    ) -> Iterator[tuple[Indices, Response]]:
+    def _responses(self, state: Evaluated, kind: str = "") -> Iterator[tuple[Indices, Response]]:
         """Yield some cells after others, and the response at their points.
 
         Parameters
         ----------
-        state, x
-            The state, and its local unknowns of the nodes.
+        state
+            The state.
         kind
             "tangent", its "symmetric" part, or "secant"; empty without stiffness.
         """
-        for law, cells, strains, variables in self._points(state, x):
+        for law, cells, strains, variables in self._points(state, state.x):
             asked = "tangent" if kind == "symmetric" else kind
             response = law.respond(strains, variables, asked)
             _check(law, strains, variables, response)
@@ -198,7 +196,7 @@ class QuadratureLaws:
     def _points(
         self, state: Evaluated, x: Array
     ) -> Iterator[tuple[HistoryLaw, Indices, Array, dict[str, Array]]]:
-        """Yield a law, some of its cells, and strains and variables before at their points."""
+        """Yield a law, some of its cells, and at their points strains of x and variables before."""
         before = self.of(state)
         for law, own in self._laws:
             assert before is not None
@@ -226,85 +224,87 @@ class QuadratureLaws:
         """Return values by place as those by cell and point."""
         return array.reshape(self._owned, self.points.shape[0], *array.shape[1:])
 
-    def set(self, state: Evaluated, x: Array, kind: str = "") -> None:
+    def _put(self, into: dict[str, Array], cells: Indices, values: Mapping[str, Array]) -> None:
+        """Write values of variables at the points of some cells."""
+        for name, found in values.items():
+            by_cell = self.by_cell(into[name])
+            by_cell[cells] = found.reshape(by_cell[cells].shape)
+
+    def set(self, state: Evaluated, kind: str = "") -> None:
         """Let the forms of the laws look at the response at a state from now on."""
         before = self.of(state)
         if before is None:
             return
         if self._seen is not None:
             variables, last, at = self._seen
-            if variables is before and kind in ("", last) and np.array_equal(x, at):
+            if variables is before and kind in ("", last) and np.array_equal(state.x, at):
                 return  # the residual of a step is that of the check before it
         self._seen = None
-        for cells, response in self._responses(state, x, kind):
+        for cells, response in self._responses(state, kind):
             _fill(self._stress, cells, response.stress)
             if kind:
                 assert response.stiffness is not None
                 _fill(self._stiffness, cells, response.stiffness)
-        self._seen = before, kind, x.copy()
+        self._seen = before, kind, state.x.copy()
 
-    def commit(self, state: Evaluated, x: Array) -> InternalVariables | None:
-        """Return the variables at the end of the step that led to a state."""
+    def commit(self, state: Evaluated) -> InternalVariables | None:
+        """Return the variables at the end of the step that led to a state. Collective."""
         before = self.of(state)
         if before is None:
             return None
         arrays = {name: array.copy() for name, array in before.arrays.items()}
-        for cells, response in self._responses(state, x):
-            for name, values in response.variables.items():
-                by_cell = self.by_cell(arrays[name])
-                by_cell[cells] = values.reshape(by_cell[cells].shape)
+        for cells, response in self._responses(state):
+            self._put(arrays, cells, response.variables)
         return before.replaced(arrays)
 
     def _differentials(
-        self, state: Evaluated, x: Array, along: Array, change: InternalVariables
+        self, state: Evaluated, along: Array, change: InternalVariables
     ) -> Iterator[tuple[Indices, Response]]:
         """Yield some cells after others, and how the response at their points changes."""
         moved = self._points(state, along)
         for (law, cells, strains, variables), (_, _, way, _) in zip(
-            self._points(state, x), moved, strict=True
+            self._points(state, state.x), moved, strict=True
         ):
             changed = self._at(change.arrays, law, cells)
             yield cells, differential(law, strains, variables, way, changed)
 
     def commit_along(
-        self, state: Evaluated, x: Array, along: Array, change: InternalVariables
+        self, state: Evaluated, along: Array, change: InternalVariables
     ) -> InternalVariables:
-        """Return how the variables at the end of a step change.
+        """Return how the variables at the end of a step change. Collective.
 
         Parameters
         ----------
-        state, x
-            The state that the step has led to, and its local unknowns of the nodes.
+        state
+            The state that the step has led to.
         along, change
-            Changes of these unknowns, and of the variables at the beginning.
+            Changes of its local unknowns, and of the variables at the beginning.
         """
         arrays = {name: np.zeros_like(array) for name, array in change.arrays.items()}
-        for cells, found in self._differentials(state, x, along, change):
-            for name, values in found.variables.items():
-                by_cell = self.by_cell(arrays[name])
-                by_cell[cells] = values.reshape(by_cell[cells].shape)
+        for cells, found in self._differentials(state, along, change):
+            self._put(arrays, cells, found.variables)
         return change.replaced(arrays)
 
-    def before_along(self, state: Evaluated, x: Array, change: InternalVariables) -> None:
+    def before_along(self, state: Evaluated, change: InternalVariables) -> None:
         """Let the forms look at how the stresses change with the variables before a step.
 
         Parameters
         ----------
-        state, x, change
+        state, change
             As of `commit_along`.
         """
         self._seen = None
         self._stress.x.array[:] = 0.0
-        for cells, found in self._differentials(state, x, np.zeros_like(x), change):
+        for cells, found in self._differentials(state, np.zeros_like(state.x), change):
             _fill(self._stress, cells, found.stress)
 
-    def commit_transposed(self, state: Evaluated, x: Array, after: InternalVariables) -> None:
+    def commit_transposed(self, state: Evaluated, after: InternalVariables) -> None:
         """Let the forms look at the stresses whose forces are those of the variables' derivatives.
 
         Parameters
         ----------
-        state, x
-            The state that a step has led to, and its local unknowns of the nodes.
+        state
+            The state that a step has led to.
         after
             Derivatives of a quantity by the variables at the end of the step. The forces are then
             its derivatives by the unknowns.
@@ -312,23 +312,23 @@ class QuadratureLaws:
         self._seen = None
         self._stress.x.array[:] = 0.0
         volumes = self.by_cell(self.volumes)
-        for law, cells, strains, variables in self._points(state, x):
+        for law, cells, strains, variables in self._points(state, state.x):
             given = self._at(after.arrays, law, cells)
             by_strain = _gradient(law, strains, variables, given, OF_STRAIN)
             volume = volumes[cells].ravel()
             _fill(self._stress, cells, by_strain / volume[:, None])
 
     def before_transposed(
-        self, state: Evaluated, x: Array, along: Array, after: InternalVariables | None
+        self, state: Evaluated, along: Array, after: InternalVariables | None
     ) -> InternalVariables | None:
-        """Return the derivatives of a quantity by the variables at the beginning of a step.
+        """Return the derivatives of a quantity by the variables before a step. Collective.
 
         Parameters
         ----------
-        state, x
+        state
             As of `commit_transposed`.
         along
-            Its derivatives by the forces of the stresses, local values of the nodes.
+            Its derivatives by the forces of the stresses, local values.
         after
             Its derivatives by the variables at the end of the step; None for a last step.
         """
@@ -338,28 +338,26 @@ class QuadratureLaws:
         arrays = {name: np.zeros_like(array) for name, array in before.arrays.items()}
         moved, volumes = self._points(state, along), self.by_cell(self.volumes)
         for (law, cells, strains, variables), (_, _, by_stress, _) in zip(
-            self._points(state, x), moved, strict=True
+            self._points(state, state.x), moved, strict=True
         ):
             given = {} if after is None else self._at(after.arrays, law, cells)
             volume = volumes[cells].ravel()
             given[OF_STRAIN] = volume[:, None] * by_stress
-            for name in variables:
-                by_cell = self.by_cell(arrays[name])
-                slopes = _gradient(law, strains, variables, given, name)
-                by_cell[cells] = slopes.reshape(by_cell[cells].shape)
+            points = law, strains, variables, given
+            self._put(arrays, cells, {name: _gradient(*points, name) for name in variables})
         return before.replaced(arrays)
 
-    def weigh(self, state: Evaluated, x: Array, after: InternalVariables) -> None:
+    def weigh(self, state: Evaluated, after: InternalVariables) -> None:
         """Let the form of `divided` look at a sum of weighted variables at the end of a step.
 
         Parameters
         ----------
-        state, x
+        state
             As of `commit_transposed`.
         after
             The weights.
         """
-        ends = self.commit(state, x)
+        ends = self.commit(state)
         assert ends is not None
         total = sum(_dot(after.arrays[name], ends.arrays[name]) for name in after.arrays)
         cells = np.arange(self._owned, dtype=np.int32)
@@ -372,10 +370,10 @@ class QuadratureLaws:
         dx = self._domain.dx(metadata={"quadrature_degree": self._degree})
         return fem.form(functions * self._weighed * dx)
 
-    def energies(self, state: Evaluated, x: Array) -> tuple[float, float | None]:
+    def energies(self, state: Evaluated) -> tuple[float, float | None]:
         """Return the energy lost in a step, and that stored at its end, if stated. Collective."""
         sums, stated, volumes = np.zeros(2), self.initial is not None, self.by_cell(self.volumes)
-        for cells, response in self._responses(state, x):
+        for cells, response in self._responses(state):
             stated = stated and response.energy is not None
             for k, values in enumerate((response.dissipation, response.energy)):
                 if values is not None:
@@ -418,18 +416,18 @@ class QuadratureLaws:
         element = basix.ufl.element("DG", cell, self._fitted)
         return np.linalg.pinv(element.tabulate(0, self.points)[0])
 
-    def secant_shear(self, state: Evaluated, x: Array) -> Array:
+    def secant_shear(self, state: Evaluated) -> Array:
         """Return the means of the secant shear modulus in the owned cells, 0 without history."""
         found = np.zeros(self._owned)
-        for cells, response in self._responses(state, x, "secant"):
+        for cells, response in self._responses(state, "secant"):
             assert response.stiffness is not None
             found[cells] = response.stiffness[:, -1, -1].reshape(cells.size, -1).mean(axis=1) / 2
         return found
 
-    def fit(self, state: Evaluated, x: Array) -> None:
+    def fit(self, state: Evaluated) -> None:
         """Let `fits` be those at the end of the step that led to a state."""
         fits = self.fits
-        for cells, response in self._responses(state, x):
+        for cells, response in self._responses(state):
             for name, values in {**response.variables, "stress": response.stress}.items():
                 by_cell = values.reshape(cells.size, self.points.shape[0], -1)
                 _fill(fits[name], cells, np.einsum("dq,cqi->cdi", self._fitting, by_cell))

@@ -61,7 +61,7 @@ class Pointwise:
         points
             Points of the reference cell, shape (points, d).
         x
-            The local unknowns of the nodes.
+            The local unknowns; those behind the nodes' are not looked at.
         cells
             Local numbers of cells.
         """
@@ -71,6 +71,6 @@ class Pointwise:
         made, reader = self._made[name], object()
         for chosen in in_chunks(cells):
             if self._reader is not reader:
-                self._reader, at.x.array[:] = reader, x
+                self._reader, at.x.array[:] = reader, x[: at.x.array.size]
             found = np.asarray(made.eval(self._space.mesh, chosen))
             yield chosen, found.reshape(chosen.size, len(points), made.value_size)

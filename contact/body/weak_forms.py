@@ -224,13 +224,11 @@ class WeakForms:
         none = None if self._body.piezo is None else fem.Constant(self._mesh, 0.0)
         return self._cuts.directions[k], none
 
-    def put(self, nodal: Array, q: Array, secant: bool = False) -> Array:
-        """Put unknowns of the nodes, and the global ones, into `at` or `secant_at`; return it."""
-        into = self.secant_at if secant else self.at
-        into.x.array[:] = nodal.ravel()
+    def put(self, nodal: Array, q: Array, secant: bool = False) -> None:
+        """Put unknowns of the nodes, and the global ones, into `at` or `secant_at`."""
+        (self.secant_at if secant else self.at).x.array[:] = nodal.ravel()
         if self._cuts is not None:
             self._cuts.set(self._cuts.secant_jump if secant else self._cuts.jump, q)
-        return np.asarray(into.x.array)
 
     def on_global(self, size: int, secant: bool = False) -> Array:
         """Return the forces of the stresses on the global unknowns, shape (m,). Collective.

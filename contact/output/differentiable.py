@@ -330,7 +330,7 @@ def _of_rigid(problem: ContactProblem, index: int, end: str) -> dict[str, Quanti
 
 def _lost(problem: ContactProblem, state: State) -> float:
     """Return the energy that plastic flow takes in the step of a state. Collective."""
-    return problem.equilibrium.energies(state)[0]
+    return problem.equilibrium.laws.energies(state)[0]
 
 
 def _driving(problem: ContactProblem, state: State, axis: int) -> float:

@@ -106,7 +106,7 @@ def estimated(
         fields = DerivedFields(body, state, shape.nodes(1))
     fields = fields or DerivedFields(body, state)
     flux, strain = sampled(fields)
-    secant = body.laws.secant_shear(state, body.nodal(state.x).ravel())
+    secant = body.laws.secant_shear(state)
     local = None
     if body.degree == 2 and body.element != MEAN_DILATATION:
         local = LocalProblems(problem, state, flux)

@@ -240,7 +240,7 @@ class DerivedFields:
         body, cells = self.body, self.body.cells[material]
         expression = partial(self._expression, body.body.materials[material])
         name = "fields", material, self.points.tobytes()
-        body.laws.fit(self._state, self._x)
+        body.laws.fit(self._state)
         if body.cuts is not None:
             body.cuts.set(body.cuts.jump, self._q)
         yield from body.pointwise.values(name, expression, self.points, self._x, cells)
@@ -267,7 +267,7 @@ class DerivedFields:
         volume, found = volumes(self.body.domain), []
         strain, mises = self.columns["dev_strain"], self.columns["von_mises"]
         laws, comm = self.body.laws, self.body.comm
-        after = laws.commit(self._state, self._x)
+        after = laws.commit(self._state)
         for index, material in enumerate(self.body.body.materials):
             limit = getattr(material.law, "first_yield", np.inf)
             flows = EQUIVALENT in laws.variables(material.law)

@@ -272,7 +272,7 @@ class Solution(Solved):
         if self.energies is not None or body.laws.initial is None:
             return None if self.energies is None else self.energies.plastic
         if not self.steps:
-            return body.energies(self.state)[0]
+            return body.laws.energies(self.state)[0]
         return sum(float(step.row["plastic_dissipation"]) for step in self.steps)
 
     @property

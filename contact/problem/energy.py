@@ -115,7 +115,7 @@ def stored(problem: ContactProblem, state: State) -> float:
     body, x = problem.equilibrium, problem.equilibrium.owned_part(state.x)
     own = 0.0
     if body.laws.initial is not None:
-        stated = body.energies(state)[1]
+        stated = body.laws.energies(state)[1]
         own = np.nan if stated is None else stated
     forces = body.forces_without_history(state)
     electric = body.product(np.where(body.component_norms.mechanical, 0.0, x), forces)
@@ -132,12 +132,12 @@ def step_end(problem: ContactProblem, state: State, before: StepEnd) -> StepEnd:
     body = problem.equilibrium
     given, internal = working_forces(problem, state)
     moved = body.owned_part(state.x) - body.owned_part(before.x)
-    plastic, stored = body.energies(state)
+    plastic, stored = body.laws.energies(state)
     forces_at: Callable[[State], Array] = body.internal_forces
     if stored is None:
         gained = -plastic
     else:
-        _, at_first = body.energies(replace(state, x=before.x))
+        _, at_first = body.laws.energies(replace(state, x=before.x))
         assert at_first is not None
         forces_at, gained = body.forces_without_history, stored - at_first
     if body.linear:

@@ -33,12 +33,12 @@ def commit_along(linearised: Linearised, x: Array, change: History) -> History:
     """
     problem, state = linearised.problem, linearised.state
     slip, variables = _parts(change)
-    moved = problem.nodes.apply(problem.equilibrium.local(x))[:, : problem.dim]
-    jump = problem.nodes.tangential_component(moved)
+    along = problem.equilibrium.local(x)
+    jump = problem.nodes.tangential_component(problem.nodes.apply(along))
     longer = np.einsum("ni,ni->n", _direction(problem, problem.nodal(state)), jump - slip.jump)
     parts: dict[str, Part] = {SLIP: SlipHistory(jump, slip.accumulated + longer)}
     if variables is not None:
-        parts[VARIABLES] = problem.equilibrium.commit_along(state, x, variables)
+        parts[VARIABLES] = problem.equilibrium.laws.commit_along(state, along, variables)
     return History(parts)
 
 
@@ -58,7 +58,8 @@ def before_along(linearised: Linearised, change: History) -> Equations:
     conditions -= np.einsum("nij,nj->ni", linearised.by_slip, slip.jump)
     if variables is None:
         return Equations(np.zeros_like(problem.equilibrium.owned_part(state.x)), conditions)
-    return Equations(problem.equilibrium.before_along(state, variables), conditions)
+    problem.equilibrium.laws.before_along(state, variables)
+    return Equations(problem.equilibrium.forces_of_laws(), conditions)
 
 
 def commit_transposed(problem: ContactProblem, state: State, after: History) -> Array:
@@ -74,7 +75,8 @@ def commit_transposed(problem: ContactProblem, state: State, after: History) -> 
     slip, variables = _parts(after)
     by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
     if variables is not None:
-        by_x += problem.equilibrium.commit_transposed(state, variables)
+        problem.equilibrium.laws.commit_transposed(state, variables)
+        by_x += problem.equilibrium.forces_of_laws()
     jump, nodal = problem.nodes, problem.nodal(state)
     by_jump = np.zeros_like(nodal)
     by_jump[:, : jump.dim] = jump.tangential_component(slip.jump)
@@ -106,7 +108,8 @@ def before_transposed(
         jump -= slip.accumulated[:, None] * _direction(problem, problem.nodal(state))
         accumulated += slip.accumulated
     parts: dict[str, Part] = {SLIP: SlipHistory(jump, accumulated)}
-    before = problem.equilibrium.before_transposed(state, along, variables)
+    local = problem.equilibrium.local(along)
+    before = problem.equilibrium.laws.before_transposed(state, local, variables)
     return History(parts if before is None else {**parts, VARIABLES: before})
 
 

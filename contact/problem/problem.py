@@ -199,7 +199,8 @@ class ContactProblem:
         """
         here = self.at(state.time, state.history)
         slip = here.interface.commit(here.nodal(state))
-        return self._history(slip, self.equilibrium.commit(replace(state, history=here.history)))
+        variables = self.equilibrium.laws.commit(replace(state, history=here.history))
+        return self._history(slip, variables)
 
     @staticmethod
     def _history(slip: SlipHistory, variables: InternalVariables | None) -> History:
