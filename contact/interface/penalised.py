@@ -32,11 +32,6 @@ class Regularisation:
     slip: float
 
 
-def penalised_forces(interface: Interface, nodal: Array, eps: Regularisation) -> Multipliers:
-    """Return the contact forces of (4.3) at nodal unknowns of shape (n, bs). Collective."""
-    return PenalisedLaw(interface, eps).forces(nodal)
-
-
 def outer(a: Array, b: Array) -> Array:
     """Return a b^T node by node, shape (n, d, d)."""
     return a[:, :, None] * b[:, None, :]

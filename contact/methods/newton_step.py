@@ -205,15 +205,10 @@ class NewtonStep:
     def operator(self) -> Operator:
         """The operator of the linear systems."""
         if self._operator is None:
-            interface = self.problem.interface
-            body = self.problem.equilibrium
+            interface, body = self.problem.interface, self.problem.equilibrium
             asymmetric = interface.friction.acts or interface.law.active or not body.symmetric
-            self._operator = body.operator(
-                interface.coupled,
-                self.problem.constraint,
-                symmetric=not asymmetric,
-                counters=self.counters,
-                kind=self.options.linear,
+            self._operator = self.problem.operator(
+                symmetric=not asymmetric, counters=self.counters, kind=self.options.linear
             )
         return self._operator
 

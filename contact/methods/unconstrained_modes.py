@@ -35,14 +35,7 @@ from contact.problem.limit_analysis import Overload
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.residuals import evaluate, residual_forces
-from contact.problem.rigid_modes import (
-    Group,
-    constrained_by_friction,
-    constrained_by_supports,
-    constrained_undeformed,
-    groups,
-    null_space,
-)
+from contact.problem.rigid_modes import Group, constrained_by_supports, groups, null_space
 from contact.problem.state import State
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
@@ -52,7 +45,7 @@ STUCK = 10.0
 
 
 @dataclass(frozen=True)
-class _RigidMotion:
+class RigidMotion:
     """Rigid motions that nothing constrains at a solution, and the amounts to subtract.
 
     Attributes
@@ -95,12 +88,23 @@ class UnconstrainedModes:
     @cached_property
     def constrained_undeformed(self) -> bool:
         """Whether supports, and contact where it touches in the reference configuration, do."""
-        return constrained_undeformed(self.problem)
+        return self._held_undeformed(self.problem.frictional)
 
     @cached_property
     def friction_alone(self) -> bool:
-        """Whether a mode is constrained by friction alone."""
-        return self.problem.frictional and constrained_by_friction(self.problem)
+        """Whether a mode is constrained by friction alone.
+
+        Nodes that touch at once hold bodies along their normals, no others: a ring between two
+        plates moves far aside before others touch.
+        """
+        return self.problem.frictional and not self._held_undeformed(friction=False)
+
+    def _held_undeformed(self, friction: bool) -> bool:
+        """Tell whether supports, and contact where it touches undeformed, hold all bodies."""
+        interface, rest = self.problem.interface, self.problem.start()
+        touching = interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.size
+        held = [group.held(friction, touching) for group in groups(self.problem)]
+        return all(null_space(gram).size == 0 for gram in held)
 
     def stuck_bound(self) -> Array | None:
         """Return friction bounds that no load exceeds, shape (n,) (stress). Collective.
@@ -152,26 +156,6 @@ class UnconstrainedModes:
     def _unsupported(self) -> list[Group]:
         return [group for group in groups(self.problem) if null_space(group.supports).size > 0]
 
-    def minimal_motion(self, problem: Problem, state: State) -> tuple[Array, bool] | None:
-        """Return the free rigid motion to take off a solution, and whether contact limits it.
-
-        Collective.
-
-        Parameters
-        ----------
-        problem
-            The whole problem, or the condensed one.
-        state
-            Its solution.
-
-        Returns
-        -------
-        The motion of owned and global unknowns of the whole problem, and whether the least
-        displacements of all would pass through the foundation; None where nothing is free.
-        """
-        found = self._rigid_motion(problem, state)
-        return None if found is None else (found.motions @ found.amounts, found.limited)
-
     def separated(
         self, problem: CondensedProblem, operator: Operator, stiffness: float
     ) -> State | None:
@@ -198,7 +182,7 @@ class UnconstrainedModes:
         for _ in range(2):  # each leaves the root of the rounding
             increment = operator.solve(-residual_forces(problem, state))
             state = replace(state, x=problem.equilibrium.moved(state.x, increment))
-        found = self._rigid_motion(problem, state)
+        found = self.free_motion(problem, state)
         if found is None:
             return None
         further = found.columns @ (found.amounts - found.wanted)
@@ -209,8 +193,16 @@ class UnconstrainedModes:
         moved[jump.nodes, : jump.dim] = found.columns @ found.amounts
         return replace(state, x=state.x - moved.ravel())
 
-    def _rigid_motion(self, problem: Problem, state: State) -> _RigidMotion | None:
-        """Return the free rigid motion to take off; None where nothing is free. Collective."""
+    def free_motion(self, problem: Problem, state: State) -> RigidMotion | None:
+        """Return the free rigid motion to take off a solution; None without any. Collective.
+
+        Parameters
+        ----------
+        problem
+            The whole problem, or the condensed one.
+        state
+            Its solution.
+        """
         interface = problem.interface
         jump, nodal = interface.jump, interface.jump.apply(state.x)
         # Pressures that are rounding hold nothing.
@@ -246,7 +238,7 @@ class UnconstrainedModes:
             parts = jump.comm.allgather((rising[near], room[near]))
             cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))
             amounts = _least_distance(products, wanted, cone, -room)
-        return _RigidMotion(whole, moved, wanted, amounts, depth, limited)
+        return RigidMotion(whole, moved, wanted, amounts, depth, limited)
 
     def pushed_aside(self, problem: Problem, state: State) -> bool:
         """Tell whether contact has moved a body to where nothing constrains it. Collective.
@@ -255,8 +247,8 @@ class UnconstrainedModes:
         """
         if not problem.interface.friction.acts or self.constrained_by_supports:
             return False
-        found = self.minimal_motion(problem, state)
-        return found is not None and found[1]
+        found = self.free_motion(problem, state)
+        return found is not None and found.limited
 
 
 def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array, Array]:
@@ -307,10 +299,10 @@ def with_least_displacements(
         if residuals.excess(outcome.allowed):
             return state, outcome
         state, outcome = free, replace(outcome, kkt=residuals)
-    found = modes.minimal_motion(problem, state)
+    found = modes.free_motion(problem, state)
     if found is None:
         return state, outcome
-    x = body.moved(state.x, -found[0])
+    x = body.moved(state.x, -found.motions @ found.amounts)
     # Where nothing presses, forces by rounding alone are out of balance elsewhere.
     for forces in (Multipliers.zero(problem.interface.jump), state.forces):
         least = replace(state, x=x, forces=forces)

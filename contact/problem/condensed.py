@@ -147,18 +147,6 @@ class CondensedBody:
         """Return zero: that is part of all that acts on the whole body."""
         return np.zeros_like(self.acting)
 
-    def operator(
-        self,
-        nodes: NDArray[np.int32],
-        constraint: Constraint | None = None,
-        *,
-        symmetric: bool,
-        counters: Counters,
-        kind: str,
-    ) -> DenseOperator:
-        """Return the dense operator; it has blocks at all nodes, in their order."""
-        return DenseOperator(self.comm, self.free, self.stiffness, counters, self.inclined)
-
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
         return float(np.sqrt(summed(self.comm, np.dot(values, values))))
@@ -173,13 +161,15 @@ class CondensedProblem:
     scales: Scales
     time: float = 1.0
 
-    #: Its unknowns are the jumps themselves.
-    constraint = None
-
     def start(self, time: float | None = None) -> State:
         """Return the state with the free unknowns at zero."""
         x = self.equilibrium.prescribe(self.equilibrium.rest())
         return State(x, Multipliers.zero(self.interface.jump), self.time)
+
+    def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> DenseOperator:
+        """Return the dense operator; it has blocks at all nodes, in their order."""
+        body = self.equilibrium
+        return DenseOperator(body.comm, body.free, body.stiffness, counters, body.inclined)
 
 
 def at_kept_nodes(interface: Interface) -> Interface:

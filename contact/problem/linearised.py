@@ -60,10 +60,7 @@ class Equations:
 def active_set(problem: ContactProblem, state: State) -> ActiveSet:
     """Return the active set of a solution. Collective."""
     interface, nodal = problem.interface, problem.nodal(state)
-    found = interface.active_set(nodal, state.forces, interface.bound(nodal, state.forces))
-    if interface.friction.acts:
-        return found
-    return ActiveSet.without_slip(found.closed, False)
+    return interface.active_set(nodal, state.forces, interface.bound(nodal, state.forces))
 
 
 def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equations:
@@ -160,11 +157,8 @@ class Linearised:
         self._regular = np.linalg.inv(regular)
         d = jump.dim
         law[:, :d] -= self._regular @ self._by_jump
-        body = problem.equilibrium
-        kind = "auto" if multigrid.is_large(body.layout) else "lu"
-        self._operator = body.operator(
-            interface.coupled, problem.constraint, symmetric=False, counters=counters, kind=kind
-        )
+        kind = "auto" if multigrid.is_large(problem.equilibrium.layout) else "lu"
+        self._operator = problem.operator(symmetric=False, counters=counters, kind=kind)
         self._operator.update("tangent", state, interface.weighted(law, state.x))
 
     def _conditions(self, nodal: Array) -> None:

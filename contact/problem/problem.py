@@ -33,7 +33,8 @@ from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
 from contact.interface.placing import candidates, find_nodes, held_nodes
-from contact.linear.constraint import Constraint
+from contact.linear.constraint import ConstrainedOperator, Constraint
+from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
 from contact.problem.contact import Contact, check_laws
@@ -336,6 +337,18 @@ class ContactProblem:
         if carried is not None:
             motions = unknowns.with_foundations(self.nodes.nodes, carried)
         return Constraint(body.layout, interface.change, motions, unknowns.free)
+
+    def operator(
+        self, *, symmetric: bool, counters: Counters, kind: str
+    ) -> SparseOperator | ConstrainedOperator:
+        """Return the operator of its linear systems; see `BodyEquilibrium.operator`. Collective."""
+        return self.equilibrium.operator(
+            self.interface.coupled,
+            self.constraint,
+            symmetric=symmetric,
+            counters=counters,
+            kind=kind,
+        )
 
     @property
     def comm(self) -> MPI.Intracomm:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from contact.body.component_norms import ComponentNorms
 from contact.history import Evaluated
 from contact.interface.interface import Interface
-from contact.linear.constraint import Constraint
 from contact.linear.operator import Counters, Operator
 from contact.problem.state import State
 from contact.typing import Array
@@ -52,7 +51,7 @@ class Scales:
 
 
 class Equilibrium(Protocol):
-    """A body as its contact nodes feel it: forces and operators at given unknowns.
+    """A body as its contact nodes feel it: forces at given unknowns.
 
     The whole body (`contact.body.equilibrium`) and the one condensed onto its contact nodes
     (`contact.problem.condensed`) are two implementations. Neither keeps a state.
@@ -127,17 +126,6 @@ class Equilibrium(Protocol):
     def exchanged(self, state: Evaluated) -> Array:
         """Return the `sizes` of the forces of each field on the other. Collective."""
 
-    def operator(
-        self,
-        nodes: NDArray[np.int32],
-        constraint: Constraint | None = None,
-        *,
-        symmetric: bool,
-        counters: Counters,
-        kind: str,
-    ) -> Operator:
-        """Return an operator with blocks at nodes, those of a constraint where one is given."""
-
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
 
@@ -154,10 +142,6 @@ class Problem(Protocol):
         """Gamma_3 with its laws."""
 
     @property
-    def constraint(self) -> Constraint | None:
-        """The constraint of its linear systems; None where there is none. Collective."""
-
-    @property
     def scales(self) -> Scales:
         """Sizes of the body and its stiffness."""
 
@@ -170,3 +154,6 @@ class Problem(Protocol):
 
         Those of another time than the problem's, where one is given.
         """
+
+    def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> Operator:
+        """Return the operator of its linear systems, with blocks where the interface has some."""

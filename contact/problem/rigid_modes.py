@@ -121,38 +121,9 @@ def groups(problem: ContactProblem) -> Iterator[Group]:
         )
 
 
-def constrained_by_friction(problem: ContactProblem) -> bool:
-    """Tell whether without friction a rigid motion of a body were free. Collective.
-
-    Nodes that touch at once hold it along their normals, no others: a ring between two plates moves
-    far aside before others touch.
-    """
-    touching = _touching(problem)
-    return any(
-        [null_space(group.held(friction=False, at=touching)).size > 0 for group in groups(problem)]
-    )
-
-
 def constrained_by_supports(problem: ContactProblem) -> bool:
     """Tell whether no rigid motion were free without contact. Collective."""
     return all([null_space(group.supports).size == 0 for group in groups(problem)])
-
-
-def constrained_undeformed(problem: ContactProblem) -> bool:
-    """Tell whether supports and contact hold all bodies where they touch undeformed. Collective."""
-    touching = _touching(problem)
-    return all(
-        [
-            null_space(group.held(problem.frictional, touching)).size == 0
-            for group in groups(problem)
-        ]
-    )
-
-
-def _touching(problem: ContactProblem) -> NDArray[np.bool_]:
-    """Tell which contact nodes touch before anything but prescribed values moves. Collective."""
-    interface, rest = problem.interface, problem.start()
-    return interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.size
 
 
 def _free_motions(problem: ContactProblem) -> dict[int, str]:

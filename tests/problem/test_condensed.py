@@ -78,9 +78,8 @@ def test_the_first_rank_alone_holds_the_dense_matrix_and_factors():
     left = condensed.Condensation(problem, Counters()).linearise("secant", problem.start())
     assert left is not None
     body = left.equilibrium
-    nodes = np.arange(body.free.shape[0], dtype=np.int32)
-    operator = body.operator(nodes, symmetric=False, counters=Counters(), kind="auto")
-    blocks = np.tile(np.eye(body.block_size), (nodes.size, 1, 1))
+    operator = left.operator(symmetric=False, counters=Counters(), kind="auto")
+    blocks = np.tile(np.eye(body.block_size), (len(body.free), 1, 1))
     operator.update("secant", BodyState(body.at), blocks)
     assert hasattr(operator, "_solve") == (WORLD.rank == 0)
     rhs = np.where(body.free.ravel(), 1.0, 0.0)

@@ -57,13 +57,8 @@ class FixedPoint(OuterLoop):
         self.operator = self._new_operator(symmetric=True)
 
     def _new_operator(self, symmetric: bool) -> Operator:
-        return self.problem.equilibrium.operator(
-            self.problem.interface.coupled,
-            self.problem.constraint,
-            symmetric=symmetric,
-            counters=self.counters,
-            kind="many" if self.options.linear == "auto" else self.options.linear,
-        )
+        kind = "many" if self.options.linear == "auto" else self.options.linear
+        return self.problem.operator(symmetric=symmetric, counters=self.counters, kind=kind)
 
     def solve(
         self, start: State | None = None, linearised_at: Array | None = None

@@ -26,12 +26,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from contact.errors import InputError, SingularError
-from contact.interface.penalised import (
-    PenalisedLaw,
-    Regularisation,
-    outer,
-    penalised_forces,
-)
+from contact.interface.penalised import PenalisedLaw, Regularisation, outer
 from contact.linear.faults import petsc_options
 from contact.linear.krylov import Packing, shell
 from contact.linear.operator import Counters
@@ -39,10 +34,10 @@ from contact.methods.options import PenaltyOptions
 from contact.methods.report import Outcome
 from contact.methods.signals import Interrupted
 from contact.methods.thesis.outer_loop import LOST, NEAR, OuterLoop
+from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.checks import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, residual_forces
-from contact.problem.rigid_modes import constrained_by_friction
 from contact.problem.state import State
 from contact.tolerances import LARGEST_VIOLATION
 from contact.typing import Array
@@ -70,12 +65,8 @@ class PenalisedProblem:
         self._error: InputError | Interrupted | None = None
         self._problem = problem
         self._body, self._interface = problem.equilibrium, problem.interface
-        self.operator = self._body.operator(
-            self._interface.coupled,
-            problem.constraint,
-            symmetric=symmetric,
-            counters=counters,
-            kind=options.linear,
+        self.operator = problem.operator(
+            symmetric=symmetric, counters=counters, kind=options.linear
         )
         self._packing = Packing(problem.comm, self._body.global_unknowns.size)
         matrix = shell(self, problem.comm, self._body.owned, self._body.global_unknowns.size)
@@ -248,21 +239,12 @@ LEAST_ADDED = 1e-2
 
 
 def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regularisation:
-    """Return the parameters of the penalised laws. Collective."""
-    automatic = automatic_eps(problem)
-    if options.eps_contact is None:
-        contact, slip = automatic.contact, automatic.slip
-    else:
-        contact = slip = options.eps_contact
-    return Regularisation(contact, slip if options.eps_slip is None else options.eps_slip)
+    """Return the parameters of the penalised laws. Collective.
 
-
-def automatic_eps(problem: ContactProblem) -> Regularisation:
-    """Return parameters that fit the body, its mesh and its loads, in any units. Collective.
-
-    The foundation is a hundred times stiffer than a layer of elements, E/h. The slip length is a
-    hundredth of the displacement that the loads, as a stress on Gamma_3, give a block of the
-    body's size; in a step of an evolution, their increment there.
+    Those that are not given fit the body, its mesh and its loads, in any units. The foundation is a
+    hundred times stiffer than a layer of elements, E/h. The slip length is a hundredth of the
+    displacement that the loads, as a stress on Gamma_3, give a block of the body's size; in a step
+    of an evolution, their increment there.
     """
     body, scales = problem.equilibrium, problem.scales
     loads, prescribed = body.external(problem.time), problem.start().x
@@ -274,7 +256,10 @@ def automatic_eps(problem: ContactProblem) -> Regularisation:
     slip = 1e-2 * displacement or 1e-6 * scales.size
     # Of the part in contact: slips of a stiff one are its own, however soft its support is.
     young = problem.interface.stiffness * scales.size
-    return Regularisation(1e-2 * scales.spacing / young, slip * min(1.0, scales.young / young))
+    contact, slip = 1e-2 * scales.spacing / young, slip * min(1.0, scales.young / young)
+    if options.eps_contact is not None:
+        contact = slip = options.eps_contact
+    return Regularisation(contact, slip if options.eps_slip is None else options.eps_slip)
 
 
 @dataclass
@@ -326,7 +311,7 @@ class Penalty(OuterLoop):
         self._failed = implicit and bool(fault)
         if self._failed:  # Algorithm 3 goes on a while
             x, fault = self.state.x, f"implicit: {fault}"
-        forces = penalised_forces(interface, interface.jump.apply(x), self._eps)
+        forces = PenalisedLaw(interface, self._eps).forces(interface.jump.apply(x))
         self.state = replace(self.state, x=x, forces=forces)
         return inner, fault or ("implicit" if implicit else "")
 
@@ -357,7 +342,7 @@ class Penalty(OuterLoop):
         constrains would fly away.
         """
         law = PenalisedLaw(self.problem.interface, self._eps, nodal)
-        if self.problem.frictional and not law.acts() and constrained_by_friction(self.problem):
+        if not law.acts() and UnconstrainedModes(self.problem).friction_alone:
             law.stick()
         return law
 
