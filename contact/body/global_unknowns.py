@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.body.description import Body
-from contact.body.rigid import Bolt, Electrode, Rigid, rigid_motions
+from contact.body.rigid import Bolt, Electrode, Rigid, numbers_at, rigid_motions
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.ranks import summed
@@ -78,11 +78,13 @@ class Member:
 
     def given(self, time: float) -> Array:
         """Return the given values of its unknowns at a time, 0 where they are free."""
-        return self.description.at(self.description.values, time) / self.units
+        given = self.description
+        return numbers_at(given.values, given.amplitude, time) / self.units
 
     def forces(self, time: float) -> Array:
         """Return the forces and moments, or the charge, on its free unknowns at a time."""
-        forces = self.description.at(self.description.forces, time)
+        given = self.description
+        forces = numbers_at(given.forces, given.amplitude, time)
         return np.where(self.free, forces * self.units, 0.0)
 
     def motion(self, points: Array, block_size: int) -> Array:
@@ -172,11 +174,7 @@ class GlobalUnknowns:
         motion
             R there, shape (n, block size, m).
         """
-        dofs = nodes[:, None] * motion.shape[1] + np.arange(motion.shape[1])
-        size = dofs.size * self.size
-        rows = np.repeat(dofs.ravel(), self.size)
-        columns = np.broadcast_to(np.arange(self.size), (dofs.size, self.size)).ravel()
-        there = sparse.coo_array((motion.reshape(size), (rows, columns)), shape=self.ties.shape)
+        there = _rows(nodes, motion, slice(0, self.size), self.ties.shape)
         return (self.ties + there).tocsr()
 
 
@@ -272,11 +270,17 @@ def _tie(
     follows &= free[nodes]
     tied[nodes] |= follows
     motion[~follows] = 0.0
-    dofs = nodes[:, None] * free.shape[1] + np.arange(free.shape[1])
-    columns = np.arange(member.columns.start, member.columns.stop)
-    rows, columns = np.broadcast_arrays(dofs[:, :, None], columns)
-    places = rows.ravel(), columns.ravel()
-    return sparse.coo_array((motion.ravel(), places), shape=(free.size, size)).tocsr()
+    return _rows(nodes, motion, member.columns, (free.size, size))
+
+
+def _rows(
+    nodes: NDArray[np.int32], motion: Array, columns: slice, shape: tuple[int, int]
+) -> sparse.csr_array:
+    """Return R at some nodes, (n, block size, columns), as rows of a matrix of all unknowns."""
+    dofs = nodes[:, None] * motion.shape[1] + np.arange(motion.shape[1])
+    every = np.broadcast_arrays(dofs[:, :, None], np.arange(columns.start, columns.stop))
+    places = tuple(numbers.ravel() for numbers in every)
+    return sparse.coo_array((motion.ravel(), places), shape=shape).tocsr()
 
 
 def _anywhere(domain: Domain, flags: NDArray[np.bool_]) -> bool:

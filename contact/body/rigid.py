@@ -30,7 +30,7 @@ def _timed(name: str, value: Timed | None) -> Timed | None:
     return OfTime(value, name) if callable(value) else value
 
 
-def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) -> Array:
+def numbers_at(values: Sequence[Timed | None], given: Amplitude | None, time: float) -> Array:
     """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it."""
     known = any(callable(value) for value in values)
     factor = amplitude_of(given, known)(time)
@@ -193,9 +193,10 @@ class Rigid:
         """Force and moment."""
         return (*self.motion.force, *self.motion.moment)
 
-    def at(self, values: Sequence[Timed | None], time: float) -> Array:
-        """Return some of these at a time, 0 for None, shape (n,)."""
-        return _at(values, self.motion.amplitude, time)
+    @property
+    def amplitude(self) -> Amplitude | None:
+        """That of the motion."""
+        return self.motion.amplitude
 
 
 @dataclass(frozen=True)
@@ -244,10 +245,6 @@ class Electrode:
     def forces(self) -> tuple[Timed | None, ...]:
         """The charge."""
         return (self.charge,)
-
-    def at(self, values: Sequence[Timed | None], time: float) -> Array:
-        """Return some of these at a time, 0 for None, shape (n,)."""
-        return _at(values, self.amplitude, time)
 
 
 @dataclass(frozen=True)
@@ -302,10 +299,6 @@ class Bolt:
     def forces(self) -> tuple[Timed | None, ...]:
         """The section force."""
         return (self.force,)
-
-    def at(self, values: Sequence[Timed | None], time: float) -> Array:
-        """Return some of these at a time, 0 for None, shape (n,)."""
-        return _at(values, self.amplitude, time)
 
 
 def rigid_motions(points: NDArray[np.floating], revolved: bool = False) -> Array:

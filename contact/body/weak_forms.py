@@ -180,29 +180,9 @@ class WeakForms:
         They are the forms of all quadrature rules, which add up: in one form FFCx would take values
         of a rule of one point for those of the others.
         """
-        v, _ = test or self._test
-        supports = [functions * form for form in self._supported(self._displacement(self.at), v)]
-        forms = self._stresses(secant_at, history_at, test or self._test, functions)
-        return forms + ([sum(supports)] if supports else [])
-
-    def _displacement(self, at: fem.Function) -> Expr:
-        """Return the displacement of unknowns `at` or `secant_at`, with the jumps across cuts."""
-        u = self.split(at)[0]
-        if self._cuts is None:
-            return u
-        return u + (self._cuts.jump if at is self.at else self._cuts.secant_jump)
-
-    def _stresses(
-        self,
-        secant_at: fem.Function,
-        history_at: fem.Function,
-        test: tuple[Expr, Expr | None],
-        functions: Expr | int = 1,
-    ) -> list[ufl.Form]:
-        """Return the forces of the stresses; see `_internal`."""
-        u, phi, (v, xi) = self._displacement(self.at), self.split(self.at)[1], test
+        u, phi, (v, xi) = self._displacement(self.at), self.split(self.at)[1], test or self._test
         frozen = {False: self._displacement(secant_at), True: self._displacement(history_at)}
-        return [
+        stresses = [
             sum(
                 (sign * functions) * secant_form(law, u_0, u, v, kinematics) * dx
                 if piezo is None
@@ -215,6 +195,15 @@ class WeakForms:
             for integrals in self._rules
             if integrals
         ]
+        supports = [functions * form for form in self._supported(u, v)]
+        return stresses + ([sum(supports)] if supports else [])
+
+    def _displacement(self, at: fem.Function) -> Expr:
+        """Return the displacement of unknowns `at` or `secant_at`, with the jumps across cuts."""
+        u = self.split(at)[0]
+        if self._cuts is None:
+            return u
+        return u + (self._cuts.jump if at is self.at else self._cuts.secant_jump)
 
     # Of cuts: the section forces, and the derivatives of all forces by shortenings.
 

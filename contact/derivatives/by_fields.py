@@ -11,12 +11,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
 from contact.arguments import expect
-from contact.body.field_work import FieldWork
+from contact.body.equilibrium import BodyEquilibrium
 from contact.body.internal_variables import VARIABLES
+from contact.body.loads import assembled
 from contact.derivatives.by_parameters import (
     Adjoint,
     LoadPath,
@@ -24,9 +26,9 @@ from contact.derivatives.by_parameters import (
     parameters_of,
     quantities_of,
 )
-from contact.derivatives.differences import Family, Parameter
+from contact.derivatives.differences import Family, Parameter, family_of
 from contact.errors import InputError
-from contact.history import InternalVariables
+from contact.history import Evaluated, InternalVariables
 from contact.output.differentiable import Differentiable, Quantity
 from contact.output.solution import Solution
 from contact.problem.linearised import Linearised
@@ -123,7 +125,7 @@ def field_gradient(
     path, asked = LoadPath(solution), _one(solution, quantity)
     given = [parameter] if isinstance(parameter, str) else {key: parameter}
     ((_, made),) = parameters_of(solution, given)
-    gradient = _FieldGradient(path.base.domain.mesh, path.family(key, made), degree)
+    gradient = _FieldGradient(path.base.domain.mesh, family_of(key, made, path.steps), degree)
     for linearised, adjoints in backwards(path, asked):
         for one in adjoints.values():
             gradient.add(linearised, one)
@@ -152,7 +154,7 @@ class _FieldGradient:
 
     def __init__(self, mesh: Mesh, family: Family, degree: int) -> None:
         self._space = fem.functionspace(mesh, ("DG" if degree == 0 else "Lagrange", degree))
-        self._works = [FieldWork(there.equilibrium, self._space) for there in family.problems]
+        self._works = [_FieldWork(there.equilibrium, self._space) for there in family.problems]
         self._family, self._found = family, np.zeros(self._space.dofmap.index_map.size_local)
 
     def add(self, linearised: Linearised, adjoint: Adjoint) -> None:
@@ -169,3 +171,52 @@ class _FieldGradient:
         made.x.array[: self._found.size] = self._found
         made.x.scatter_forward()
         return made
+
+
+class _FieldWork:
+    """Work along given unknowns, one value for each function of a field.
+
+    The functions add up to 1, so that the values add up to the work: if a constant of a material is
+    the sum of m_i phi_i, the derivative of value i by the constant is that of the work by m_i.
+
+    Parameters
+    ----------
+    body
+        The body.
+    space
+        Of the field: DG0 or P1.
+    """
+
+    def __init__(self, body: BodyEquilibrium, space: fem.FunctionSpace) -> None:
+        self._body, functions = body, ufl.TestFunction(space)
+        self._along = fem.Function(body.space)
+        self._owned = space.dofmap.index_map.size_local
+        self._forms = body.forms.work(self._along, functions)
+        self._weighted = body.laws.divided(functions)
+
+    def __call__(
+        self, state: Evaluated, along: Array, phi_scale: float, after: InternalVariables | None
+    ) -> Array:
+        """Return the values of the functions that this rank owns. Collective.
+
+        Parameters
+        ----------
+        state, along
+            The unknowns of the stresses, and the owned ones along which they work.
+        phi_scale
+            The unit of the potential in both, which may be that of another body.
+        after
+            Weights of the internal variables at the end of the step, whose sum counts as work;
+            None for none.
+        """
+        body = self._body
+        for into, values in ((body.forms.at, state.x), (self._along, body.local(along))):
+            nodal = body.nodal(values).copy()
+            nodal[:, body.dim :] *= phi_scale / body.phi_scale
+            into.x.array[:] = nodal.ravel()
+        body.laws.set(state)
+        found = sum(assembled(form, self._owned) for form in self._forms)
+        if after is not None:
+            body.laws.weigh(state, after)
+            found = found + assembled(self._weighted, self._owned)
+        return np.asarray(found)

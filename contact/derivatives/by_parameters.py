@@ -150,9 +150,8 @@ def sensitivity(
     expect("method", method, accepted, method in (AUTO, TANGENT, ADJOINT))
     path = LoadPath(solution)
     asked = quantities_of(solution, quantities)
-    families = {
-        name: path.family(name, given) for name, given in parameters_of(solution, parameters)
-    }
+    named = parameters_of(solution, parameters)
+    families = {name: family_of(name, given, path.steps) for name, given in named}
     smooth = _with_gradients(asked)
     blind = [name for name in asked if name not in smooth]
     if method == ADJOINT and blind:
@@ -260,37 +259,19 @@ class LoadPath:
         """Return the points of weakly active nodes of all steps. Collective."""
         return np.unique(np.concatenate([weakly_active(*step) for step in self.steps]), axis=0)
 
-    def family(self, name: str, parameter: Parameter) -> Family:
-        """Return the problems beside that of a parameter. Collective."""
-        return family_of(name, parameter, self.steps)
-
 
 def _with_gradients(quantities: Mapping[str, Quantity]) -> dict[str, Differentiable]:
     """Return those of the quantities that the adjoint can take."""
     return {name: it for name, it in quantities.items() if isinstance(it, Differentiable)}
 
 
-@dataclass
-class _Direction:
-    """Changes with a parameter: of unknowns, contact forces and history, per unit of it."""
-
-    x: Array
-    forces: Array
-    history: History
-
-
-def _beside(family: Family, state: State, direction: _Direction | None = None) -> _Sides:
-    """Return problems and states beside a parameter, moved along a direction. Collective."""
-    found = []
+def _moved(family: Family, state: State, x: Array, forces: Array, change: History) -> _Sides:
+    """Return the sides of a parameter, moved by changes per unit of it. Collective."""
+    sides = []
     for way, problem in zip(family.ways, family.problems, strict=True):
-        there = state
-        if direction is not None:
-            there = replace(
-                moved_state(problem, state, way * direction.x, way * direction.forces),
-                history=_sum(state.history, way, direction.history),
-            )
-        found.append(at(problem, there))
-    return found
+        there = moved_state(problem, state, way * x, way * forces)
+        sides.append(at(problem, replace(there, history=_sum(state.history, way, change))))
+    return sides
 
 
 def _sum(history: History, factor: float, change: History) -> History:
@@ -301,7 +282,7 @@ def _sum(history: History, factor: float, change: History) -> History:
 
 def _explicit(family: Family, state: State, linearised: Linearised) -> tuple[Equations, _Sides]:
     """Return dR/dm at the fixed state and history, and the problems beside it. Collective."""
-    sides = _beside(family, state)
+    sides = [at(problem, state) for problem in family.problems]
     found = [equations(*side, linearised.active) for side in sides]
     change = Equations(
         family.slope([one.forces for one in found]),
@@ -351,8 +332,7 @@ def _tangent(
             x, forces = linearised.solve(change + by_history)
             for name, quantity in quantities.items():
                 if name not in gradients:
-                    direction = _Direction(x, forces, histories[key])
-                    moved = _beside(family, state, direction)
+                    moved = _moved(family, state, x, forces, histories[key])
                     rows[name][key].append(_slope_of(family, quantity, moved))
                     continue
                 by_x, by_force = gradients[name]
