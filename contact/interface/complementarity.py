@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from contact.interface.active_set import ActiveSet
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
+from contact.interface.nodes import unit_vectors
 from contact.ranks import summed
 from contact.tolerances import EPS
 from contact.typing import Array
@@ -278,8 +279,7 @@ def _bound_gradient(
     if limit is None:
         return gradient
     fall = np.maximum(interface.friction.by_slip(total, length), -limit)
-    direction = slip / np.maximum(length, 1e-300)[:, None]
-    gradient[:, : interface.dim] = fall[:, None] * direction
+    gradient[:, : interface.dim] = fall[:, None] * unit_vectors(slip)
     return gradient
 
 

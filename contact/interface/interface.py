@@ -14,7 +14,6 @@ from contact.interface.friction import NodalFriction
 from contact.interface.law import InterfaceLaw
 from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes
-from contact.linear.constraint import Change
 from contact.mesh.entities import component_sums
 from contact.ranks import summed
 from contact.tolerances import EPS, NEGLIGIBLE, ROUNDING
@@ -209,11 +208,6 @@ class Interface:
             block = law.current_block(nodal, pressure)
             density = np.einsum("nij,nj->ni", block, law.jump.apply(change))
             law.jump.transpose(law.jump.weight[:, None] * density, residual)
-
-    @property
-    def change(self) -> Change | None:
-        """The change of unknowns that makes the jumps unknowns; None where they are."""
-        return None if self.jump.coupling is None else self.jump.coupling.change
 
     @property
     def coupled(self) -> NDArray[np.int32]:

@@ -19,6 +19,12 @@ from contact.ranks import largest, summed
 from contact.typing import Array
 
 
+def unit_vectors(vectors: Array) -> Array:
+    """Return the directions of rows, shape (n, d); zero where there is none."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1.0))
+
+
 def contact_directions(
     normal: Array, movable: Array, given: NDArray[np.bool_] | bool = True
 ) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
+from contact.interface.nodes import unit_vectors
 from contact.typing import Array
 from forms.foundation import penalty_friction_modulus, penalty_pressure
 
@@ -95,9 +96,7 @@ class PenalisedLaw:
         block = block + modulus[:, None, None] * jump.tangent
         if self._modulus is not None:
             return block
-        # Unit vectors of the slip; zero where there is none, as are the terms with it.
-        tangential, slip = interface.slip(nodal), interface.slip_length(nodal)
-        unit = tangential / np.where(slip > 0, slip, 1.0)[:, None]
+        slip, unit = interface.slip_length(nodal), unit_vectors(interface.slip(nodal))
         total, share = interface.pressure(nodal, forces), slip / (slip + self._eps.slip)
         along = (interface.friction.by_slip(total, slip) - modulus) * share
         across = interface.friction.by_pressure(total, slip) * slope * share

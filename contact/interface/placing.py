@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -139,15 +137,6 @@ def _corners(space: fem.FunctionSpace) -> NDArray[np.int32]:
     return np.unique(cells[:, np.concatenate(corners)])
 
 
-@contextmanager
-def _naming(key: str) -> Iterator[None]:
-    """Let messages begin with the key of the contact that they are about."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{key}.{error}") from None
-
-
 def _place(
     domain: Domain,
     space: fem.FunctionSpace,
@@ -277,8 +266,10 @@ def find_nodes(
         )
     unknown, cut = np.zeros_like(gap), 0.0
     if obstacle.is_shape:
-        with _naming(key):
+        try:
             gap, unknown, cut = _place(domain, space, obstacle, found, direction, gap, press)
+        except InputError as error:
+            raise InputError(f"{key}.{error}") from None
     else:
         check_gap(domain, gap, key, press)
     gap = found.along(direction, gap)

@@ -21,11 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from contact.interface.nodes import unit_vectors
 from contact.tolerances import HUGE
-
-Array = NDArray[np.float64]
+from contact.typing import Array
 
 
 def dot(x: Array, y: Array) -> Array:
@@ -47,12 +46,6 @@ def _lead(x: Array) -> Array:
 def _mixed(x: Array, y: Array) -> Array:
     """Return x_0 y_0 - x_1 . y_1 in the frame."""
     return (x[:, 0] * y[:, 1] + x[:, 1] * y[:, 0]) / 2 - dot(x[:, 2:], y[:, 2:])
-
-
-def units(x: Array) -> Array:
-    """Return the directions of rows; zero where there is none."""
-    size = np.linalg.norm(x, axis=1)
-    return x / np.where(size > 0, size, 1.0)[:, None]
 
 
 @dataclass
@@ -140,13 +133,13 @@ class Cones:
         a, b = np.linalg.norm(s1, axis=1), np.linalg.norm(z1, axis=1)
         s0, z0 = np.hypot(1.0, a), np.hypot(1.0, b)
         # s.z >= 1 without the differences of large numbers that it is made of
-        ratio, aside = (s0 + a) / (z0 + b), units(s1) + units(z1)
+        ratio, aside = (s0 + a) / (z0 + b), unit_vectors(s1) + unit_vectors(z1)
         inner = (ratio + 1 / ratio) / 2 + a * b * dot(aside, aside) / 2
         inner = np.where(a * b > 0, inner, s0 * z0)
         gamma = np.sqrt((1 + inner) / 2)
         w = (s1 - z1) / (2 * gamma[:, None])
         size = np.linalg.norm(w, axis=1)
-        self._axis = units(w)
+        self._axis = unit_vectors(w)
         self._axis[size == 0, :1] = 1.0
         self._boost = np.sqrt(1 + size**2) + size
         self._first = 1 + 2 * size**2

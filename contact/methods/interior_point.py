@@ -27,11 +27,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
-from contact.methods.cones import Array, Cones, Step
+from contact.methods.cones import Cones, Step
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep
 from contact.methods.report import Outcome
 from contact.methods.stagnation import PROGRESS
@@ -39,7 +38,9 @@ from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
 from contact.problem.protocols import Problem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
+from contact.ranks import summed
 from contact.tolerances import EPS
+from contact.typing import Array
 
 #: Note of its steps in the history.
 INTERIOR_POINT = "interior point"
@@ -170,7 +171,7 @@ class InteriorPoint:
             work = (total / way if total > 0 and way > 0 else block) * least**2
         else:
             total = total or block * jump.maximum(np.abs(opening))
-            least = self._sum(float(np.maximum(gap, 0.0).sum())) / count + total / block
+            least = float(summed(jump.comm, np.maximum(gap, 0.0).sum())) / count + total / block
             work = SHARE_UNSUPPORTED * total * least / count
         # Where the body would lift off, the slack at the start is that opening.
         slack = np.maximum(np.maximum(gap, opening), least)
@@ -209,10 +210,6 @@ class InteriorPoint:
                 break
         return Outcome(kkt, iteration.options.allowed, ended)
 
-    def _sum(self, value: float) -> float:
-        """Return the sum of the values of all ranks. Collective."""
-        return float(self.problem.equilibrium.comm.allreduce(value, op=MPI.SUM))
-
     @property
     def state(self) -> State:
         """The present iterate."""
@@ -228,10 +225,10 @@ class InteriorPoint:
         jump, cones, nodal = interface.jump, self.cones, interface.jump.apply(x)
         ways = np.abs(jump.gap) + np.abs(jump.normal_component(nodal))
         slips = interface.slip_length(nodal)[self._frictional]
-        contact = self._sum(float(cones.force @ ways[self._near] + cones.bound @ slips))
+        contact = float(summed(jump.comm, cones.force @ ways[self._near] + cones.bound @ slips))
         own = body.owned_part(x)[: body.owned]
         forces = body.internal_forces(replace(self._state, x=x)), body.external(self._state.time)
-        works = [abs(self._sum(float(own @ force[: body.owned]))) for force in forces]
+        works = [abs(float(summed(jump.comm, own @ force[: body.owned]))) for force in forces]
         return cones.duality_gap() / ((contact + sum(works)) or 1.0)
 
     @np.errstate(over="ignore", invalid="ignore")  # of a body that falls; no such step is taken

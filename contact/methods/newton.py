@@ -124,10 +124,12 @@ class Newton:
             problem.scales, options.gamma
         )
         self._begin()
-        if self.modes is None:
+        modes = self.modes
+        if modes is None:
             assert isinstance(problem, ContactProblem)
-            self.modes = UnconstrainedModes(problem)
-        underconstrained = not self.modes.constrained_undeformed
+            modes = UnconstrainedModes(problem)
+        self._modes = modes
+        underconstrained = not self._modes.constrained_undeformed
         self.whole = NewtonStep(problem, options, self._parameters, self.counters, underconstrained)
         self._condensed: CondensedStep | None = None
         self._condensable, self._pays = False, False
@@ -143,13 +145,13 @@ class Newton:
     def _condensed_step(self) -> CondensedStep:
         """Return the steps on the condensed body, made when they are first asked for."""
         if self._condensed is None:
-            assert isinstance(self.problem, ContactProblem) and self.modes is not None
+            assert isinstance(self.problem, ContactProblem)
             body = Condensation(self.problem, self.counters)
             self._condensed = CondensedStep(
                 body,
                 self.options,
                 self._parameters,
-                partial(_solve_condensed, modes=self.modes),
+                partial(_solve_condensed, modes=self._modes),
                 self.history,
                 self.counters,
                 FALLBACKS,
@@ -161,8 +163,7 @@ class Newton:
         self.problem = self.whole.problem = problem
         self.history = IterationHistory(self.monitor)
         if isinstance(problem, ContactProblem):
-            assert self.modes is not None
-            self.modes.problem = problem
+            self._modes.problem = problem
             if self._condensed is not None:
                 self._condensed.set_load_step(problem, self.history)
         self._begin()
@@ -219,12 +220,11 @@ class Newton:
         self._begin(iterate)
         iteration = self.iteration
         self.history.restart()
-        assert self.modes is not None
         iterate, outcome = self._iterate(iterate)
         if not outcome.converged and not outcome.overloaded:
             found = self._without_forces(iterate)
             iterate, outcome = found or self._fall_back(iterate, outcome)
-        elif not self._pays and self.modes.pushed_aside(self.problem, iterate.state):
+        elif not self._pays and self._modes.pushed_aside(self.problem, iterate.state):
             found = self._fall_back(iterate, outcome)
             iterate, outcome = found if found[1].converged else (iterate, outcome)
         unsolved = not outcome.converged and not outcome.overloaded
@@ -241,8 +241,7 @@ class Newton:
         where contact constrains a mode: a body moved aside may be in balance too, though friction
         has another solution that holds it.
         """
-        assert self.modes is not None
-        if not self.modes.constrained_by_supports:
+        if not self._modes.constrained_by_supports:
             return None
         try:
             state = self.whole.without_contact(iterate.state)
@@ -278,7 +277,7 @@ class Newton:
         """
         iteration = self.iteration
         if isinstance(self.problem, CondensedProblem):
-            found = self._continuation(self.problem) or self._separated(outcome)
+            found = self._continuation(self.problem) or self._separated(self.problem, outcome)
             if found is not None:
                 return found
         elif self._condensable and not self._pays and iteration.left > 0:
@@ -288,8 +287,7 @@ class Newton:
                 return iterate, outcome
         if iteration.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
-            assert self.modes is not None
-            iterate, outcome = interior_point(iteration, self.whole, self.modes, self.last_steps)
+            iterate, outcome = interior_point(iteration, self.whole, self._modes, self.last_steps)
         return iterate, outcome
 
     def _continuation(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
@@ -309,15 +307,15 @@ class Newton:
 
         return continuation(solve, Iterate(problem.start()))
 
-    def _separated(self, outcome: Outcome) -> tuple[Iterate, Outcome] | None:
+    def _separated(
+        self, problem: CondensedProblem, outcome: Outcome
+    ) -> tuple[Iterate, Outcome] | None:
         """Return a state with all nodes open that a rigid motion leads to, if any. Collective."""
-        problem, modes = self.problem, self.modes
-        if outcome.converged or not isinstance(problem, CondensedProblem):
+        if outcome.converged or self._modes.constrained_by_supports:
             return None
-        assert modes is not None
-        if modes.constrained_by_supports:
-            return None
-        state = modes.separated(problem, self.whole.operator, self._parameters.nodal_stiffness)
+        state = self._modes.separated(
+            problem, self.whole.operator, self._parameters.nodal_stiffness
+        )
         if state is None:
             return None
         # All forces are rounding then: they are relative to those at zero displacement.

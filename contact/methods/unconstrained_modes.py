@@ -67,6 +67,11 @@ class RigidMotion:
     depth: float
     limited: bool
 
+    @property
+    def motion(self) -> Array:
+        """The motion to subtract, of owned and global unknowns of the whole problem."""
+        return self.motions @ self.amounts
+
 
 @dataclass
 class UnconstrainedModes:
@@ -302,7 +307,7 @@ def with_least_displacements(
     found = modes.free_motion(problem, state)
     if found is None:
         return state, outcome
-    x = body.moved(state.x, -found.motions @ found.amounts)
+    x = body.moved(state.x, -found.motion)
     # Where nothing presses, forces by rounding alone are out of balance elsewhere.
     for forces in (Multipliers.zero(problem.interface.jump), state.forces):
         least = replace(state, x=x, forces=forces)

@@ -21,6 +21,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.interface.nodes import unit_vectors
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import Group, groups, null_space
 from contact.ranks import on_root
@@ -180,7 +181,7 @@ class Overload:
 
         def found() -> Overload | None:
             bears = bound > NEGLIGIBLE * scale / bound.size
-            along = [_units(of[bears]) for of in sideways]
+            along = [unit_vectors(of[bears]) for of in sideways]
             slips, own = tangential[bears], np.asarray(bound[bears] / scale, dtype=float)
             each = np.asarray(work / scale, dtype=float)
             return _overload(free, each, normal, slips, own, along)
@@ -221,14 +222,8 @@ def _overload(
                 multiple = np.inf
                 break
             multiple = driven / taken
-        along.append(_units(ways))
+        along.append(unit_vectors(ways))
     return None if motion is None else Overload(free @ motion, multiple)
-
-
-def _units(vectors: Array) -> Array:
-    """Return the directions of rows; zero where there is none."""
-    size = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(vectors / np.where(size > 0, size, 1.0))
 
 
 def _work(group: Group, free: Array, time: float) -> tuple[Array, float]:

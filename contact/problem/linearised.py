@@ -23,6 +23,7 @@ from contact.errors import InputError
 from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.multipliers import Multipliers
+from contact.interface.nodes import unit_vectors
 from contact.linear import multigrid
 from contact.linear.operator import Counters
 from contact.problem.problem import ContactProblem
@@ -70,7 +71,7 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     slip, pressure = interface.slip(nodal), interface.pressure(nodal, state.forces)
     length = np.linalg.norm(slip, axis=1)
     bound = interface.friction.bound(pressure, length)
-    along = slip / np.maximum(length, np.finfo(float).tiny)[:, None]
+    along = unit_vectors(slip)
     friction = jump.tangential_component(vectors)
     slides = friction - np.where(active.slips, bound, 0.0)[:, None] * along
     tangential = np.where(active.sticks[:, None], interface.stiffness * slip, slides)

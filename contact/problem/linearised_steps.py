@@ -15,6 +15,7 @@ import numpy as np
 from contact.body.internal_variables import VARIABLES
 from contact.history import History, InternalVariables, Part
 from contact.interface.multipliers import SlipHistory
+from contact.interface.nodes import unit_vectors
 from contact.problem.linearised import Equations, Linearised
 from contact.problem.problem import SLIP, ContactProblem
 from contact.problem.state import State
@@ -115,9 +116,7 @@ def before_transposed(
 
 def _direction(problem: ContactProblem, nodal: Array) -> Array:
     """Return the directions of slip in a step, which its length changes with, shape (n, d)."""
-    slip = problem.interface.slip(nodal)
-    length = np.linalg.norm(slip, axis=1)
-    return np.asarray(slip / np.maximum(length, np.finfo(float).tiny)[:, None])
+    return unit_vectors(problem.interface.slip(nodal))
 
 
 def _parts(history: History) -> tuple[SlipHistory, InternalVariables | None]:

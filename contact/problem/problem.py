@@ -329,14 +329,14 @@ class ContactProblem:
     @cached_property
     def constraint(self) -> Constraint | None:
         """The constraint of its linear systems; None where there is none. Collective."""
-        body, interface = self.equilibrium, self.interface
-        unknowns, carried = body.global_unknowns, interface.jump.carried
-        if interface.change is None and unknowns.size == 0:
+        body, nodes = self.equilibrium, self.nodes
+        unknowns, motions = body.global_unknowns, body.global_unknowns.ties
+        if nodes.coupling is None and unknowns.size == 0:
             return None
-        motions = unknowns.ties
-        if carried is not None:
-            motions = unknowns.with_foundations(self.nodes.nodes, carried)
-        return Constraint(body.layout, interface.change, motions, unknowns.free)
+        if nodes.carried is not None:
+            motions = unknowns.with_foundations(nodes.nodes, nodes.carried)
+        change = None if nodes.coupling is None else nodes.coupling.change
+        return Constraint(body.layout, change, motions, unknowns.free)
 
     def operator(
         self, *, symmetric: bool, counters: Counters, kind: str

@@ -33,18 +33,18 @@ def test_the_least_of_all_places():
     assert f"nothing holds ring against rigid motions ({motions}), which cost nothing" in said
 
     modes, body = UnconstrainedModes(problem), problem.equilibrium
-    motion, limited = modes.minimal_motion(problem, state)
-    assert not limited
-    assert np.abs(motion).max() < 1e-9
+    found = modes.free_motion(problem, state)
+    assert not found.limited
+    assert np.abs(found.motion).max() < 1e-9
     # Whatever motion is added, the least of all takes it off.
     (group,) = groups(problem)
     ring = int(np.argsort(group.centres[:, 1])[1])
     columns = group.moved[:, 3 * ring : 3 * ring + 3]
     for amounts in ([0.01, 0.0, 0.0], [0.0, 0.02, 0.01], [-0.3, -0.2, 0.1]):
         elsewhere = replace(state, x=body.moved(state.x, columns @ np.array(amounts)))
-        motion, limited = modes.minimal_motion(problem, elsewhere)
-        assert not limited
-        back = body.moved(elsewhere.x, -motion)
+        found = modes.free_motion(problem, elsewhere)
+        assert not found.limited
+        back = body.moved(elsewhere.x, -found.motion)
         np.testing.assert_allclose(nodes.apply(back), nodes.apply(state.x), rtol=0, atol=1e-9)
     # Relative to the lid that were half of its way.
     lifted = body.nodal(state.x)[: group.component.size]

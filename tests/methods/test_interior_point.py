@@ -57,7 +57,9 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     state, outcome = Newton(problem, NewtonOptions()).solve()
     assert outcome.converged
     method = Newton(problem, NewtonOptions(condense=False))
-    found, outcome = interior_point(method.iteration, method.whole, method.modes, method.last_steps)
+    found, outcome = interior_point(
+        method.iteration, method.whole, method._modes, method.last_steps
+    )
     assert outcome.converged, outcome.reason
     assert found.state.near(state, rtol=1e-6, atol=1e-9)
 
@@ -69,7 +71,9 @@ def interior(
     problem = build_problem(parse_case(case), SELF)
     state, _ = Newton(problem, NewtonOptions()).solve()
     method = Newton(problem, NewtonOptions(condense=False, linear=linear))
-    found, outcome = interior_point(method.iteration, method.whole, method.modes, method.last_steps)
+    found, outcome = interior_point(
+        method.iteration, method.whole, method._modes, method.last_steps
+    )
     return outcome, found.state.near(state, rtol=1e-6, atol=atol)
 
 

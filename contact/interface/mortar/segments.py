@@ -157,8 +157,9 @@ def common_points(
         functions = side.shape.lagrange(side.order, at)
         gap += sign * np.einsum("pk,pk->p", functions, nodes[pair, :, -1])
         gap += sign * side.distance(facets[pair], at, direction[i[pair]])
-    slopes = slave.slopes(i[pair], on_slave)
-    size = np.linalg.norm(across(slopes), axis=1) / np.abs(_turned(slave, own[pair], on_slave))
+    gradients, d = slave.shape.gradients(slave.order, on_slave), slave.shape.dim
+    slopes, turned = slave.slopes(i[pair], on_slave), _slopes(gradients, own[pair, :, :d])
+    size = np.linalg.norm(across(slopes), axis=1) / np.abs(determinant(turned))
     if slave.revolved:
         functions = slave.shape.lagrange(slave.order, on_slave)
         size *= 2 * np.pi * np.einsum("pk,pk->p", functions, slave.points[i[pair], :, 0])
@@ -328,12 +329,6 @@ def _within(begin: Array, along: Array, polygons: Array) -> tuple[Array, Array, 
     on_edge = (level & (np.abs(height) <= ROUNDING)).any(axis=1)
     zero = np.zeros(len(begin))
     return np.maximum(low, zero), np.where(beyond, zero, np.minimum(high, 1.0)), 1 - 0.5 * on_edge
-
-
-def _turned(side: Surface, nodes: Array, at: Array) -> Array:
-    """Return the determinants of the maps of facets to the plane at points, shape (p,)."""
-    shape = side.shape
-    return determinant(_slopes(shape.gradients(side.order, at), nodes[..., : shape.dim]))
 
 
 def _slopes(gradients: Array, nodes: Array) -> Array:
