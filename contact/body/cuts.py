@@ -30,6 +30,7 @@ from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices, cell_facets, connected
 from contact.mesh.together import members
+from contact.ranks import summed
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
@@ -103,7 +104,6 @@ class Cuts:
         self._free = [k for k, bolt in enumerate(body.bolts) if bolt.shortening is None]
         zero = constant(domain.mesh, 0.0)
         self._loads = [Loads(domain, body, direction, zero, 1) for direction in self.directions]
-        self._last: tuple[float, Array] | None = None
         self.jump, self.secant_jump = fem.Function(whole), fem.Function(whole)
 
     @staticmethod
@@ -116,10 +116,7 @@ class Cuts:
 
     def external(self, time: float) -> Array:
         """Return the work of the loads at a time by unit shortenings, shape (k,). Collective."""
-        if self._last is None or self._last[0] != time:
-            own = np.array([loads.at(time)[0] for loads in self._loads])
-            self._last = time, np.asarray(self._comm.allreduce(own, op=MPI.SUM))
-        return self._last[1]
+        return summed(self._comm, [loads.at(time)[0] for loads in self._loads])
 
     @cached_property
     def pieces(self) -> Pieces | None:

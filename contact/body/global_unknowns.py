@@ -145,9 +145,20 @@ class GlobalUnknowns:
         found = (m for m in self.members if m.foundation and m.description.on == part)
         return next(found, None)
 
-    def still(self, nodes: int, block_size: int) -> Array | None:
-        """Return the motion of a fixed obstacle, (nodes, block size, m); None without any q."""
-        return np.zeros((nodes, block_size, self.size)) if self.size > 0 else None
+    def of_foundation(
+        self, points: Array, block_size: int, part: str | None = None
+    ) -> Array | None:
+        """Return R of the foundation in front of a part at points, (n, block size, m).
+
+        Zero where it is fixed, and without a part; None without any q.
+        """
+        if self.size == 0:
+            return None
+        found = np.zeros((len(points), block_size, self.size))
+        member = None if part is None else self.member(part)
+        if member is not None:
+            found[:, :, member.columns] = member.motion(points, block_size)
+        return found
 
     def prescribe(self, q: Array, time: float) -> Array:
         """Return q with the given values at a time."""

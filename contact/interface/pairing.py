@@ -94,7 +94,7 @@ def find_pair(
         body.block_size,
         cut,
         body.domain.revolved,
-        body.global_unknowns.still(local.size, body.block_size),
+        body.global_unknowns.of_foundation(points, body.block_size),
     )
     return nodes, coupling
 

@@ -229,8 +229,8 @@ def find_nodes(
     obstacle: Obstacle,
     key: str = "contact",
     press: bool = False,
-) -> tuple[ContactNodes, Mixing | None]:
-    """Collect the contact nodes of a boundary part, and the jumps there. Collective.
+) -> tuple[ContactNodes, Candidates]:
+    """Collect the contact nodes of a boundary part, and all of its nodes. Collective.
 
     A node whose contact direction supports hold, or that follows a rigid part, is left out. Where
     they hold it aslant to that, as a plane of symmetry beside an inclined foundation does, it is
@@ -296,7 +296,7 @@ def find_nodes(
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
         domain.revolved,
-        _motion(body, part, points),
+        body.global_unknowns.of_foundation(points, body.block_size, part),
     )
     if jump.size == 0:
         bare = domain.comm.allreduce(bool(((free > APART) & meets).any()), op=MPI.LOR)
@@ -306,16 +306,7 @@ def find_nodes(
             if bare
             else f"{key}.on: part {part!r} has no node that is free to move towards the foundation"
         )
-    return jump, found.mixing
-
-
-def _motion(body: BodyEquilibrium, part: str, points: Array) -> Array | None:
-    """Return how the foundation moves at contact nodes of a part, shape (n, block size, m)."""
-    unknowns = body.global_unknowns
-    motion, member = unknowns.still(len(points), body.block_size), unknowns.member(part)
-    if motion is not None and member is not None:
-        motion[:, :, member.columns] = member.motion(points, body.block_size)
-    return motion
+    return jump, found
 
 
 def held_nodes(

@@ -16,9 +16,12 @@ from contact.interface.complementarity import ComplementarityParameters
 from contact.linear.operator import Counters
 from contact.methods.chord import MOST_STEPS, Chord
 from contact.methods.conductivity_derivative import ConductivityDerivative
+from contact.methods.continuation import CONTINUATION
+from contact.methods.interior_point import INTERIOR_POINT
 from contact.methods.newton_step import Iterate, StepResult
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Outcome
+from contact.methods.unconstrained_modes import RIGID_MOTION
 from contact.problem.condensed import Condensation, CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals
@@ -29,6 +32,9 @@ CONTACT_PART = 1e-3
 #: Ratio of the residual of the condensed contact problem to that before the step above which the
 #: problem counts as unsolved, and the whole body is taken.
 UNSOLVED = 0.05
+
+#: Notes of fallbacks that a record of the whole problem repeats.
+FALLBACKS = CONTINUATION, RIGID_MOTION, INTERIOR_POINT
 
 #: Solves a condensed problem from an iterate, with a history of its own.
 Solver = Callable[
@@ -52,8 +58,6 @@ class CondensedStep:
         Of the whole problem: it is asked whether the solve is to end.
     counters
         Where solves of the condensed problem are counted.
-    fallbacks
-        Notes of records that tell of a fallback.
     """
 
     fault = "the condensed contact problem is not solved"
@@ -66,11 +70,10 @@ class CondensedStep:
         solve: Solver,
         history: IterationHistory,
         counters: Counters,
-        fallbacks: tuple[str, ...],
     ) -> None:
         self.condensation, self.options, self.parameters = condensation, options, parameters
         self.counters, self.conductivity_derivative = counters, ConductivityDerivative()
-        self._solve, self._history, self._fallbacks = solve, history, fallbacks
+        self._solve, self._history = solve, history
         worth = MOST_STEPS if options.keep != "never" else 0.0
         self._chord = Chord(options.tolerance, worth)
 
@@ -123,6 +126,6 @@ class CondensedStep:
         if not body.linear:
             self._chord.taken()
         notes = [record.note for record in history.records]
-        taken = [word for word in self._fallbacks if any(word in note for note in notes)]
+        taken = [word for word in FALLBACKS if any(word in note for note in notes)]
         note = ", ".join([*["chord step"] * keep, *taken])
         return StepResult(replace(end, state=new), note, tuple(history.records), overloaded)

@@ -22,16 +22,13 @@ class ConductivityDerivative:
     ----------
     near
         Largest residual at which the derivative may be included at all.
+    included
+        Whether the last step has included it.
     """
 
     near: float = np.inf
+    included: bool = False
     _limit: float = np.inf
-    _included: bool = False
-
-    @property
-    def included(self) -> bool:
-        """Whether the last step has included the derivative."""
-        return self._included
 
     def worsened(self, residual: float) -> bool:
         """Tell whether the last step included the derivative and has raised the residual.
@@ -41,11 +38,11 @@ class ConductivityDerivative:
         residual
             The largest residual after that step.
         """
-        if not self._included or residual <= self._limit:
+        if not self.included or residual <= self._limit:
             return False
         # The next step, with psi frozen, may only undo this one: ask for a smaller residual.
         self._limit *= 0.1
-        self._included = False
+        self.included = False
         return True
 
     def __call__(self, residual: float, allowed: bool = True) -> bool:
@@ -59,7 +56,7 @@ class ConductivityDerivative:
             Whether the solver would include it.
         """
         self.worsened(residual)
-        self._included = allowed and residual <= min(self.near, self._limit)
-        if self._included:
+        self.included = allowed and residual <= min(self.near, self._limit)
+        if self.included:
             self._limit = residual
-        return self._included
+        return self.included

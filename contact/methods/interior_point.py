@@ -265,36 +265,19 @@ class InteriorPoint:
                 constants, closed, jump.tangential_component(moved)[frictional] + slip
             )
 
-        dx, step, length = predictor_corrector(cones, solve)
+        # Mehrotra's predictor and corrector, both with the same matrix.
+        now, affine = cones.duality_gap(), solve(cones.affine_target())[1]
+        length = min(1.0, cones.to_boundary(affine))
+        if length == 0:  # the system is singular to rounding
+            return False
+        centre = (cones.duality_gap_after(affine, length) / now) ** 3 if now > 0 else 0.0
+        centre = max(0.0, centre)
+        dx, step = solve(cones.target(affine, centre * now / max(cones.degree, 1)))
+        share = min(LONGEST, max(SHORTEST, 1 - centre))
+        length = min(1.0, share * cones.to_boundary(step))
         if not (np.isfinite(length) and length > 1e-12):
             return False
         x = body.prescribe(body.moved(state.x, length * dx), state.time)
         self._state = replace(state, x=x)
         cones.move(step, length)
         return True
-
-
-#: From constants of the cones, see `Cones.affine_target`, to the step of the body and of the cones.
-Solve = Callable[[tuple[Array, Array]], tuple[Array, Step]]
-
-
-def predictor_corrector(cones: Cones, solve: Solve) -> tuple[Array, Step, float]:
-    """Return Mehrotra's step of the body, that of the cones, and the part of both to take.
-
-    Parameters
-    ----------
-    cones
-        The present slacks and multipliers, scaled.
-    solve
-        Solves the linearised problem; both times with the same matrix.
-    """
-    now, degree = cones.duality_gap(), max(cones.degree, 1)
-    dx, affine = solve(cones.affine_target())
-    length = min(1.0, cones.to_boundary(affine))
-    if length == 0:  # the system is singular to rounding
-        return dx, affine, length
-    centre = (cones.duality_gap_after(affine, length) / now) ** 3 if now > 0 else 0.0
-    centre = max(0.0, centre)
-    dx, step = solve(cones.target(affine, centre * now / degree))
-    share = min(LONGEST, max(SHORTEST, 1 - centre))
-    return dx, step, min(1.0, share * cones.to_boundary(step))

@@ -69,7 +69,7 @@ from contact.methods.newton_step import Iterate, Iteration, NewtonStep, Step
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Monitor, Outcome
 from contact.methods.stagnation import PROGRESS, Best, Stagnation, undeformed_equilibrium
-from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.methods.unconstrained_modes import RIGID_MOTION, UnconstrainedModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
@@ -78,10 +78,6 @@ from contact.problem.state import State
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
-
-#: Notes of the fallbacks in the history.
-RIGID_MOTION = "rigid motion"
-FALLBACKS = CONTINUATION, RIGID_MOTION, INTERIOR_POINT
 
 #: Stagnation limit in a continuation: condensed steps cost little beside another value of the
 #: parameter, and Example 8.4 with ten times its conductivity needs them.
@@ -154,7 +150,6 @@ class Newton:
                 partial(_solve_condensed, modes=self._modes),
                 self.history,
                 self.counters,
-                FALLBACKS,
             )
         return self._condensed
 

@@ -40,6 +40,9 @@ from contact.problem.state import State
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 
+#: Note of a rigid motion to where all nodes are open.
+RIGID_MOTION = "rigid motion"
+
 #: Friction bound of such a node, as a force over all loads.
 STUCK = 10.0
 

@@ -200,11 +200,6 @@ class Linearised:
         self._by_force += np.eye(d) - normal - jump.tangent
         self._by_force -= pressed
 
-    @property
-    def local(self) -> bool:
-        """Whether the conditions of a node depend on the values there alone."""
-        return self.problem.interface.friction.local
-
     def solve(self, change: Equations) -> tuple[Array, Array]:
         """Return the changes of the owned unknowns and of f that answer a residual. Collective.
 
@@ -221,7 +216,7 @@ class Linearised:
             known = np.einsum("nij,nj->ni", self._regular, left)
             jump.transpose(-jump.weight[:, None] * known, rhs)
             dx = self._operator.solve(rhs, EPS)
-            moved = jump.apply(self._local(dx))
+            moved = jump.apply(self.problem.equilibrium.local(dx))
             df = known - np.einsum(
                 "nij,nj->ni", self._regular, np.einsum("nij,nj->ni", self._by_jump, moved)
             )
@@ -250,7 +245,7 @@ class Linearised:
             known = np.einsum("nji,nj->ni", self._regular, left)
             jump.transpose(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
             dx = self._operator.solve_transposed(rhs)
-            moved = weight * jump.apply(self._local(dx))[:, : jump.dim]
+            moved = weight * jump.apply(self.problem.equilibrium.local(dx))[:, : jump.dim]
             dc = known - np.einsum("nji,nj->ni", self._regular, moved)
             x, c = x + dx, c + dc
             by_jump, by_own = self._smoothed_transposed(dc)
@@ -274,31 +269,29 @@ class Linearised:
         jump, d = self.problem.nodes, self.problem.dim
         by_normal = np.einsum("nij,nj->ni", self._by_jump[:, :, :d], jump.normal)
         found = np.einsum("ni,ni->n", conditions, by_normal)
-        pressed = jump.weight * jump.normal_component(jump.apply(self._local(x)))
+        pressed = jump.weight * jump.normal_component(jump.apply(self.problem.equilibrium.local(x)))
         return found + pressed * np.einsum("ni,ni->n", self._layer[:, :d], jump.normal)
 
     def _conditions_of(self, moved: Array, f: Array) -> Array:
         """Return the change of the conditions with jumps and contact forces. Collective."""
         changed = np.einsum("nij,nj->ni", self._by_jump, moved)
         changed += np.einsum("nij,nj->ni", self._by_force, f)
-        if self.local:
+        friction = self.problem.interface.friction
+        if friction.local:
             return changed
         pressure = self.problem.nodes.normal_component(f)
         pressure = pressure + np.einsum("ni,ni->n", self._layer, moved)
-        bound = self._rate * self.problem.interface.friction.smoothing(pressure)
+        bound = self._rate * friction.smoothing(pressure)
         return changed - bound[:, None] * self._along
 
     def _smoothed_transposed(self, conditions: Array) -> tuple[Array, Array]:
         """Return the derivatives by jumps and forces through a smoothed pressure. Collective."""
-        if self.local:
+        friction = self.problem.interface.friction
+        if friction.local:
             return np.zeros_like(self._layer), np.zeros_like(conditions)
         by_bound = -self._rate * np.einsum("ni,ni->n", self._along, conditions)
-        by_pressure = self.problem.interface.friction.smoothing.transposed(by_bound)[:, None]
+        by_pressure = friction.smoothing.transposed(by_bound)[:, None]
         return by_pressure * self._layer, by_pressure * self.problem.nodes.normal
-
-    def _local(self, owned: Array) -> Array:
-        """Return an increment of owned unknowns with those of the ghosts. Collective."""
-        return self.problem.equilibrium.local(owned)
 
     @staticmethod
     def _enough(taken: list[float], size: float) -> bool:

@@ -32,7 +32,7 @@ from contact.interface.law import Conductor
 from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
-from contact.interface.placing import candidates, find_nodes, held_nodes
+from contact.interface.placing import Candidates, find_nodes, held_nodes
 from contact.linear.constraint import ConstrainedOperator, Constraint
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
@@ -273,25 +273,23 @@ class ContactProblem:
             with on_all_ranks(self.comm):
                 contact.conductor.check()
         assert contact.friction is not None  # filled in above
-        body = self.equilibrium
-        if contact.against is not None:
-            sides = contact.on, contact.against
-            frictional = contact.friction.given
-            nodes, coupling = find_pair(
-                body, *sides, contact.foundation, key, contact.press, frictional
-            )
-            laws = contact.friction, contact.layer, contact.conductor
-            return Entry(contact.on, nodes, *laws, coupling=coupling)
-        nodes, mixing = find_nodes(body, contact.on, contact.foundation, key, contact.press)
+        body, given = self.equilibrium, (contact.foundation, key, contact.press)
         laws = contact.friction, contact.layer, contact.conductor
-        return Entry(contact.on, nodes, *laws, self._held(key, contact, nodes), mixing=mixing)
+        if contact.against is not None:
+            rough = contact.friction.given
+            nodes, coupling = find_pair(body, contact.on, contact.against, *given, friction=rough)
+            return Entry(contact.on, nodes, *laws, coupling=coupling)
+        nodes, found = find_nodes(body, contact.on, *given)
+        held = self._held(key, contact, nodes, found)
+        return Entry(contact.on, nodes, *laws, held, mixing=found.mixing)
 
-    def _held(self, key: str, contact: Contact, nodes: ContactNodes) -> ContactNodes | None:
+    def _held(
+        self, key: str, contact: Contact, nodes: ContactNodes, found: Candidates
+    ) -> ContactNodes | None:
         if contact.conductor is None or not self.piezoelectric:
             return None
-        body, global_unknowns = self.equilibrium, self.equilibrium.global_unknowns
-        found = candidates(self.domain, body.space, contact.on)
-        held = held_nodes(found, contact.foundation, body.free, nodes)
+        global_unknowns = self.equilibrium.global_unknowns
+        held = held_nodes(found, contact.foundation, self.equilibrium.free, nodes)
         taken = bool(global_unknowns.tied[found.nodes, -1].any())
         if self.comm.allreduce(taken, op=MPI.LOR):
             raise InputError(

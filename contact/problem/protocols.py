@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from contact.body.component_norms import ComponentNorms
 from contact.history import Evaluated
@@ -68,10 +66,6 @@ class Equilibrium(Protocol):
     @property
     def block_size(self) -> int:
         """Number of unknowns of a node."""
-
-    @property
-    def free(self) -> NDArray[np.bool_]:
-        """Which unknowns of the owned nodes are not fixed, shape (nodes, block size)."""
 
     @property
     def owned(self) -> int:
