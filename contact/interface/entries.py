@@ -240,8 +240,6 @@ def _check_apart(entries: Sequence[Entry]) -> None:
 
 def _side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
     first = pieces[0]
-    if len(pieces) == 1:
-        return first
     together: dict[str, Any] = {
         name: np.concatenate([getattr(nodes, name) for nodes in pieces])
         for name in ("nodes", "points", "weight", "normal", "lift", "tangent", "gap", "deviation")

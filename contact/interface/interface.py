@@ -97,11 +97,9 @@ class Interface:
     @property
     def extents(self) -> tuple[Array, Array]:
         """The number of contact nodes of each component, and their area, shape (k,). Collective."""
-        jump, ones = self.jump, np.ones_like(self.jump.weight)
-        if self.components == 1:
-            return np.array([float(jump.size)]), np.array([jump.sum(ones)])
-        count = component_sums(self.comm, self.component, ones, self.components)
-        return count, component_sums(self.comm, self.component, jump.weight, self.components)
+        of, weight = (self.comm, self.component), self.jump.weight
+        count = component_sums(*of, np.ones_like(weight), self.components)
+        return count, component_sums(*of, weight, self.components)
 
     def opening(self, nodal: Array) -> Array:
         """Return gap - u_nu, shape (n,): the distance that is left."""

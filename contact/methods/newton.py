@@ -252,17 +252,13 @@ class Newton:
         """Take Newton's steps, with the body condensed where that pays."""
         iteration = self.iteration
         if self._pays:
-            iterate, outcome = self._condensed_loop(iterate)
+            iterate, outcome = NewtonLoop(iteration, self._condensed_step()).run(iterate)
             if outcome.converged or outcome.overloaded or iteration.left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
-            return self.whole_loop().run(iterate)
+            return NewtonLoop(iteration, self.whole).run(iterate)
         give_up = partial(overestimates_stiffness, self.problem, self._parameters)
-        return replace(self.whole_loop(), give_up=give_up).run(iterate)
-
-    def _condensed_loop(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
-        """Iterate over the material, with contact solved on the condensed body."""
-        return NewtonLoop(self.iteration, self._condensed_step()).run(iterate)
+        return NewtonLoop(iteration, self.whole, give_up=give_up).run(iterate)
 
     def _fall_back(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
         """Try the fallbacks in turn, on the condensed body where there is one.
@@ -277,7 +273,8 @@ class Newton:
                 return found
         elif self._condensable and not self._pays and iteration.left > 0:
             logger.info("%s; going on with the condensed body", outcome.ended)
-            iterate, outcome = self._condensed_loop(Iterate(self.problem.start()))
+            begin = Iterate(self.problem.start())
+            iterate, outcome = NewtonLoop(iteration, self._condensed_step()).run(begin)
             if outcome.converged:
                 return iterate, outcome
         if iteration.left > 0:
@@ -328,11 +325,7 @@ class Newton:
 
     def last_steps(self, state: State) -> tuple[Iterate, Outcome]:
         """Take Newton's last steps from the state that a fallback has reached. Collective."""
-        return self.whole_loop().run(self.iterate_at(state), INTERIOR_POINT)
-
-    def whole_loop(self) -> NewtonLoop:
-        """Return the iteration on the problem's own body."""
-        return NewtonLoop(self.iteration, self.whole)
+        return NewtonLoop(self.iteration, self.whole).run(self.iterate_at(state), INTERIOR_POINT)
 
 
 def _solve_condensed(

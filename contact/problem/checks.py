@@ -19,7 +19,7 @@ from contact.body.description import Fixed
 from contact.body.fields import Field, Moving, values_at
 from contact.body.loads import to_blame
 from contact.errors import InputError
-from contact.interface.law import Conductor
+from contact.interface.law import InterfaceLaw
 from contact.problem.limit_analysis import UnilateralSupport
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
@@ -347,15 +347,7 @@ def _flows(
     interface = problem.interface
     law, held = interface.law, interface.held
     if state is None:
-        conductors = law.conductor, None if held is None else held.conductor
-        sizes = interface.jump.nodes.size, 0 if held is None else held.jump.nodes.size
-        at_contact, among_held = (
-            np.zeros(size, dtype=bool)
-            if conductor is None
-            else _conducts(conductor, size, interface.size)
-            for conductor, size in zip(conductors, sizes, strict=True)
-        )
-        return at_contact, among_held
+        return _conducts(law, interface.size), _conducts(held, interface.size)
     found = [
         law.current_block(nodal, pressure, full=True)[:, -1, -1] != 0
         for law, nodal, pressure in interface.acting(state.x, state.forces)
@@ -363,8 +355,10 @@ def _flows(
     return found[0], found[1] if held is not None else np.zeros(0, dtype=bool)
 
 
-def _conducts(conductor: Conductor, count: int, deep: float) -> NDArray[np.bool_]:
+def _conducts(law: InterfaceLaw | None, deep: float) -> NDArray[np.bool_]:
     """Tell which nodes conduct where they are pressed, and far into the foundation."""
-    closed = np.ones(count, dtype=bool)
-    psi = conductor.psi.at(np.full(count, deep), ~closed, closed)
-    return np.broadcast_to(psi, (count,)) > 0
+    closed = np.ones(0 if law is None else law.jump.nodes.size, dtype=bool)
+    if law is None or law.conductor is None:
+        return ~closed
+    psi = law.conductor.psi.at(np.full(closed.size, deep), ~closed, closed)
+    return np.broadcast_to(psi, closed.shape) > 0
