@@ -13,25 +13,17 @@ from collections.abc import Mapping
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh
 
 from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.internal_variables import VARIABLES
 from contact.body.loads import assembled
-from contact.derivatives.by_parameters import (
-    Adjoint,
-    LoadPath,
-    backwards,
-    parameters_of,
-    quantities_of,
-)
-from contact.derivatives.differences import Family, Parameter, family_of
+from contact.derivatives.by_parameters import LoadPath, backwards, parameters_of, quantities_of
+from contact.derivatives.differences import Parameter, family_of
 from contact.errors import InputError
 from contact.history import Evaluated, InternalVariables
 from contact.output.differentiable import Differentiable, Quantity
 from contact.output.solution import Solution
-from contact.problem.linearised import Linearised
 from contact.typing import Array
 
 #: Section of a case with the constants that may be fields.
@@ -125,11 +117,20 @@ def field_gradient(
     path, asked = LoadPath(solution), _one(solution, quantity)
     given = [parameter] if isinstance(parameter, str) else {key: parameter}
     ((_, made),) = parameters_of(solution, given)
-    gradient = _FieldGradient(path.base.domain.mesh, family_of(key, made, path.steps), degree)
+    family, element = family_of(key, made, path.steps), ("Lagrange" if degree else "DG", degree)
+    gradient = fem.Function(fem.functionspace(path.base.domain.mesh, element), name="gradient")
+    space = gradient.function_space
+    works = [_FieldWork(there.equilibrium, space) for there in family.problems]
+    found = np.zeros(space.dofmap.index_map.size_local)
     for linearised, adjoints in backwards(path, asked):
+        state, scale = linearised.state, linearised.problem.equilibrium.phi_scale
         for one in adjoints.values():
-            gradient.add(linearised, one)
-    return gradient.function()
+            weights = None if one.after is None else one.after.get(VARIABLES)
+            assert weights is None or isinstance(weights, InternalVariables)
+            found += family.slope([work(state, one.along, scale, weights) for work in works])
+    gradient.x.array[: found.size] = found
+    gradient.x.scatter_forward()
+    return gradient
 
 
 def _one(solution: Solution, quantity: str | Quantity) -> Mapping[str, Differentiable]:
@@ -139,38 +140,6 @@ def _one(solution: Solution, quantity: str | Quantity) -> Mapping[str, Different
     words = "a quantity with a gradient"
     expect("quantity", found, words, isinstance(found, Differentiable))
     return {name: found}  # type: ignore[dict-item]
-
-
-class _FieldGradient:
-    """The gradient by a field, which each step adds to.
-
-    Parameters
-    ----------
-    mesh, degree
-        Of the field.
-    family
-        The problems beside the constant.
-    """
-
-    def __init__(self, mesh: Mesh, family: Family, degree: int) -> None:
-        self._space = fem.functionspace(mesh, ("DG" if degree == 0 else "Lagrange", degree))
-        self._works = [_FieldWork(there.equilibrium, self._space) for there in family.problems]
-        self._family, self._found = family, np.zeros(self._space.dofmap.index_map.size_local)
-
-    def add(self, linearised: Linearised, adjoint: Adjoint) -> None:
-        """Add the part of a step. Collective."""
-        state, scale = linearised.state, linearised.problem.equilibrium.phi_scale
-        weights = None if adjoint.after is None else adjoint.after.get(VARIABLES)
-        assert weights is None or isinstance(weights, InternalVariables)
-        found = [work(state, adjoint.along, scale, weights) for work in self._works]
-        self._found += self._family.slope(found)
-
-    def function(self) -> fem.Function:
-        """Return the gradient as a function of the field's space. Collective."""
-        made = fem.Function(self._space, name="gradient")
-        made.x.array[: self._found.size] = self._found
-        made.x.scatter_forward()
-        return made
 
 
 class _FieldWork:
