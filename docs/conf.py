@@ -1,10 +1,15 @@
 """Sphinx: `make docs`, or ``python3 -m sphinx -W docs build/docs`` from the top folder."""
 
+import inspect
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, get_type_hints
+
+from sphinx.util.typing import stringify_annotation
 
 import contact
 
@@ -98,6 +103,52 @@ def _bars(_: Any, __: str, ___: str, made: Any, ____: Any, lines: list[str]) -> 
         lines[i] = "".join(p if p.startswith("`") else p.replace("|", r"\|") for p in pieces)
 
 
+def _section(lines: list[str], title: str) -> tuple[int, int]:
+    """Return where the rows of a section begin and end; nowhere where there is none."""
+    if title not in lines:
+        return 0, 0
+    first = lines.index(title) + 2
+    heads = [i - 1 for i, x in enumerate(lines) if i > first and re.fullmatch("-{3,}", x)]
+    return first, (heads or [len(lines)])[0]
+
+
+def _type_of(made: type, name: str) -> str:
+    """Return the type of an attribute of a class, or nothing."""
+    for base in made.__mro__:
+        found = inspect.get_annotations(base).get(name)
+        if found is None:
+            getter = getattr(vars(base).get(name), "fget", None)
+            found = getattr(getter, "__annotations__", {}).get("return")
+        if found is not None:
+            try:
+                only = SimpleNamespace(__annotations__={name: found})
+                found = get_type_hints(only, vars(sys.modules[base.__module__]))[name]
+            except (NameError, TypeError):  # imported for type checkers alone, or of the class
+                return str(found)
+            return stringify_annotation(found, "smart")
+    return ""
+
+
+def _types(_: Any, what: str, __: str, made: Any, ___: Any, lines: list[str]) -> None:
+    """Add the attributes that a class inherits, and let all say their types."""
+    if what != "class" or "Attributes" not in lines:
+        return
+    for base in made.__mro__[1:]:
+        known = {name for row in lines if row[:1].strip() for name in re.split(", ?", row)}
+        inherited = inspect.cleandoc(base.__doc__ or "").splitlines()
+        kept, more = False, []
+        for row in inherited[slice(*_section(inherited, "Attributes"))]:
+            kept = known.isdisjoint(re.split(", ?", row)) if row[:1].strip() else kept
+            more += [row] if kept else []
+        if base.__module__.split(".")[0] in ("contact", "forms"):
+            end = _section(lines, "Attributes")[1]
+            lines[end:end] = [x.replace(", ", ",") if x[:1].strip() else x for x in [*more, ""]]
+    for i in range(*_section(lines, "Attributes")):
+        if re.fullmatch(r"\w+(,\w+)*", lines[i]):
+            types = dict.fromkeys(_type_of(made, name) for name in lines[i].split(","))
+            lines[i] += f" : {', '.join(types)}" if all(types) else ""
+
+
 def _present(app: Any, name: str, source: list[str]) -> None:
     """Leave notebooks that have not been run out of the examples."""
     if name == "examples":
@@ -123,5 +174,6 @@ def _mathjax(app: Any) -> None:
 def setup(app: Any) -> None:
     """Connect what docstrings need, before napoleon reads them, the index, and MathJax."""
     app.connect("autodoc-process-docstring", _bars, priority=400)
+    app.connect("autodoc-process-docstring", _types, priority=410)
     app.connect("source-read", _present)
     app.connect("builder-inited", _mathjax)
