@@ -13,30 +13,24 @@ from contact.output.solution import Note, Remark, Solution
 from contact.problem.problem import ContactProblem
 
 
-def held_aslant(solution: Solution) -> Iterator[Remark]:
-    """Say where a support holds touching nodes aslant to the contact direction, with friction."""
-    nodes = solution.problem.nodes
-    aslant = np.linalg.norm(nodes.lift - nodes.normal, axis=1)
-    if nodes.maximum(np.where(solution.friction_bound > 0, aslant, 0.0)) > 0.1:
-        yield Note(
-            "a support holds contact nodes aslant to the contact direction: no friction acts there "
-            "along the directions that it holds, and their pressures bear its share on all meshes; "
-            "the error of forces is that of these nodes alone"
-        )
+def held_along(solution: Solution) -> Iterator[Remark]:
+    """Say where supports hold touching nodes along the contact, so that friction does not act.
 
-
-def moved_along(solution: Solution) -> Iterator[Remark]:
-    """Say where supports move nodes along another body that follows there, with friction."""
+    Aslant to the contact direction, or moved along another body that is free there.
+    """
     problem, nodes, d = solution.problem, solution.problem.nodes, solution.problem.dim
+    rubs = solution.friction_bound > 0
+    aslant = np.where(rubs, np.linalg.norm(nodes.lift - nodes.normal, axis=1), 0.0)
     jump = problem.nodal(solution.state)[:, :d]
     along = jump - nodes.normal_component(jump)[:, None] * nodes.normal
     held = np.linalg.norm(along - nodes.tangential_component(jump), axis=1)
     moves = np.linalg.norm(problem.equilibrium.nodal(solution.state.x)[nodes.nodes, :d], axis=1)
-    if nodes.maximum(np.where(solution.friction_bound > 0, held, 0.0)) > 0.1 * nodes.maximum(moves):
+    moved = nodes.maximum(np.where(rubs, held, 0.0)) > 0.1 * nodes.maximum(moves)
+    if nodes.maximum(aslant) > 0.1 or moved:
         yield Note(
-            "supports move contact nodes along another body, whose nodes are free there: no "
-            "friction acts at these nodes along the directions that supports hold; the error of "
-            "forces is that of these nodes alone"
+            "supports hold contact nodes aslant to the contact direction, or move them along "
+            "another body: no friction acts at these nodes along the directions that supports "
+            "hold, and the error of forces is that of these nodes alone"
         )
 
 

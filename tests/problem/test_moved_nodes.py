@@ -116,5 +116,5 @@ def test_nodes_that_slide_over_free_ones_are_told(way):
         "top": [way, 0.0, -0.005],
     }
     solution = moved(Blocks(3).domain(COMM), Contact("over", against="under"), supports)
-    notes = [note for note in solution.notes if "[moved-along]" in note]
+    notes = [note for note in solution.notes if "[held-along]" in note]
     assert len(notes) == (way > 0)
