@@ -13,15 +13,13 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from contact import _compat
 from contact.body.fields import Field, Moving, at_time
 from contact.case.file import Case
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
-from contact.mesh.entities import exterior_facets
+from contact.mesh.entities import exterior_facets, paths
 from contact.mesh.geometry import facet_normals
 from contact.output.figures.body import rendered
 from contact.output.figures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, YELLOW, heading
@@ -248,21 +246,13 @@ def chains(edges: Array) -> list[Array]:
     _, first, number = np.unique(
         np.round(points / (1e-9 * size)), axis=0, return_index=True, return_inverse=True
     )
-    ends, places = number.reshape(-1, 2), points[first]
-    graph = sparse.coo_array((np.ones(len(ends)), ends.T), shape=2 * (len(places),)).tocsr()
-    graph = graph + graph.T
-    degree = np.diff(graph.indptr)
+    ends, places, found = number.reshape(-1, 2), points[first], list[Array]()
+    degree = np.bincount(ends.ravel())
     if degree.max() > 2:
         return list(edges)
-    count, piece = csgraph.connected_components(graph, directed=False)
-    # The end of a piece; a closed curve has none.
-    order = np.lexsort((degree > 1, piece))
-    starts = order[np.searchsorted(piece[order], np.arange(count))]
-    found = []
-    for start in starts:
-        line = csgraph.depth_first_order(graph, start, False, return_predecessors=False)
-        closed = degree[start] > 1
-        found.append(places[np.append(line, start) if closed else line])
+    for line in paths(ends, len(places)):
+        closed = degree[line[0]] > 1
+        found.append(places[np.append(line, line[0]) if closed else line])
     return found
 
 

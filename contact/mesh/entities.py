@@ -12,7 +12,7 @@ from dolfinx import mesh as dmesh
 from dolfinx.common import IndexMap
 from mpi4py import MPI
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from contact._compat import lasting
 from contact.mesh.cells import shape_of
@@ -168,3 +168,25 @@ def graph_components(
     graph = sparse.coo_array((np.ones(one.size, dtype=bool), (one, other)), shape=(size, size))
     count, labels = connected_components(graph, directed=False)
     return int(count), labels
+
+
+def paths(edges: npt.NDArray[np.integer[Any]], count: int) -> list[npt.NDArray[np.intp]]:
+    """Return the vertices of each component of a graph of lines, from end to end.
+
+    Each begins at its end with the smaller number; a closed curve has none, and begins at its
+    first vertex. They come in the order of their first vertices.
+
+    Parameters
+    ----------
+    edges, count
+        Pairs of vertices, shape (m, 2), and the number of vertices.
+    """
+    graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(count, count)).tocsr()
+    graph = graph + graph.T
+    pieces, piece = connected_components(graph, directed=False)
+    first = np.lexsort((np.arange(count), np.diff(graph.indptr) > 1, piece))
+    starts = first[np.searchsorted(piece[first], np.arange(pieces))]
+    return [
+        depth_first_order(graph, start, directed=False, return_predecessors=False)
+        for start in np.sort(starts)
+    ]

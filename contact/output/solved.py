@@ -9,13 +9,12 @@ import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 from scipy.spatial import KDTree
 
 from contact.errors import InputError, counted
 from contact.interface.mortar.surface import surface_of
 from contact.interface.multipliers import Multipliers
+from contact.mesh.entities import paths
 from contact.output.formats import in_pieces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -278,21 +277,9 @@ def _along_chain(
 ) -> NDArray[np.intp]:
     """Follow the links from node to node; pieces come in the order of their first ends."""
     both = np.isin(links, names).all(axis=1)
-    # Number the nodes by position, so that every choice below is one of position.
+    # Number the nodes by position, so that every choice is one of position.
     rank = np.empty_like(by_position)
     rank[by_position] = np.arange(by_position.size)
     sorter = np.argsort(names)
     edges = rank[sorter[np.searchsorted(names, links[both], sorter=sorter)]]
-    n = names.size
-    graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(n, n)).tocsr()
-    graph = graph + graph.T
-    degree = np.diff(graph.indptr)
-    count, piece = csgraph.connected_components(graph, directed=False)
-    # The end of a piece; a closed curve has none and begins at its first node.
-    first = np.lexsort((np.arange(n), degree > 1, piece))
-    starts = first[np.searchsorted(piece[first], np.arange(count))]
-    chains = [
-        csgraph.depth_first_order(graph, start, directed=False, return_predecessors=False)
-        for start in np.sort(starts)
-    ]
-    return np.asarray(by_position[np.concatenate(chains)])
+    return np.asarray(by_position[np.concatenate(paths(edges, names.size))])
