@@ -1,6 +1,8 @@
-"""Errors that a user can mend, and counts in messages."""
+"""Errors that a user can mend, and counts and suggestions in messages."""
 
+import difflib
 import re
+from collections.abc import Iterable
 
 #: How NumPy writes a number where Python's own writing is asked for.
 NUMBER = re.compile(r"\bnp\.(?:u?int|float|bool|str)\d*_?\(([^()]*)\)|\bnp\.(True|False)_?\b")
@@ -10,6 +12,18 @@ def counted(number: float, noun: str) -> str:
     """Return a number of things in words: ``1 node``, ``2 nodes``."""
     text = f"{number:.3g}" if isinstance(number, float) else str(number)
     return f"{text} {noun}" + ("" if text == "1" else "s")
+
+
+def clipped(text: str, length: int = 100) -> str:
+    """Cut a text that is too long, and show characters that are not printable by their codes."""
+    text = text if len(text) <= length else text[: length - 3] + "..."
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def nearest(name: str, options: Iterable[str], words: str = " (did you mean {}?)") -> str:
+    """Return a suggestion of the name nearest to a wrong one; nothing if none is near."""
+    near = difflib.get_close_matches(name, list(options), n=1)
+    return words.format(clipped(near[0])) if near else ""
 
 
 class InputError(ValueError):

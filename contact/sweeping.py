@@ -8,7 +8,6 @@ computed from the same input.
 from __future__ import annotations
 
 import csv
-import difflib
 import hashlib
 import itertools
 import logging
@@ -27,7 +26,7 @@ from contact.case.digest import check_files, check_same, digest
 from contact.case.file import Case, load_case
 from contact.case.messages import listed
 from contact.case.text import literal, to_toml
-from contact.errors import InputError, counted
+from contact.errors import InputError, counted, nearest
 from contact.mesh.domain import Domain
 from contact.methods.load_stepping import Reached, predicted, solve_step
 from contact.methods.method import METHODS, Method
@@ -142,9 +141,8 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
         if not own:
             if not known:  # another quantity is meant, or one that this case has not
                 known = _numbers(values_of(SUMMARY, solution))
-            near = difflib.get_close_matches(name, known, n=1)
-            near = near or [key for key in known if key.startswith(top)][:1]
-            hint = f" (did you mean {near[0]}?)" if near else ""
+            begins = next((key for key in known if key.startswith(top)), "")
+            hint = nearest(name, known) or nearest(begins, known)
             raise InputError(
                 f"--columns {name}: no number, vector or table of these in this case's "
                 f"summary.json{hint}; accepted: {listed(known)}"
@@ -177,10 +175,9 @@ def _check_columns(names: Sequence[str]) -> None:
     for name in names:
         top = name.partition(".")[0]
         if top not in known:
-            near = difflib.get_close_matches(top, known, n=1)
-            hint = f" (did you mean {near[0]}?)" if near else ""
             raise InputError(
-                f"--columns {name}: no key of summary.json{hint}; accepted: {', '.join(known)}"
+                f"--columns {name}: no key of summary.json{nearest(top, known)}; accepted: "
+                f"{', '.join(known)}"
             )
 
 

@@ -10,7 +10,7 @@ from contact.body.elements import needed
 from contact.body.fields import CONSTANT
 from contact.case.body import ZERO
 from contact.case.formula import Expression
-from contact.case.messages import Words, fault, listed, nearest
+from contact.case.messages import Words, fault, listed
 from contact.case.section import (
     AMPLITUDE,
     PART,
@@ -18,6 +18,7 @@ from contact.case.section import (
     walk,
 )
 from contact.case.units import check_units
+from contact.errors import nearest
 from contact.mesh.together import meet, members
 from contact.settings import SPATIAL
 from contact.tolerances import HUGE

@@ -31,7 +31,7 @@ from contact.case.evolution import Evolution
 from contact.case.interface import Contact, Electric, Friction
 from contact.case.material import Material
 from contact.case.mesh import Mesh, cut_about_axis
-from contact.case.messages import clipped, describe, describe_fault, fault, keys_of, path_of, shown
+from contact.case.messages import describe, describe_fault, fault, keys_of, path_of, shown
 from contact.case.section import (
     FromTable,
     OneOrSome,
@@ -42,7 +42,7 @@ from contact.case.section import (
     without_effect,
 )
 from contact.case.units import Labels, share
-from contact.errors import InputError
+from contact.errors import InputError, clipped
 from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
 from contact.output.options import OutputOptions, Units
 from contact.settings import Accepted

@@ -6,7 +6,6 @@ The words come from the models: each kind of value carries the accepted ones in 
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import json
 import re
@@ -20,6 +19,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError, PydanticUndefined
 
+from contact.errors import clipped, nearest
 from contact.settings import Accepted, Internal
 
 #: Most characters of a quoted value, a key, a path of keys, and a list of accepted names.
@@ -70,12 +70,6 @@ def shown(given: Any) -> str:
     return clipped(text, VALUE)
 
 
-def clipped(text: str, length: int = PATH) -> str:
-    """Cut a text that is too long, and show characters that are not printable by their codes."""
-    text = text if len(text) <= length else text[: length - 3] + "..."
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-
-
 def path_of(keys: Iterable[str]) -> str:
     """Join keys to a path, as on the command line; a long one loses its middle."""
     text = ".".join(clipped(key, KEY) for key in keys)
@@ -97,12 +91,6 @@ def either(options: Iterable[str]) -> str:
     """Join options: ``a, b or c``."""
     *first, last = options
     return f"{', '.join(first)} or {last}" if first else last
-
-
-def nearest(name: str, options: Iterable[str], words: str = " (did you mean {}?)") -> str:
-    """Return a suggestion of the name nearest to a wrong one; nothing if none is near."""
-    near = difflib.get_close_matches(name, list(options), n=1)
-    return words.format(listed(near)) if near else ""
 
 
 def sections_of(annotation: Any) -> dict[str, type]:
@@ -129,8 +117,10 @@ def keys_of(section: type) -> Mapping[str, FieldInfo]:
     options: Any = section
     hints, keys = get_type_hints(options, include_extras=True), {}
     meanings: dict[str, str] = {}
-    for base in reversed(section.__mro__):
-        meanings |= _meanings(base)
+    for base in reversed(section.__mro__):  # under "Attributes" in their docstrings
+        text = inspect.cleandoc(base.__doc__ or "").partition("Attributes\n----------\n")[2]
+        for names, said in re.findall(r"^(\w+(?:, \w+)*)\n((?:[ ]+.*\n?|\n)+)", text, re.MULTILINE):
+            meanings |= dict.fromkeys(names.split(", "), " ".join(said.split()))
     for field in fields(options):
         if any(isinstance(mark, Internal) for mark in get_args(hints[field.name])[1:]):
             continue
@@ -138,13 +128,6 @@ def keys_of(section: type) -> Mapping[str, FieldInfo]:
         keys[field.name] = FieldInfo.from_annotated_attribute(hints[field.name], default)
         keys[field.name].description = meanings.get(field.name, "")
     return keys
-
-
-def _meanings(options: type) -> dict[str, str]:
-    """Return the meanings in a class's docstring, under "Attributes", by name."""
-    _, _, attributes = inspect.cleandoc(options.__doc__ or "").partition("Attributes\n----------\n")
-    blocks = re.findall(r"^(\w+(?:, \w+)*)\n((?:[ ]+.*\n?|\n)+)", attributes, re.MULTILINE)
-    return {name: " ".join(text.split()) for names, text in blocks for name in names.split(", ")}
 
 
 def kinds_of(sections: Iterable[type]) -> tuple[str, dict[str, type]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
@@ -11,7 +10,7 @@ from typing import Any, NoReturn
 from mpi4py import MPI
 
 from contact import __version__
-from contact.errors import InputError
+from contact.errors import InputError, nearest
 from contact.output.reference import files_help
 
 DESCRIPTION = """\
@@ -80,8 +79,7 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     for i, argument in enumerate(rest):
         follows = i > 0 and rest[i - 1].startswith("-")
         if argument.startswith("--"):
-            near = difflib.get_close_matches(argument.partition("=")[0], known, n=1)
-            hint = f", did you mean {near[0]}?" if near else ""
+            hint = nearest(argument.partition("=")[0], known, ", did you mean {}?")
             raise InputError(f"{argument}: unknown option{hint}; accepted: {', '.join(known)}")
         if not argument.startswith("-") and not follows:
             one = ONE.get(options.command, "case file")

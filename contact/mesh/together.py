@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from mpi4py import MPI
 
-from contact.errors import InputError
+from contact.errors import InputError, nearest
 from contact.mesh.entities import Indices, combinations
 
 ACCEPTED = "the name of a part, or a list of names"
@@ -98,8 +97,7 @@ def known(kind: str, name: str, names: Mapping[str, Indices]) -> str:
     """
     if name in names:
         return name
-    near = difflib.get_close_matches(str(name), names, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    hint = nearest(str(name), names, "; did you mean '{}'?")
     raise InputError(
         f"the mesh has no {kind} {name!r}{hint} (its {kind}s: {', '.join(sorted(names))})"
     )

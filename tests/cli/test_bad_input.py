@@ -8,7 +8,8 @@ from mpi4py import MPI
 
 from contact.case import mesh
 from contact.case.file import parse_case
-from contact.case.messages import LIST, clipped, listed, path_of, shown
+from contact.case.messages import LIST, listed, path_of, shown
+from contact.errors import clipped
 from contact.cli.main import main
 
 TABLES = {

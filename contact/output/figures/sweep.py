@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import itertools
 import tomllib
 from collections.abc import Sequence
@@ -17,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from contact.errors import InputError
+from contact.errors import InputError, nearest
 from contact.output.figures.figures import image
 from contact.output.figures.style import (
     BLUE,
@@ -161,10 +160,9 @@ class Swept:
         known = [name for name in self.columns if name != "input"]
         found = [name for name in known if is_of(name, key)]
         if not found:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f" (did you mean {near[0]}?)" if near else ""
             raise InputError(
-                f"--field {key}: no such column of sweep.csv{hint}; accepted: {', '.join(known)}"
+                f"--field {key}: no such column of sweep.csv{nearest(key, known)}; accepted: "
+                f"{', '.join(known)}"
             )
         return [name for name in found if len(found) > 1 and self.varies(name)] or found
 
