@@ -59,12 +59,6 @@ class Sides:
         #: Which facets have two sides.
         self.inside = self.sums(np.ones((*self.places.shape, 1)))[:, :, 0, 0] > 1.5
 
-    def _added(self, values: Array) -> Array:
-        """Return the sums of values at nodes of facets of cells, (cells facets m, b)."""
-        entries = np.ones(self.places.size), (self.places.ravel(), np.arange(self.places.size))
-        onto = csr_array(entries, shape=(self._count * self.places.shape[2], self.places.size))
-        return self.exchanged(onto @ values)[self.places.ravel()]
-
     def exchanged(self, rows: Array) -> Array:
         """Return the sums over all ranks of values by place, (facets m, b). Collective."""
         width = self.places.shape[2] * rows.shape[1]
@@ -76,8 +70,10 @@ class Sides:
 
     def sums(self, values: Array) -> Array:
         """Return the sums, as the values of shape (cells, facets, m, b). Collective."""
-        flat = values.reshape(self.places.size, values.shape[3])
-        return self._added(flat).reshape(values.shape)
+        flat, places = values.reshape(-1, values.shape[3]), self.places.ravel()
+        entries = np.ones(places.size), (places, np.arange(places.size))
+        onto = csr_array(entries, shape=(self._count * self.places.shape[2], places.size))
+        return self.exchanged(onto @ flat)[places].reshape(values.shape)
 
     def across(self, closures: NDArray[np.intp], corners: int) -> csr_array:
         """Return the matrix from values at corners of cells to places between two cells."""

@@ -209,15 +209,10 @@ def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
                 words = "%s; going on from step %d, the last one intact"
                 logger.warning(words, error, len(found))
             return found
-    on_root(comm, lambda: _tell_missing(files))
-    return found
-
-
-def _tell_missing(files: Sequence[Path]) -> None:
-    """Say where there are steps behind one that is missing."""
-    if len([*files[0].parent.glob("0????.npz")]) > len(files):
+    if comm.rank == 0 and len([*files[0].parent.glob("0????.npz")]) > len(files):
         missing = files[0].parent / name_of(len(files) + 1)
         logger.warning("%s is missing; going on from step %d", missing, len(files))
+    return found
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,6 @@ from forms.crystal import VOIGT
 from forms.elasticity import Anisotropic, mandel, moduli
 from forms.hencky import is_linear
 from forms.history import HistoryLaw, isotropic_stiffness
-from forms.piezo import Piezo
 from forms.plane_stress import without_stress_across
 
 #: Factors of the components of a tensor in the basis of Mandel.
@@ -306,11 +305,9 @@ def _stiffness(material: Material, shear: Array, factor: Array) -> Array:
             stiffness = without_stress_across(stiffness)
     if material.factor is not None:
         stiffness = factor[:, None, None] * stiffness
-    return stiffness if material.piezo is None else _coupled(stiffness, material.piezo)
-
-
-def _coupled(stiffness: Array, piezo: Piezo) -> Array:
-    """Return the matrix from (eps, E) to (sigma, D), shape (cells, 9, 9)."""
+    piezo = material.piezo
+    if piezo is None:
+        return stiffness
     coupling = np.array([np.asarray(piezo.e)[:, j, k] for j, k in VOIGT]).T * MANDEL
     whole = np.zeros((len(stiffness), 9, 9))
     whole[:, :6, :6], whole[:, 6:, 6:] = stiffness, np.asarray(piezo.beta)

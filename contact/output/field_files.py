@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
-from contact.output.fields import DerivedFields, discontinuous, linear, unknowns
+from contact.output.fields import DerivedFields, linear, unknowns
 from contact.output.folder import ROOM
 from contact.output.formats import Grid, Values, in_pieces, write_share
 from contact.output.solution import Solution
@@ -249,21 +249,8 @@ def _write_xdmf(problem: ContactProblem, frames: Sequence[Frame], folder: Path) 
 
 def _at_nodes(problem: ContactProblem, state: State, derived: DerivedFields) -> list[fem.Function]:
     """Return all fields at the nodes, all discontinuous where the derived ones are."""
-    found, nodal = unknowns(problem.equilibrium, state.x), derived.nodes()
-    if derived.group_count > 1:
-        found = {name: _apart(function) for name, function in found.items()}
-    return list((found | nodal).values())
-
-
-def _apart(function: fem.Function) -> fem.Function:
-    """Return a nodal function with values of each cell for itself."""
-    space = function.function_space
-    shape = space.ufl_element().reference_value_shape
-    made = discontinuous(space, function.name, shape)
-    values = function.x.array.reshape(-1, space.dofmap.index_map_bs)
-    array = made.x.array.reshape(-1, values.shape[1])
-    array[made.function_space.dofmap.list] = values[space.dofmap.list]
-    return made
+    found = unknowns(problem.equilibrium, state.x, "DG" if derived.group_count > 1 else "Lagrange")
+    return list((found | derived.nodes()).values())
 
 
 def _at_corners(

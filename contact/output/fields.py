@@ -46,25 +46,24 @@ EQUIVALENT = "equivalent_plastic_strain"
 
 
 def nodal_function(
-    name: str, source: fem.FunctionSpace, values: Array, shape: tuple[int, ...]
+    name: str,
+    source: fem.FunctionSpace,
+    values: Array,
+    shape: tuple[int, ...],
+    family: str = "Lagrange",
 ) -> fem.Function:
-    """Return a Lagrange function with a value of some shape on the nodes of another Lagrange space.
+    """Return a function with a value of some shape on the nodes of a Lagrange space.
 
-    The values are those at the local nodes of `source`, shape (nodes, components).
+    The values are those at the local nodes of `source`, shape (nodes, components). Of the family
+    "DG" it has them for each cell by itself.
     """
     mesh, degree = source.mesh, source.ufl_element().embedded_superdegree
-    function = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, shape)), name=name)
+    function = fem.Function(fem.functionspace(mesh, (family, degree, shape)), name=name)
     # Two spaces of one mesh need not number their nodes alike.
     target = function.function_space.dofmap.list
     function.x.array.reshape(-1, values.shape[1])[target] = values[source.dofmap.list]
     function.x.scatter_forward()
     return function
-
-
-def discontinuous(space: fem.FunctionSpace, name: str, shape: tuple[int, ...]) -> fem.Function:
-    """Return a function on the nodes of the cells of a Lagrange space, each for itself."""
-    degree = space.ufl_element().embedded_superdegree
-    return fem.Function(fem.functionspace(space.mesh, ("DG", degree, shape)), name=name)
 
 
 def linear(function: fem.Function) -> fem.Function:
@@ -80,14 +79,13 @@ def linear(function: fem.Function) -> fem.Function:
     return made
 
 
-def unknowns(body: BodyEquilibrium, x: Array) -> dict[str, fem.Function]:
+def unknowns(body: BodyEquilibrium, x: Array, family: str = "Lagrange") -> dict[str, fem.Function]:
     """Return the displacement and, for a piezoelectric body, the potential. Collective."""
-    values, d = body.nodal(x), body.dim
-    made = {"displacement": nodal_function("displacement", body.space, values[:, :d], (d,))}
+    u = body.nodal(x)[:, : body.dim]
+    given: dict[str, tuple[Array, tuple[int, ...]]] = {"displacement": (u, (body.dim,))}
     if body.piezoelectric:
-        potential = body.phi_scale * values[:, d:]
-        made["potential"] = nodal_function("potential", body.space, potential, ())
-    return made
+        given["potential"] = body.phi_scale * body.nodal(x)[:, body.dim :], ()
+    return {k: nodal_function(k, body.space, *value, family) for k, value in given.items()}
 
 
 class Extremes(NamedTuple):
@@ -373,9 +371,10 @@ class DerivedFields:
                 for name, columns in self.columns.items()
             }
         made = {}
-        links = space.dofmap.list[: groups.size]
+        links, degree = space.dofmap.list[: groups.size], self.body.degree
         for name, columns in self.columns.items():
-            made[name] = discontinuous(space, name, self.shapes[name])
+            apart = fem.functionspace(space.mesh, ("DG", degree, self.shapes[name]))
+            made[name] = fem.Function(apart, name=name)
             dofs = made[name].function_space.dofmap.list[: groups.size]
             array = made[name].x.array.reshape(-1, columns.stop - columns.start)
             array[dofs] = means[groups[:, None], links, columns]

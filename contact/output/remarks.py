@@ -93,6 +93,7 @@ def measure(solution: Solution, whole: bool = True) -> list[float]:
 def review(solution: Solution) -> None:
     """Add all remarks to the notes and warnings of a solution. Collective."""
     strains = measure(solution)
+    times = [record.state.time for record in solution.steps] or [solution.problem.time]
     for identifier, remarks in {
         "halved-steps": halved(solution),
         "unloading": unloading(solution),
@@ -113,7 +114,7 @@ def review(solution: Solution) -> None:
         "conductivity": conductivity(solution),
         "conductivity-ramp": ramp(solution),
         "two-bodies": bodies.choices(solution),
-        "meeting-supports": meeting_supports(solution.problem, _times(solution)),
+        "meeting-supports": meeting_supports(solution.problem, times),
         "passing-bodies": bodies.passing(solution.problem),
         "one-material": bodies.regions(solution),
         "unresisted-motion": bodies.unresisted_motions(solution),
@@ -124,11 +125,6 @@ def review(solution: Solution) -> None:
         for text in remarks:
             listed = solution.notes if isinstance(text, Note) else solution.warnings
             listed.append(f"{text} [{identifier}]")
-
-
-def _times(solution: Solution) -> list[float]:
-    """Return the ends of the steps, or the time of the only one."""
-    return [record.state.time for record in solution.steps] or [solution.problem.time]
 
 
 def halved(solution: Solution) -> Iterator[Remark]:

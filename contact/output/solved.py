@@ -236,24 +236,14 @@ def contact_result(solved: Solved, whole: bool = True) -> ContactResult:
         own["charge"] = problem.interface.law.charge(solved.nodal, solved.pressure)
     if whole:
         own = {name: nodes.gather(values) for name, values in own.items()}
-        order = _order(problem, nodes.gather(nodes.points), own["node"])
+        order = _by_position(problem, nodes.gather(nodes.points))
+        if problem.dim == 2:
+            order = _along_chain(own["node"], order, nodes.gather(_links(problem)))
     else:
         order = _by_position(problem, nodes.points)
     order = order[np.argsort(own["entry"][order], kind="stable")]
     arrays: dict[str, Any] = {name: values[order] for name, values in own.items()}
     return ContactResult(**arrays, _problem=problem)
-
-
-def _order(problem: ContactProblem, points: Array, names: NDArray[np.int64]) -> NDArray[np.intp]:
-    """Return the order of the contact nodes of all ranks, given their points and global numbers.
-
-    In 2-D from node to node along Gamma_3, each connected component from its end with the smaller
-    x (then y); in 3-D by x, then y, then z. Collective.
-    """
-    by_position = _by_position(problem, points)
-    if problem.dim == 3:
-        return by_position
-    return _along_chain(names, by_position, problem.nodes.gather(_links(problem)))
 
 
 def _by_position(problem: ContactProblem, points: Array) -> NDArray[np.intp]:

@@ -9,8 +9,8 @@ from mpi4py import MPI
 from contact.case import mesh
 from contact.case.file import parse_case
 from contact.case.messages import LIST, listed, path_of, shown
-from contact.errors import clipped
 from contact.cli.main import main
+from contact.errors import clipped
 
 TABLES = {
     "mesh": 'generator = "rectangle"\nsize = [4.0, 1.0]\ncells = [8, 2]',

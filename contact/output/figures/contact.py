@@ -447,14 +447,10 @@ def _draw_friction(ax: Axes, skin: Any, view: list[int], low: Array, high: Array
     rounding = 1e-9 * np.linalg.norm(traction, axis=1).max(initial=0.0)
     acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
     if acting.size:
-        chosen = acting[_thinned(flat[acting], 16)]
+        # The first of each cell of a grid of 16 x 16 cells.
+        places = flat[acting] - flat[acting].min(axis=0)
+        cells = np.floor(16 * places / (places.max() or 1.0))
+        chosen = acting[np.unique(cells, axis=0, return_index=True)[1]]
         longest = 0.1 * (high - low).max()
         exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / longest}
         ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
-
-
-def _thinned(flat: Array, count: int) -> NDArray[np.intp]:
-    """Return the first point of each cell of a grid of count x count cells."""
-    span = np.ptp(flat, axis=0).max() or 1.0
-    cells = np.floor((flat - flat.min(axis=0)) / span * count)
-    return np.unique(cells, axis=0, return_index=True)[1]

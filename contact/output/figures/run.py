@@ -130,11 +130,15 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
 
     def run(_: Path) -> Run:
         flat = "rz" if about["kinematics"] == "axisymmetric" else "xy"
+        row = surface["row"]
+        nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
+        along = {f"nu_{axis}": surface["normal"][nodes, i] for i, axis in enumerate("xyz")}
+        rigid = surface["rigid"][nodes] > 0
         return Run(
             heading(str(about["title"])),
             Units(**about.get("units", {})),
             "xyz" if "z" in columns else flat,
-            _moved(columns | _of_surface(surface), body),
+            _moved({**columns, **along, "entry": surface["entry"][nodes], "rigid": rigid}, body),
             body,
             surface,
             opposite=read(folder, OPPOSITE, read_grid) if OPPOSITE in files else None,
@@ -299,14 +303,6 @@ def _tables(path: Path) -> list[Table]:
     starts = np.flatnonzero(np.diff(columns["t"])) + 1
     parts = {name: np.split(values, starts) for name, values in columns.items()}
     return [{name: values[k] for name, values in parts.items()} for k in range(len(starts) + 1)]
-
-
-def _of_surface(surface: Any) -> dict[str, NDArray[Any]]:
-    """Return the columns that the contact part adds to ``contact.csv``."""
-    row = surface["row"]
-    nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
-    added = {f"nu_{axis}": surface["normal"][nodes, i] for i, axis in enumerate("xyz")}
-    return added | {"entry": surface["entry"][nodes], "rigid": surface["rigid"][nodes] > 0}
 
 
 def _moved(table: Table, body: Any) -> Table:
