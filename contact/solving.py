@@ -41,8 +41,7 @@ from contact.methods.signals import SIGNALLED, stop_on_signal
 from contact.nesting import nested_start, pays
 from contact.output.checkpoint import Checkpoints, read_steps
 from contact.output.remarks import announce
-from contact.output.solution import Solution, StepRecord
-from contact.output.steps import StepRecorder
+from contact.output.solution import Solution, StepRecord, StepRecorder
 from contact.output.uniqueness import uniqueness
 from contact.problem.checks import check_potential, check_problem, check_supports
 from contact.problem.problem import ContactProblem

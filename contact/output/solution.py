@@ -17,13 +17,16 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.linear.operator import Counters
+from contact.methods.load_stepping import LoadStep
 from contact.methods.report import IterationHistory, Outcome
 from contact.output.error_estimate import Estimate
 from contact.output.fields import Deformation, DerivedFields, unknowns
 from contact.output.intervals import Intervals
 from contact.output.options import OutputOptions, Source, Units
+from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import (
     ChargeBalance,
+    DrivenPart,
     Movements,
     Resultant,
     charge_balance,
@@ -33,7 +36,8 @@ from contact.output.resultants import (
     supports,
 )
 from contact.output.solved import ContactResult, Solved, contact_result
-from contact.problem.energy import Balance
+from contact.problem.energy import Balance, StepEnd, balance, step_end
+from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -76,6 +80,42 @@ class StepRecord:
         """Return the main columns; `row` has all."""
         shown = {name: self.row[name] for name in SHOWN if name in self.row}
         return f"<StepRecord: {', '.join(f'{name} = {v:.4g}' for name, v in shown.items())}>"
+
+
+class StepRecorder:
+    """Makes the records of one step after the other.
+
+    Parameters
+    ----------
+    problem
+        The problem of the evolution.
+    last
+        The record to go on from; from the reference configuration by default. Collective.
+    """
+
+    def __init__(self, problem: ContactProblem, last: StepRecord | None = None) -> None:
+        self._before = StepEnd.rest(problem)
+        if last is not None:
+            here = problem.at(last.state.time, last.state.history)
+            self._before = step_end(here, last.state, self._before)
+            self._before = replace(self._before, enthalpy=last.enthalpy)
+        self._rounding = 0.0 if last is None else last.rounding
+        self._driven = DrivenPart.of(problem)
+
+    def record(self, step: LoadStep) -> StepRecord:
+        """Return the record of a step that follows the last one. Collective."""
+        problem, state = step.problem, step.state
+        now = step_end(problem, state, self._before)
+        energies = balance(problem, state, self._before, now)
+        self._before = now
+        solution = Solution(problem, state, step.outcome, step.history, step.counters, "", {})
+        solution.energies = energies
+        if self._driven is not None:
+            way, force = (find(problem, state) for find in (self._driven.way, self._driven.force))
+            solution.driven = way, force
+        row = values_of(STEPS, solution)
+        self._rounding = max(self._rounding, step.outcome.kkt.rounding)
+        return StepRecord(state, row, now.enthalpy, self._rounding)
 
 
 @dataclass(repr=False)
