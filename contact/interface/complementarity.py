@@ -23,7 +23,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contact.interface.active_set import ActiveSet
 from contact.interface.interface import Interface
@@ -245,11 +244,12 @@ def linearise(
         friction[slips] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slips]
         limit = softening * parameters.nodal_stiffness if unchanged else None
         rate = _bound_gradient(interface, total, slip, length, limit)
-        ahead, follows = _follow_pressure(
-            interface, nodal, total, length, slope, opening, parameters, closed
-        )
+        # The bound follows the pressure of this very step.
+        by_pressure = interface.friction.by_pressure(total, length)
+        ahead = np.where(closed, -by_pressure * parameters.gamma * opening, 0.0)
+        rate[:, :d] += by_pressure[:, None] * slope
+        rate += by_pressure[:, None] * interface.law.layer_gradient(nodal)
         friction[slips] += (ahead[:, None] * along)[slips]
-        rate = rate + follows
         blocks[slips, :d, :] += along[slips, :, None] * rate[slips, None, :]
         blocks[slips, :d, :d] += sliding[slips]
     return LinearisedContact(Multipliers(pressure, friction), blocks, active, unchanged)
@@ -281,21 +281,3 @@ def _bound_gradient(
     fall = np.maximum(interface.friction.by_slip(total, length), -limit)
     gradient[:, : interface.dim] = fall[:, None] * unit_vectors(slip)
     return gradient
-
-
-def _follow_pressure(
-    interface: Interface,
-    nodal: Array,
-    total: Array,
-    length: Array,
-    slope: Array,
-    opening: Array,
-    parameters: ComplementarityParameters,
-    closed: NDArray[np.bool_],
-) -> tuple[Array, Array]:
-    """Return how the bound follows the pressure of this very step: change and gradient."""
-    rate = interface.friction.by_pressure(total, length)
-    gradient = np.zeros((length.size, interface.jump.block_size))
-    gradient[:, : interface.dim] = rate[:, None] * slope
-    gradient += rate[:, None] * interface.law.layer_gradient(nodal)
-    return np.where(closed, -rate * parameters.gamma * opening, 0.0), gradient

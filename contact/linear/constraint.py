@@ -254,16 +254,12 @@ class ConstrainedBulk:
             self.columns += added
             self.corner = self.corner + across + across.T + border[1]
         self.columns = np.stack([self.layout.mask(column) for column in self.columns.T], axis=1)
-        self._without_followers(matrix)
+        kept = matrix.createVecLeft()  # without unknowns that are not free
+        kept.array[:] = self.layout.free.ravel()
+        matrix.diagonalScale(kept, kept)
 
     def border(self, kind: str) -> None:
         """Return None: the border is that of `columns` and `corner`."""
-
-    def _without_followers(self, matrix: PETSc.Mat) -> None:
-        """Take the rows and columns of unknowns that are not free out of a matrix. Collective."""
-        own = matrix.createVecLeft()
-        own.array[:] = self.layout.free.ravel()
-        matrix.diagonalScale(own, own)
 
 
 class ConstrainedOperator:

@@ -278,6 +278,8 @@ class Condensation:
         if not (self._regular and np.isfinite(forces).all()):
             return None
         free, inclined = body.layout.at(self.nodes)
+        jump = self.full.interface.jump
+        others = body.nodal(state.x)[self.nodes[jump.nodes.size :]]
         condensed = CondensedBody(
             body.comm,
             body.dim,
@@ -285,7 +287,7 @@ class Condensation:
             self._rows,
             self._stiffness,
             forces,
-            self._at(state.x),
+            np.concatenate([jump.apply(state.x), others]).ravel(),
             self._own,
             acting,
             body.component_norms.at(self.nodes),
@@ -348,12 +350,6 @@ class Condensation:
         for rank, other in enumerate(every[1:], 1):
             comm.Send(np.ascontiguousarray(stiffness[other]), rank)
         return stiffness[own]
-
-    def _at(self, x: Array) -> Array:
-        """Return the owned kept unknowns: jumps, then values at the other kept nodes."""
-        jump, body = self.full.interface.jump, self.full.equilibrium
-        others = body.nodal(x)[self.nodes[jump.nodes.size :]]
-        return np.concatenate([jump.apply(x), others]).ravel()
 
     def expand(self, condensed: CondensedProblem, x: Array) -> Array:
         """Return the increment of the full problem's owned unknowns. Collective.

@@ -193,7 +193,10 @@ def _group(
     body, d = problem.equilibrium, problem.dim
     points, global_unknowns = body.layout.points, body.global_unknowns
     names: list[str] = []
-    centres, centre = [], _centre(problem)
+    # Rotations about the mean of the contact nodes are well scaled.
+    contact = problem.nodes
+    weight = contact.sum(np.ones_like(contact.weight))
+    centres, centre = [], np.array([contact.sum(x) for x in contact.points.T]) / weight
     pieces = _pieces(problem) if moving else None
     own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
     many = len(own_names) * len(components) + len(moving)
@@ -272,13 +275,6 @@ def described(motions: Array, names: list[str]) -> str:
         if size > 1 and np.linalg.norm(motions.T @ along) > (1 - 1e-6) * size:
             found.append(f"translation along {axis}, together")
     return ", ".join(dict.fromkeys(found)) or "translation and rotation combined"
-
-
-def _centre(problem: ContactProblem) -> Array:
-    """Return the mean of the contact nodes: rotations about it are well scaled."""
-    nodes = problem.nodes
-    weight = nodes.sum(np.ones_like(nodes.weight))
-    return np.array([nodes.sum(x) for x in nodes.points.T]) / weight
 
 
 def middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:

@@ -109,13 +109,12 @@ def coupling_operator(
     columns = [np.concatenate([rows.slaves, rows.masters]) for rows in given]
     halo = Halo(owners, index_map.size_local, np.concatenate(columns))
     numbers = np.concatenate([rows.nodes for rows in given])
-    jumps = sparse.vstack(
-        [
-            _over(rows, halo.places(names), halo.numbers.size)
-            for rows, names in zip(given, columns, strict=True)
-        ],
-        format="csr",
-    )
+    found = []  # each contact's jumps by the values of the nodes of all contacts
+    for rows, names in zip(given, columns, strict=True):
+        own = sparse.hstack([rows.own, -rows.other], format="coo")
+        at, shape = (own.row, halo.places(names)[own.col]), (rows.nodes.size, halo.numbers.size)
+        found.append(sparse.csr_array((own.data, at), shape=shape))
+    jumps = sparse.vstack(found, format="csr")
     replaced = halo.places(numbers)
     circle = _cyclic(comm, halo, replaced, jumps)
     if circle:
@@ -130,22 +129,14 @@ def coupling_operator(
     named = index_map.local_to_global(local)
     order, every = np.argsort(named), np.eye(free.shape[1]) * free[replaced][:, None, :]
     of_contact = np.isin(numbers, named)
-    found = np.searchsorted(named, numbers[of_contact], sorter=order)
-    every[of_contact] = unknowns[order[found]]
+    place = np.searchsorted(named, numbers[of_contact], sorter=order)
+    every[of_contact] = unknowns[order[place]]
     change = Change.of(comm, halo, replaced, jumps, (every, free))
     none = np.zeros(0, dtype=np.intp)
     between = comm.allreduce(any(rows.masters.size for rows in given), op=MPI.LOR)
     taken = np.flatnonzero(halo.reverse(taking)[:, 0])
     operator = CouplingOperator(halo, jumps, change, numbers, between, taken, none, none)
     return operator.at(named)
-
-
-def _over(rows: Mixing, places: NDArray[np.intp], count: int) -> sparse.csr_array:
-    """Return a contact's jumps by the values of the nodes of all contacts."""
-    entries = sparse.hstack([rows.own, -rows.other], format="coo")
-    return sparse.csr_array(
-        (entries.data, (entries.row, places[entries.col])), shape=(rows.nodes.size, count)
-    )
 
 
 def _cyclic(

@@ -127,7 +127,12 @@ def read_stl(path: str | Path) -> Array:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; accepted: an STL file") from None
-    corners = _binary(data) if _is_binary(data) else _text(path, data)
+    count = int.from_bytes(data[80:84], "little") if len(data) >= HEADER else -1
+    if len(data) == HEADER + EACH * count:
+        kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+        corners = np.frombuffer(data, kind, offset=HEADER)["corners"].astype(np.float64)
+    else:
+        corners = _text(path, data)
     if corners.size and not np.all(np.isfinite(corners)):
         raise InputError(f"{path}: coordinates that are no numbers; accepted: an STL file")
     area = np.linalg.norm(
@@ -138,16 +143,6 @@ def read_stl(path: str | Path) -> Array:
     if len(corners) == 0:
         raise InputError(f"{path}: no triangles; accepted: an STL file, binary or text")
     return corners
-
-
-def _is_binary(data: bytes) -> bool:
-    count = int.from_bytes(data[80:84], "little") if len(data) >= HEADER else -1
-    return len(data) == HEADER + EACH * count
-
-
-def _binary(data: bytes) -> Array:
-    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    return np.frombuffer(data, kind, offset=HEADER)["corners"].astype(np.float64)
 
 
 def _text(path: Path, data: bytes) -> Array:
