@@ -71,14 +71,12 @@ class Loads:
         self._last: tuple[float, Array] | None = None
         for number, load in enumerate(body.loads):
             for work, moving in _works(domain, load, f"load.{number}", v, xi, self._time):
-                self._add(load.factor, moving, work)
-
-    def _add(self, amplitude: Amplitude, moving: bool, work: ufl.Form) -> None:
-        for share in self._shares:
-            if share.amplitude == amplitude and share.moving == moving:
-                share.work = share.work + work
-                return
-        self._shares.append(_Share(amplitude, moving, work))
+                kind = load.factor, moving
+                share = next((s for s in self._shares if (s.amplitude, s.moving) == kind), None)
+                if share is None:
+                    self._shares.append(_Share(*kind, work))
+                else:
+                    share.work = share.work + work
 
     def at(self, time: float) -> Array:
         """Return the owned nodal loads at a time. Collective where loads know the time."""

@@ -39,7 +39,7 @@ CRASH = 70
 #: Command -> its module. They load dolfinx, which PETSc's options have to precede.
 COMMANDS = {
     "new": "contact.cli.new",
-    "mesh": "contact.cli.mesh",
+    "mesh": "contact.cli.new",
     "check": "contact.cli.check",
     "solve": "contact.cli.solve",
     "sweep": "contact.cli.solve",

@@ -1,4 +1,4 @@
-"""``contact new MESH``: a case file to begin with, for a mesh of one's own."""
+"""``contact new``, ``contact mesh``: a case file to begin with, a mesh file for many ranks."""
 
 from __future__ import annotations
 
@@ -15,12 +15,28 @@ from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.interface.pairing import facing_parts
 from contact.mesh.domain import ON_AXIS, Domain
-from contact.mesh.reader import from_file
+from contact.mesh.reader import convert, from_file
 from contact.ranks import on_root
 from contact.tolerances import NEGLIGIBLE
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Write the file that is asked for."""
+    return {"new": _new, "mesh": _convert}[options.command](options, comm)
+
+
+def _convert(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Write a mesh file as one that many ranks read in shares."""
+    to = Path(options.to)
+    cells = on_root(comm, lambda: convert(Path(options.file), to))
+    if comm.rank == 0:
+        parts, regions = (", ".join(group.names) for group in (cells.parts, cells.regions))
+        print(f"{to}, {to.with_suffix('.h5')}: {len(cells.regions.rows)} cells")
+        print(f"parts {parts}; regions {regions}")
+    return CONVERGED
+
+
+def _new(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     """Write the case file."""
     mesh = Path(options.mesh)
     path = Path(options.case) if options.case else mesh.with_suffix(".toml")

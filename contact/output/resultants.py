@@ -15,13 +15,12 @@ from typing import TypedDict, cast
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.description import Body
 from contact.body.fields import constant, knows_time, steady
-from contact.body.loads import Loads, expression
+from contact.body.loads import Loads, assembled, expression
 from contact.body.rigid import Bolt, Electrode
 from contact.errors import InputError
 from contact.mesh.together import members
@@ -258,10 +257,10 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     residual = equilibrium.nodal(residual_forces(problem, state))[:, d:]
     residual = np.asarray(residual / equilibrium.phi_scale)
     parts = holding(problem, electric=True)
-    nodal = {part: held[:, 0] * residual[nodes] for part, (nodes, held) in parts.items()}
-    nodal |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.body.electrodes}
-    electrodes = {part: _sum(problem, charges) for part, charges in nodal.items()}
-    magnitude = sum(_sum(problem, np.abs(charges)) for charges in nodal.values())
+    on_parts = {part: held[:, 0] * residual[nodes] for part, (nodes, held) in parts.items()}
+    on_parts |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.body.electrodes}
+    electrodes = {part: _sum(problem, charges) for part, charges in on_parts.items()}
+    magnitude = sum(_sum(problem, np.abs(charges)) for charges in on_parts.values())
     given: dict[str, float] = {}
     body = 0.0
     x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(equilibrium.space)
@@ -271,9 +270,8 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
         measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
         now = constant(problem.domain.mesh, time)
         density = expression(problem.domain, load.charge, x, now, f"load.{i}.charge")
-        vector = fem.assemble_vector(fem.form(density * test[d] * measure))
-        vector.scatter_reverse(InsertMode.add)
-        charges = load.factor(time) * vector.array[: equilibrium.owned].reshape(-1, bs)[:, d]
+        nodal = assembled(fem.form(density * test[d] * measure), equilibrium.owned)
+        charges = load.factor(time) * nodal.reshape(-1, bs)[:, d]
         charge = _sum(problem, charges)
         magnitude += _sum(problem, np.abs(charges))
         if load.on is None:
