@@ -169,30 +169,15 @@ def joined_nodes(
     given = [entry.coupling or entry.mixing for entry in entries]
     rows = [jumps for jumps in given if jumps is not None]
     there = None if inclined is None else inclined.at(nodes.nodes)
-    unknowns = _unknowns(nodes, projectors(free[nodes.nodes], there))
+    # The unknowns by their jumps: free components, the normal one of which is that of the unknowns,
+    # of which the `lift` stands for that of the components that supports hold.
+    unknowns, d = projectors(free[nodes.nodes], there), nodes.dim
+    held = nodes.normal - np.einsum("nij,nj->ni", unknowns[:, :d, :d], nodes.normal)
+    unknowns[:, :d, :d] += nodes.lift[:, :, None] * held[:, None, :]
     coupling = coupling_operator(nodes.comm, index_map, rows, (nodes.nodes, unknowns), free)
     if coupling is not None and inclined is not None:
         _check_rollers(nodes, coupling, inclined, any(entry.coupling for entry in entries))
     return replace(nodes, coupling=coupling, carried=_carried(nodes, coupling, ties, unknowns))
-
-
-def _unknowns(nodes: ContactNodes, movable: Array) -> Array:
-    """Return the unknowns of nodes by their jumps, shape (n, block size, block size).
-
-    They are the components that are free. The normal component of a jump is that of its unknowns,
-    of which the `lift` stands for that of the components that supports hold.
-
-    Parameters
-    ----------
-    nodes
-        The contact nodes.
-    movable
-        The projectors onto the unknowns that are free, shape (n, block size, block size).
-    """
-    d, made = nodes.dim, movable.copy()
-    held = nodes.normal - np.einsum("nij,nj->ni", movable[:, :d, :d], nodes.normal)
-    made[:, :d, :d] += nodes.lift[:, :, None] * held[:, None, :]
-    return made
 
 
 def _check_rollers(

@@ -228,7 +228,11 @@ class ContactProblem:
             body.layout.inclined,
         )
         self._check_cuts(found)
-        stiffness = self._young_of_contacts() / size
+        # The softer side where bodies touch: parts far from there may be softer by far.
+        where = self.domain, self.body.materials, body.cells
+        sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
+        young = max(min(young_behind(*where, side) for side in both) for both in sides)
+        stiffness = young / size
         law = joined_law(self.entries, found, body.phi_scale, stiffness)
         friction = joined_friction(self.entries, found)
         held = joined_held(self.entries, law, body.layout.index_map.local_range[0])
@@ -256,15 +260,6 @@ class ContactProblem:
             nodes.transpose(vectors, into)
             along[:, :, k] = body.nodal(into)[:, : self.dim]
         body.cuts.check(np.arange(len(along), dtype=np.int32), along, "contact meets")
-
-    def _young_of_contacts(self) -> float:
-        """Return the modulus of the softer side where bodies touch. Collective.
-
-        Parts far from there may be softer by orders of magnitude.
-        """
-        where = self.domain, self.body.materials, self.equilibrium.cells
-        sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
-        return max(min(young_behind(*where, side) for side in both) for both in sides)
 
     def _entry(self, key: str, contact: Contact) -> Entry:
         if contact.layer is not None:
