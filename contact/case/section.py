@@ -22,7 +22,6 @@ from pydantic import (
     Field,
     PlainSerializer,
     PlainValidator,
-    SerializationInfo,
     SerializerFunctionWrapHandler,
     Tag,
     ValidationInfo,
@@ -188,16 +187,8 @@ def _placed(given: str, info: ValidationInfo) -> FilePath:
     return FilePath(Path((info.context or {}).get("folder", ".")) / given)
 
 
-def _path(path: str, info: SerializationInfo) -> str:
-    return (info.context or {}).get("path", str)(path)  # type: ignore[no-any-return]
-
-
 def _expression(given: Any) -> Expression:
     return given if isinstance(given, Expression) else Expression(given)
-
-
-def _component(given: Any) -> Any:
-    return given if given == "free" else _expression(given)
 
 
 def _not_negative(expression: Expression) -> Expression:
@@ -217,10 +208,6 @@ def _part(given: Any) -> str:
         return together.part(given)
     except InputError:
         raise PydanticCustomError("part", "part") from None
-
-
-def _members(name: str) -> str | list[str]:
-    return list(name.members) if isinstance(name, together.Together) else name
 
 
 #: Tell a list, "many", from a single value, "one"; and a law, by its name, from a formula.
@@ -261,11 +248,15 @@ Names: TypeAlias = Annotated[
     _NAMES,
 ]
 #: A file, whose path a dump writes by the function ``path`` of its context.
-File: TypeAlias = Annotated[str, AfterValidator(_placed), PlainSerializer(_path)]
+File: TypeAlias = Annotated[
+    str,
+    AfterValidator(_placed),
+    PlainSerializer(lambda path, info: (info.context or {}).get("path", str)(path)),
+]
 Part: TypeAlias = Annotated[
     str,
     PlainValidator(_part),
-    PlainSerializer(_members),
+    PlainSerializer(lambda name: [*getattr(name, "members", ())] or name),
     PART,
     Accepted(together.ACCEPTED),
     _NAMES,
@@ -307,7 +298,7 @@ TimeFormula: TypeAlias = Annotated[
 ]
 Component: TypeAlias = Annotated[
     Expression | Literal["free"],
-    PlainValidator(_component),
+    PlainValidator(lambda given: given if given == "free" else _expression(given)),
     _as_source,
     Accepted('a number, a formula or "free"'),
     WithJsonSchema(_FORMULA),

@@ -194,15 +194,10 @@ def write_rows(
 
     def write() -> None:
         if columns is not None and (pieces or comm.rank == 0):
-            write_table(columns, own, more)
+            rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+            write_csv(own, columns, rows, more)
 
     on_each(comm, write)
-
-
-def write_table(columns: Table, path: Path, more: bool = False) -> None:
-    """Write columns, or put more behind those that are there. On one rank."""
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    write_csv(path, columns, rows, more)
 
 
 def write_csv(
