@@ -88,6 +88,13 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
         f"# Parts inside of it, for supports, electrodes and bolts:\n{within}" if within else ""
     )
     regions = ", ".join(sorted(domain.regions))
+    keys = "".join(f"{key} = {literal(value)}\n" for key, value in domain.space.items())
+    space = f"[space]                       # as the elements of the file\n{keys}\n" if keys else ""
+    held = f"""
+[[fixed]]                     # the part that lies lowest
+on = {literal(lowest)}
+displacement = {_along(d, 0.0)}
+"""
     return f"""\
 # A case to begin with; every key is described in docs/case-file.md.
 # Units are yours, but all the same: with mm and N, stresses are in MPa.
@@ -101,11 +108,11 @@ file = {literal(name)}
 # Parts of its boundary, to be named below:
 {parts}{within}# Regions: {regions}.
 
-{_space(domain)}{_materials(domain)}
+{space}{_materials(domain)}
 [[fixed]]                     # the part that lies highest; "free": no support in this direction
 {f"on = {literal(highest)}":<30}# or a list of parts
 displacement = {pressed}
-{_held(domain, lowest) if pairs else ""}
+{held if pairs else ""}
 # [[load]]                    # a resultant on any part but those of contacts
 # on = {literal(highest)}
 # force = {_along(d, -1.0)}
@@ -119,14 +126,6 @@ mu = 0.2
 method = "newton"
 tolerance = 1e-8
 """
-
-
-def _space(domain: Domain) -> str:
-    """Return the section for which the elements of the mesh's file were made, if they tell."""
-    if not domain.space:
-        return ""
-    lines = (f"{key} = {literal(value)}" for key, value in domain.space.items())
-    return "\n".join(["[space]                       # as the elements of the file", *lines, "\n"])
 
 
 def _materials(domain: Domain) -> str:
@@ -148,18 +147,11 @@ poisson = 0.3
     )
 
 
-def _held(domain: Domain, lowest: str) -> str:
-    """Return the support of the lowest body."""
-    return f"""
-[[fixed]]                     # the part that lies lowest
-on = {literal(lowest)}
-displacement = {_along(domain.dim, 0.0)}
-"""
-
-
 def _foundation(domain: Domain, lowest: str) -> str:
     """Return the contact of one body with a plane. Collective."""
-    ground, d = _along(domain.dim, _lowest(domain)), domain.dim
+    d = domain.dim
+    least = domain.mesh.geometry.x[:, d - 1].min(initial=np.inf)
+    ground = _along(d, domain.comm.allreduce(float(least), op=MPI.MIN) + 0.0)
     return f"""\
 [contact]                     # the part that lies lowest
 on = {literal(lowest)}
@@ -191,12 +183,6 @@ against = {literal(against if len(against) > 1 else against[0])}
 def _along(dim: int, value: float) -> str:
     """Return a vector along the last axis, as TOML."""
     return literal([0.0] * (dim - 1) + [value])
-
-
-def _lowest(domain: Domain) -> float:
-    """Return the least last coordinate of the mesh. Collective."""
-    x = domain.mesh.geometry.x[:, domain.dim - 1]
-    return domain.comm.allreduce(float(x.min(initial=np.inf)), op=MPI.MIN) + 0.0
 
 
 def _heights(domain: Domain) -> dict[str, float]:

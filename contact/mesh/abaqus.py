@@ -17,7 +17,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from contact.mesh.assembly import NESTING, Assembly, Member, Scope, real
 from contact.mesh.cells import distinct, once, together
@@ -197,7 +196,7 @@ def _take(
             found.sets.setdefault(found.name(options.get("ELSET", kind)), [])
             return
         numbers = found.elements.setdefault(kind, [])
-        count = _nodes(kind) + 1
+        count = _known(kind)[1] + 1
         values = [found.number(value) for line in lines for value in line if value]
         if len(values) % count:
             raise ValueError(f"*ELEMENT, TYPE={kind}: {len(values)} numbers, {count} an element")
@@ -234,11 +233,6 @@ def _take(
         found.other.append(keyword)
 
 
-def _nodes(kind: str) -> int:
-    """Return the number of nodes of a type of elements."""
-    return _known(kind)[1]
-
-
 def _known(kind: str) -> tuple[int, int]:
     """Return the dimension and the number of nodes of a type of elements."""
     for pattern, dim in TYPES:
@@ -261,9 +255,13 @@ def _deck(found: Scope) -> Contents:
     for block, (kind, values) in enumerate(found.elements.items()):
         dim, count = _known(kind)
         rows = np.array(values, dtype=np.int64).reshape(-1, count + 1)
-        nodes = _indices(tags, rows[:, 1:], "elements")
-        if (dim, count) == (1, 3):
-            nodes = _middle_last(points, nodes)
+        nodes = np.minimum(np.searchsorted(tags, rows[:, 1:]), max(tags.size - 1, 0))
+        if tags.size == 0 or np.any(tags[nodes] != rows[:, 1:]):
+            raise ValueError("it has elements whose nodes it does not have")
+        if (dim, count) == (1, 3):  # the middle one last, wherever the program has it
+            middle = points[nodes].mean(axis=1, keepdims=True)
+            order = np.argsort(-np.linalg.norm(points[nodes] - middle, axis=2), 1, kind="stable")
+            nodes = np.take_along_axis(nodes, order, axis=1)
         blocks.append((KINDS[dim, count], nodes))
         places = np.arange(len(rows))
         homes.append(np.column_stack([rows[:, 0], np.full_like(places, block), places]))
@@ -304,19 +302,6 @@ def _deck(found: Scope) -> Contents:
     if found.other:
         deck.notes.append(f"left out: {', '.join(f'*{word}' for word in found.other)}")
     return deck
-
-
-def _middle_last(points: npt.NDArray[np.float64], lines: Ints) -> Ints:
-    """Return lines of three nodes with the middle one last, wherever the program has it."""
-    spread = np.linalg.norm(points[lines] - points[lines].mean(axis=1, keepdims=True), axis=2)
-    return np.take_along_axis(lines, np.argsort(-spread, axis=1, kind="stable"), axis=1)
-
-
-def _indices(tags: Ints, rows: Ints, words: str) -> Ints:
-    places = np.minimum(np.searchsorted(tags, rows), max(tags.size - 1, 0))
-    if tags.size == 0 or np.any(tags[places] != rows):
-        raise ValueError(f"it has {words} whose nodes it does not have")
-    return np.asarray(places)
 
 
 def _members(sets: dict[str, list[Member]], key: str, above: tuple[str, ...]) -> list[int]:

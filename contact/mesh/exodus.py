@@ -62,7 +62,7 @@ def read(file: Path) -> Contents:
     Raises
     ------
     ValueError
-        If it has elements that are not known, or whose nodes it does not have.
+        If it has elements that are not known.
     Exception
         Of any kind, if it is damaged.
     """
@@ -93,8 +93,6 @@ def _add_blocks(data: Any, made: Contents) -> None:
             continue
         given = data.variables[f"connect{number + 1}"]
         rows = np.asarray(given[:], dtype=np.int64) - 1
-        if rows.size and not 0 <= rows.min() <= rows.max() < len(made.points):
-            raise ValueError("it has elements whose nodes it does not have")
         kind = str(given.elem_type).upper()
         known = [own for begins, own in KINDS.items() if kind.startswith(begins)]
         if not known:

@@ -150,6 +150,10 @@ def _by_number(key: str, arrays: Sequence[Any]) -> Iterator[tuple[str, dict[int,
 def model_of(contents: Contents) -> Model:
     """Return the contents of a file as they are checked."""
     known = [_kind(name, nodes.shape[1]) for name, nodes in contents.blocks]
+    if any(
+        r.size and not 0 <= r.min() <= r.max() < len(contents.points) for _, r in contents.blocks
+    ):
+        raise ValueError("it has elements whose nodes it does not have")
     kinds = list(dict.fromkeys(kind for kind, _ in known if kind[1] > 0))
     cut = as_simplices(kinds, _collapsed(contents, [kind for kind, _ in known]))
     if cut is not None:
@@ -162,7 +166,11 @@ def model_of(contents: Contents) -> Model:
         none = np.zeros((0, 1), dtype=np.int64)
         return Model(kinds, tags, contents.points, np.zeros((0, max(dim, 1))), none, {}, {})
     blocks = [nodes for _, nodes in contents.blocks]
-    places = _places(shape, blocks[whole[0]].shape[1])
+    # The nodes of a cell, and the corners in the order of the shape among them, in VTK's order.
+    count = blocks[whole[0]].shape[1]
+    order = shape.vtk(1 if count == shape.corners else 2)[1][:count]
+    corners = [order.index(corner) for corner in range(shape.corners)]
+    places = shape.nodes(1 if count == shape.corners else 2)[list(order)]
     for b in whole:
         blocks[b] = _middles_in_order(shape, contents.points, blocks[b])
     every = np.concatenate([blocks[b] for b in whole])
@@ -185,7 +193,9 @@ def model_of(contents: Contents) -> Model:
             left.append(name)
     if regions and len(distinct(np.concatenate([*regions.values()]))) < len(cells):
         regions[BODY] = cells
-    outside, without = _exterior(shape, cells[:, _corners(shape)]), []
+    # Facets of one cell alone, by their corners, around them.
+    facets = cells[:, corners][:, shape.facet_corners[:, shape.facet.around]]
+    outside, without = once(facets.reshape(-1, facets.shape[2])), list[str]()
     for name, nodes in contents.nodes.items():
         found = outside[np.isin(outside, nodes).all(axis=1)]
         if not len(found):
@@ -273,12 +283,6 @@ def _kind(name: str, nodes: int) -> tuple[Kind, Shape | None]:
     return (f"{label} {nodes}", shape.dim if shape else 3, 1 if nodes == CUT[label] else 2), shape
 
 
-def _places(shape: Shape, count: int) -> Any:
-    """Return the nodes of a cell with so many of them, in VTK's order."""
-    degree = 1 if count == shape.corners else 2
-    return shape.nodes(degree)[list(shape.vtk(degree)[1])][:count]
-
-
 def _middles_in_order(shape: Shape, points: Array, rows: Ints) -> Ints:
     """Return cells whose nodes between corners are in VTK's order.
 
@@ -309,17 +313,6 @@ def _middles_in_order(shape: Shape, points: Array, rows: Ints) -> Ints:
         costs = -np.einsum("cid,cjd->ij", places, given)
         ordered[:, columns[nodes]] = ordered[:, columns[nodes[linear_sum_assignment(costs)[1]]]]
     return ordered
-
-
-def _corners(shape: Shape) -> list[int]:
-    """Return the corners in the order of the shape, as nodes in VTK's order."""
-    return [shape.vtk(1)[1].index(corner) for corner in range(shape.corners)]
-
-
-def _exterior(shape: Shape, corners: Ints) -> Ints:
-    """Return the facets of one cell alone, by their corners, around them."""
-    facets = corners[:, shape.facet_corners[:, shape.facet.around]]
-    return once(facets.reshape(-1, facets.shape[2]))
 
 
 if __name__ == "__main__":

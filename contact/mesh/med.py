@@ -73,8 +73,6 @@ def _contents(mesh: Any, dim: int, families: Any) -> Contents:
             raise ValueError(f"elements {kind} that are not known")
         name, count = KINDS[kind]
         rows = np.asarray(given["NOD"][()], dtype=np.int64).reshape(count, -1).T - 1
-        if rows.size and not 0 <= rows.min() <= rows.max() < len(points):
-            raise ValueError("it has elements whose nodes it does not have")
         for group, members in _groups(given, named).items():
             made.groups.setdefault(group, {})[len(blocks)] = members
         blocks.append((name, rows))

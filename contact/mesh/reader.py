@@ -72,7 +72,7 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
         If the file is missing, damaged or no mesh, has no boundary groups, cells of several kinds,
         or degenerate, folded or overlapping cells. The message names the file.
     """
-    return _from_rank_0(comm, lambda: _read_msh(Path(path)), f"mesh file {path}")
+    return _from_rank_0(comm, lambda: _read(Path(path), gmsh=True), f"mesh file {path}")
 
 
 def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
@@ -131,24 +131,16 @@ def convert(file: Path, to: Path) -> Cells:
     return cells
 
 
-def _read(file: Path) -> Model:
-    """Read a file by the ending of its name."""
-    return (_read_other if file.suffix.lower() in OTHERS else _read_msh)(file)
-
-
-def _read_msh(file: Path) -> Model:
-    """Read a file of Gmsh."""
+def _read(file: Path, gmsh: bool = False) -> Model:
+    """Read a file by the ending of its name, or one of Gmsh."""
+    if not file.is_file():
+        raise InputError("no such file")
+    other = None if gmsh else OTHERS.get(file.suffix.lower())
+    if other is not None:
+        return _apart("contact.mesh.formats", [], file.resolve(), file, f"the {other} reader")
     how = ["switch"] if _format(file) < 4 else ["as they are"]
     with _plain_name(file) as plain:
         return _apart("contact.mesh.extraction", how, plain, file, "Gmsh")
-
-
-def _read_other(file: Path) -> Model:
-    """Read a file of another format."""
-    if not file.is_file():
-        raise InputError("no such file")
-    reader = f"the {OTHERS[file.suffix.lower()]} reader"
-    return _apart("contact.mesh.formats", [], file.resolve(), file, reader)
 
 
 def _apart(module: str, options: list[str], plain: Path, file: Path, reader: str) -> Model:
@@ -163,38 +155,32 @@ def _apart(module: str, options: list[str], plain: Path, file: Path, reader: str
     file, reader
         Its name, and who reads it, in messages.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "model.npz"
-        command = [sys.executable, "-P", "-m", module, str(plain), str(out), *options]
-        return _result(command, plain, out, file, reader)
-
-
-def _result(command: list[str], plain: Path, out: Path, file: Path, reader: str) -> Model:
-    """Run a process, and return the model that it writes."""
     limit = LEAST_TIME + TIME_A_BYTE * file.stat().st_size
     # All modules of this process can be imported by the other.
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
-    try:
-        done = subprocess.run(
-            command,
-            env=environment,
-            cwd=file.parent,  # where XDMF has its binary files
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=limit,
-        )
-    except subprocess.TimeoutExpired:
-        raise InputError(f"{reader} does not come to an end with it in {limit:.0f} s") from None
-    if done.returncode != 0:
-        raise InputError(
-            f"{reader} breaks off reading it (status {done.returncode}): it is damaged"
-        )
-    if not out.exists():
-        said = " ".join(done.stdout.decode(errors="replace").split())
-        said = said.replace(str(plain), file.name)
-        raise InputError(f"{reader} says of it: {said or 'nothing, and reads nothing of it'}")
-    return Model.load(out)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "model.npz"
+        try:
+            done = subprocess.run(
+                [sys.executable, "-P", "-m", module, str(plain), str(out), *options],
+                env=environment,
+                cwd=file.parent,  # where XDMF has its binary files
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                timeout=limit,
+            )
+        except subprocess.TimeoutExpired:
+            raise InputError(f"{reader} does not come to an end with it in {limit:.0f} s") from None
+        if done.returncode != 0:
+            raise InputError(
+                f"{reader} breaks off reading it (status {done.returncode}): it is damaged"
+            )
+        if not out.exists():
+            said = " ".join(done.stdout.decode(errors="replace").split())
+            said = said.replace(str(plain), file.name)
+            raise InputError(f"{reader} says of it: {said or 'nothing, and reads nothing of it'}")
+        return Model.load(out)
 
 
 def _format(file: Path) -> int:
@@ -203,8 +189,6 @@ def _format(file: Path) -> int:
     Gmsh takes a file for a mesh by how it begins, and anything else for a script, whose commands
     it executes: nothing may come before ``$MeshFormat``.
     """
-    if not file.is_file():
-        raise InputError("no such file")
     try:
         with file.open("rb") as stream:
             start = stream.read(200)

@@ -133,7 +133,7 @@ def check_model(model: Model) -> Cells:
     notes = [*model.notes]
     if dim == 3 and np.any(kept < 0):
         notes.append(SERENDIPITY)
-    if left := len(_first_of_each(every[:, first])) - len(regions.rows):
+    if left := len(np.unique(_number(every[:, first]))) - len(regions.rows):
         notes.append(f"{left} cell(s) in no physical group are no part of the body")
     # The nodes of the body alone; others may be centres of circles.
     used = np.unique(regions.rows)
@@ -245,11 +245,6 @@ def _flatten(points: Array, dim: int) -> Array:
             "physical group) and plane meshes with z = const"
         )
     return np.ascontiguousarray(points[:, :dim])
-
-
-def _first_of_each(rows: Ints) -> Ints:
-    """Return the index of the first of equal rows, shape (k,)."""
-    return np.unique(_number(rows), return_index=True)[1]
 
 
 def _number(rows: Ints) -> Ints:

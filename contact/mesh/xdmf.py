@@ -95,8 +95,6 @@ def read(file: Path) -> Any:
     on_nodes: dict[str, Any] = {}
     for grid in grids:
         own = _blocks(grid, root, file)
-        if any(r.size and not 0 <= r.min() <= r.max() < len(points) for _, r in own):
-            raise ValueError("it has elements whose nodes it does not have")
         at = [_among(blocks[:1], *block) for block in own]
         numbers = [0 if k is not None else len(blocks) + i for i, k in enumerate(at)]
         for name, on, values in _attributes(grid, root, file):
@@ -105,9 +103,11 @@ def read(file: Path) -> Any:
             elif on == "Cell" and len(values) == sum(len(rows) for _, rows in own):
                 pieces = np.split(values, np.cumsum([len(rows) for _, rows in own])[:-1])
                 for number, place, piece in zip(numbers, at, pieces, strict=True):
-                    if place is not None:
-                        piece = _spread(piece, place, len(blocks[0][1]))
-                    on_cells.setdefault(name, {})[number] = piece
+                    every = piece
+                    if place is not None:  # some cells of the mesh: 0 elsewhere
+                        every = np.zeros(len(blocks[0][1]), dtype=piece.dtype)
+                        every[place] = piece
+                    on_cells.setdefault(name, {})[number] = every
         blocks += [block for block, place in zip(own, at, strict=True) if place is None]
     data = {
         name: [found.get(b, np.zeros(len(rows), dtype=int)) for b, (_, rows) in enumerate(blocks)]
@@ -127,13 +127,6 @@ def _among(mesh: list[tuple[str, Ints]], name: str, rows: Ints) -> Ints | None:
     place[number[:count]] = np.arange(count)
     found = place[number[count:]]
     return found if np.all(found >= 0) else None
-
-
-def _spread(values: Any, place: Ints, count: int) -> Any:
-    """Return values of some cells as values of all, 0 elsewhere."""
-    found = np.zeros(count, dtype=values.dtype)
-    found[place] = values
-    return found
 
 
 def _attributes(grid: Element, root: Element, file: Path) -> list[tuple[str, str, Any]]:
