@@ -205,8 +205,8 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
             "--out": _value("DIR", "folder for results"),
             "--restart": _value(
                 "DIR",
-                "go on with an evolution that was ended, from the checkpoints in DIR: the case is "
-                "known, and the results go there too unless told otherwise",
+                "go on with an interrupted evolution from its checkpoints in DIR, which have the "
+                "case too; the results go to DIR unless --out names another folder",
             ),
             **shown,
             "--overwrite": replaces,
@@ -233,7 +233,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
     )
     yield (
         "plot DIR [options]",
-        "draw the figures of a run again, from its files, or that of a sweep",
+        "draw the figures of a run from its files, or the figure of a sweep",
         None,
         {
             "folder": _value("DIR", "folder with the results of a run, or of a sweep"),
