@@ -41,10 +41,13 @@ SAMPLES = np.logspace(-9, 3, 49, dtype=np.float64)
 PRESSURES = np.logspace(-6, 6, 13, dtype=np.float64)
 
 
-def expect(name: str, given: object, accepted: str, fits: object) -> None:
+def expect(
+    name: str, given: object, accepted: str, fits: object, identifier: str = "value"
+) -> None:
     """Raise an InputError that shows a value and the accepted ones in words, unless it fits."""
     if not fits:
-        raise InputError(f"{name}: given {shorten(repr(given))}; accepted: {accepted}")
+        words = f"{name}: given {shorten(repr(given))}; accepted: {accepted}"
+        raise InputError(words, identifier)
 
 
 def fill(made: object, **values: object) -> None:
@@ -58,7 +61,8 @@ def check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
     if not least <= value <= HUGE:
         raise InputError(
             f"{key}: a size of {value:.3g} leads to numbers that overflow; accepted: units that "
-            f"keep sizes between {1 / HUGE:g} and {HUGE:g}"
+            f"keep sizes between {1 / HUGE:g} and {HUGE:g}",
+            "overflow",
         )
 
 
@@ -136,10 +140,11 @@ def naming(name: str) -> Iterator[None]:
     except InputError:
         raise
     except _Returned as error:
-        raise InputError(f"{name}: {error}") from None
+        raise InputError(f"{name}: {error}", "own-function") from None
     except Exception as error:
         raise InputError(
-            f"{name}: the function raises {type(error).__name__}: {shorten(str(error))}"
+            f"{name}: the function raises {type(error).__name__}: {shorten(str(error))}",
+            "own-function",
         ) from error
 
 
@@ -244,5 +249,6 @@ def check_slope(
     worst = places[np.argmax(np.abs(given - mean)[places] / (allowed[places] + TINY))]
     raise InputError(
         f"{name}: {given[worst]:.4g} at {at[worst]:.3g}, where differences of the values are "
-        f"{mean[worst]:.4g}; accepted: the derivative of the law"
+        f"{mean[worst]:.4g}; accepted: the derivative of the law",
+        "law-derivative",
     )

@@ -1,5 +1,7 @@
 """Errors that a user can mend, and counts and suggestions in messages."""
 
+from __future__ import annotations
+
 import difflib
 import re
 from collections.abc import Iterable
@@ -27,15 +29,31 @@ def nearest(name: str, options: Iterable[str], words: str = " (did you mean {}?)
 
 
 class InputError(ValueError):
-    """Bad input: the message names the fault and the accepted values.
+    """Bad input: the message names the fault and the accepted values, and ends in an identifier.
 
-    The command line prints the message alone and leaves with exit status 2. Numbers of NumPy that
-    it repeats stand there as numbers.
+    The command line prints the message alone and leaves with exit status 2.
+
+    Parameters
+    ----------
+    words
+        The message; numbers of NumPy that it repeats stand there as numbers.
+    identifier
+        The entry of the page of messages, docs/troubleshooting.md, which it shares with others
+        of the same remedy.
     """
+
+    def __init__(self, words: str, identifier: str) -> None:
+        super().__init__(words, identifier)
+        self.words = NUMBER.sub(lambda found: found[1] or found[2] or "", words)
+        self.identifier = identifier
 
     def __str__(self) -> str:
         """Return the message."""
-        return NUMBER.sub(lambda found: found[1] or found[2] or "", super().__str__())
+        return f"{self.words} [{self.identifier}]"
+
+    def within(self, place: str) -> InputError:
+        """Return the error with words before its own, such as the name of a file."""
+        return InputError(f"{place}{self.words}", self.identifier)
 
 
 class SingularError(InputError):

@@ -139,7 +139,8 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
         raise InputError(
             f"{case.source}: solver.nested: there are {len(found) + 1} nested levels only; "
             f"accepted: at least {2 * COARSEST} cells along each edge and parts that end at "
-            "positions of the grid of half as many, or mesh.refine > 0"
+            "positions of the grid of half as many, or mesh.refine > 0",
+            "nested",
         )
     return found
 

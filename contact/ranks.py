@@ -188,5 +188,6 @@ def refused(error: OSError) -> InputError:
     where = "a file" if error.filename is None else error.filename
     return InputError(
         f"{where}: {error.strerror or error}; accepted: a place to write to, with room for the "
-        "results (earlier results are kept)"
+        "results (earlier results are kept)",
+        "cannot-write",
     )

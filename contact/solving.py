@@ -169,7 +169,7 @@ def solve(
     expect("solve", case, "a case, the name of a case file, or a Problem", fits)
     folder, restart = (None if given is None else Path(given) for given in (folder, restart))
     for name in replacements.keys() - set(REPLACEMENTS):
-        raise InputError(f"{name}: unknown; accepted: {', '.join(REPLACEMENTS)}")
+        raise InputError(f"{name}: unknown; accepted: {', '.join(REPLACEMENTS)}", "no-such-name")
     nested = settings.nested if isinstance(settings, NewtonOptions) else None
     if isinstance(case, ContactProblem):
         given = {"folder": folder, "restart": restart, "nested": nested or None, **replacements}
@@ -404,7 +404,8 @@ def _prescribed(problem: ContactProblem, start: State) -> State:
     if not problem.comm.allreduce(fits, op=MPI.LAND):
         raise InputError(
             "start: given a state of another problem; accepted: one with the same mesh, elements "
-            "and contact nodes, on the same ranks"
+            "and contact nodes, on the same ranks",
+            "start",
         )
     x = problem.equilibrium.prescribe(start.x, problem.time)
     return State(x, start.forces, problem.time, problem.history)
@@ -422,7 +423,10 @@ def _refuse(given: Mapping[str, object], beside: str) -> None:
     """Refuse arguments that would be ignored."""
     for name, value in given.items():
         if value is not None:
-            raise InputError(f"{name}: given together with {beside}; accepted: one without it")
+            raise InputError(
+                f"{name}: given together with {beside}; accepted: one without it",
+                "ignored-argument",
+            )
 
 
 def _check_options(settings: Options | None, monitor: Monitor | None) -> None:
@@ -447,7 +451,8 @@ def _checked_times(
     if not np.all(np.isfinite(ends)) or np.any(np.diff([begin, *ends]) <= 0):
         raise InputError(
             f"times: given {', '.join(f'{time:g}' for time in ends)}; accepted: numbers that "
-            f"increase, the first above {begin:g}"
+            f"increase, the first above {begin:g}",
+            "value",
         )
     for end in ends:
         check_supports(problem.at(end))

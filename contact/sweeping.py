@@ -92,9 +92,11 @@ class Axis:
         except ValueError:  # bare words
             texts = values = [value.strip() for value in given.split(",")]
         if not key.strip() or not values or "" in values:
-            raise InputError(f"--over {text}: accepted: path.to.key=value,value,...")
+            raise InputError(f"--over {text}: accepted: path.to.key=value,value,...", "over")
         if any(one == other for one, other in itertools.combinations(values, 2)):
-            raise InputError(f"--over {text}: a value stands there twice; accepted: each once")
+            raise InputError(
+                f"--over {text}: a value stands there twice; accepted: each once", "over"
+            )
         return Axis(key.strip(), tuple(texts))
 
 
@@ -113,7 +115,9 @@ def _spread(text: str, whole: str) -> str:
         numbers = np.linspace(*ends, int(count))
     except ValueError:
         accepted = f"a:b:n, n numbers from a to b, 2 to {MOST} of them"
-        raise InputError(f"--over {whole}: given {text.strip()}; accepted: {accepted}") from None
+        raise InputError(
+            f"--over {whole}: given {text.strip()}; accepted: {accepted}", "over"
+        ) from None
     # To twelve digits: 0.3, and not 0.30000000000000004. Some keys take whole numbers alone.
     as_written = not {*f"{first}{last}"} & {*".eE"} and (numbers == np.rint(numbers)).all()
     kind = int if as_written else float
@@ -145,7 +149,8 @@ def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float
             hint = nearest(name, known) or nearest(begins, known)
             raise InputError(
                 f"--columns {name}: no number, vector or table of these in this case's "
-                f"summary.json{hint}; accepted: {listed(known)}"
+                f"summary.json{hint}; accepted: {listed(known)}",
+                "columns",
             )
         for key, numbers in own.items():
             ends = _ENTRIES.get(key.partition(".")[0], ())
@@ -177,7 +182,8 @@ def _check_columns(names: Sequence[str]) -> None:
         if top not in known:
             raise InputError(
                 f"--columns {name}: no key of summary.json{nearest(top, known)}; accepted: "
-                f"{', '.join(known)}"
+                f"{', '.join(known)}",
+                "columns",
             )
 
 
@@ -298,7 +304,9 @@ def _kept_rows(
     table, before = folder / TABLE, folder / CASE
     for path in (table, before):
         if path.is_symlink() or (path.exists() and not path.is_file()):
-            raise InputError(f"{path} is no file of ours; accepted: a folder without it")
+            raise InputError(
+                f"{path} is no file of ours; accepted: a folder without it", "not-ours"
+            )
     refused = f"--out {folder}: given"
     rows = _read(table) if table.exists() else []
     if rows:
@@ -306,13 +314,15 @@ def _kept_rows(
         if swept != names:
             raise InputError(
                 f"{refused} a sweep over other keys; accepted: one over {', '.join(swept)}, or "
-                "another folder"
+                "another folder",
+                "sweep-table",
             )
         for name in columns:
             if not any(is_of(column, name) for column in rows[0]):
                 raise InputError(
                     f"--columns {name}: the rows of {table} have other columns; accepted: columns "
-                    "that they have, or another folder"
+                    "that they have, or another folder",
+                    "sweep-table",
                 )
     text = to_toml(load(first), anchored=True)
     if before.exists():
@@ -322,7 +332,8 @@ def _kept_rows(
     elif table.exists():
         raise InputError(
             f"{refused} a {TABLE} without the {CASE} that a sweep leaves beside it; accepted: "
-            "another folder"
+            "another folder",
+            "sweep-table",
         )
     for row in rows:
         point = {name: row[name] for name in names}
@@ -334,7 +345,8 @@ def _kept_rows(
         if then.pop(SEAL, "") != _seal(row):
             raise InputError(
                 f"{table}: the row {', '.join(_set(point))} has been changed since it was "
-                "computed; accepted: the table as a sweep has left it, or another folder"
+                "computed; accepted: the table as a sweep has left it, or another folder",
+                "sweep-table",
             )
         check_files(f"--out {folder}", made, then, now)
     return {tuple(row[name] for name in names): dict(row) for row in rows}
@@ -355,7 +367,8 @@ def _read(table: Path) -> list[dict[str, str]]:
         whole = False
     if not whole:
         raise InputError(
-            f"{table}: damaged, or no table of a sweep of this version; accepted: another folder"
+            f"{table}: damaged, or no table of a sweep of this version; accepted: another folder",
+            "sweep-table",
         )
     return found
 
@@ -365,7 +378,8 @@ def _write(folder: Path, rows: Sequence[Mapping[str, Any]], first: Case) -> None
     if any([*row] != [*rows[0]] for row in rows):
         raise InputError(
             f"{folder / TABLE}: its rows have other columns than those of this version, or other "
-            "--columns; accepted: another folder"
+            "--columns; accepted: another folder",
+            "sweep-table",
         )
     if not (folder / CASE).exists():
         (folder / CASE).write_text(to_toml(first, anchored=True), encoding="utf-8")

@@ -73,7 +73,7 @@ def parameters(name: str) -> dict[str, float]:
         If there is no such generator.
     """
     if name not in GENERATORS:
-        raise InputError(_unknown("mesh generator", name, GENERATORS))
+        raise InputError(_unknown("mesh generator", name, GENERATORS), "generator")
     signature = inspect.signature(GENERATORS[name])
     return {key: parameter.default for key, parameter in signature.parameters.items()}
 
@@ -131,18 +131,22 @@ def build(name: str, cell: str | None = None, order: int = 1, **given: float) ->
     defaults = parameters(name)
     for key, value in given.items():
         if key not in defaults:
-            raise InputError(_unknown(f"parameter of the mesh generator {name!r}", key, defaults))
+            raise InputError(
+                _unknown(f"parameter of the mesh generator {name!r}", key, defaults), "generator"
+            )
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number or not 0.0 < value < math.inf:
             raise InputError(
-                f"{key} of the mesh generator must be a positive number; given: {value}"
+                f"{key} of the mesh generator must be a positive number; given: {value}",
+                "generator",
             )
     if order not in (1, 2):
-        raise InputError(f"order of the mesh generator must be 1 or 2; given: {order}")
+        raise InputError(f"order of the mesh generator must be 1 or 2; given: {order}", "generator")
     if name in SWEPT and (cell not in (None, "tetrahedron") or order > 1):
         raise InputError(
             f"cells of the mesh generator {name!r} must be tetrahedra of order 1; given: "
-            f"{cell or 'tetrahedron'}, order {order}"
+            f"{cell or 'tetrahedron'}, order {order}",
+            "generator",
         )
     with _cells(gmsh, cell, order):
         GENERATORS[name](**given)
@@ -150,7 +154,8 @@ def build(name: str, cell: str | None = None, order: int = 1, **given: float) ->
     accepted = known[gmsh.model.getDimension()]
     if cell not in (None, *accepted):
         raise InputError(
-            f"cell of the mesh generator {name!r} must be {' or '.join(accepted)}; given: {cell}"
+            f"cell of the mesh generator {name!r} must be {' or '.join(accepted)}; given: {cell}",
+            "generator",
         )
 
 

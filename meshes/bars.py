@@ -35,7 +35,9 @@ def bar(
     ``loaded_from`` on). The elements have ``contact_size`` at the bottom, ``size`` far away.
     """
     if loaded_from >= length:
-        raise InputError(f"loaded_from must be less than the length {length}; given: {loaded_from}")
+        raise InputError(
+            f"loaded_from must be less than the length {length}; given: {loaded_from}", "generator"
+        )
     gmsh, body, (bottom, right, loaded, rest, left) = _polygon(
         [(0, 0), (length, 0), (length, height), (loaded_from, height), (0, height)]
     )
@@ -69,7 +71,9 @@ def bar_on_ends(
     side), ``contact`` (the bottom between them).
     """
     if 2.0 * end >= length:
-        raise InputError(f"end must be less than half the length {length}; given: {end}")
+        raise InputError(
+            f"end must be less than half the length {length}; given: {end}", "generator"
+        )
     gmsh, body, (first, contact, last, right, top, left) = _polygon(
         [(0, 0), (end, 0), (length - end, 0), (length, 0), (length, height), (0, height)]
     )

@@ -31,7 +31,9 @@ def bracket(
     room["bolt_diameter"] = min(room["bolt_diameter"], length - inner)
     for key, diameter in (("eye_diameter", eye_diameter), ("bolt_diameter", bolt_diameter)):
         if diameter >= room[key]:
-            raise InputError(f"{key} must be less than {room[key]:g}; given: {diameter:g}")
+            raise InputError(
+                f"{key} must be less than {room[key]:g}; given: {diameter:g}", "generator"
+            )
     occ = gmsh.model.occ
     around = [(0, 0), (length, 0), (length, thickness), (inner, thickness)]
     around += [(thickness, inner), (thickness, height), (0, height)]

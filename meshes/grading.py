@@ -155,7 +155,8 @@ def check_cells(count: float, dim: int | None = None) -> None:
         raise InputError(
             f"the sizes ask for at least 1e{math.floor(count)} cells, which take more memory than "
             f"the {machine / 1e9:.3g} GB that there are; accepted: sizes that give at most "
-            f"{machine / CELL_MEMORY:.1e} cells"
+            f"{machine / CELL_MEMORY:.1e} cells",
+            "mesh-memory",
         )
     seconds = 10**count * CELL_SECONDS
     if seconds > LONG:

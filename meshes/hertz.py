@@ -65,7 +65,7 @@ def disc(
     import gmsh
 
     if top_angle > 90.0:
-        raise InputError(f"top_angle must be at most 90 degrees; given: {top_angle}")
+        raise InputError(f"top_angle must be at most 90 degrees; given: {top_angle}", "generator")
     geo = gmsh.model.geo
     centre = geo.addPoint(0, radius, 0)
     # Angles from the lowest point, counter-clockwise; every arc is shorter than 180 degrees.

@@ -66,7 +66,9 @@ def half_cylinder(
     import gmsh
 
     if arc_size > radius:  # a few chords make no circle
-        raise InputError(f"arc_size must be at most the radius, {radius:g}; given: {arc_size:g}")
+        raise InputError(
+            f"arc_size must be at most the radius, {radius:g}; given: {arc_size:g}", "generator"
+        )
     half_space(
         radius=radius,
         extent=extent,
@@ -80,4 +82,6 @@ def half_cylinder(
 
 def _check(radius: float, extent: float) -> None:
     if radius >= extent:
-        raise InputError(f"radius must be below the extent, {extent:g}; given: {radius:g}")
+        raise InputError(
+            f"radius must be below the extent, {extent:g}; given: {radius:g}", "generator"
+        )

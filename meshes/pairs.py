@@ -189,7 +189,9 @@ def two_spheres(
     import gmsh
 
     if quarters not in (1, 2):
-        raise InputError(f"quarters of the mesh generator must be 1 or 2; given: {quarters:g}")
+        raise InputError(
+            f"quarters of the mesh generator must be 1 or 2; given: {quarters:g}", "generator"
+        )
     bodies: dict[str, list[int]] = {}
     parts: dict[str, list[int]] = {}
     touching = []

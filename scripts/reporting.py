@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 from PIL import Image
 
-from contact import Case, InputError, Solution, solve
+from contact import Case, NotConvergedError, Solution, solve
 from contact.methods.method import METHODS
 from contact.methods.options import Options
 from contact.methods.report import Outcome, Record
@@ -179,13 +179,13 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
 
     Raises
     ------
-    InputError
+    NotConvergedError
         If it does not converge: no table or figure shows such numbers.
     """
     solution = solve(case) if problem is None else solve(problem, case.solver)
     solution.units = case.case.units
     if not solution.converged:
-        raise InputError(f"{case.title}: {solution.outcome.reason}")
+        raise NotConvergedError(f"{case.title}: {solution.outcome.reason}")
     return solution
 
 

@@ -169,7 +169,8 @@ class Cuts:
             if self._comm.allreduce(float(np.abs(here).max(initial=0.0)), op=MPI.MAX) > NEGLIGIBLE:
                 raise InputError(
                     f"bolt on {part!r}: {text} nodes of the cut along its normal; accepted: parts "
-                    "that end a row of cells before the cut, or act along it"
+                    "that end a row of cells before the cut, or act along it",
+                    "bolt-held",
                 )
 
     def set(self, into: fem.Function, q: Array) -> None:
@@ -192,7 +193,9 @@ def _direction(
     mesh, d, comm = domain.mesh, domain.dim, domain.comm
     facets = domain.facets_anywhere(part)
     if not all(name in domain.inside for name in members(part)):
-        raise InputError(f"bolt on {part!r}: it is on the boundary; accepted: a part inside")
+        raise InputError(
+            f"bolt on {part!r}: it is on the boundary; accepted: a part inside", "bolt"
+        )
     corners = np.zeros((0, d, d))
     if facets.size:  # which dolfinx divides by
         corners = mesh.geometry.x[entities_to_geometry(mesh, d - 1, facets)][:, :d, :d]
@@ -202,7 +205,9 @@ def _direction(
     spread, axes = np.linalg.eigh((points - middle).T @ (points - middle))
     normal = axes[:, 0] * np.sign(axes[np.abs(axes[:, 0]).argmax(), 0])
     if spread[0] > (1e-6 * domain.size) ** 2 * len(points):
-        raise InputError(f"bolt on {part!r}: the cut is not plane; accepted: facets in one plane")
+        raise InputError(
+            f"bolt on {part!r}: the cut is not plane; accepted: facets in one plane", "bolt"
+        )
     nodes = fem.locate_dofs_topological(space, d - 1, facets)
     flags = la.vector(space.dofmap.index_map)
     flags.array[nodes] = 1.0
@@ -238,5 +243,6 @@ def _check_through(
     joined = np.flatnonzero((met[: mesh.topology.index_map(d - 1).size_local] > 0).all(axis=1))
     if domain.comm.allreduce(bool(np.setdiff1d(joined, facets).size), op=MPI.LOR):
         raise InputError(
-            f"bolt on {part!r}: the cut ends within the body; accepted: all facets of a section"
+            f"bolt on {part!r}: the cut ends within the body; accepted: all facets of a section",
+            "bolt",
         )

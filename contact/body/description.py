@@ -106,12 +106,14 @@ class Fixed:
         if all(value is None for value in self.given.values()):
             raise InputError(
                 f"Fixed on {self.on!r}: nothing is prescribed; accepted: a displacement with a "
-                "component that is not free, normal, or a potential"
+                "component that is not free, normal, or a potential",
+                "supports",
             )
         if self.normal is not None and self.displacement is not None:
             raise InputError(
                 f"Fixed on {self.on!r}: normal and displacement; accepted: one of them, and two "
-                "supports for both"
+                "supports for both",
+                "one-condition",
             )
 
     @property
@@ -220,9 +222,8 @@ class Load:
             amplitude=own_amplitude(f"Load on {self.on or 'the body'!r}", amplitude),
         )
         if not self.named:
-            raise InputError(
-                "Load: nothing is given; accepted: force, traction, pressure or charge"
-            )
+            words = "Load: nothing is given; accepted: force, traction, pressure or charge"
+            raise InputError(words, "load-values")
 
     @property
     def named(self) -> dict[str, Field | Moving]:
@@ -272,9 +273,8 @@ class Elastic:
     ) -> None:
         fill(self, on=part(on), stiffness=vector(stiffness), normal=field(normal))
         if self.stiffness is None and self.normal is None:
-            raise InputError(
-                f"Elastic on {self.on!r}: nothing is given; accepted: stiffness or normal"
-            )
+            words = f"Elastic on {self.on!r}: nothing is given; accepted: stiffness or normal"
+            raise InputError(words, "elastic")
 
 
 @dataclass(frozen=True)
@@ -346,7 +346,8 @@ class Material:
             If a nonlinear law is piezoelectric: the strain across would have to follow the field.
         """
         fits = self.piezo is None or self.in_plane_stress or is_linear(self.law)
-        expect("piezo", self.piezo, "None in plane stress, unless the law is linear", fits)
+        accepted = "None in plane stress, unless the law is linear"
+        expect("piezo", self.piezo, accepted, fits, "plane-stress")
         law, piezo = in_plane_stress(self.law, self.piezo)
         return replace(self, law=law, piezo=piezo)
 
@@ -436,7 +437,8 @@ class Body:
         if self.bolts and history:
             raise InputError(
                 f"bolt on {self.bolts[0].on!r}: a material of the body has internal variables, as "
-                "flow theory has; accepted: materials without internal variables where a bolt is"
+                "flow theory has; accepted: materials without internal variables where a bolt is",
+                "bolt",
             )
         fits = not self.electrodes or self.piezo is not None
         expect("electrodes", self.electrodes, "electrodes of a piezoelectric material", fits)
@@ -482,7 +484,8 @@ class Body:
             if not ((young > 0 and -1 < poisson < 0.5) or isinstance(material.law, Anisotropic)):
                 raise InputError(
                     f"material: given Young's modulus {young:g} and Poisson's ratio {poisson:g}; "
-                    "accepted: a modulus > 0, a ratio between -1 and 0.5, both excluded"
+                    "accepted: a modulus > 0, a ratio between -1 and 0.5, both excluded",
+                    "material-constants",
                 )
             for name, tensors in (("", material.law), ("piezoelectric ", material.piezo)):
                 if not isinstance(tensors, Anisotropic | Piezo):
@@ -492,4 +495,4 @@ class Body:
                     if dim == 2:
                         tensors.check_plane()
                 except ValueError as error:
-                    raise InputError(f"{name}material: {error}") from error
+                    raise InputError(f"{name}material: {error}", "material-constants") from error

@@ -41,12 +41,16 @@ def check_element(element: str, degree: int, shape: Shape, order: int = 1) -> No
         If the degree is none, the element has no such name, or not this degree, or these cells.
     """
     if degree not in (1, 2):
-        raise InputError(f"degree: given {degree!r}; accepted: 1 or 2")
+        raise InputError(f"degree: given {degree!r}; accepted: 1 or 2", "value")
     if element not in ELEMENTS:
-        raise InputError(f"element: given {element!r}; accepted: {', '.join(map(repr, ELEMENTS))}")
+        raise InputError(
+            f"element: given {element!r}; accepted: {', '.join(map(repr, ELEMENTS))}", "value"
+        )
     accepted = needed(element, degree, shape, order)
     if accepted is not None:
-        raise InputError(f"element: given {element!r} of degree {degree}; accepted: {accepted}")
+        raise InputError(
+            f"element: given {element!r} of degree {degree}; accepted: {accepted}", "value"
+        )
 
 
 def needed(element: str, degree: int, shape: Shape, order: int = 1) -> str | None:

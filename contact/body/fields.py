@@ -175,7 +175,7 @@ def field(value: Scalar | None) -> Field | Moving | None:
         return Number(float(value))
     if isinstance(value, Expr):
         if value.ufl_shape != ():
-            raise InputError(f"given UFL of shape {value.ufl_shape}; accepted: {ACCEPTED}")
+            raise InputError(f"given UFL of shape {value.ufl_shape}; accepted: {ACCEPTED}", "field")
         # UFL makes numbers of 0 * x[0] and of components of vectors.
         everywhere = not ufl.domain.extract_domains(value)
         return Number(float(value)) if everywhere else Ufl(value)
@@ -183,7 +183,7 @@ def field(value: Scalar | None) -> Field | Moving | None:
         return cast(Field, value)
     if callable(value):
         return Callback(value)
-    raise InputError(f"given {value!r} for a function of position; accepted: {ACCEPTED}")
+    raise InputError(f"given {value!r} for a function of position; accepted: {ACCEPTED}", "field")
 
 
 def vector(
@@ -210,11 +210,14 @@ def vector(
     if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
         raise InputError(
             f"given {value!r} for a vector; accepted: a list with an entry a component, such as "
-            "[0.0, 0.0] in the plane, or UFL or a Function of vectors"
+            "[0.0, 0.0] in the plane, or UFL or a Function of vectors",
+            "field",
         )
     found = tuple(None if isinstance(v, str) and v == "free" else field(v) for v in value)
     if not free and any(component is None for component in found):
-        raise InputError(f"given {value!r} for a vector; accepted: 0 where nothing acts")
+        raise InputError(
+            f"given {value!r} for a vector; accepted: 0 where nothing acts", "load-values"
+        )
     return found
 
 
@@ -309,7 +312,7 @@ class Ufl:
         cells = geometry.compute_colliding_cells(mesh, found, x)
         first, count = cells.offsets[:-1], np.diff(cells.offsets)
         if _compat.lasting(mesh.comm).allreduce(bool(np.any(count == 0)), op=MPI.LOR):
-            raise InputError("a given Function is not defined everywhere on its part")
+            raise InputError("a given Function is not defined everywhere on its part", "field")
         if not len(x):
             return np.zeros(0)
         return np.asarray(function.eval(x, cells.array[first]), dtype=float).reshape(-1)
@@ -329,7 +332,7 @@ def mesh_of(expression: Expr) -> dmesh.Mesh:
     try:
         domain = ufl.domain.extract_unique_domain(expression)
     except ValueError as error:
-        raise InputError(f"a UFL expression: {error}") from None
+        raise InputError(f"a UFL expression: {error}", "field") from None
     if domain is None:
-        raise InputError("a UFL expression without a mesh; accepted: a number instead")
+        raise InputError("a UFL expression without a mesh; accepted: a number instead", "field")
     return dmesh.Mesh(domain.ufl_cargo(), domain)

@@ -233,7 +233,8 @@ def _check_motion(rigid: Rigid, domain: Domain) -> None:
     if (size := len(rigid.motion.displacement)) != domain.dim:
         raise InputError(
             f"{rigid.name} on {rigid.on!r}: the motion has {size} components, the body has "
-            f"{domain.dim}"
+            f"{domain.dim}",
+            "components",
         )
     if not domain.revolved:
         return
@@ -241,7 +242,8 @@ def _check_motion(rigid: Rigid, domain: Domain) -> None:
     if any(value is None or callable(value) or value != 0 for value in (radial, turn)):
         raise InputError(
             f"{rigid.name} on {rigid.on!r}: a rigid part moves along the axis alone where space is "
-            "axisymmetric; accepted: 0 for the first component of the displacement, no rotation"
+            "axisymmetric; accepted: 0 for the first component of the displacement, no rotation",
+            "rigid-part",
         )
 
 
@@ -264,7 +266,8 @@ def _tie(
     follows[:, slice(d, None) if isinstance(member.description, Electrode) else slice(0, d)] = True
     if _anywhere(domain, tied[nodes] & follows):
         raise InputError(
-            f"{key}: it shares nodes with another rigid part or electrode; accepted: parts apart"
+            f"{key}: it shares nodes with another rigid part or electrode; accepted: parts apart",
+            "rigid-part",
         )
     # A node that a support holds cannot follow.
     moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > NEGLIGIBLE
@@ -272,11 +275,13 @@ def _tie(
         if isinstance(member.description, Electrode):
             raise InputError(
                 f"{key}: it shares nodes with a part whose potential is fixed; accepted: parts "
-                "that share no nodes"
+                "that share no nodes",
+                "rigid-part",
             )
         raise InputError(
             f"{key}: a support fixes a component of one of its nodes that is free to move with it; "
-            "accepted: that component given there, or parts that share no nodes"
+            "accepted: that component given there, or parts that share no nodes",
+            "rigid-part",
         )
     follows &= free[nodes]
     tied[nodes] |= follows

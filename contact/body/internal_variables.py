@@ -109,7 +109,8 @@ class QuadratureLaws:
                 elif values[name].shape[2:] != first.shape:
                     raise InputError(
                         f"material: the variable {name!r} has the shapes {values[name].shape[2:]} "
-                        f"and {first.shape} in two materials; accepted: one, or two names"
+                        f"and {first.shape} in two materials; accepted: one, or two names",
+                        "law-variables",
                     )
                 values[name][own] = first
         return {name: array.reshape(-1, *array.shape[2:]) for name, array in values.items()}
@@ -485,10 +486,9 @@ def _check(
             shapes[name] = np.shape(energies), (n,)
     for name, (given, accepted) in shapes.items():
         if given != accepted:
-            raise InputError(
-                f"{type(law).__name__}: respond: {name}: given the shape {given}; accepted: "
-                f"{accepted}, a row per point"
-            )
+            place = f"{type(law).__name__}: respond: {name}"
+            words = f"{place}: given the shape {given}; accepted: {accepted}, a row per point"
+            raise InputError(words, "law-variables")
 
 
 def _fill(function: fem.Function, cells: Indices, values: Array) -> None:

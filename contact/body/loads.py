@@ -112,14 +112,17 @@ def _works(
     for force in (load.density, load.force):
         if force is not None and len(force) != domain.dim:
             raise InputError(
-                f"load on {place}: the force has {len(force)} components, the body has {domain.dim}"
+                f"load on {place}: the force has {len(force)} components, the body has "
+                f"{domain.dim}",
+                "components",
             )
     if load.charge is not None and xi is None:
-        raise InputError(f"load on {place}: a charge needs a piezoelectric material")
+        raise InputError(f"load on {place}: a charge needs a piezoelectric material", "piezo")
     if domain.revolved and load.force is not None and not getattr(load.force[0], "is_zero", False):
         raise InputError(
             f"{key}.force.0: given one across the axis, where it cancels over the full turn; "
-            "accepted: 0, or a traction or pressure"
+            "accepted: 0, or a traction or pressure",
+            "value",
         )
     area = 1.0 if load.force is None else domain.volume(measure)
     works = []

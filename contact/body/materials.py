@@ -46,7 +46,8 @@ def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
         if not material.on:
             raise InputError(
                 f"material.{i}.on: missing; accepted: with several materials, the regions of "
-                f"each ({', '.join(sorted(domain.regions))})"
+                f"each ({', '.join(sorted(domain.regions))})",
+                "missing",
             )
         cells = np.unique(np.concatenate([domain.cells(name) for name in material.on]))
         both = owner[cells].max(initial=-1)
@@ -54,7 +55,8 @@ def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
         if other >= 0:
             raise InputError(
                 f"material.{i}.on: {', '.join(material.on)} shares cells with the regions of "
-                f"material.{other} ({', '.join(materials[other].on)}); accepted: each cell in one"
+                f"material.{other} ({', '.join(materials[other].on)}); accepted: each cell in one",
+                "regions",
             )
         owner[cells] = i
         found.append(cells.astype(np.int32))
@@ -92,11 +94,13 @@ def _check_all(domain: Domain, owner: Indices) -> None:
         if without > 0:
             raise InputError(
                 f"material: the region {name!r} has none; accepted: a [[material]] with "
-                f"on = {name!r}, or one without `on` for the whole mesh"
+                f"on = {name!r}, or one without `on` for the whole mesh",
+                "regions",
             )
     raise InputError(
         f"material: {left} cells of the mesh are in no region and have none; accepted: a region "
-        "(physical group) for each cell, or one material without `on` for the whole mesh"
+        "(physical group) for each cell, or one material without `on` for the whole mesh",
+        "regions",
     )
 
 

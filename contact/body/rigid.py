@@ -286,7 +286,7 @@ class Bolt:
         fill(self, shortening=_timed("Bolt: shortening", shortening))
         fill(self, amplitude=own_amplitude("Bolt", amplitude))
         if (self.force is None) == (self.shortening is None):
-            raise InputError(f"Bolt on {self.on!r}: accepted: one of force and shortening")
+            raise InputError(f"Bolt on {self.on!r}: accepted: one of force and shortening", "bolt")
 
     name = "bolt"
 

@@ -150,7 +150,8 @@ class Rollers:
                 raise InputError(
                     f"fixed.{number}.normal: {fixed.on} has an edge, where it has no normal; "
                     "accepted: a smooth part; each face of an edge as a part and an entry of its "
-                    "own"
+                    "own",
+                    "roller-normal",
                 )
             found.append((nodes, normal))
         d, size = domain.dim, unsupported.shape[1]
@@ -191,7 +192,8 @@ class Rollers:
             if self._domain.comm.allreduce(shared, op=MPI.LOR):
                 raise InputError(
                     f"fixed.{roller.number}.normal: the part shares nodes with a rigid part; "
-                    "accepted: parts apart"
+                    "accepted: parts apart",
+                    "roller-normal",
                 )
 
     def set(self, nodal: Array, time: float) -> None:
@@ -240,7 +242,8 @@ class Rollers:
         raise InputError(
             f"fixed.{number}.normal: given {asked_there:.4g} along the normal of "
             f"{self._body.fixed[number].on!r}, and at ({where}) {names} asks for {got_there:.4g}; "
-            "accepted: displacements that agree where parts meet, or parts apart"
+            "accepted: displacements that agree where parts meet, or parts apart",
+            "roller-values",
         )
 
     def forces(self, number: int, nodes: NDArray[np.int32]) -> Array:

@@ -89,13 +89,14 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
             if len(fixed.displacement) != dim:
                 raise InputError(
                     f"fixed on {fixed.on!r}: displacement has {len(fixed.displacement)} "
-                    f"components, the body has {dim}"
+                    f"components, the body has {dim}",
+                    "components",
                 )
             given = list(fixed.displacement)
         if fixed.potential is not None:
             if body.piezo is None:
                 raise InputError(
-                    f"fixed on {fixed.on!r}: a potential needs a piezoelectric material"
+                    f"fixed on {fixed.on!r}: a potential needs a piezoelectric material", "piezo"
                 )
             given.append(fixed.potential)
         for component, value in enumerate(given):
@@ -139,7 +140,8 @@ def _off_axis(domain: Domain, part: str, points: Array) -> Callable[[Array], Non
             raise InputError(
                 f"fixed on {part!r}: a radial displacement of {largest:.4g} where the part meets "
                 'the axis; accepted: 0 at x = 0, for instance "0.1*x", or "free": there u_r = 0 '
-                "anyway"
+                "anyway",
+                "axis",
             )
 
     return check

@@ -42,7 +42,8 @@ def _elastic(domain: Domain, body: Body) -> Iterator[tuple[list[Expr], Expr, Mea
         if given and len(given) != domain.dim:
             raise InputError(
                 f"elastic on {support.on!r}: the stiffness has {len(given)} components, the body "
-                f"has {domain.dim}"
+                f"has {domain.dim}",
+                "elastic",
             )
         key = f"elastic.{number}"
         normal = Number(0.0) if support.normal is None else support.normal
@@ -68,7 +69,10 @@ def _check_stiffness(domain: Domain, on: str, value: Any, key: str) -> None:
     found = domain.comm.allgather(values[wrong][:1].tolist())
     worst = [one for own in found for one in own]
     if worst:
-        raise InputError(f"{key}: given {worst[0]:g} on {on!r}; accepted: numbers >= 0 everywhere")
+        raise InputError(
+            f"{key}: given {worst[0]:g} on {on!r}; accepted: numbers >= 0 everywhere",
+            "negative-stiffness",
+        )
 
 
 class WeakForms:

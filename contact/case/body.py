@@ -89,7 +89,7 @@ class Fixed(Section):
         one = [key for key in keys if getattr(self, key) is not None]
         if len(one) > 1:
             accepted = f"one of {' and '.join(one)}, and for more another entry"
-            raise fault(one[0], as_given(getattr(self, one[0])), accepted)
+            raise fault(one[0], as_given(getattr(self, one[0])), accepted, "one-condition")
         if self.symmetry is not None or self.normal is not None:
             return self
         if self.potential is None and all(c == "free" for c in self.displacement or ()):
@@ -180,7 +180,7 @@ def _check_across(key: str, domain: Domain, on: str, axis: int) -> None:
     name = "xyz"[axis]
     if axis >= domain.dim or (domain.revolved and axis == 0):
         known = "y" if domain.revolved else " or ".join("xyz"[: domain.dim])
-        raise InputError(f'{key}: given "{name}"; accepted: {known}')
+        raise InputError(f'{key}: given "{name}"; accepted: {known}', "value")
     facets, there = domain.facets(on), np.zeros(0)
     if facets.size:  # which `entities_to_geometry` divides by
         nodes = entities_to_geometry(domain.mesh, domain.dim - 1, facets)
@@ -190,7 +190,8 @@ def _check_across(key: str, domain: Domain, on: str, axis: int) -> None:
     if high - low > 1e-6 * domain.size:
         raise InputError(
             f"{key}: {on} reaches from {name} = {low:.6g} to {high:.6g}; accepted: a part in a "
-            f"plane across {name}"
+            f"plane across {name}",
+            "symmetry",
         )
 
 
@@ -230,13 +231,13 @@ class Load(Section):
     def _check(self) -> Self:
         if (self.on is None) == (not self.everywhere):
             given = "neither" if self.on is None else "both"
-            raise fault("on", Words(given), "one of on and everywhere = true")
+            raise fault("on", Words(given), "one of on and everywhere = true", "exclusive-keys")
         right, wrong = (VOLUME, SURFACE) if self.everywhere else (SURFACE, VOLUME)
         place = "everywhere = true" if self.everywhere else "on"
         for key in wrong:
             if getattr(self, key) is not None:
                 given = Words(f"together with {place}")
-                raise fault(key, given, f"with {place}: {', '.join(right)}")
+                raise fault(key, given, f"with {place}: {', '.join(right)}", "exclusive-keys")
         if all(getattr(self, key) is None for key in right):
             raise fault(right[0], Words("missing"), f"at least one of {', '.join(right)}")
         return self
@@ -315,7 +316,12 @@ class Moving(Section):
             accepted = "0 across the axis of a body of revolution"
             raise fault(f"{key}.displacement.0", as_given(across), accepted)
         if any(turn != ZERO for turn in self.turns):
-            raise fault(f"{key}.rotation", Words("given"), "no rotation of a body of revolution")
+            raise fault(
+                f"{key}.rotation",
+                Words("given"),
+                "no rotation of a body of revolution",
+                "rigid-part",
+            )
 
     def motion(self, case: Case, dim: int) -> rigid.Motion:
         """Return the motion itself, of a body in 2-D or 3-D."""
@@ -374,7 +380,7 @@ class Bolt(Section):
     def _check(self) -> Self:
         if (self.force is None) == (self.shortening is None):
             given = "neither" if self.force is None else "both"
-            raise fault("force", Words(given), "one of force and shortening")
+            raise fault("force", Words(given), "one of force and shortening", "bolt")
         return self
 
     def build(self, case: Case) -> rigid.Bolt:

@@ -106,8 +106,8 @@ def named(source: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        text = str(error)
-        raise InputError(text if text.startswith(source) else f"{source}: {text}") from error
+        own = error.words.startswith(source)
+        raise error.within("" if own else f"{source}: ") from error
 
 
 def replaced_by(arguments: Collection[str]) -> tuple[str, ...]:
@@ -121,14 +121,17 @@ def _check_replaced(filled: Collection[str], arguments: Mapping[str, object]) ->
         names = REPLACEABLE[key]
         if all(arguments[name] is None for name in names):
             raise InputError(
-                f"{key}: missing; accepted: it in the case, or {' or '.join(names)}=... in Python"
+                f"{key}: missing; accepted: it in the case, or {' or '.join(names)}=... in Python",
+                "missing",
             )
 
 
 def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
     """Return the materials of a case in the axes of the body."""
     if law is not None and len(case.materials) > 1:
-        raise InputError("law: a law given beside the case replaces one material, not several")
+        raise InputError(
+            "law: a law given beside the case replaces one material, not several", "replaces-one"
+        )
     made = []
     for key, section in case.materials:
         if domain.revolved:
@@ -163,7 +166,8 @@ def _contacts(
     if len(case.contacts) > 1 and replaced:
         raise InputError(
             "contact: foundation, layer, coefficient and friction given beside the case "
-            "replace those of one contact, not of several"
+            "replace those of one contact, not of several",
+            "replaces-one",
         )
     made = []
     for key, contact in case.contacts:

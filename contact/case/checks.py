@@ -64,11 +64,11 @@ def _check_plane_stress(case: Case) -> None:
     """Raise a fault if no stress acts across the body, and an element or a law does not fit."""
     if case.space.element != "standard":
         accepted = '"standard" in plane stress, where nothing locks'
-        raise fault("space.element", case.space.element, accepted)
+        raise fault("space.element", case.space.element, accepted, "plane-stress")
     for key, material in case.materials:
         if material.piezoelectric and material.law in ("log", "j2"):
             accepted = '"linear" or "anisotropic" in plane stress with piezoelectric constants'
-            raise fault(f"{key}.law", material.law, accepted)
+            raise fault(f"{key}.law", material.law, accepted, "plane-stress")
 
 
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
@@ -85,7 +85,7 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
             for name in members(value):
                 if name not in known:
                     accepted = f"a part of the mesh: {listed(known)}{nearest(name, known)}"
-                    raise fault(path, name, accepted)
+                    raise fault(path, name, accepted, "part-name")
     for path, contact in case.contacts:
         only = None if contact.foundation is None else contact.foundation.only
         if only is not None and only != dimension:
@@ -156,13 +156,15 @@ def _check_mechanical(case: Case) -> None:
         for i, section in enumerate(getattr(case, key)):
             for name in names:
                 if getattr(section, name) is not None:
-                    raise fault(f"{key}.{i}.{name}", as_given(getattr(section, name)), accepted)
+                    raise fault(
+                        f"{key}.{i}.{name}", as_given(getattr(section, name)), accepted, "piezo"
+                    )
     for path, contact in case.contacts:
         key, electric = case.electric_of(path, contact)
         if electric is not None:
-            raise fault(key, Words("given a table"), accepted)
+            raise fault(key, Words("given a table"), accepted, "piezo")
     if case.electrode:
-        raise fault("electrode", Words("given"), accepted)
+        raise fault("electrode", Words("given"), accepted, "piezo")
 
 
 def _check_potential(case: Case) -> None:
@@ -171,7 +173,7 @@ def _check_potential(case: Case) -> None:
     electric = [case.electric_of(*entry)[1] for entry in case.contacts]
     if not grounded and not any(section is not None and section.k_e > 0 for section in electric):
         accepted = "a potential on at least one part, or [electric] with k_e > 0"
-        raise fault("fixed", Words("no potential fixed"), accepted)
+        raise fault("fixed", Words("no potential fixed"), accepted, "ungrounded")
     for i, section in enumerate(case.electrode):
         if any(meet(section.on, other) for other in grounded):
             raise fault(f"electrode.{i}.on", section.on, "a part whose potential is not fixed")
@@ -200,7 +202,9 @@ def _check_contacts(case: Case) -> None:
     for key in ("friction", "electric"):
         own = [getattr(contact, key) is not None for _, contact in case.contacts]
         if all(own) and getattr(case, key) is not None:
-            raise fault(key, Words(f"beside {key} of every contact"), "one of them")
+            raise fault(
+                key, Words(f"beside {key} of every contact"), "one of them", "exclusive-keys"
+            )
 
 
 def _check_regions(case: Case) -> None:

@@ -57,7 +57,8 @@ def digest(case: Case) -> dict[str, str]:
             reason = getattr(error, "strerror", str(error)) or "not readable"
             where = getattr(error, "filename", None) or path
             raise InputError(
-                f"{case.source}: {key}: {where}: {reason}; accepted: a file that can be read"
+                f"{case.source}: {key}: {where}: {reason}; accepted: a file that can be read",
+                "file-name",
             ) from None
     return found
 
@@ -71,7 +72,8 @@ def check_files(where: str, made: str, before: Mapping[str, str], now: Mapping[s
         if before.get(key) != now.get(key):
             raise InputError(
                 f"{where}: the file {key} has changed since {made}; accepted: the same file, or "
-                "another folder"
+                "another folder",
+                "changed-input",
             )
 
 
@@ -116,7 +118,7 @@ def check_same(
         if place is None:
             return
         said = f"of another case: there {place}"
-    raise InputError(f"{where}: given {found} {said}; accepted: {accepted}")
+    raise InputError(f"{where}: given {found} {said}; accepted: {accepted}", "other-case")
 
 
 def _differences(before: Any, now: Any, path: str = "") -> Iterator[str]:

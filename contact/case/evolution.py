@@ -58,12 +58,12 @@ class Amplitude(Section):
         if self.file is not None:
             for key in ("time", "value"):
                 if getattr(self, key) is not None:
-                    raise fault(key, Words("given with file"), f"{key}, or file")
+                    raise fault(key, Words("given with file"), f"{key}, or file", "exclusive-keys")
             try:
                 _check_increasing("file", self.points[0])
             except InputError as error:
-                words, _, accepted = str(error).partition("; accepted: ")
-                raise fault("file", Words(words), accepted) from None
+                words, _, accepted = error.words.partition("; accepted: ")
+                raise fault("file", Words(words), accepted, error.identifier) from None
             return self
         for key in ("time", "value"):
             if getattr(self, key) is None:
@@ -91,9 +91,13 @@ def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; accepted: {accepted}") from None
+        raise InputError(
+            f"{path}: {error.strerror}; accepted: {accepted}", "amplitude-file"
+        ) from None
     except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text in UTF-8; accepted: {accepted}") from None
+        raise InputError(
+            f"{path}: not a text in UTF-8; accepted: {accepted}", "amplitude-file"
+        ) from None
     lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
     rows: list[tuple[float, float]] = []
     for number, line in enumerate(lines):
@@ -106,12 +110,14 @@ def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
         except ValueError:
             if number > 0 or cells[0][:1].isdigit():
                 raise InputError(
-                    f"{path}: no numbers in {line!r:.40}; accepted: {accepted}"
+                    f"{path}: no numbers in {line!r:.40}; accepted: {accepted}", "amplitude-file"
                 ) from None
             continue  # names
         rows.append((first, second))
     if len(rows) < 2:
-        raise InputError(f"{path}: {len(rows)} rows of numbers; accepted: {accepted}")
+        raise InputError(
+            f"{path}: {len(rows)} rows of numbers; accepted: {accepted}", "amplitude-file"
+        )
     times, values = zip(*rows, strict=True)
     return times, values
 

@@ -220,7 +220,7 @@ class Case(Section):
         try:
             check_mesh(self, dimension, parts)
         except PydanticCustomError as error:
-            raise InputError(f"{self._source}: {describe_fault(error)}") from None
+            raise describe_fault(error).within(f"{self._source}: ") from None
 
 
 def _entries(key: str, given: Kind | tuple[Kind, ...]) -> tuple[tuple[str, Kind], ...]:
@@ -265,11 +265,13 @@ def load_case(
         data = tomllib.loads(text)
     except OSError as error:
         reason = error.strerror or "not readable"
-        raise InputError(f"{path}: {reason}; accepted: a case file (TOML)") from None
+        raise InputError(f"{path}: {reason}; accepted: a case file (TOML)", "toml") from None
     except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text in UTF-8; accepted: a case file (TOML)") from None
+        raise InputError(
+            f"{path}: not a text in UTF-8; accepted: a case file (TOML)", "toml"
+        ) from None
     except (ValueError, RecursionError) as error:  # of a whole number with too many digits, too
-        raise InputError(f"{path}: not a TOML file: {clipped(str(error), 200)}") from None
+        raise InputError(f"{path}: not a TOML file: {clipped(str(error), 200)}", "toml") from None
     if isinstance(overrides, Mapping):
         overrides = [f"{key}={value}" for key, value in overrides.items()]
     for given in overrides:
@@ -310,11 +312,12 @@ def parse_case(
     try:
         case = Case.model_validate(data, context={"folder": folder})
     except ValidationError as error:
-        raise InputError(describe(error, Case, source)) from None
+        raise describe(error, Case, source) from None
     file = case.mesh.file
     if file is not None and not Path(file).is_file():
         raise InputError(
-            f"{source}: mesh.file: no file {file}; accepted: a mesh file (.msh, .inp, ...)"
+            f"{source}: mesh.file: no file {file}; accepted: a mesh file (.msh, .inp, ...)",
+            "file-name",
         )
     case._source, case._filled = source, tuple(filled)
     return case
@@ -332,7 +335,7 @@ def _stand_ins(
     made, filled = dict(data), []
     for key in without:
         if key not in REPLACEABLE:
-            raise InputError(f"without: given {key!r}; accepted: {', '.join(REPLACEABLE)}")
+            raise InputError(f"without: given {key!r}; accepted: {', '.join(REPLACEABLE)}", "value")
         table = made.get("friction")
         if key == "friction.mu":
             if isinstance(table, Mapping) and table.get("law") == "coulomb" and "mu" not in table:
@@ -390,4 +393,4 @@ def _index(place: list[Any], key: str, above: list[str], path: str, source: str)
 
 
 def _refusal(source: str, path: str, words: str) -> InputError:
-    return InputError(f"{source}: --set {clipped(path)}: {words}")
+    return InputError(f"{source}: --set {clipped(path)}: {words}", "set")

@@ -92,7 +92,7 @@ class Expression:
 
     def __init__(self, source: float | str) -> None:
         if isinstance(source, bool) or not isinstance(source, int | float | str):
-            raise InputError(f"{source!r} is neither a number nor a formula")
+            raise InputError(f"{source!r} is neither a number nor a formula", "formula")
         self.source: float | str
         #: The value of a constant, else the syntax tree.
         self._read: float | ast.expr
@@ -104,7 +104,9 @@ class Expression:
         try:
             self.source = self._read = _finite(source)
         except InputError:
-            raise InputError(f"{shown(source)} is not finite; accepted: finite numbers") from None
+            raise InputError(
+                f"{shown(source)} is not finite; accepted: finite numbers", "not-finite"
+            ) from None
 
     @property
     def is_constant(self) -> bool:
@@ -156,7 +158,9 @@ class Expression:
         found = bad if comm is None else list(itertools.chain(*comm.allgather(bad)))
         if found:
             place = ", ".join(f"{c:g}" for c in found[0])
-            raise InputError(f"{self} is not finite at ({place}); accepted: a formula that is")
+            raise InputError(
+                f"{self} is not finite at ({place}); accepted: a formula that is", "not-finite"
+            )
         return values
 
     def ufl(self, x: Expr, time: float | fem.Constant | None = None) -> Expr:
@@ -168,9 +172,13 @@ class Expression:
         if isinstance(self._read, float):
             return self._read
         if dimension < 3 and "z" in self.names:
-            raise InputError(f"{self} uses z in a plane problem; accepted there: x and y")
+            raise InputError(
+                f"{self} uses z in a plane problem; accepted there: x and y", "formula-variable"
+            )
         if time is None and "t" in self.names:
-            raise InputError(f"{self} uses t; accepted in a static problem: formulas without")
+            raise InputError(
+                f"{self} uses t; accepted in a static problem: formulas without", "formula-variable"
+            )
         coordinates = (x[i] for i in range(dimension))
         variables = dict(zip(VARIABLES, coordinates, strict=False)) | {"t": time}
         return _as_number(_value(self._read, variables))
@@ -228,13 +236,14 @@ class NodalField:
         try:
             values = self.expression.numpy(points, self.comm, self.time)
         except InputError as error:
-            raise InputError(f"{self.key}: {error}") from None
+            raise error.within(f"{self.key}: ") from None
         largest = float(np.abs(values).max(initial=0.0))
         check_range(self.key, self.comm.allreduce(largest, op=MPI.MAX), least=0.0)
         least = self.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
         if least < self.minimum:
             raise InputError(
-                f"{self.key}: {self.expression} is {least:g} at a node; accepted: values >= 0"
+                f"{self.key}: {self.expression} is {least:g} at a node; accepted: values >= 0",
+                "negative",
             )
         return values
 
@@ -274,24 +283,29 @@ def _parse(source: str) -> tuple[float | ast.expr, frozenset[str]]:
     """Read a formula and the names of its variables, or raise an InputError that shows it."""
     if len(source) > MAX_LENGTH:
         raise InputError(
-            f"{shown(source)} has {len(source)} characters; accepted: at most {MAX_LENGTH}"
+            f"{shown(source)} has {len(source)} characters; accepted: at most {MAX_LENGTH}",
+            "long-formula",
         )
     try:
         body = ast.parse(source.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         # Python reports some malformed or deeply nested texts by the last three.
-        raise InputError(f"{shown(source)} is not a formula; accepted: {ACCEPTED}") from error
+        raise InputError(
+            f"{shown(source)} is not a formula; accepted: {ACCEPTED}", "formula"
+        ) from error
     level: list[ast.AST] = [body]
     for _ in range(MAX_DEPTH):
         level = [child for node in level for child in ast.iter_child_nodes(node)]
     if level:
-        raise InputError(f"{shown(source)} is nested too deeply; accepted: {MAX_DEPTH} levels")
+        raise InputError(
+            f"{shown(source)} is nested too deeply; accepted: {MAX_DEPTH} levels", "long-formula"
+        )
     try:
         # Anything that is not accepted is found by an evaluation anywhere.
         with np.errstate(all="ignore"):
             value = _value(body, dict.fromkeys(VARIABLES, np.zeros(1)))
     except InputError as error:
-        raise InputError(f"{shown(source)}: {error}") from None
+        raise error.within(f"{shown(source)}: ") from None
     if isinstance(value, float):
         return value, frozenset()
     names = {node.id for node in ast.walk(body) if isinstance(node, ast.Name)}
@@ -315,18 +329,18 @@ def _value(node: ast.AST, variables: Mapping[str, Any]) -> Any:
         case ast.Name(id=name) if name in VARIABLES:
             return variables[name]
         case ast.Name(id=name):
-            raise InputError(f"unknown name {name}; accepted: {ACCEPTED}")
+            raise InputError(f"unknown name {name}; accepted: {ACCEPTED}", "formula")
         case ast.UnaryOp(op=op, operand=operand) if type(op) in _ARITHMETIC:
             return _apply(_ARITHMETIC[type(op)], read(operand))
         case ast.BinOp(op=op, left=left, right=right) if type(op) in _ARITHMETIC:
             return _arithmetic(op, read(left), read(right))
         case ast.BinOp(op=ast.BitXor()):
-            raise InputError("^ is not accepted; a power is written **")
+            raise InputError("^ is not accepted; a power is written **", "formula")
         case ast.Compare(left=left, ops=signs, comparators=others):
             return _comparison(signs, [read(side) for side in (left, *others)])
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
             return _function(name, [read(arg) for arg in args])
-    raise InputError(f"{ast.unparse(node)[:40]} is not accepted; accepted: {ACCEPTED}")
+    raise InputError(f"{ast.unparse(node)[:40]} is not accepted; accepted: {ACCEPTED}", "formula")
 
 
 def _arithmetic(op: ast.operator, left: Any, right: Any) -> Any:
@@ -337,7 +351,7 @@ def _arithmetic(op: ast.operator, left: Any, right: Any) -> Any:
     """
     left_is_zero, right_is_zero = (isinstance(a, float) and a == 0.0 for a in (left, right))
     if isinstance(op, ast.Div) and right_is_zero:
-        raise InputError("division by zero is not accepted")
+        raise InputError("division by zero is not accepted", "not-finite")
     if isinstance(op, ast.Pow) and right_is_zero:
         return 1.0
     if isinstance(op, ast.Mult | ast.Div) and (left_is_zero or right_is_zero):
@@ -348,7 +362,7 @@ def _arithmetic(op: ast.operator, left: Any, right: Any) -> Any:
 def _comparison(signs: Sequence[ast.cmpop], sides: Sequence[Any]) -> Any:
     """Evaluate ``a < b``, or the chain ``a < b < c``, which holds if each link does."""
     if not all(type(sign) in _COMPARISONS for sign in signs):
-        raise InputError("only the comparisons < <= > >= == != are accepted")
+        raise InputError("only the comparisons < <= > >= == != are accepted", "formula")
     pairs = zip(signs, itertools.pairwise(sides), strict=True)
     links = [_apply(_COMPARISONS[type(sign)], *pair) for sign, pair in pairs]
     known = [link for link in links if isinstance(link, float)]
@@ -362,7 +376,7 @@ def _function(name: str, arguments: Sequence[Any]) -> Any:
     def check(right: bool, accepted: str) -> None:
         if not right:
             given = f"{name} is given {len(arguments)} argument(s)"
-            raise InputError(f"{given}; accepted: {accepted}")
+            raise InputError(f"{given}; accepted: {accepted}", "formula")
 
     if name in _FUNCTIONS:
         check(len(arguments) == 1, "1 argument")
@@ -371,7 +385,7 @@ def _function(name: str, arguments: Sequence[Any]) -> Any:
         check(len(arguments) >= 2, "2 arguments or more")
         return reduce(partial(_apply, _EXTREMES[name]), arguments)
     if name != "where":
-        raise InputError(f"unknown function {name}; accepted: {ACCEPTED}")
+        raise InputError(f"unknown function {name}; accepted: {ACCEPTED}", "formula")
     check(len(arguments) == 3, "3 arguments: condition, a, b")
     condition, a, b = arguments
     if isinstance(condition, float):
@@ -407,5 +421,5 @@ def _finite(value: Any) -> float:
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise InputError("a constant in it is not finite; accepted: finite numbers")
+        raise InputError("a constant in it is not finite; accepted: finite numbers", "not-finite")
     return number

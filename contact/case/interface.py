@@ -118,7 +118,9 @@ class HeightMap(Section):
         try:
             heights = np.asarray(np.load(self.file), dtype=float)
         except (OSError, ValueError, EOFError) as error:
-            raise InputError(f"{self.file}: {error}; accepted: a NumPy array of heights") from None
+            raise InputError(
+                f"{self.file}: {error}; accepted: a NumPy array of heights", "heights"
+            ) from None
         spacing, origin = self.spacing or [], self.origin or [0.0] * heights.ndim
         one = f"{heights.ndim} numbers, one per direction of the array"
         for key, given in (("spacing", spacing), ("origin", origin)):
@@ -138,7 +140,9 @@ class HeightMap(Section):
         made = f"the grid of {' by '.join(map(str, shape))} points that their coordinates make"
         if math.prod(shape) > 4 * len(heights):  # scattered points
             raise InputError(
-                f"{self.file}: {len(heights)} points of {made}; accepted: each point of a grid once"
+                f"{self.file}: {len(heights)} points of {made}; accepted: each point of a grid "
+                "once",
+                "heights",
             )
         grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(across))
         given = np.column_stack(across)[order]
@@ -149,7 +153,9 @@ class HeightMap(Section):
             one = twice[0].tolist() if twice.size else min(missing)
             where = f"({', '.join(f'{x:g}' for x in one)})"
             said = f"{where} stands twice" if twice.size else f"no height at {where}"
-            raise InputError(f"{self.file}: {said}, of {made}; accepted: each point of a grid once")
+            raise InputError(
+                f"{self.file}: {said}, of {made}; accepted: each point of a grid once", "heights"
+            )
         return places, heights[order].reshape(shape)
 
 
@@ -366,7 +372,7 @@ class Contact(Section):
         for one, other in pairs:
             if getattr(self, one) is not None and getattr(self, other) is not None:
                 key = other if other == "rigid" else one
-                raise fault(key, Words(f"both {one} and {other}"), "one of them")
+                raise fault(key, Words(f"both {one} and {other}"), "one of them", "exclusive-keys")
         if self.against is not None and meet(self.against, self.on):
             raise fault("against", self.against, "another part than `on`")
         if (self.axis is None) != (self.direction != "axis"):

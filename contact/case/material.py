@@ -73,6 +73,7 @@ def _either_way(section: Section, short: tuple[str, ...], full: tuple[str, ...])
         missing[0] if missing else given[-1],
         Words(f"only {', '.join(given) or 'nothing'}" if missing else "both ways"),
         f"either all of {', '.join(short)}, or {' and '.join(full)}",
+        "exclusive-keys",
     )
 
 
@@ -115,7 +116,7 @@ class Piezo(Section):
         try:
             from_voigt(*self.voigt)
         except ValueError as error:
-            raise fault("beta", Words(error), POSITIVE) from None
+            raise fault("beta", Words(error), POSITIVE, "material-constants") from None
         return self
 
 
@@ -283,7 +284,7 @@ class Material(Section):
         for key in CONSTANTS:
             if given.get(key) is not None:
                 words = Words(f'given with name = "{given["name"]}"')
-                raise fault(key, words, f"{key} without name")
+                raise fault(key, words, f"{key} without name", "exclusive-keys")
         return {"units": "SI", **given}
 
     @model_validator(mode="after")
@@ -307,9 +308,9 @@ class Material(Section):
         try:
             entry = self.entry
         except InputError as error:
-            key = "library" if self.library is not None and str(error)[0] == "/" else "name"
-            words, _, accepted = str(error).partition("; accepted: ")
-            raise fault(key, Words(words), accepted) from None
+            key = "library" if self.library is not None and error.words[0] == "/" else "name"
+            words, _, accepted = error.words.partition("; accepted: ")
+            raise fault(key, Words(words), accepted, error.identifier) from None
         if self.poling is not None and entry is not None and entry.isotropic is not None:
             raise fault("poling", self.poling, f"no axis: {self.name} is isotropic")
 
@@ -334,7 +335,9 @@ class Material(Section):
             self._law(np.eye(3))
         except ValueError as error:
             words, _, accepted = str(error).removeprefix("hardening: ").partition("accepted: ")
-            raise fault("hardening", Words(words or shown(points)), accepted) from None
+            raise fault(
+                "hardening", Words(words or shown(points)), accepted, "material-constants"
+            ) from None
 
     def _check_stiffness(self) -> None:
         if self.yield_strain is not None:
@@ -344,7 +347,7 @@ class Material(Section):
             Anisotropic(self.voigt).check()
         except ValueError as error:
             key = "c11" if self.stiffness is None else "stiffness"
-            raise fault(key, Words(error), POSITIVE) from None
+            raise fault(key, Words(error), POSITIVE, "material-constants") from None
 
     def build(self, dim: int) -> description.Material:
         """Return the material itself in the axes of a body in 2-D or 3-D."""
@@ -425,7 +428,8 @@ class Material(Section):
             raise InputError(
                 f"{key}: the crystal is not the same all around its axis X3, and no body of "
                 "revolution consists of it; accepted: materials of class 6mm, poled ceramics "
-                "among them, or a mesh in 3-D"
+                "among them, or a mesh in 3-D",
+                "material-constants",
             )
 
 
@@ -461,7 +465,7 @@ def make_material(dim: int, **keys: TableValue | NDArray[np.float64]) -> descrip
     try:
         section = Material.model_validate(plain)
     except ValidationError as error:
-        raise InputError(describe(error, Material, "make_material")) from None
+        raise describe(error, Material, "make_material") from None
     key, axis = section.axis
     accepted = "an angle from x in degrees" if dim == 2 else f"a vector of {dim} numbers"
     expect(f"make_material: {key}", axis, accepted, axis is None or np.ndim(axis) == dim - 2)

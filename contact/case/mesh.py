@@ -238,7 +238,7 @@ class Mesh(Section):
             return self
         if (self.generator is None) == (self.file is None):
             given = "neither generator nor file" if self.file is None else "generator and file"
-            raise fault("generator", Words(given), "one of generator and file")
+            raise fault("generator", Words(given), "one of generator and file", "exclusive-keys")
         if self.diagonal is not None and self.generator != "rectangle":
             raise fault("diagonal", self.diagonal, "diagonal for a rectangle only")
         known = grid.CELLS.get(self.generator or "", tuple(shape.name for shape in SHAPES))
@@ -325,7 +325,9 @@ class Mesh(Section):
             for name in getattr(self, key):
                 if name in known:
                     accepted = f"a name that the mesh has not: {', '.join(known)} are there"
-                    raise InputError(f"mesh.{key}.{name}: given again; accepted: {accepted}")
+                    raise InputError(
+                        f"mesh.{key}.{name}: given again; accepted: {accepted}", "part-facets"
+                    )
 
         def markers(key: str) -> Iterator[tuple[str, Marker]]:
             for name, formula in getattr(self, key).items():
@@ -335,7 +337,7 @@ class Mesh(Section):
             try:
                 return formula.numpy(x[: domain.dim].T) != 0
             except InputError as error:
-                raise InputError(f"{label}: {error}") from None
+                raise error.within(f"{label}: ") from None
 
         mesh = domain.mesh
         with on_all_ranks(domain.comm):  # a formula may have no value on one of them
@@ -355,7 +357,8 @@ class Mesh(Section):
             raise InputError(
                 f"{place}{total:.3g} cells take more memory, {needed / 1e9:.3g} GB a rank, than "
                 f"there is, {least / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), "
-                "or more ranks on more machines"
+                "or more ranks on more machines",
+                "mesh-memory",
             )
         if total > MANY and comm.rank == 0:
             gigabytes, seconds = needed / 1e9, total * CELL_SECONDS / comm.size

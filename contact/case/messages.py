@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError, PydanticUndefined
 
-from contact.errors import clipped, nearest
+from contact.errors import InputError, clipped, nearest
 from contact.settings import Accepted, Internal
 
 #: Most characters of a quoted value, a key, a path of keys, and a list of accepted names.
@@ -42,8 +42,11 @@ MEANT = ", did you mean {}?"
 #: Stands for the given value where the key itself is wrong.
 UNKNOWN = Words("unknown key")
 
+#: Identifiers of these words of the program's for a given value, see `InputError`.
+IDENTIFIERS = {UNKNOWN: "unknown-key", Words("missing"): "missing"}
 
-def fault(key: str, given: Any, accepted: str) -> PydanticCustomError:
+
+def fault(key: str, given: Any, accepted: str, identifier: str = "") -> PydanticCustomError:
     """Return an error for a validator to raise.
 
     Parameters
@@ -54,8 +57,11 @@ def fault(key: str, given: Any, accepted: str) -> PydanticCustomError:
         The given value of the case file, words inside `Words`, or `UNKNOWN`.
     accepted
         The accepted values, in words.
+    identifier
+        See `InputError`; by default that of an unknown or missing key, or of a wrong value.
     """
-    return PydanticCustomError("fault", "fault", {"key": key, "given": given, "accepted": accepted})
+    context = {"key": key, "given": given, "accepted": accepted, "identifier": identifier}
+    return PydanticCustomError("fault", "fault", context)
 
 
 def shown(given: Any) -> str:
@@ -166,22 +172,22 @@ def accepted_by(annotation: Any, metadata: Iterable[Any] = ()) -> str:
     return ", or ".join([*others, table])
 
 
-def describe(error: ValidationError, root: type[BaseModel], source: str) -> str:
-    """Return the one-line message for the first mistake of a case.
+def describe(error: ValidationError, root: type[BaseModel], source: str) -> InputError:
+    """Return the error, of a one-line message, for the first mistake of a case.
 
     An unknown key comes before all else: a missing key or a wrong value elsewhere is often but
     its consequence.
     """
     errors = sorted(error.errors(), key=lambda e: e["type"] not in UNKNOWN_KEY)
-    return f"{source}: {_message(errors[0], root)}"
+    return _message(errors[0], root).within(f"{source}: ")
 
 
-def describe_fault(error: PydanticCustomError) -> str:
-    """Return the message for a fault that was raised outside of pydantic's validation."""
+def describe_fault(error: PydanticCustomError) -> InputError:
+    """Return the error for a fault that was raised outside of pydantic's validation."""
     return _line([], **(error.context or {}))
 
 
-def _message(error: ErrorDetails, root: type[BaseModel]) -> str:
+def _message(error: ErrorDetails, root: type[BaseModel]) -> InputError:
     keys, sections, others, accepted = _locate(error["loc"], root)
     kind, context, given = error["type"], error.get("ctx", {}), error["input"]
     if kind == "fault":
@@ -193,15 +199,19 @@ def _message(error: ErrorDetails, root: type[BaseModel]) -> str:
         return _line(keys, name, given.get(name, Words("missing")), either(map(shown, kinds)))
     if kind == "value_error":
         # Raised by a formula or a dataclass, whose message is complete.
-        text = str(context["error"])
+        whole: InputError = context["error"]
+        text = whole.words
         own = [f"{section.__name__}: " for section in sections if section.__name__ in text]
-        return f"{path_of(keys)}{'.' if own else ': '}{text.removeprefix(own[0] if own else '')}"
+        words = text.removeprefix(own[0] if own else "")
+        return InputError(f"{path_of(keys)}{'.' if own else ': '}{words}", whole.identifier)
     return _line(keys, "", Words("missing") if kind == "missing" else given, accepted)
 
 
-def _line(keys: list[str], key: str, given: Any, accepted: str) -> str:
-    """Return the message for a fault of a key below others; see `fault`."""
+def _line(keys: list[str], key: str, given: Any, accepted: str, identifier: str = "") -> InputError:
+    """Return the error for a fault of a key below others; see `fault`."""
     keys = [*keys, *(key.split(".") if key else ())]
+    if isinstance(given, Words):
+        identifier = identifier or IDENTIFIERS.get(given, "")
     if given is UNKNOWN:
         options = accepted.split(", ")
         given, accepted = f"{UNKNOWN}{nearest(keys[-1], options, MEANT)}", listed(options)
@@ -209,13 +219,13 @@ def _line(keys: list[str], key: str, given: Any, accepted: str) -> str:
         given = "given a table"
     elif not isinstance(given, Words):
         given = f"given {shown(given)}"
-    return f"{path_of(keys)}: {given}; accepted: {accepted}"
+    return InputError(f"{path_of(keys)}: {given}; accepted: {accepted}", identifier or "value")
 
 
 def _unknown(
     keys: list[str], given: Any, sections: list[type], others: list[type], root: type[BaseModel]
-) -> str:
-    """Return the message for an unknown key of sections, which may have a meaning elsewhere.
+) -> InputError:
+    """Return the error for an unknown key of sections, which may have a meaning elsewhere.
 
     `others` are all sections that could stand there.
     """
@@ -242,7 +252,7 @@ def _unknown(
     else:
         here = [shown(value) for value, kind in kinds.items() if kind in sections]
         hint = "".join(f" with {name} = {value}" for value in here) + nearest(key, options, MEANT)
-    return _line(keys, "", Words(f"{UNKNOWN}{hint}"), listed(options))
+    return _line(keys, "", Words(f"{UNKNOWN}{hint}"), listed(options), "unknown-key")
 
 
 def _locate(

@@ -193,13 +193,18 @@ def _expression(given: Any) -> Expression:
 
 def _not_negative(expression: Expression) -> Expression:
     if expression.is_constant and expression.value < 0:
-        raise InputError(f"{expression} is negative; accepted: a number >= 0 or a formula")
+        raise InputError(
+            f"{expression} is negative; accepted: a number >= 0 or a formula", "negative"
+        )
     return expression
 
 
 def _of_time(given: Any) -> Any:
     if isinstance(given, Expression) and given.names - {"t"}:
-        raise InputError(f"{given} depends on the place; accepted: a number or a formula in t")
+        raise InputError(
+            f"{given} depends on the place; accepted: a number or a formula in t",
+            "formula-variable",
+        )
     return given
 
 

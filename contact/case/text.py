@@ -52,7 +52,8 @@ def number_at(case: Case, key: str) -> float:
     if isinstance(place, bool) or not isinstance(place, int | float):
         words = "nothing" if place is None else f"{place!r}"
         raise InputError(
-            f"{case.source}: {key}: {words} stands there; accepted: a key with a number"
+            f"{case.source}: {key}: {words} stands there; accepted: a key with a number",
+            "no-number",
         )
     return float(place)
 

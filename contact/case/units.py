@@ -109,7 +109,7 @@ def check_units(case: Case) -> None:
                     "beside materials by name those of SI with a prefix, and force/area, such as "
                     "mm, MPa, N/mm^2"
                 )
-                raise fault(f"case.units.{known}", words, accepted)
+                raise fault(f"case.units.{known}", words, accepted, "units")
         quantity = systems.contradiction(own, labels, quantities)
         if quantity is not None:
             words = Words(
@@ -124,12 +124,12 @@ def check_units(case: Case) -> None:
             accepted = listed(found) or (
                 "labels of one system: stress = force / length^2, charge = force length / potential"
             )
-            raise fault(f"{path}.units", words, accepted)
+            raise fault(f"{path}.units", words, accepted, "units")
         if first is None:
             first = path, material, own
         elif own != first[2]:
             words = Words(f"{_shown(material)}, and {first[0]} has {_shown(first[1])}")
-            raise fault(f"{path}.units", words, "one system of units for all materials")
+            raise fault(f"{path}.units", words, "one system of units for all materials", "units")
 
 
 def _shown(material: Any) -> str:

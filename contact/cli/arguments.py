@@ -57,7 +57,9 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise an InputError with the usage."""
-        raise InputError(f"{message}; accepted: {' '.join(self.format_usage().split())}")
+        raise InputError(
+            f"{message}; accepted: {' '.join(self.format_usage().split())}", "command-line"
+        )
 
     def _print_message(self, message: str, file: Any = None) -> None:
         if MPI.COMM_WORLD.rank == 0:
@@ -80,10 +82,14 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
         follows = i > 0 and rest[i - 1].startswith("-")
         if argument.startswith("--"):
             hint = nearest(argument.partition("=")[0], known, ", did you mean {}?")
-            raise InputError(f"{argument}: unknown option{hint}; accepted: {', '.join(known)}")
+            raise InputError(
+                f"{argument}: unknown option{hint}; accepted: {', '.join(known)}", "command-line"
+            )
         if not argument.startswith("-") and not follows:
             one = ONE.get(options.command, "case file")
-            raise InputError(f"{argument}: one argument too many; accepted: one {one}")
+            raise InputError(
+                f"{argument}: one argument too many; accepted: one {one}", "command-line"
+            )
     return options, rest
 
 

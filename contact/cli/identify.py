@@ -27,12 +27,14 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     data = on_root(comm, lambda: read_data(options.data))
     keys = [key.strip() for key in (options.keys or "").split(",") if key.strip()]
     if not keys:
-        raise InputError("--for: missing; accepted: keys of the case, --for friction.mu,...")
+        raise InputError(
+            "--for: missing; accepted: keys of the case, --for friction.mu,...", "missing"
+        )
     picture = None if options.plot is None else Path(options.plot)
     on_root(comm, lambda: _check_free(picture))
     bounds = dict(_bound(text) for text in options.bound)
     for key in bounds.keys() - set(keys):
-        raise InputError(f"--bound {key}: no parameter; accepted: {', '.join(keys)}")
+        raise InputError(f"--bound {key}: no parameter; accepted: {', '.join(keys)}", "bound")
     with progress(comm, options.quiet) as monitor:
         found = identify(case, data, keys, bounds, monitor=monitor, comm=comm)
     if comm.rank == 0:
@@ -47,11 +49,15 @@ def _check_free(path: Path | None) -> None:
     if path is None:
         return
     if path.suffix not in (".png", ".pdf", ".svg"):
-        raise InputError(f"--plot {path}: accepted: a file that ends in .png, .pdf or .svg")
+        raise InputError(
+            f"--plot {path}: accepted: a file that ends in .png, .pdf or .svg", "plot-file"
+        )
     if not path.parent.is_dir():
-        raise InputError(f"--plot {path}: there is no such folder; accepted: one that is there")
+        raise InputError(
+            f"--plot {path}: there is no such folder; accepted: one that is there", "plot-file"
+        )
     if path.exists():
-        raise InputError(f"--plot {path}: it exists; accepted: a new file")
+        raise InputError(f"--plot {path}: it exists; accepted: a new file", "plot-file")
 
 
 def _bound(text: str) -> tuple[str, tuple[float, float]]:
@@ -62,7 +68,7 @@ def _bound(text: str) -> tuple[str, tuple[float, float]]:
     except ValueError:
         least = largest = np.nan
     if not least < largest:
-        raise InputError(f"--bound {text}: accepted: KEY=LEAST:LARGEST, friction.mu=0:1")
+        raise InputError(f"--bound {text}: accepted: KEY=LEAST:LARGEST, friction.mu=0:1", "bound")
     return key.strip(), (least, largest)
 
 

@@ -62,7 +62,8 @@ def _check_cache() -> None:
     except OSError as error:
         raise InputError(
             f"{cache}: {error.strerror or error}; accepted: a folder to keep compiled forms in, "
-            "by HOME or XDG_CACHE_HOME"
+            "by HOME or XDG_CACHE_HOME",
+            "cannot-write",
         ) from None
 
 
@@ -118,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _end(comm, str(interrupt), SIGNALLED + interrupt.number)
     except MemoryError:
         text = "not enough memory; accepted: fewer cells, or more ranks on more machines"
-        return _end(comm, text, BAD_INPUT)
+        return _end(comm, str(InputError(text, "memory")), BAD_INPUT)
     except OSError as error:
         return _end(comm, str(refused(error)), BAD_INPUT)
     except KeyboardInterrupt as interrupt:

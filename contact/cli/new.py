@@ -41,7 +41,9 @@ def _new(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     mesh = Path(options.mesh)
     path = Path(options.case) if options.case else mesh.with_suffix(".toml")
     if not on_root(comm, mesh.is_file):
-        raise InputError(f"{mesh}: no such file; accepted: a mesh file (.msh, .inp, .vtu, ...)")
+        raise InputError(
+            f"{mesh}: no such file; accepted: a mesh file (.msh, .inp, .vtu, ...)", "file-name"
+        )
     text = case_text(from_file(comm, mesh), mesh, path)
 
     def write() -> None:
@@ -50,7 +52,7 @@ def _new(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 file.write(text)
         except FileExistsError:
             raise InputError(
-                f"{path}: it is there already; accepted: another name, by --case FILE"
+                f"{path}: it is there already; accepted: another name, by --case FILE", "file-name"
             ) from None
 
     on_root(comm, write)
@@ -71,7 +73,8 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
     if len(order) < 2:
         raise InputError(
             f"{mesh}: {', '.join(sorted(heights))} as parts: none to hold beside those in contact; "
-            "accepted: a mesh that also names the sides that are held and pressed"
+            "accepted: a mesh that also names the sides that are held and pressed",
+            "new-parts",
         )
     lowest, highest = order[0], order[-1]
     d = domain.dim

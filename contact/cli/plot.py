@@ -29,7 +29,8 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         if text not in FORMATS:
             raise InputError(
                 f"--format {options.format}: unknown format {text!r}; accepted: "
-                f"{', '.join(FORMATS)}, or several with commas"
+                f"{', '.join(FORMATS)}, or several with commas",
+                "figure-option",
             )
     width = None if options.width is None else inches(options.width)
     limits = [limits_of(option, getattr(options, option)) for option in ("xlim", "ylim")]
@@ -41,11 +42,15 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 if getattr(options, option) not in (None, False):
                     raise InputError(
                         f"--{option}: the figure of a sweep shows no places; accepted: --field, "
-                        "--format, --width"
+                        "--format, --width",
+                        "figure-option",
                     )
             return plot_sweep(folder, options.field, formats, look)
         if options.animate and options.step is not None:
-            raise InputError("--step: an animation shows all steps; accepted: --step or --animate")
+            raise InputError(
+                "--step: an animation shows all steps; accepted: --step or --animate",
+                "figure-of-steps",
+            )
         if options.animate:
             return animate(folder, options.field, look)
         return plot(folder, options.field, formats, look, options.step)
@@ -62,7 +67,9 @@ def inches(text: str) -> float:
     match = _LENGTH.fullmatch(text.strip())
     length = float(match[1]) * _INCHES[match[2]] if match else 0.0
     if not 1.5 <= length <= 40:
-        raise InputError(f"--width {text}; accepted: a length such as 85mm, from 40mm to 1000mm")
+        raise InputError(
+            f"--width {text}; accepted: a length such as 85mm, from 40mm to 1000mm", "figure-option"
+        )
     return length
 
 
@@ -81,5 +88,7 @@ def limits_of(option: str, text: str | None) -> tuple[float, float] | None:
     except ValueError:
         low = high = 0.0
     if not low < high < math.inf:
-        raise InputError(f"--{option} {text}; accepted: the ends of the axis, such as 0.5,1.5")
+        raise InputError(
+            f"--{option} {text}; accepted: the ends of the axis, such as 0.5,1.5", "figure-option"
+        )
     return low, high

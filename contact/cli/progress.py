@@ -182,11 +182,14 @@ def _log(name: str) -> logging.Handler:
             with path.open("rb") as file:
                 begin = file.read(5)
             if begin and not re.fullmatch(rb"\d{4}-", begin):
-                raise InputError(f"--log {name}: given no log; accepted: a new file, or a log")
+                raise InputError(
+                    f"--log {name}: given no log; accepted: a new file, or a log", "log-file"
+                )
         handler = logging.FileHandler(name, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise InputError(
-            f"--log {name}: {error.strerror or error}; accepted: a file to write to the end of"
+            f"--log {name}: {error.strerror or error}; accepted: a file to write to the end of",
+            "cannot-write",
         ) from None
     handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s"))
     who = f"{shlex.join(sys.argv)}, process on {platform.node()}"

@@ -51,7 +51,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     case = on_root(comm, lambda: _load(options))
     out = options.restart if options.out is None else options.out
     if not out:  # the present folder is "."; this is rather a variable that is not set
-        raise InputError('--out "": no folder; accepted: a folder to write to')
+        raise InputError('--out "": no folder; accepted: a folder to write to', "cannot-write")
     restart = None if options.restart is None else Path(options.restart)
     for note in amplitude_notes(case) if comm.rank == 0 else ():
         logging.getLogger("contact.case").warning(note)
@@ -120,9 +120,11 @@ def _load(options: argparse.Namespace) -> Case:
     """Read the case: that of its file, or that of an interrupted run. On one rank."""
     if options.restart is None:
         if options.case is None:
-            raise InputError("CASE.toml: missing; accepted: a case file, or --restart DIR")
+            raise InputError(
+                "CASE.toml: missing; accepted: a case file, or --restart DIR", "missing"
+            )
         if options.out is None:
-            raise InputError("--out: missing; accepted: a folder to write to")
+            raise InputError("--out: missing; accepted: a folder to write to", "missing")
         return load_case(options.case, options.set)
     folder = Path(options.restart)
     case = load_case(options.case or case_of(folder), options.set)
@@ -145,9 +147,9 @@ def _check_results(folder: Path, case: Case) -> None:
 
 def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not options.over:
-        raise InputError("--over: missing; accepted: --over KEY=V1,V2,...")
+        raise InputError("--over: missing; accepted: --over KEY=V1,V2,...", "missing")
     if not options.out:
-        raise InputError("--out: missing; accepted: a folder to write to")
+        raise InputError("--out: missing; accepted: a folder to write to", "missing")
     axes = [Axis.of(text) for text in options.over]
     shown = progress(comm, options.quiet, options.log, options.verbose)
     with result_folder(options.out, comm, overwrite=True) as folder, shown as monitor:

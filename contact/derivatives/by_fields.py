@@ -60,7 +60,10 @@ def gap_gradient(solution: Solution, quantity: str | Quantity) -> Array:
     path, asked = LoadPath(solution), _one(solution, quantity)
     law = solution.problem.interface.law
     if law.layer is not None or law.follows_gap:
-        raise InputError("gap_gradient: the layer or charge depends on the gap; accepted: neither")
+        raise InputError(
+            "gap_gradient: the layer or charge depends on the gap; accepted: neither",
+            "no-derivative",
+        )
     found = np.zeros_like(solution.problem.nodes.gap)
     for linearised, adjoints in backwards(path, asked):
         for one in adjoints.values():

@@ -157,7 +157,8 @@ def sensitivity(
     if method == ADJOINT and blind:
         raise InputError(
             f"method: given 'adjoint'; the quantity {blind[0]!r} has no gradient; accepted: "
-            "'tangent'"
+            "'tangent'",
+            "value",
         )
     adjoint = method == ADJOINT or (method == AUTO and len(asked) < len(families) and not blind)
     found = Sensitivities(ADJOINT if adjoint else TANGENT, path.counters, path.weakly_active())
@@ -197,16 +198,20 @@ def parameters_of(
     if not isinstance(case, Case):
         raise InputError(
             "parameters: given keys of a case, for a problem that was built in Python; accepted: "
-            "{name: Parameter(value, problem)}"
+            "{name: Parameter(value, problem)}",
+            "value",
         )
     domain, comm = solution.problem.domain, solution.problem.comm
     for key in given:
         sections, value = key.split("."), number_at(case, key)
         accepted = "a number of the mesh, materials, supports, loads, contact or rigid parts"
         expect("parameters", key, accepted, sections[0] not in WITHOUT)
-        accepted = "a number of the mesh where that is not adapted"
-        adapts = sections[0] == "mesh" and case.mesh.adapt is not None
-        expect("parameters", key, accepted, not adapts)
+        if sections[0] == "mesh" and case.mesh.adapt is not None:
+            raise InputError(
+                f"parameters: given {key!r}; accepted: a number of the mesh where that is not "
+                "adapted",
+                "adapted-mesh",
+            )
         accepted = "a number above 0: friction begins at 0, and derivatives are one-sided there"
         begins = "friction" in sections[:-1] and sections[-1] in BEGIN
         expect(f"parameters: {key}", value, accepted, value != 0 or not begins)
@@ -231,11 +236,14 @@ class LoadPath:
         expect("solution", solution, "a Solution", isinstance(solution, Solution))
         if not solution.converged:
             reason = solution.outcome.reason
-            raise InputError(f"solution: {reason}; accepted: one that has converged")
+            raise InputError(
+                f"solution: {reason}; accepted: one that has converged", "no-derivative"
+            )
         if solution.method == PENALTY:
             raise InputError(
                 "solution: a penalty lets the body penetrate, and derivatives are those of contact "
-                "without; accepted: method 'newton' or 'uzawa'"
+                "without; accepted: method 'newton' or 'uzawa'",
+                "penalised",
             )
         base = solution.problem
         body = base.equilibrium
@@ -243,7 +251,8 @@ class LoadPath:
             raise InputError(
                 "sensitivity: the stiffness of the material is not symmetric, and a foundation or "
                 "part moves freely; accepted: kinematic hardening without recovery, or prescribed "
-                "motions"
+                "motions",
+                "no-derivative",
             )
         states = [record.state for record in solution.steps] or [solution.state]
         self.steps = [(base.at(state.time, state.history), state) for state in states]

@@ -136,7 +136,8 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
         if not base.comm.allreduce(same, op=MPI.LAND):
             raise InputError(
                 f"{name}: {parameter.value:g} is a border at which the contact nodes, the mesh or "
-                "the variables of the material change; accepted: a parameter that leaves them"
+                "the variables of the material change; accepted: a parameter that leaves them",
+                "border",
             )
     return Family((*problems.values(),), (*problems,), factors, over)
 

@@ -293,11 +293,14 @@ class _Model:
     ) -> None:
         self._case, self._comm, self._monitor = case, comm, monitor
         if case.evolution is None:
-            raise InputError(f"{case.source}: evolution: missing; accepted: a case with load steps")
+            raise InputError(
+                f"{case.source}: evolution: missing; accepted: a case with load steps", "missing"
+            )
         arrays = {name: np.asarray(values, dtype=float) for name, values in data.items()}
         if TIME not in arrays or len(arrays) < 2:
             raise InputError(
-                f"data: columns {', '.join(arrays)}; accepted: t and columns of steps.csv"
+                f"data: columns {', '.join(arrays)}; accepted: t and columns of steps.csv",
+                "data-file",
             )
         self._time = arrays.pop(TIME)
         expect("data", "no rows", "one row or more", self._time.size > 0)
@@ -324,7 +327,10 @@ class _Model:
         shown = ", ".join(f"{key} = {value:g}" for key, value in values.items())
         if not self.solution.converged:
             reason = self.solution.outcome.reason
-            raise InputError(f"{shown}: {reason}; accepted: numbers with which the case converges")
+            raise InputError(
+                f"{shown}: {reason}; accepted: numbers with which the case converges",
+                "identification-start",
+            )
         rows = [record.row for record in self.solution.steps]
         known = ", ".join(rows[0])
         for name in self._measured:

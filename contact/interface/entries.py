@@ -194,7 +194,8 @@ def _check_rollers(
         contact = "contact of a body of revolution that reaches its axis"
     raise InputError(
         f"fixed.normal: its part shares nodes with a {contact}, where jumps are sums over nodes; "
-        "accepted: there a displacement across an axis instead, or parts apart"
+        "accepted: there a displacement across an axis instead, or parts apart",
+        "roller-contact",
     )
 
 
@@ -219,7 +220,8 @@ def _check_apart(entries: Sequence[Entry]) -> None:
         names = ", ".join(entry.on for entry in entries)
         raise InputError(
             f"contact: the parts {names} share nodes, which one obstacle alone can hold; "
-            "accepted: parts without common nodes, such as pieces of a side with a gap between"
+            "accepted: parts without common nodes, such as pieces of a side with a gap between",
+            "contacts-meet",
         )
 
 
@@ -336,5 +338,7 @@ def _bounds(entries: Sequence[Entry]) -> tuple[int, ...]:
 
 def _alike(lagged: Sequence[bool]) -> bool:
     if len(set(lagged)) > 1:
-        raise InputError("contact: lagged is true for some and false for others; accepted: one way")
+        raise InputError(
+            "contact: lagged is true for some and false for others; accepted: one way", "lagged"
+        )
     return lagged[0]

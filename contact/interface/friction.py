@@ -82,12 +82,13 @@ class Friction:
         if isinstance(coefficient, int | float):
             raise InputError(
                 f"Friction({coefficient}): accepted: Friction(mu={coefficient}), a "
-                "coefficient, or Friction(tresca=...), a bound"
+                "coefficient, or Friction(tresca=...), a bound",
+                "no-such-name",
             )
         size = isinstance(radius, int | float | np.number) and 0 <= radius < np.inf
         expect("Friction: radius", radius, "a length >= 0", size)
         if sum(one is not None for one in (coefficient, tresca, mu, law)) > 1:
-            raise InputError("Friction: accepted: one of coefficient, tresca, mu and law")
+            raise InputError("Friction: accepted: one of coefficient, tresca, mu and law", "value")
         # A coefficient that lacks something is no function of position.
         if any(hasattr(mu, name) for name in COEFFICIENT if name != "__call__"):
             coefficient, mu = cast(FrictionCoefficient, mu), None
@@ -179,14 +180,16 @@ def _check_constants(name: str, symbol: str, law: FrictionLaw) -> None:
         row, k = np.unravel_index(np.argmax(np.where(above, ratio, -np.inf)), above.shape)
         raise InputError(
             f"{name}: maximum: given {law.maximum:.4g}, but {symbol} is {ratio[row, k]:.4g} at the "
-            f"slip {slips[k]:.3g}; accepted: an upper bound of {symbol} at all slips"
+            f"slip {slips[k]:.3g}; accepted: an upper bound of {symbol} at all slips",
+            "law-bounds",
         )
     if faster.any():
         row, k = np.unravel_index(np.argmax(np.where(faster, falls / steps, 0.0)), faster.shape)
         raise InputError(
             f"{name}: lipschitz: given {law.lipschitz:.4g}, but {symbol} falls by "
             f"{falls[row, k] / steps[k]:.4g} per length between the slips {slips[k]:.3g} and "
-            f"{slips[k + 1]:.3g}; accepted: the Lipschitz constant of {symbol} in the slip"
+            f"{slips[k + 1]:.3g}; accepted: the Lipschitz constant of {symbol} in the slip",
+            "law-bounds",
         )
 
 
@@ -203,7 +206,7 @@ def _check(name: str, values: Array, nodes: ContactNodes) -> None:
     worst = np.concatenate(nodes.comm.allgather(bad[:1]))
     if worst.size > 0:
         raise InputError(
-            f"Friction: {name} is {worst[0]:g} at a node; accepted: finite values >= 0"
+            f"Friction: {name} is {worst[0]:g} at a node; accepted: finite values >= 0", "negative"
         )
 
 

@@ -72,7 +72,8 @@ class Conductor:
         ):
             missing = [method for method in methods if not hasattr(law, method)]
             accepted = f"an object with {', '.join(methods)}"
-            expect(f"Conductor: {name} without {', '.join(missing)}", law, accepted, not missing)
+            place = f"Conductor: {name} without {', '.join(missing)}"
+            expect(place, law, accepted, not missing, "conductor-law")
         both = np.concatenate([-SAMPLES[::-1], SAMPLES])
         never, psi = np.zeros(both.size, dtype=bool), self.psi
         if psi.follows_gap:

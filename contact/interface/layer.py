@@ -56,7 +56,9 @@ class Layer:
             that is not its own, or p_nu does not vanish before the layer is touched.
         """
         if not self.thickness >= 0:
-            raise InputError(f"layer: the thickness is {self.thickness:g}; accepted: >= 0, or inf")
+            raise InputError(
+                f"layer: the thickness is {self.thickness:g}; accepted: >= 0, or inf", "layer-law"
+            )
         depths = self.depths(size)
         differences = np.concatenate([[0.0], np.logspace(-6, 3, 37)])
         for name, law, samples in (
@@ -64,7 +66,7 @@ class Layer:
             ("h_nu", self.h_nu, np.concatenate([-differences, differences])),
         ):
             if not callable(getattr(law, "derivative", None)):
-                raise InputError(f"layer: {name} has no method `derivative`")
+                raise InputError(f"layer: {name} has no method `derivative`", "layer-law")
             with np.errstate(all="ignore"):
                 with naming(f"layer: {name}"):
                     values = real(law(samples), samples.shape, EACH)
@@ -72,14 +74,19 @@ class Layer:
                     slopes = real(law.derivative(samples), samples.shape, EACH)
             if not (np.isfinite(values).all() and np.isfinite(slopes).all()):
                 bad = samples[~(np.isfinite(values) & np.isfinite(slopes))][0]
-                raise InputError(f"layer: {name} or its derivative is no number at {bad:g}")
+                raise InputError(
+                    f"layer: {name} or its derivative is no number at {bad:g}", "layer-law"
+                )
             if values.min() < 0:
                 bad = samples[np.argmin(values)]
-                raise InputError(f"layer: {name} is negative at {bad:g}; accepted: values >= 0")
+                raise InputError(
+                    f"layer: {name} is negative at {bad:g}; accepted: values >= 0", "layer-law"
+                )
             if name == "p_nu" and np.any(values[samples < 0] > 0):
                 raise InputError(
                     "layer: p_nu presses before the layer is touched; accepted: 0 at negative "
-                    "penetrations"
+                    "penetrations",
+                    "layer-law",
                 )
             check_slope(f"layer: {name}: derivative", law, law.derivative, samples[samples != 0])
 

@@ -115,7 +115,7 @@ def _coupled(
     one, other = (owners.named(side.nodes.ravel()) for side in (slave, master))
     if body.comm.allreduce(np.intersect1d(one, other).size, op=MPI.SUM) > 0:
         raise InputError(
-            f"{label} share nodes; accepted: parts of two bodies whose meshes are apart"
+            f"{label} share nodes; accepted: parts of two bodies whose meshes are apart", "pair"
         )
     reach = REACH * body.domain.size
     coupling = couple(slave, master, reach)
@@ -132,7 +132,8 @@ def _coupled(
     if body.comm.allreduce(coupling.nodes.size, op=MPI.SUM) == 0:
         raise InputError(
             f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
-            "held there; accepted: sides of two bodies that look at each other"
+            "held there; accepted: sides of two bodies that look at each other",
+            "pair",
         )
     _check_apart(body, coupling, owners, label)
     return coupling
@@ -144,7 +145,8 @@ def _check_apart(body: BodyEquilibrium, coupling: Coupling, owners: Owners, labe
     if body.comm.allreduce(bool(body.global_unknowns.tied[local].any()), op=MPI.LOR):
         raise InputError(
             f"{label}: their nodes follow a rigid part or an electrode of unknown potential; "
-            "accepted: parts that end before these"
+            "accepted: parts that end before these",
+            "pair",
         )
 
 
@@ -209,7 +211,8 @@ def _check_rim(
     if body.comm.allreduce(filled, op=MPI.LOR):
         raise InputError(
             f"{label}: supports hold the first along its surface, where friction would pull at "
-            "the second; accepted: on and against exchanged, supports on its rim, no friction"
+            "the second; accepted: on and against exchanged, supports on its rim, no friction",
+            "held-side",
         )
 
 
@@ -232,11 +235,13 @@ def _apart(
     if _connected(body, coupling, slave.owners):
         raise InputError(
             f"{label} are sides of one body that look away from each other; accepted: parts of two "
-            "bodies whose meshes are apart"
+            "bodies whose meshes are apart",
+            "pair",
         )
     raise InputError(
         f"{label}: the undeformed bodies overlap, by up to {cut:.3g}; accepted: meshes that are "
-        "apart or touch, but for the deviation of straight facets from a curve"
+        "apart or touch, but for the deviation of straight facets from a curve",
+        "overlap",
     )
 
 

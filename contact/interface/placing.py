@@ -166,7 +166,8 @@ def _place(
         raise InputError(
             "foundation: it lies behind the contact part: the contact direction points "
             "into the body at every node; accepted: a normal towards the body, a shape in front "
-            "of it, or inside = true for a body within"
+            "of it, or inside = true for a body within",
+            "behind",
         )
     rounding = 1e-5 * domain.size  # that of mesh files
     _refuse_within(domain, obstacle, found.surface[facing > 0], gap[facing > 0], rounding)
@@ -186,7 +187,8 @@ def _place(
         raise InputError(
             f"foundation: the undeformed body cuts it, by up to {cut:.3g}; accepted: gaps "
             f">= 0 but for {rounding:.1g} (rounding), and the deviation of straight facets from a "
-            'curve, or overlap = "press"'
+            'curve, or overlap = "press"',
+            "overlap",
         )
     return np.where(facing > 0, np.maximum(gap, 0.0), gap), unknown, float(cut)
 
@@ -207,19 +209,24 @@ def _refuse_within(
         raise InputError(
             f"foundation: {counted(count, 'contact node')} within it, and the contact direction "
             "does not lead back to its surface; accepted: a distance that is positive, or "
-            "triangles whose normals point, towards the body, and overlaps less deep than the shape"
+            "triangles whose normals point, towards the body, and overlaps less deep than the "
+            "shape",
+            "inside-out",
         )
 
 
 def check_gap(domain: Domain, gap: Array, key: str, press: bool) -> None:
     """Refuse given gaps that are no numbers, or none as nothing is to be pressed. Collective."""
     if domain.comm.allreduce(bool(np.isnan(gap).any()), op=MPI.LOR):
-        raise InputError(f"{key}: the gap is no number at a node; accepted: lengths, or inf")
+        raise InputError(
+            f"{key}: the gap is no number at a node; accepted: lengths, or inf", "negative"
+        )
     least = domain.comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
     if least < -1e-12 * domain.size and not press:
         raise InputError(
             f"{key}.gap: {least:g} at a node; accepted: values >= 0 (in Python also press=True, "
-            "by which the foundation presses the body out)"
+            "by which the foundation presses the body out)",
+            "negative",
         )
 
 
@@ -262,14 +269,15 @@ def find_nodes(
     if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
         raise InputError(
             f"{key}.foundation: a contact node has no contact direction (it is the sphere's "
-            "centre, on the axis of a cylinder, or where a formula has no value or no slope)"
+            "centre, on the axis of a cylinder, or where a formula has no value or no slope)",
+            "contact-direction",
         )
     unknown, cut = np.zeros_like(gap), 0.0
     if obstacle.is_shape:
         try:
             gap, unknown, cut = _place(domain, space, obstacle, found, direction, gap, press)
         except InputError as error:
-            raise InputError(f"{key}.{error}") from None
+            raise error.within(f"{key}.") from None
     else:
         check_gap(domain, gap, key, press)
     gap = found.along(direction, gap)
@@ -280,7 +288,8 @@ def find_nodes(
     if not domain.comm.allreduce(bool(meets.any()), op=MPI.LOR):
         raise InputError(
             f"{key}: from no node of the part {part!r} does the contact direction meet the "
-            "foundation; accepted: a shape in front of the part; an axis from the body towards it"
+            "foundation; accepted: a shape in front of the part; an axis from the body towards it",
+            "foundation-missed",
         )
     keep = (free > APART) & meets & (weight > 0)
     nodes, points, direction = nodes[keep], points[keep], direction[keep]
@@ -300,11 +309,15 @@ def find_nodes(
     )
     if jump.size == 0:
         bare = domain.comm.allreduce(bool(((free > APART) & meets).any()), op=MPI.LOR)
+        if bare:
+            raise InputError(
+                f"{key}.on: of part {part!r} the axis of revolution alone meets the foundation, "
+                "where nodes carry no pressure; accepted: a finer mesh there",
+                "tip-on-axis",
+            )
         raise InputError(
-            f"{key}.on: of part {part!r} the axis of revolution alone meets the foundation, where "
-            "nodes carry no pressure; accepted: a finer mesh there"
-            if bare
-            else f"{key}.on: part {part!r} has no node that is free to move towards the foundation"
+            f"{key}.on: part {part!r} has no node that is free to move towards the foundation",
+            "held-part",
         )
     return jump, found
 

@@ -191,9 +191,11 @@ def library(path: Path = PACKAGED) -> Mapping[str, Entry]:
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; accepted: a library of materials") from None
+        raise InputError(
+            f"{path}: {error.strerror}; accepted: a library of materials", "library"
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file: {error}") from None
+        raise InputError(f"{path}: not a TOML file: {error}", "toml") from None
     for name, table in data.items():
         try:
             if not isinstance(table, Mapping):
@@ -205,7 +207,8 @@ def library(path: Path = PACKAGED) -> Mapping[str, Entry]:
             raise InputError(
                 f"{path}: {name}: {fault}; accepted: class, source, temperature, condition, and "
                 "young and poisson, c or stiffness, with e or coupling and permittivity, as in "
-                "the package's own library"
+                "the package's own library",
+                "library",
             ) from None
     return found
 
@@ -224,4 +227,4 @@ def find(name: str, path: Path = PACKAGED) -> Entry:
     lower = {other.lower(): other for other in known}
     near = difflib.get_close_matches(name.lower(), lower, n=1)
     hint = f" (did you mean {lower[near[0]]}?)" if near else ""
-    raise InputError(f"{name}: no such material{hint}; accepted: {', '.join(known)}")
+    raise InputError(f"{name}: no such material{hint}; accepted: {', '.join(known)}", "library")

@@ -78,7 +78,8 @@ def petsc_options(prefix: str) -> Iterator[None]:
         words = str(error).strip().splitlines()[-1].removeprefix("[0] ")
         raise InputError(
             f"PETSc cannot set up its solver: {words}; accepted: options of PETSc with the prefix "
-            f"-{prefix} that it knows, or none"
+            f"-{prefix} that it knows, or none",
+            "petsc-options",
         ) from error
 
 
@@ -97,7 +98,8 @@ def check_overflow(layout: Layout, operator: float, rhs: float) -> None:
         raise InputError(
             f"numbers overflow{law}: Young's modulus is {young:.3g}, the linear operator of the "
             f"size {operator:.3g}, its right-hand side {rhs:.3g}; accepted: constants, loads "
-            "and prescribed values in units that bring them nearer to 1"
+            "and prescribed values in units that bring them nearer to 1",
+            "overflow",
         )
 
 
@@ -116,17 +118,20 @@ def no_solution(pc: PETSc.PC, prefix: str) -> InputError:
             "out of memory in the factorisation; accepted: a smaller mesh, more memory or "
             f"ranks, a larger -{prefix}mat_mumps_icntl_23 where that limits it (MB a "
             f"rank), a larger -{prefix}mat_mumps_icntl_14 (percent of workspace beyond "
-            'the estimate), or linear = "iterative" in [solver]'
+            'the estimate), or linear = "iterative" in [solver]',
+            "memory",
         )
     if _functions_vanish(pc):
         return InputError(
             "multigrid fails: some of its aggregates of nodes are too small to tell rigid motions "
             f"apart; accepted: options of PETSc with the prefix -{prefix}pc_gamg_ that make "
-            'larger ones, none of these options, or linear = "lu" in [solver]'
+            'larger ones, none of these options, or linear = "lu" in [solver]',
+            "multigrid",
         )
     return SingularError(
         "the linear system is singular: the body can move freely; fix enough "
-        "displacement components (or, for a piezoelectric body, a potential)"
+        "displacement components (or, for a piezoelectric body, a potential)",
+        "unsupported",
     )
 
 

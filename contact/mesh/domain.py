@@ -201,7 +201,7 @@ class Domain:
         """
         for one in members(name):
             if one in self.unusable:
-                raise InputError(self.unusable[one])
+                raise InputError(self.unusable[one], "part-facets")
         return self.facets_anywhere(name)
 
     def facets_anywhere(self, name: str) -> Indices:
@@ -209,7 +209,7 @@ class Domain:
         names = {**self.parts, **self.inside}
         for one in members(name):
             if one in self.unusable and one not in self.inside:
-                raise InputError(self.unusable[one])
+                raise InputError(self.unusable[one], "part-facets")
         found = [names[known("part", one, names)] for one in members(name)]
         return found[0] if len(found) == 1 else np.unique(np.concatenate(found))
 
@@ -345,7 +345,8 @@ def from_mesh(
     if shape_of(mesh) not in SHAPES or not flat:
         raise InputError(
             "the mesh must consist of triangles or quadrilaterals in the plane, or of tetrahedra "
-            "or hexahedra, with a geometry of degree 1 or 2"
+            "or hexahedra, with a geometry of degree 1 or 2",
+            "cell-kinds",
         )
     boundary = exterior_facets(mesh)
     chosen = {name: _owned(mesh, tdim - 1, given) for name, given in parts.items()}
@@ -354,7 +355,8 @@ def from_mesh(
         if _compat.lasting(mesh.comm).allreduce(wrong) > 0:
             raise InputError(
                 f"the part {name!r} contains interior facets of the mesh; accepted: facets of the "
-                "boundary, or the name among inside={...}"
+                "boundary, or the name among inside={...}",
+                "part-facets",
             )
     cells = {name: _owned(mesh, tdim, given) for name, given in (regions or {}).items()}
     within = {name: facets_inside(mesh, given) for name, given in (inside or {}).items()}
@@ -390,7 +392,7 @@ def with_further_names(
     for name, own in (*inside.items(), *regions.items()):
         if domain.comm.allreduce(own.size, op=MPI.SUM) == 0:
             entity = "facet inside of the body" if name in inside else "cell"
-            raise InputError(f"{name!r} contains no {entity}")
+            raise InputError(f"{name!r} contains no {entity}", "part-facets")
     reason = "the part {!r} lies inside of the body; a part must lie on its boundary" + UNLESS
     return replace(
         domain,
@@ -446,7 +448,7 @@ def with_names(
         counts = comm.allreduce(np.array([s.size for s in sets.values()], dtype=np.int64))
         empty = [name for name, count in zip(sets, counts, strict=True) if count == 0]
         if empty:
-            raise InputError(f"the {kind} {empty[0]!r} contains no {of_it}")
+            raise InputError(f"the {kind} {empty[0]!r} contains no {of_it}", "part-facets")
     return Domain(mesh, parts, regions, extent(mesh) if size is None else size)
 
 
@@ -472,14 +474,16 @@ def revolved(domain: Domain) -> Domain:
     if domain.dim != 2:
         raise InputError(
             'space.kinematics: "axisymmetric" with a mesh in 3-D; accepted: a mesh in 2-D, '
-            "x the radius and y the axis"
+            "x the radius and y the axis",
+            "axisymmetric",
         )
     radius = domain.mesh.geometry.x[:, 0]
     least = domain.comm.allreduce(float(radius.min(initial=np.inf)), op=MPI.MIN)
     if least < -ON_AXIS * domain.size:
         raise InputError(
             f'space.kinematics: "axisymmetric", and the mesh goes to x = {least:.4g}; accepted: '
-            "a mesh with x >= 0, the half plane of the body"
+            "a mesh with x >= 0, the half plane of the body",
+            "axisymmetric",
         )
     radius[on_axis(domain, domain.mesh.geometry.x)] = 0.0
     return replace(domain, revolved=True)

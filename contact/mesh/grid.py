@@ -61,12 +61,9 @@ class GridError(InputError):
     """
 
     def __init__(self, key: str, given: Any, accepted: str) -> None:
-        super().__init__(key, given, accepted)
+        super().__init__(f"mesh.{key}: given {given}; accepted: {accepted}", "value")
+        self.args = key, given, accepted  # by which it is copied to other ranks
         self.key, self.given, self.accepted = key, given, accepted
-
-    def __str__(self) -> str:
-        """Return the message."""
-        return f"mesh.{self.key}: given {self.given}; accepted: {self.accepted}"
 
 
 @dataclass(frozen=True)
@@ -124,7 +121,9 @@ def rectangle(
     grid, chosen = plan("rectangle", origin, size, cells, parts or {})
     kinds = dmesh.DiagonalType.__members__
     if diagonal not in kinds:
-        raise InputError(f"mesh diagonal {diagonal!r} is unknown (accepted: {', '.join(kinds)})")
+        raise InputError(
+            f"mesh diagonal {diagonal!r} is unknown (accepted: {', '.join(kinds)})", "generator"
+        )
     mesh = dmesh.create_rectangle(
         comm,
         grid[:2],
@@ -161,7 +160,7 @@ def box(
     """
     grid, chosen = plan("box", origin, size, cells, parts or {})
     if np.shape(axis) != (3,) or not np.linalg.norm(axis) > 0.0:
-        raise InputError(f"mesh axis must be 3 numbers, not all zero; given: {axis}")
+        raise InputError(f"mesh axis must be 3 numbers, not all zero; given: {axis}", "generator")
     kind = _cell_type("box", cell)
     mesh = dmesh.create_box(
         comm, grid[:2], list(cells), cell_type=kind, ghost_mode=dmesh.GhostMode.none

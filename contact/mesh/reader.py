@@ -134,7 +134,7 @@ def convert(file: Path, to: Path) -> Cells:
 def _read(file: Path, gmsh: bool = False) -> Model:
     """Read a file by the ending of its name, or one of Gmsh."""
     if not file.is_file():
-        raise InputError("no such file")
+        raise InputError("no such file", "file-name")
     other = None if gmsh else OTHERS.get(file.suffix.lower())
     if other is not None:
         return _apart("contact.mesh.formats", [], file.resolve(), file, f"the {other} reader")
@@ -171,15 +171,20 @@ def _apart(module: str, options: list[str], plain: Path, file: Path, reader: str
                 timeout=limit,
             )
         except subprocess.TimeoutExpired:
-            raise InputError(f"{reader} does not come to an end with it in {limit:.0f} s") from None
+            raise InputError(
+                f"{reader} does not come to an end with it in {limit:.0f} s", "mesh-file"
+            ) from None
         if done.returncode != 0:
             raise InputError(
-                f"{reader} breaks off reading it (status {done.returncode}): it is damaged"
+                f"{reader} breaks off reading it (status {done.returncode}): it is damaged",
+                "mesh-file",
             )
         if not out.exists():
             said = " ".join(done.stdout.decode(errors="replace").split())
             said = said.replace(str(plain), file.name)
-            raise InputError(f"{reader} says of it: {said or 'nothing, and reads nothing of it'}")
+            raise InputError(
+                f"{reader} says of it: {said or 'nothing, and reads nothing of it'}", "mesh-file"
+            )
         return Model.load(out)
 
 
@@ -195,13 +200,15 @@ def _format(file: Path) -> int:
             stream.seek(max(0, file.stat().st_size - 200))
             end = stream.read()
     except OSError as error:
-        raise InputError(f"it cannot be read ({error.strerror})") from error
+        raise InputError(f"it cannot be read ({error.strerror})", "mesh-file") from error
     found = re.match(rb"\$MeshFormat[ \t]*\r?\n\s*(2|4)(\.\d+)?[ \t]", start.removeprefix(BOM))
     if found is None:
-        raise InputError("this is no Gmsh .msh file of format 2.2 or 4.1 (it begins otherwise)")
+        raise InputError(
+            "this is no Gmsh .msh file of format 2.2 or 4.1 (it begins otherwise)", "mesh-file"
+        )
     # Gmsh takes a section that is cut off for a whole one.
     if re.search(rb"\$End\w+\s*$", end) is None:
-        raise InputError("it is cut off: it does not end as a section does")
+        raise InputError("it is cut off: it does not end as a section does", "mesh-file")
     return int(found[1])
 
 
@@ -271,7 +278,7 @@ def _checked(load: Callable[[], Model], source: str) -> Cells:
     try:
         return check_model(load())
     except InputError as error:
-        raise InputError(f"{source}: {error}") from None
+        raise error.within(f"{source}: ") from None
 
 
 def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
@@ -313,7 +320,7 @@ def _gmsh() -> Iterator[Any]:
     try:
         import gmsh
     except (ImportError, OSError) as error:  # OSError: one of its shared libraries is missing.
-        raise InputError(f"the Python module gmsh is needed ({error})") from error
+        raise InputError(f"the Python module gmsh is needed ({error})", "gmsh") from error
     started = not gmsh.isInitialized()
     if started:
         gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -327,7 +334,7 @@ def _gmsh() -> Iterator[Any]:
         # Gmsh's errors are of this very class; anything else is a fault of the program.
         if type(error) is not Exception:
             raise
-        raise InputError(f"Gmsh says: {error}") from error
+        raise InputError(f"Gmsh says: {error}", "mesh-file") from error
     finally:
         gmsh.model.remove()
         gmsh.option.setNumber("General.Terminal", terminal)

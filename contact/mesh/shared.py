@@ -52,10 +52,12 @@ def write(cells: Cells, path: Path) -> None:
 
     heavy = path.with_suffix(".h5")
     if path.suffix.lower() != ".xdmf":
-        raise InputError(f"{path}: given another ending; accepted: a name that ends with .xdmf")
+        raise InputError(
+            f"{path}: given another ending; accepted: a name that ends with .xdmf", "xdmf-files"
+        )
     for file in (path, heavy):
         if file.exists():
-            raise InputError(f"{file}: it is there already; accepted: another name")
+            raise InputError(f"{file}: it is there already; accepted: another name", "file-name")
     groups = {name: getattr(cells, name) for name in GROUPS}
     said: dict[str, Any] = {
         name: {"names": group.names, "sets": group.sets} for name, group in groups.items()
@@ -149,10 +151,13 @@ def read(comm: MPI.Intracomm, heavy: Path, digest: str) -> Cells:
 
     def check() -> None:
         if not heavy.is_file():
-            raise InputError(f"{heavy}: it is missing beside its .xdmf file; accepted: both")
+            raise InputError(
+                f"{heavy}: it is missing beside its .xdmf file; accepted: both", "xdmf-files"
+            )
         if _sha256(heavy) != digest:
             raise InputError(
-                f"{heavy}: it is not as it was written; accepted: as contact mesh has left it"
+                f"{heavy}: it is not as it was written; accepted: as contact mesh has left it",
+                "xdmf-files",
             )
 
     on_root(comm, check)

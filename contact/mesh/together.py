@@ -49,7 +49,7 @@ def part(given: str | Sequence[str]) -> str:
     names = [given] if isinstance(given, str) else given
     named = isinstance(names, list | tuple) and all(isinstance(n, str) and n for n in names)
     if not named or not names:
-        raise InputError(f"given {given!r}; accepted: {ACCEPTED}")
+        raise InputError(f"given {given!r}; accepted: {ACCEPTED}", "value")
     different = list(dict.fromkeys(names))
     return different[0] if len(different) == 1 else Together(different)
 
@@ -99,5 +99,6 @@ def known(kind: str, name: str, names: Mapping[str, Indices]) -> str:
         return name
     hint = nearest(str(name), names, "; did you mean '{}'?")
     raise InputError(
-        f"the mesh has no {kind} {name!r}{hint} (its {kind}s: {', '.join(sorted(names))})"
+        f"the mesh has no {kind} {name!r}{hint} (its {kind}s: {', '.join(sorted(names))})",
+        "part-name",
     )

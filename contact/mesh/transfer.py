@@ -136,7 +136,8 @@ def check_adaptable(mesh: dmesh.Mesh) -> None:
     if not shape.simplex:
         raise InputError(
             f"mesh.adapt: the cells are {shape.plural}, of which some cannot be refined alone; "
-            "accepted: triangles or tetrahedra, or mesh.refine"
+            "accepted: triangles or tetrahedra, or mesh.refine",
+            "refine",
         )
 
 
@@ -144,7 +145,8 @@ def _check_straight(mesh: dmesh.Mesh) -> None:
     if _compat.geometry_degree(mesh) > 1:
         raise InputError(
             "mesh.refine, mesh.adapt: the cells are curved; accepted: cells of order 1, or a finer "
-            "mesh of order 2"
+            "mesh of order 2",
+            "refine",
         )
 
 

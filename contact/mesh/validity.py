@@ -118,7 +118,7 @@ def check_model(model: Model) -> Cells:
     order = np.argsort(model.tags)
     tags, points = model.tags[order], model.points[order]
     if np.any(tags[1:] == tags[:-1]):
-        raise InputError("it has several nodes of one number")
+        raise InputError("it has several nodes of one number", "mesh-file")
     first = _placed(shape.nodes(1), model.places)
     every = _places(tags, model.cells)
     curved = _curved(points, every, model.places, shape, first)
@@ -147,12 +147,13 @@ def check_model(model: Model) -> Cells:
     reasons, inside = _check_cells(shape, points, cells, parts)
     usable = {name: rows for name, rows in parts.items() if name not in reasons}
     if not usable:
+        if reasons:
+            raise InputError(next(iter(reasons.values())), "part-facets")
         entities = "curves" if dim == 2 else "surfaces"
-        reason = next(iter(reasons.values()), None)
         raise InputError(
-            reason
-            or f"it has no physical groups of {entities}, nor sets or tags of facets or nodes: no "
-            "part has a name"
+            f"it has no physical groups of {entities}, nor sets or tags of facets or nodes: no "
+            "part has a name",
+            "no-groups",
         )
     notes += [
         reason if name in inside else f"ignored: {reason}" for name, reason in reasons.items()
@@ -168,7 +169,8 @@ def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
     if dim < 2:
         raise InputError(
             "it has no triangles, quadrilaterals, tetrahedra or hexahedra (Gmsh saves the elements "
-            "of physical groups alone, if there are any: the body needs a physical group, too)"
+            "of physical groups alone, if there are any: the body needs a physical group, too)",
+            "no-groups",
         )
     labels = [(label, order) for label, kind_dim, order in kinds if kind_dim == dim]
     for label, order in labels:
@@ -176,7 +178,8 @@ def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
             why = "another shape" if order < 3 else f"order {order}"
             raise InputError(
                 f"its cells include {label!r}, of {why}; accepted are triangles or quadrilaterals "
-                "in 2-D, tetrahedra, hexahedra, prisms or pyramids in 3-D, of order 1 or 2"
+                "in 2-D, tetrahedra, hexahedra, prisms or pyramids in 3-D, of order 1 or 2",
+                "cell-kinds",
             )
     return Shape(labels[0][0].split()[0].lower())
 
@@ -230,7 +233,7 @@ def _places(tags: Ints, nodes: Ints) -> Ints:
     """Return the positions of nodes in the ascending tags."""
     places = np.minimum(np.searchsorted(tags, nodes), max(tags.size - 1, 0))
     if tags.size == 0 or np.any(tags[places] != nodes):
-        raise InputError("it has elements whose nodes it does not have")
+        raise InputError("it has elements whose nodes it does not have", "mesh-file")
     return places
 
 
@@ -238,11 +241,12 @@ def _flatten(points: Array, dim: int) -> Array:
     """Return the coordinates in 2-D or in 3-D."""
     extent = np.ptp(points, axis=0)
     if not np.all(np.isfinite(extent)):
-        raise InputError("it has nodes whose coordinates are no numbers, or too large")
+        raise InputError("it has nodes whose coordinates are no numbers, or too large", "mesh-file")
     if dim == 2 and extent[2] > 1e-9 * extent.max():
         raise InputError(
             "it is a surface in 3-D; accepted are meshes of tetrahedra (the volume needs a "
-            "physical group) and plane meshes with z = const"
+            "physical group) and plane meshes with z = const",
+            "surface-mesh",
         )
     return np.ascontiguousarray(points[:, :dim])
 
@@ -365,16 +369,20 @@ def _check_cells(
     if not shape.simplex and np.any(collapsed):
         raise InputError(
             f"it has {collapsed.sum()} cell(s) with one node at several corners, the first near "
-            f"{_first(collapsed, x * unit)}; accepted: {shape.plural} with nodes of their own"
+            f"{_first(collapsed, x * unit)}; accepted: {shape.plural} with nodes of their own",
+            "collapsed-cells",
         )
     if np.any(flat):
         where = _first(flat, x * unit)
-        raise InputError(f"it has {flat.sum()} cell(s) of zero volume, the first near {where}")
+        raise InputError(
+            f"it has {flat.sum()} cell(s) of zero volume, the first near {where}", "mesh-geometry"
+        )
     folded = np.abs(np.sign(volume).sum(axis=1)) < volume.shape[1]
     if np.any(folded):
         raise InputError(
             f"it has {folded.sum()} cell(s) with a corner of 180 degrees or more, the first near "
-            f"{_first(folded, x * unit)}"
+            f"{_first(folded, x * unit)}",
+            "folded-cells",
         )
     curved = nodes.shape[1] > shape.corners
     bent = np.full(len(cells), curved)
@@ -387,12 +395,14 @@ def _check_cells(
     if np.any(bent) and curved:
         raise InputError(
             f"it has {bent.sum()} cell(s) that are folded by their curved edges, the first near "
-            f"{_first(bent, x * unit)}"
+            f"{_first(bent, x * unit)}",
+            "folded-edges",
         )
     if np.any(bent):
         raise InputError(
             f"it has {bent.sum()} cell(s) that are folded inside, the first near "
-            f"{_first(bent, x * unit)}"
+            f"{_first(bent, x * unit)}",
+            "folded-cells",
         )
 
     cell_facets = np.sort(cells[:, shape.facet_corners], axis=2)
@@ -410,7 +420,9 @@ def _check_cells(
     side = np.bincount(inner, weights=sides.ravel(), minlength=total)
     wrong = (count > 2) | ((count == 2) & (side != 0.0))
     if np.any(wrong):
-        raise InputError(f"its cells overlap (inverted cells) at {wrong.sum()} facet(s)")
+        raise InputError(
+            f"its cells overlap (inverted cells) at {wrong.sum()} facet(s)", "mesh-geometry"
+        )
 
     reasons: dict[str, str] = {}
     within: list[str] = []

@@ -44,7 +44,9 @@ class Options:
     def __post_init__(self) -> None:
         """Refuse a tolerance that nothing or anything meets."""
         if not (isinstance(self.tolerance, float | int) and 0 < self.tolerance < 1):
-            raise InputError(f"tolerance: given {self.tolerance!r}; accepted: between 0 and 1")
+            raise InputError(
+                f"tolerance: given {self.tolerance!r}; accepted: between 0 and 1", "value"
+            )
 
     @property
     def allowed(self) -> Residuals:

@@ -178,7 +178,7 @@ def read_checkpoint(path: str | Path, problem: ContactProblem) -> State:
     said, own = read_share(comm, path, Path.read_bytes, ONCE)
     found = _Nodes.of(problem, own["points"]) if "points" in own else None
     if found is None:
-        raise InputError(_other(path))
+        raise InputError(_other(path), "other-checkpoint")
     return _state(problem, path, (said, own), found)
 
 
@@ -207,7 +207,7 @@ def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
                 raise
             if comm.rank == 0:
                 words = "%s; going on from step %d, the last one intact"
-                logger.warning(words, error, len(found))
+                logger.warning(words, error.words, len(found))
             return found
     if comm.rank == 0 and len([*files[0].parent.glob("0????.npz")]) > len(files):
         missing = files[0].parent / name_of(len(files) + 1)
@@ -246,7 +246,8 @@ def _read(problem: ContactProblem, path: Path, nodes: dict[str, _Nodes]) -> Step
         if found is None:
             raise InputError(
                 f"--restart {path.parent.parent}: given checkpoints of another mesh; accepted: "
-                "those of the same case"
+                "those of the same case",
+                "other-checkpoint",
             )
         nodes[place.name] = found
     return StepRecord(_state(problem, path, (said, own), nodes[place.name]), row, *numbers)
@@ -262,7 +263,8 @@ def _state(
     if kept != asked.keys():
         raise InputError(
             f"checkpoints: given the history {sorted(kept)}; accepted: {sorted(asked)}, that of "
-            "the materials of the problem"
+            "the materials of the problem",
+            "other-checkpoint",
         )
     here = {CONTACT_NODES: nodes.own[problem.nodes.nodes]}
     if QUADRATURE_POINTS in initial.places:
@@ -282,12 +284,12 @@ def _state(
             if len(own[name]) != shape[0]:
                 raise ValueError(f"{len(own[name])} rows of {name}")
         if motion.shape != rest.shape or any(own[k].shape != shape for k, shape in shapes.items()):
-            raise InputError(_other(path))
+            raise InputError(_other(path), "other-checkpoint")
     near, found = _NEAR * problem.domain.size, dict[str, Matching]()
     for place, points in here.items():
         matched = matching(comm, read[place], points, near)
         if matched is None:
-            raise InputError(_other(path))
+            raise InputError(_other(path), "other-checkpoint")
         found[place] = matched
     values = {name: found[place](own[name]) for name, (place, _) in rows.items()}
     return State(

@@ -210,7 +210,8 @@ def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -
     if not has_adios2:
         raise InputError(
             'output.fields: "vtx" needs a dolfinx with ADIOS2, and this one has none; accepted: '
-            '"vtu", "xdmf" or "none"'
+            '"vtu", "xdmf" or "none"',
+            "vtx",
         )
     derived = DerivedFields(problem.equilibrium, frames[0][1])
     at_nodes, in_cells = _at_nodes(problem, frames[0][1], derived), list(derived.cells().values())

@@ -159,7 +159,9 @@ def _take(path: Path, overwrite: bool) -> tuple[int, list[Path]]:
         if isinstance(error, InputError):
             raise
         reason = error.strerror or "not writable"
-        raise InputError(f"--out {path}: {reason}; accepted: a folder to write to") from None
+        raise InputError(
+            f"--out {path}: {reason}; accepted: a folder to write to", "cannot-write"
+        ) from None
     return lock, made
 
 
@@ -176,7 +178,7 @@ def _release(path: Path, lock: int, made: list[Path]) -> None:
 def _lock(folder: Path) -> int:
     """Lock a folder for this process and return the lock, which is held until it is closed."""
     path = folder / LOCK
-    wrong = InputError(f"{path} is no file of ours; accepted: a folder without it")
+    wrong = InputError(f"{path} is no file of ours; accepted: a folder without it", "not-ours")
     while True:
         # Neither a link is followed nor a pipe waited for.
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
@@ -208,7 +210,8 @@ def _lock_file(lock: int, folder: Path) -> None:
         owner = os.pread(lock, 200, 0).decode(errors="replace").strip()
         raise InputError(
             f"--out {folder}: another run works in it ({owner}); accepted: a folder of its own, "
-            "or the same after that run"
+            "or the same after that run",
+            "folder-locked",
         ) from None
     except OSError as error:
         if error.errno not in _NO_LOCKS:
@@ -233,18 +236,21 @@ def check_members(folder: Path, names: Iterable[str] | None = None, overwrite: b
         if found not in (None, expected):
             raise InputError(
                 f"{path}: given {found} where the results have {expected}; accepted: a folder "
-                "without it"
+                "without it",
+                "not-ours",
             )
         for inner in path.iterdir() if found == "a folder" else ():
             if not _ADIOS.fullmatch(inner.name) or kind(inner) != "a file":
                 raise InputError(
                     f"{path}: given a folder with {inner.name} in it, which is not of a run; "
-                    "accepted: a folder without it"
+                    "accepted: a folder without it",
+                    "not-ours",
                 )
         if found is not None and not overwrite and name not in own:
             raise InputError(
                 f"{path}: given {found} that no run's {SUMMARY} there names as its own; accepted: "
-                "--overwrite to replace it, or another folder"
+                "--overwrite to replace it, or another folder",
+                "not-ours",
             )
 
 
@@ -321,7 +327,8 @@ def recover(folder: Path) -> None:
         return
     if found != "a folder" or not all(_is_stage(path) for path in stage.iterdir()):
         raise InputError(
-            f"{stage}: given {found} that no run has left there; accepted: a folder without it"
+            f"{stage}: given {found} that no run has left there; accepted: a folder without it",
+            "not-ours",
         )
     if kind(stage / "new" / SUMMARY) == "a file":
         check_members(stage / "new", os.listdir(stage / "new"))

@@ -240,10 +240,10 @@ def read_data(path: str | Path) -> dict[str, Array]:
             raise ValueError("a name stands twice")
         values = np.array([_numbers(number, names, row) for number, row in numbered[1:]])
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; accepted: a CSV file") from None
+        raise InputError(f"{path}: {error.strerror}; accepted: a CSV file", "data-file") from None
     except ValueError as error:
         raise InputError(
-            f"{path}: {error}; accepted: a row of names, then rows of numbers"
+            f"{path}: {error}; accepted: a row of names, then rows of numbers", "data-file"
         ) from None
     columns = values.reshape(-1, len(names)).T
     return dict(zip(names, columns, strict=True))

@@ -326,7 +326,7 @@ def sensor(problem: ContactProblem, state: State, electrode: str) -> Reading:
 
 def _demand_potential(problem: ContactProblem) -> None:
     if not problem.piezoelectric:
-        raise InputError("charges and potentials need a piezoelectric material")
+        raise InputError("charges and potentials need a piezoelectric material", "piezo")
 
 
 def _sum(problem: ContactProblem, values: Array) -> float:

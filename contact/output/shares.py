@@ -62,7 +62,8 @@ def as_written(path: Path) -> Iterator[None]:
         raise
     except (OSError, EOFError, BadZipFile, LookupError, TypeError, ValueError) as error:
         raise InputError(
-            f"{path}: no checkpoint, or a damaged one ({error}); accepted: as a run has left it"
+            f"{path}: no checkpoint, or a damaged one ({error}); accepted: as a run has left it",
+            "no-checkpoint",
         ) from None
 
 

@@ -186,7 +186,9 @@ class ContactResult:
         """
         known = {k: v for k, v in vars(self).items() if getattr(v, "dtype", None) == np.float64}
         if name not in known:
-            raise InputError(f"contact.function({name!r}): accepted: {', '.join(known)}")
+            raise InputError(
+                f"contact.function({name!r}): accepted: {', '.join(known)}", "no-such-name"
+            )
         values, domain = known[name], self._problem.domain
         facets = np.concatenate([domain.facets(contact.on) for contact in self._problem.contacts])
         surface = dmesh.create_submesh(domain.mesh, domain.dim - 1, np.unique(facets))[0]

@@ -77,7 +77,8 @@ def files_of(folder: Path) -> list[Path]:
             return found
     raise InputError(
         f"--restart {folder}: no checkpoints there; accepted: the folder of an evolution that was "
-        "ended before its last step, of one mesh (none are kept with [mesh.adapt])"
+        "ended before its last step, of one mesh (none are kept with [mesh.adapt])",
+        "no-checkpoint",
     )
 
 
@@ -122,7 +123,8 @@ def check_own(folder: Path) -> None:
         if given is not None:
             raise InputError(
                 f"{place}: given {given}, which no run has left there; accepted: a folder of "
-                "results without it, checkpoints of the evolution go there"
+                "results without it, checkpoints of the evolution go there",
+                "not-ours",
             )
 
 
@@ -174,7 +176,8 @@ def save(
         for piece in new.keys() - known.keys():
             if kind(place / piece) is not None:
                 raise InputError(
-                    f"{place / piece}: no run has left it; accepted: a folder without it"
+                    f"{place / piece}: no run has left it; accepted: a folder without it",
+                    "not-ours",
                 )
         _list(place, known | new, digest)
 
@@ -193,7 +196,10 @@ def _read_whole(path: Path, digest: str | None) -> bytes:
     """
     data = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(data).hexdigest() != digest:
-        raise InputError(f"{path}: no checkpoint, or a damaged one; accepted: as a run has left it")
+        raise InputError(
+            f"{path}: no checkpoint, or a damaged one; accepted: as a run has left it",
+            "no-checkpoint",
+        )
     return data
 
 

@@ -88,7 +88,8 @@ def _check_plane_stress(problem: ContactProblem) -> None:
     if not (plane and all(thin) and body.element == "standard"):
         raise InputError(
             "material: plane stress; accepted: all materials of a body in the plane, with the "
-            "standard element"
+            "standard element",
+            "plane-stress",
         )
 
 
@@ -105,14 +106,16 @@ def _check_loads(problem: ContactProblem) -> None:
         if load.on is not None and _shared(problem, load.on, contact.on)[1]:
             raise InputError(
                 f"load.{i}.on: {load.on} shares facets with the contact part {contact.on}; "
-                "accepted: parts beside it, or body forces"
+                "accepted: parts beside it, or body forces",
+                "load-on-contact",
             )
     for contact, (i, support) in product(problem.contacts, enumerate(problem.body.elastic)):
         sides = [contact.on] if contact.against is None else [contact.on, contact.against]
         if any([_shared(problem, support.on, side)[1] for side in sides]):
             raise InputError(
                 f"elastic.{i}.on: {support.on} shares facets with the contact part {contact.on}; "
-                "accepted: parts beside it"
+                "accepted: parts beside it",
+                "load-on-contact",
             )
     _check_sizes(problem)
 
@@ -125,7 +128,8 @@ def _check_sizes(problem: ContactProblem) -> None:
         key = to_blame(given, domain, time)
         raise InputError(
             f"{key}: a formula is not finite everywhere on its part; accepted: a formula, or a "
-            "function, that is"
+            "function, that is",
+            "not-finite",
         )
     largest = domain.comm.allreduce(float(np.abs(loads).max(initial=0.0)), op=MPI.MAX)
     if largest > HUGE:
@@ -153,7 +157,8 @@ def check_supports(problem: ContactProblem) -> None:
                 when = "" if time == 1.0 else f" at t = {time:g}"
                 raise InputError(
                     f"fixed.{j}.{name}: {found[1]:g} on {last.on}; accepted: {found[0]:g}, "
-                    f"as fixed.{i} has there{when}"
+                    f"as fixed.{i} has there{when}",
+                    "supports",
                 )
 
 
@@ -252,12 +257,13 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
         return
     unconstrained = null_space(group.held(problem.frictional))
     if unconstrained.shape[1] > 0:
-        raise InputError(_unconstrained(problem, group, unconstrained))
+        raise InputError(_unconstrained(problem, group, unconstrained), "unsupported")
     support = UnilateralSupport.of(group)
     if support is not None and support.lost(problem.time) is not None:
         raise InputError(
             f"the loads pull the body off the foundation{support.besides}, and no support holds it "
-            "there; accepted: loads that press it on, or more displacement components fixed"
+            "there; accepted: loads that press it on, or more displacement components fixed",
+            "pulled-off",
         )
 
 
@@ -336,7 +342,8 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
         known += ", or with a body that conducts and whose potential is known"
     raise InputError(
         f"the potential{where} is not determined: it is prescribed nowhere, and the foundation "
-        f"conducts nowhere; accepted: a potential fixed on a part, or contact with {known}"
+        f"conducts nowhere; accepted: a potential fixed on a part, or contact with {known}",
+        "ungrounded",
     )
 
 

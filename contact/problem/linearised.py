@@ -313,7 +313,8 @@ class Linearised:
         if EPS * 2.0 ** len(taken) > 1:
             raise InputError(
                 "friction.radius: the coupling of the nodes by a smoothed pressure is too strong "
-                "for derivatives; accepted: a smaller radius or coefficient of friction"
+                "for derivatives; accepted: a smaller radius or coefficient of friction",
+                "smoothed-pressure",
             )
         # Rounding, or the next correction is as much smaller than this one as this one than the
         # last. The first ones may grow, as the smoothed pressure follows.

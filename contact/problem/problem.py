@@ -289,13 +289,15 @@ class ContactProblem:
         if self.comm.allreduce(taken, op=MPI.LOR):
             raise InputError(
                 f"{key}.on: part {contact.on!r}, which carries charge, shares nodes with an "
-                "electrode of unknown potential; accepted: parts apart, or an insulated foundation"
+                "electrode of unknown potential; accepted: parts apart, or an insulated foundation",
+                "rigid-part",
             )
         moves = global_unknowns.member(contact.on) is not None
         if held.size > 0 and moves:
             raise InputError(
                 f"{key}.rigid: supports hold nodes of part {contact.on!r}, which carry charge as "
-                "the foundation comes near; accepted: a part that can move everywhere"
+                "the foundation comes near; accepted: a part that can move everywhere",
+                "held-charge",
             )
         return held
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contact import InputError
+from contact import NotConvergedError
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
@@ -125,7 +125,7 @@ def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
             problem = manufactured(dim, degree, n) if dim else singular.problem(n, degree)
             state, outcome = Newton(problem, NewtonOptions(tolerance=1e-9)).solve()
             if not outcome.converged:
-                raise InputError(f"{label}, 1/h = {n}: {outcome.reason}")
+                raise NotConvergedError(f"{label}, 1/h = {n}: {outcome.reason}")
             residuals.append(outcome.kkt.largest)
             if dim:
                 e, largest = errors(problem.equilibrium, state.x, exact(dim)), np.nan

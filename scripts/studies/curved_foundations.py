@@ -27,10 +27,10 @@ from contact import (
     Cylinder,
     Domain,
     Fixed,
-    InputError,
     Level,
     Linear,
     Load,
+    NotConvergedError,
     Problem,
     Punch,
     Shape,
@@ -434,7 +434,7 @@ def hertz(h: float, degree: int) -> Array:
 def ratios(solution: Solution, exact: float) -> Array:
     """Return pressures over the exact one, with their weights, shape (2, n). Collective."""
     if not solution.converged:
-        raise InputError(solution.outcome.reason)
+        raise NotConvergedError(solution.outcome.reason)
     nodes = solution.problem.nodes
     return np.stack([nodes.gather(solution.pressure) / exact, nodes.gather(nodes.weight)])
 

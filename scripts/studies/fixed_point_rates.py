@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact import InputError, build_problem
+from contact import NotConvergedError, build_problem
 from contact.case.interface import Friction
 from contact.history import BodyState
 from contact.methods.options import FixedPointOptions, Options, PenaltyOptions
@@ -67,7 +67,7 @@ def watched(iteration: Iteration, n: int) -> tuple[Array, float, float]:
     problem = build_problem(case)
     found, _, outcome = iterates(problem, _settings(iteration))
     if not outcome.converged:
-        raise InputError(f"{iteration.label}: {outcome.reason}")
+        raise NotConvergedError(f"{iteration.label}: {outcome.reason}")
     body, last, kkt = problem.equilibrium, found[-1].x, outcome.kkt
     distances = [errors(body, last, body.function(state.x)).energy for state in found[:-1]]
     residual = kkt.largest if iteration.eps is None else kkt.equilibrium

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from contact import Case, InputError, build_problem, load_case
+from contact import Case, NotConvergedError, build_problem, load_case
 from contact.methods.options import FixedPointOptions
 from contact.methods.thesis.fixed_point import FixedPoint
 from contact.typing import Array
@@ -72,7 +72,7 @@ def errors(
     implicit = build_problem(case_of(name, cells, k_e, False, changes), domain=problem.domain)
     limit, ended = FixedPoint(implicit, FixedPointOptions(tolerance=1e-11)).solve()
     if not ended.converged:
-        raise InputError(f"k_e = {k_e:g}: {ended.reason}")
+        raise NotConvergedError(f"k_e = {k_e:g}: {ended.reason}")
     distances = [np.linalg.norm(norm(state.x - limit.x)) for state in found]
     return np.array(distances), outcome.converged
 

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contact import Case, InputError, build_problem, load_case
+from contact import Case, NotConvergedError, build_problem, load_case
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction
 from contact.problem.contact import Contact
@@ -99,7 +99,7 @@ def fixed_point_errors(
     problem = build_problem(case)
     found, _, outcome = iterates(problem, case.solver, first=0)
     if not outcome.converged:
-        raise InputError(f"{case.title}: {outcome.reason}")
+        raise NotConvergedError(f"{case.title}: {outcome.reason}")
     norm, exact = ProductNorm(problem), found[-1].x
     return np.array([np.linalg.norm(norm(state.x - exact)) for state in found[:-1]])
 

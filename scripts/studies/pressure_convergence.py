@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from contact import InputError, Problem, solve
+from contact import NotConvergedError, Problem, solve
 from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -110,7 +110,7 @@ def measured(series: Series, n: int, degree: int) -> tuple[Array, float]:
         solution = solve(series.problem(exact, n, degree), NewtonOptions(tolerance=1e-10))
         problem = solution.problem
         if not solution.converged:
-            raise InputError(f"{n} cells: {solution.outcome.reason}")
+            raise NotConvergedError(f"{n} cells: {solution.outcome.reason}")
         given = series.pressure(exact, problem.nodes.points)
         error, dual, norm = solution.pressure - given, DualNorm(problem), problem.nodes.norm
         ratios = norm(error) / norm(given), dual.pressure(error) / dual.pressure(given)

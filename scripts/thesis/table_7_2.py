@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact import Case, InputError, build_problem, solve
+from contact import Case, NotConvergedError, build_problem, solve
 from contact.case.interface import Friction
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
@@ -145,7 +145,7 @@ def table(report: Report, n: int) -> None:
 def checked(solution: Solution) -> Solution:
     """Return the solution of a penalised problem, or stop the script."""
     if not solution.converged:
-        raise InputError(f"penalty: {solution.outcome.reason}")
+        raise NotConvergedError(f"penalty: {solution.outcome.reason}")
     return solution
 
 

@@ -1,5 +1,6 @@
 """A case that is right, and what runs it by the command line, or sees that it is refused."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,14 @@ def write(folder: Path, text: str, name: str = "case.toml") -> Path:
     return path
 
 
+def check_identifier(line: str) -> None:
+    """Check that a message ends in an identifier, and has no second one."""
+    found = re.search(r" (\[[a-z]+(-[a-z]+)*\])$", line)
+    assert found, line
+    before = line[: found.start()]
+    assert found[1] not in before and not re.search(r"\[[a-z]+(-[a-z]+)+\]", before), line
+
+
 def refuse(case: Path, words: list[str], capfd: pytest.CaptureFixture[str], *options: str) -> None:
     """Check that a case is refused with one message that names the file and holds the words."""
     status, lines = run(case, *options, capfd=capfd)
@@ -83,6 +92,7 @@ def refuse(case: Path, words: list[str], capfd: pytest.CaptureFixture[str], *opt
     if MPI.COMM_WORLD.rank == 0:
         assert len(lines) == 1, lines
         assert lines[0].startswith("contact: ")
+        check_identifier(lines[0])
         missing = [word for word in [case.name, *words] if word not in lines[0]]
         assert not missing, f"{missing} not in: {lines[0]}"
     else:

@@ -11,6 +11,7 @@ from contact.case.file import parse_case
 from contact.case.messages import LIST, listed, path_of, shown
 from contact.cli.main import main
 from contact.errors import clipped
+from tests.cli.running import check_identifier
 
 TABLES = {
     "mesh": 'generator = "rectangle"\nsize = [4.0, 1.0]\ncells = [8, 2]',
@@ -172,6 +173,7 @@ def refused(path, capsys, *arguments):
     message = capsys.readouterr().err
     assert time.process_time() - begin < 20
     assert message.startswith("contact: ") and message.count("\n") == 1
+    check_identifier(message.rstrip("\n"))
     assert len(message) < 300 + LIST
     return message
 

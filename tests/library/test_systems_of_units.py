@@ -108,7 +108,7 @@ MM = {"length": "mm", "stress": "MPa"}
         ({"units": None, "labels": MM}, '"SI" has m for length, and case.units.length = "mm"'),
         ({"units": None, "labels": {"stress": "psi"}}, 'stress: the unit "psi" is not known'),
         ({"units": "GPa", "labels": MM}, '"GPa" has GPa for stress'),
-        ({"units": "SI", "labels": MM}, 'accepted: "N-mm-MPa"$'),
+        ({"units": "SI", "labels": MM}, r'accepted: "N-mm-MPa" \[units]$'),
         ({"units": "kN-mm-GPa", "labels": {"stress": "N/mm²"}}, "for stress"),
         ({"units": "SI", "labels": "N-mm-MPa"}, "for length"),
         ({"units": "N-mm", "labels": None}, "accepted: .*N-mm-MPa.*or a table"),
@@ -122,7 +122,7 @@ MM = {"length": "mm", "stress": "MPa"}
         (
             {"units": "GPa", "labels": {"length": "mm", "stress": "GPa", "potential": "GV"}}
             | {"name": "PZT-4"},
-            'accepted: { length = "mm", force = "kN", potential = "GV" }$',
+            r'accepted: { length = "mm", force = "kN", potential = "GV" } \[units]$',
         ),
         (
             {"units": "GPa", "labels": {"length": "mm", "stress": "GPa", "charge": "nC"}}

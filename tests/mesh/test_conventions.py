@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from dolfinx import io
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.errors import InputError
+from contact.errors import InputError, SingularError
+from contact.mesh.grid import GridError
 from contact.mesh.reader import from_file
 from contact.mesh.xdmf import WINDOW, _mixed
 from tests.problems.quadrilaterals import unit_block
@@ -303,4 +305,20 @@ def test_long_runs_of_mixed_cells():
 
 def test_no_message_shows_how_numpy_writes_numbers():
     given = [np.float64(2.0), np.int64(3), np.True_, "np.pi"]
-    assert str(InputError(f"given {given}")) == "given [2.0, 3, True, 'np.pi']"
+    error = InputError(f"given {given}", "value")
+    assert error.words == "given [2.0, 3, True, 'np.pi']"
+    assert str(error) == f"{error.words} [value]"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InputError("no file", "file-name").within("part.msh: "),
+        SingularError("singular", "unsupported"),
+        GridError("size", 0, "more"),
+    ],
+)
+def test_an_error_has_one_identifier_on_all_ranks(error):
+    copied = pickle.loads(pickle.dumps(error))
+    assert type(copied) is type(error) and str(copied) == str(error)
+    assert str(error) == f"{error.words} [{error.identifier}]"

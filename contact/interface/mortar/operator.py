@@ -121,7 +121,8 @@ def coupling_operator(
         raise InputError(
             f"contact.against: {circle} contact nodes follow, by way of the nodes opposite, "
             "themselves; accepted: contacts that form no circle, such as one of two that are each "
-            "other's opposite"
+            "other's opposite",
+            "contact-cycle",
         )
     taking = np.zeros((halo.numbers.size, 1))
     taking[jumps.indices] = 1.0

@@ -155,7 +155,8 @@ class Shape(ABC):
             raise InputError(
                 f"{type(self).__name__}: distance: the normal {given} at {place}, where "
                 f"differences of the distances are {there}; accepted: unit normals out of the "
-                "foundation, the slope of the signed distance"
+                "foundation, the slope of the signed distance",
+                "shape-normals",
             )
 
     @abstractmethod
@@ -279,8 +280,6 @@ def measured(
                 if shape is not None:
                     shape.check_normals(points)
         except InputError as error:
-            text = str(error)
-            raise InputError(
-                text if text.startswith(label) else f"{label}: {text}"
-            ) from error.__cause__
+            own = error.words.startswith(label)
+            raise error.within("" if own else f"{label}: ") from error.__cause__
     return found

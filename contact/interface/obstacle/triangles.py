@@ -49,7 +49,8 @@ class Triangles(Shape):
             raise InputError(
                 f"normals point to both sides of the surface, at ({x:g}, {y:g}, {z:g}) for "
                 "instance; accepted: triangles that all have their corners counter-clockwise, "
-                "seen from the body"
+                "seen from the body",
+                "stl-normals",
             )
 
     @cached_property
@@ -126,7 +127,7 @@ def read_stl(path: str | Path) -> Array:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; accepted: an STL file") from None
+        raise InputError(f"{path}: {error.strerror}; accepted: an STL file", "stl") from None
     count = int.from_bytes(data[80:84], "little") if len(data) >= HEADER else -1
     if len(data) == HEADER + EACH * count:
         kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -134,14 +135,14 @@ def read_stl(path: str | Path) -> Array:
     else:
         corners = _text(path, data)
     if corners.size and not np.all(np.isfinite(corners)):
-        raise InputError(f"{path}: coordinates that are no numbers; accepted: an STL file")
+        raise InputError(f"{path}: coordinates that are no numbers; accepted: an STL file", "stl")
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     corners = corners[area > 1e-10 * longest**2]
     if len(corners) == 0:
-        raise InputError(f"{path}: no triangles; accepted: an STL file, binary or text")
+        raise InputError(f"{path}: no triangles; accepted: an STL file, binary or text", "stl")
     return corners
 
 
@@ -151,8 +152,8 @@ def _text(path: Path, data: bytes) -> Array:
         numbers = np.array(found, dtype=np.float64)
     except ValueError:
         raise InputError(
-            f"{path}: coordinates that are no numbers; accepted: an STL file"
+            f"{path}: coordinates that are no numbers; accepted: an STL file", "stl"
         ) from None
     if len(found) % 3:
-        raise InputError(f"{path}: triangles without three corners; accepted: an STL file")
+        raise InputError(f"{path}: triangles without three corners; accepted: an STL file", "stl")
     return numbers.reshape(-1, 3, 3)

@@ -84,7 +84,9 @@ def scalar(run: Run, field: str) -> tuple[Array, bool]:
             return values[:, int("".join(str("xyz".index(i)) for i in part), 3)], of_cells
     endings = {1: "", 3: "[_x, ...]", 9: "[_xx, ...]"}
     accepted = [f"{name}{endings[np.size(v) // len(v)]}" for name, v in at_points.items()]
-    raise InputError(f"--field {field}: no such field; accepted: {', '.join(sorted(accepted))}")
+    raise InputError(
+        f"--field {field}: no such field; accepted: {', '.join(sorted(accepted))}", "figure-option"
+    )
 
 
 @dataclass(frozen=True)

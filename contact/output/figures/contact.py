@@ -137,7 +137,8 @@ def shown(
         )
         raise InputError(
             f"{words}: beside the contact part, which has {lies}; accepted: coordinates of the "
-            "mesh that show some of it, or --field for the body alone"
+            "mesh that show some of it, or --field for the body alone",
+            "figure-option",
         )
     return found
 

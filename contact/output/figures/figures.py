@@ -146,7 +146,9 @@ def animate(folder: Path, fields: Sequence[str] = (), look: Look = PAGE) -> list
 def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
     """Let files be drawn, and add them to the results in a folder."""
     if not (folder / "summary.json").is_file():
-        raise InputError(f"{folder}: no results there; accepted: a folder that a run has left")
+        raise InputError(
+            f"{folder}: no results there; accepted: a folder that a run has left", "no-results"
+        )
     with result_folder(folder, MPI.COMM_SELF, overwrite=True):  # it only adds
         try:
             files = draw(begin(folder))
@@ -178,7 +180,10 @@ def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, loo
         found = [body_figure(replace(made, box=box, **alike)) for made in pictures]
         figures = [figure for figure in found if figure is not None]
         if not figures:
-            raise InputError("--animate: pyvista cannot draw here; accepted: a display, or Xvfb")
+            raise InputError(
+                "--animate: pyvista cannot draw here; accepted: a display, or Xvfb",
+                "figure-of-steps",
+            )
         if runs[0].plane:
             axes = [figure.axes[0] for figure in figures]
             shown = np.array([(ax.get_xlim(), ax.get_ylim()) for ax in axes])

@@ -120,7 +120,8 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
     if (folder / "contact.pvtu").exists():
         raise InputError(
             f"{folder}: the contact part is in pieces, one a rank; accepted: results of one rank, "
-            "or of fewer contact nodes; ParaView opens contact.pvtu"
+            "or of fewer contact nodes; ParaView opens contact.pvtu",
+            "contact-in-pieces",
         )
     about = summary or read(folder, "summary.json", _table_of)
     bodies = "fields.pvtu" if (folder / "fields.pvtu").exists() else "fields.vtu"
@@ -169,7 +170,9 @@ def read_step(folder: Path, number: int) -> Run:
     known = {frame[1] + 1: frame for frame in frames}
     if number not in known:
         accepted = ", ".join(map(str, known))
-        raise InputError(f"--step {number}: no fields of such a step; accepted: {accepted}")
+        raise InputError(
+            f"--step {number}: no fields of such a step; accepted: {accepted}", "figure-of-steps"
+        )
     return _at(run, folder, *known[number])
 
 
@@ -178,7 +181,8 @@ def _frames(folder: Path) -> tuple[Run, list[tuple[float, int, str, str]]]:
     if not (folder / "fields.pvd").is_file():
         raise InputError(
             f"{folder}: no steps there; accepted: the results of an evolution, with "
-            'output.fields = "vtu"'
+            'output.fields = "vtu"',
+            "figure-of-steps",
         )
     run = read_run(folder)
     assert run.steps is not None  # where there are fields in time, there are steps
@@ -212,15 +216,19 @@ def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
     path = folder / name
     try:
         return reader(path)
+    except InputError:  # of a further file
+        raise
     except FileNotFoundError:
         hint = ', written with output.fields = "vtu"' if name == "fields.vtu" else ""
-        raise InputError(f"{path}: no such file; accepted: a run's results{hint}") from None
+        raise InputError(
+            f"{path}: no such file; accepted: a run's results{hint}", "no-results"
+        ) from None
     except OSError as error:
         raise refused(error) from None
     except KeyError as error:
-        raise InputError(f"{path}: not as a run has left it (no {error})") from None
+        raise InputError(f"{path}: not as a run has left it (no {error})", "no-results") from None
     except (ValueError, IndexError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: not as a run has left it ({error})") from None
+        raise InputError(f"{path}: not as a run has left it ({error})", "no-results") from None
 
 
 def _table_of(path: Path) -> dict[str, Any]:

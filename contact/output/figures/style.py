@@ -112,7 +112,8 @@ class Look:
             low, high = (0.0 if abs(end) < least else end for end in (low, high))
             raise InputError(
                 f"--{'xy'[axis]}lim {given[0]:g},{given[1]:g}: beside {shown}, which is drawn from "
-                f"{low:.4g} to {high:.4g}; accepted: ends that show some of it"
+                f"{low:.4g} to {high:.4g}; accepted: ends that show some of it",
+                "figure-option",
             )
         return given
 

@@ -84,7 +84,9 @@ def plot_sweep(
     figures = {f"-{name.replace('/', '-')}": swept.chosen(name) for name in columns}
     figures = figures or {"": swept.default}
     if not all(figures.values()):
-        raise InputError(f"{folder}: no result of the sweep varies; accepted: --field COLUMN")
+        raise InputError(
+            f"{folder}: no result of the sweep varies; accepted: --field COLUMN", "sweep-column"
+        )
     files = []
     with matplotlib.rc_context(look.style):
         for ending, chosen in figures.items():
@@ -162,7 +164,8 @@ class Swept:
         if not found:
             raise InputError(
                 f"--field {key}: no such column of sweep.csv{nearest(key, known)}; accepted: "
-                f"{', '.join(known)}"
+                f"{', '.join(known)}",
+                "sweep-column",
             )
         return [name for name in found if len(found) > 1 and self.varies(name)] or found
 
@@ -171,7 +174,9 @@ class Swept:
         try:
             return np.array([float(row[name]) for row in self.rows])
         except ValueError:
-            raise InputError(f"--field {name}: no numbers; accepted: a column of numbers") from None
+            raise InputError(
+                f"--field {name}: no numbers; accepted: a column of numbers", "sweep-column"
+            ) from None
 
     def label(self, name: str) -> str:
         """Return a column in words, with its unit: a component by its axis."""
@@ -212,7 +217,9 @@ def _read(folder: Path) -> Swept:
     except (OSError, ValueError, IndexError, csv.Error):
         keys = []
     if not keys or any(None in row.values() for row in rows):
-        raise InputError(f"{path}: damaged, or no table of a sweep; accepted: a sweep's folder")
+        raise InputError(
+            f"{path}: damaged, or no table of a sweep; accepted: a sweep's folder", "sweep-table"
+        )
     try:
         case = tomllib.loads(path.with_suffix(".toml").read_text("utf-8"))
         about = case.get("case", {})
@@ -221,7 +228,7 @@ def _read(folder: Path) -> Swept:
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         accepted = "the case that a sweep has left beside its table"
         raise InputError(
-            f"{path.with_suffix('.toml')}: missing or damaged; accepted: {accepted}"
+            f"{path.with_suffix('.toml')}: missing or damaged; accepted: {accepted}", "sweep-toml"
         ) from None
 
 
