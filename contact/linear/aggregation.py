@@ -7,7 +7,6 @@ its transpose and all summands of P^T K P from one set-up to the next: more than
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
+from contact.linear.layout import hidden
 from contact.ranks import exchanged
 
 Integers = NDArray[np.integer[Any]]
@@ -72,15 +72,17 @@ class Aggregation:
         The operator K.
     tentative
         The tentative interpolation P0, which is destroyed.
+    steps
+        How often it is smoothed.
     """
 
-    def __init__(self, matrix: PETSc.Mat, tentative: PETSc.Mat) -> None:
+    def __init__(self, matrix: PETSc.Mat, tentative: PETSc.Mat, steps: int = 1) -> None:
         self._matrix, self._comm = matrix, matrix.comm.tompi4py()
         self._bs = tentative.getBlockSizes()[1]
         self._modes = _restricted(matrix.getNearNullSpace(), tentative)
         sizes, self._range = tentative.getSizes(), tentative.getOwnershipRangeColumn()
         self._find_others()
-        starts, columns, values = _smoothed(matrix, tentative)
+        starts, columns, values = _smoothed(matrix, tentative, steps)
         #: Lengths of the rows that others ask for.
         self._counts = np.diff(starts)[self._asked]
         sent = columns[_places(starts, self._asked)].astype(np.int64)
@@ -179,7 +181,8 @@ class Aggregation:
 
     def update(self) -> PETSc.Mat:
         """Return P^T K P of K and P as they are. Collective."""
-        with _without("matptap_via"):
+        # Of a sequential matrix the option has other values.
+        with hidden("", ["matptap_via"]):
             own = self._matrix.getDiagonalBlock().ptap(self.rows, result=self._product)
         self._product = own
         if self._comm.size == 1:
@@ -226,19 +229,6 @@ class Aggregation:
         return made
 
 
-@contextmanager
-def _without(name: str) -> Iterator[None]:
-    """Hide an option of the user for a while: of a sequential matrix it has other values."""
-    known = PETSc.Options()
-    given = known.getString(name) if known.hasName(name) else None
-    known.delValue(name)
-    try:
-        yield
-    finally:
-        if given is not None:
-            known[name] = given
-
-
 def _restricted(modes: PETSc.NullSpace, tentative: PETSc.Mat) -> PETSc.NullSpace:
     """Return a near null space on the coarse level: P0 keeps lengths and angles. Collective."""
     found = []
@@ -248,21 +238,26 @@ def _restricted(modes: PETSc.NullSpace, tentative: PETSc.Mat) -> PETSc.NullSpace
     return PETSc.NullSpace().create(vectors=found, comm=tentative.comm)
 
 
-def _smoothed(matrix: PETSc.Mat, tentative: PETSc.Mat) -> tuple[Integers, Integers, Any]:
-    """Return the owned rows of P = (I - w D^-1 K) P0: starts, global columns, values. Collective.
+def _smoothed(
+    matrix: PETSc.Mat, tentative: PETSc.Mat, steps: int
+) -> tuple[Integers, Integers, Any]:
+    """Return the owned rows of P = (I - w D^-1 K)^steps P0: starts, global columns, values.
 
     With w = 4/3 over the largest eigenvalue of D^-1 K (Vanek, Mandel and Brezina 1996). P0 is
-    destroyed.
+    destroyed. Collective.
     """
     diagonal = matrix.getDiagonal()
     diagonal.reciprocal()
-    made = matrix.matMult(tentative)
-    made.diagonalScale(L=diagonal)
-    factor = -4 / (3 * _largest_eigenvalue(matrix))
-    made.aypx(factor, tentative, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    factor, made = -4 / (3 * _largest_eigenvalue(matrix)), tentative
+    for _ in range(steps):
+        product = matrix.matMult(made)
+        product.diagonalScale(L=diagonal)
+        product.aypx(factor, made, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        # On several ranks Python would not free it before all come to it.
+        made.destroy()
+        made = product
     rows = made.getValuesCSR()
-    # On several ranks Python would not free them before all come to it.
-    for each in (made, tentative, diagonal):
+    for each in (made, diagonal):
         each.destroy()
     return rows  # type: ignore[no-any-return]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -214,6 +214,22 @@ def options(prefix: str, values: Mapping[str, str]) -> Iterator[None]:
     finally:
         for name in own:
             known.delValue(name)
+
+
+@contextmanager
+def hidden(prefix: str, names: Iterable[str]) -> Iterator[None]:
+    """Hide options of PETSc that the user gives under a prefix for a while."""
+    known = PETSc.Options(prefix)
+    given = {name: known.getString(name) for name in names if known.hasName(name)}
+    for name in given:
+        known.delValue(name)
+    try:
+        yield
+    finally:
+        for name, value in given.items():
+            known[name] = value
+            # PETSc warns of options that nobody has read.
+            known.hasName(name)
 
 
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:

@@ -18,7 +18,7 @@ from contact._compat import keeps_inverted_blocks
 from contact.linear.aggregation import AGGREGATES, Aggregation, rows_of, tentative
 from contact.linear.faults import petsc_options
 from contact.linear.krylov import Components, refine
-from contact.linear.layout import Layout, options, set_defaults
+from contact.linear.layout import Layout, hidden, options, set_defaults
 from contact.typing import Array
 
 #: Unknowns from which an iterative solver pays, by dimension and whether the body is piezoelectric
@@ -219,6 +219,22 @@ class StiffNodes:
         return vector
 
 
+#: Options of the user that are not those of the levels above GAMG's, whose matrices are made here.
+NOT_ABOVE = ("pc_type", "pc_mg_galerkin")
+
+#: A W-cycle visits the levels of GAMG twice: PETSc visits a coarsest level once.
+TWICE = {"ksp_type": "richardson", "ksp_max_it": "2", "ksp_norm_type": "none"}
+
+
+def _go_down(named: dict[str, str]) -> None:
+    """Make options of GAMG those of the next level: counts of levels, and values of each."""
+    squared = int(named["pc_gamg_aggressive_coarsening"])
+    named["pc_gamg_aggressive_coarsening"] = str(max(squared - 1, 0))
+    first, *others = named["pc_gamg_threshold"].split(",")
+    factor = float(named.get("pc_gamg_threshold_scale", 1))
+    named["pc_gamg_threshold"] = ",".join(others) or str(factor * float(first))
+
+
 #: Cost of renewing the coarse levels, in iterations (seen in `scripts.benchmarks.phases`).
 PRICE = 8
 
@@ -267,24 +283,29 @@ class Hierarchy:
         known, kinds = PETSc.Options(prefix), ("pc_gamg_", "pc_mg_", "mg_")
         # Read one by one: PETSc warns of options that nobody has read.
         named = {name: known.getString(name) for name in known.getAll() if name.startswith(kinds)}
-        squared = int(named["pc_gamg_aggressive_coarsening"])
-        while True:
-            with petsc_options(prefix), options(f"{prefix}aggregates_", named | AGGREGATES):
+        steps = int(named["pc_gamg_agg_nsmooths"])
+        while named["pc_gamg_type"] == "agg":
+            own = {name: value for name, value in named.items() if name.startswith("pc_gamg_")}
+            with petsc_options(prefix), options(f"{prefix}aggregates_", own | AGGREGATES):
                 found = tentative(matrix, f"{prefix}aggregates_")
             if found is None:
                 break
-            self._levels.append(Aggregation(matrix, found))
-            squared = max(squared - 1, 0)
-            named["pc_gamg_aggressive_coarsening"] = str(squared)
+            self._levels.append(Aggregation(matrix, found, steps))
+            _go_down(named)
             # Of small matrices GAMG leaves some ranks without rows.
             if self._levels[-1].interpolation.getSize()[1] <= LARGE[3, False] * matrix.comm.size:
                 break
             matrix = self._levels[-1].update()
         if not self._levels:
             return
-        self._below = named | {"ksp_type": "preonly", "pc_type": "gamg"}
+        # The whole cycle is repeated, and not its lower part once more.
+        named.pop("pc_mg_multiplicative_cycles", None)
+        visits = TWICE if named.get("pc_mg_cycle_type") == "w" else {"ksp_type": "preonly"}
+        self._below = named | visits | {"pc_type": "gamg"}
         pc.setType("mg")
         pc.setMGLevels(1 + len(self._levels))
+        with petsc_options(prefix), hidden(prefix, NOT_ABOVE):
+            pc.setFromOptions()
         for k, level in enumerate(reversed(self._levels), start=1):
             pc.setMGInterpolation(k, level.interpolation)
         pc.getMGCoarseSolve().setOptionsPrefix(f"{prefix}coarse_")

@@ -11,7 +11,7 @@ from contact.body.description import Body, Fixed, Load
 from contact.interface.obstacle import Plane
 from contact.linear import aggregation
 from contact.linear.aggregation import Aggregation, tentative
-from contact.linear.layout import options
+from contact.linear.layout import hidden, options
 from contact.linear.multigrid import DEFAULTS, held_motions
 from contact.linear.operator import SparseOperator
 from contact.mesh.grid import box
@@ -23,14 +23,14 @@ from tests.problems import mechanics
 WORLD = MPI.COMM_WORLD
 
 
-def level_of(problem: ContactProblem) -> tuple[PETSc.Mat, Aggregation]:
+def level_of(problem: ContactProblem, steps: int = 1) -> tuple[PETSc.Mat, Aggregation]:
     """Return the stiffness of a body, and its first coarse level. Collective."""
     body = problem.equilibrium
     matrix = body.create_matrix()
     body.assemble(matrix, "secant", problem.start())
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     matrix.setNearNullSpace(held_motions(body.layout))
-    return matrix, Aggregation(matrix, aggregates(matrix))
+    return matrix, Aggregation(matrix, aggregates(matrix), steps)
 
 
 def aggregates(matrix: PETSc.Mat, threshold: str = "0.01") -> PETSc.Mat:
@@ -81,6 +81,41 @@ def test_the_interpolation_is_smoothed_by_one_step_of_jacobi() -> None:
         assert moved.norm() <= 1e-12 * matrix.norm()
     assert np.ptp(damping) <= 1e-10 * damping[0]
     assert 0.2 < damping[0] < 1.4
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("steps", [0, 2])
+def test_the_interpolation_is_smoothed_as_often_as_asked_for(steps: int) -> None:
+    """Coarse rigid motions become (1 - w D^-1 K)^steps B, with w of the same K for one step."""
+    problem = mechanics.leaning_block(WORLD, 8)
+    matrix, level = level_of(problem, steps)
+    _, once = level_of(problem)
+    diagonal = matrix.getDiagonal()
+    levels = (level.update(), once.update())
+    modes = (each.getNearNullSpace().getVecs() for each in (matrix, *levels))
+    for fine, rough, other in zip(*modes, strict=True):
+        step = fine - once.interpolation * other
+        strained = matrix * fine
+        strained.pointwiseDivide(strained, diagonal)
+        damping = step.dot(strained) / strained.dot(strained)
+        expected = fine.copy()
+        for _ in range(steps):
+            strained = matrix * expected
+            strained.pointwiseDivide(strained, diagonal)
+            expected.axpy(-damping, strained)
+        assert (level.interpolation * rough - expected).norm() <= 1e-12 * fine.norm()
+        assert step.norm() > 1e-3 * fine.norm()
+
+
+@pytest.mark.parallel
+def test_the_coarse_operator_of_wider_interpolation_is_that_of_petsc() -> None:
+    """Rows of P then reach columns of ranks whose rows of K do not."""
+    matrix, level = level_of(mechanics.leaning_block(WORLD, 8), steps=2)
+    found = level.update()
+    expected = matrix.ptap(level.interpolation.convert("aij", PETSc.Mat()))
+    vector = expected.createVecRight()
+    vector.setRandom()
+    assert (found * vector - expected * vector).norm() <= 1e-13 * (expected * vector).norm()
 
 
 @pytest.mark.parallel
@@ -137,3 +172,15 @@ def test_how_petsc_multiplies_on_several_ranks_is_no_matter_of_one() -> None:
         assert known.getString("matptap_via") == "nonscalable"
     finally:
         known.delValue("matptap_via")
+
+
+def test_options_are_hidden_for_a_while_only() -> None:
+    known = PETSc.Options()
+    known["hidden_one"] = "1"
+    try:
+        with hidden("hidden_", ["one", "two"]):
+            assert not known.hasName("hidden_one")
+        assert known.getString("hidden_one") == "1"
+        assert not known.hasName("hidden_two")
+    finally:
+        known.delValue("hidden_one")
