@@ -52,7 +52,14 @@ def tentative(matrix: PETSc.Mat, prefix: str) -> PETSc.Mat | None:
     pc.setType("gamg")
     pc.setGAMGLevels(2)
     pc.setFromOptions()
+    # GAMG would not make the graph symmetric: where an entry is rounding and its transpose is zero,
+    # one rank would break off and the others wait.
+    told = all(matrix.isSymmetricKnown())
+    if told:
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, False)
     pc.setUp()
+    if told:
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     found = pc.getMGInterpolation(1) if pc.getMGLevels() > 1 else None
     pc.destroy()
     return found

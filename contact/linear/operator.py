@@ -45,7 +45,11 @@ class Bulk(Protocol):
         """The unknowns."""
 
     def create_matrix(self) -> PETSc.Mat:
-        """Return an empty matrix with the pattern of the body. Collective."""
+        """Return an empty matrix with the pattern of the body. Collective.
+
+        It lives no longer than the mesh, whose communicator it has, and nor do copies of it: after
+        that PETSc ends in a segmentation fault.
+        """
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
         """Assemble the body's "secant", "tangent" or its "symmetric" part. Collective."""

@@ -141,6 +141,31 @@ def test_entries_may_be_zero_where_others_are_later() -> None:
 
 
 @pytest.mark.parallel
+def test_rounding_on_one_side_of_a_symmetric_matrix() -> None:
+    """With a threshold of zero one rank broke off, and the others waited for it."""
+    body = (problem := mechanics.leaning_block(WORLD, 8)).equilibrium
+    matrix = body.create_matrix()
+    body.assemble(matrix, "secant", problem.start())
+    starts, columns, values = matrix.getValuesCSR()
+    rows = np.repeat(np.arange(*matrix.getOwnershipRange()), np.diff(starts))
+    small = 1e-17 * np.random.default_rng(WORLD.rank).integers(0, 2, values.size)
+    tiny = (rows // 3 != columns // 3) & (rows % 3 == 0) & (columns % 3 == 0)
+    weak = np.abs(values) < 0.2 * np.abs(values).max()
+    values = np.where(
+        rows % 3 == columns % 3, np.where(weak, np.where(tiny, small, 0.0), values), 0.0
+    )
+    matrix.setValuesCSR(starts, columns, values)
+    matrix.assemble()
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    matrix.setNearNullSpace(held_motions(body.layout))
+    found = aggregates(matrix, "0")
+    assert matrix.isSymmetricKnown() == (True, True)
+    ones = found.createVecRight()
+    ones.set(1.0)
+    assert (found * ones).norm() > 0
+
+
+@pytest.mark.parallel
 def test_multigrid_knows_rigid_motions_with_inclined_supports() -> None:
     """Their matrix is copied, and lost them on the way: the program broke off."""
     tilt = np.sqrt(0.5)
