@@ -5,6 +5,8 @@ import os
 import re
 import shutil
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, get_type_hints
@@ -129,9 +131,24 @@ def _type_of(made: type, name: str) -> str:
     return ""
 
 
+def _argument_type(made: type, name: str) -> str:
+    """Return the type of an argument of a constructor, or nothing.
+
+    Sphinx would take that of the attribute of the same name, which may be narrower.
+    """
+    try:
+        found = get_type_hints(made.__init__).get(name)  # type: ignore[misc]
+    except NameError:  # imported for type checkers alone
+        return ""
+    return stringify_annotation(found, "smart") if found is not None else ""
+
+
 def _types(_: Any, what: str, __: str, made: Any, ___: Any, lines: list[str]) -> None:
-    """Add the attributes that a class inherits, and let all say their types."""
-    if what != "class" or "Attributes" not in lines:
+    """Let arguments and attributes say their types; add the attributes that a class inherits."""
+    if what != "class":
+        return
+    _say(lines, "Parameters", partial(_argument_type, made))
+    if "Attributes" not in lines:
         return
     for base in made.__mro__[1:]:
         known = {name for row in lines if row[:1].strip() for name in re.split(", ?", row)}
@@ -143,10 +160,27 @@ def _types(_: Any, what: str, __: str, made: Any, ___: Any, lines: list[str]) ->
         if base.__module__.split(".")[0] in ("contact", "forms"):
             end = _section(lines, "Attributes")[1]
             lines[end:end] = [x.replace(", ", ",") if x[:1].strip() else x for x in [*more, ""]]
-    for i in range(*_section(lines, "Attributes")):
-        if re.fullmatch(r"\w+(,\w+)*", lines[i]):
-            types = dict.fromkeys(_type_of(made, name) for name in lines[i].split(","))
-            lines[i] += f" : {', '.join(types)}" if all(types) else ""
+    _say(lines, "Attributes", partial(_type_of, made))
+
+
+def _say(lines: list[str], section: str, type_of: Callable[[str], str]) -> None:
+    """Put types behind the names of a section; names of unlike types get rows of their own."""
+    first, end = _section(lines, section)
+    rows: list[list[str]] = []
+    for line in lines[first:end]:
+        if line[:1].strip() or not rows:
+            rows.append([line])
+        else:
+            rows[-1].append(line)
+    made: list[str] = []
+    for head, *text in rows:
+        names = re.split(", ?", head) if re.fullmatch(r"\w+(, ?\w+)*", head) else []
+        types = [type_of(name) for name in names]
+        if all(types) and len(set(types)) > 1:
+            made += [x for n, t in zip(names, types, strict=True) for x in (f"{n} : {t}", *text)]
+        else:
+            made += [f"{head} : {types[0]}" if names and all(types) else head, *text]
+    lines[first:end] = made
 
 
 def _present(app: Any, name: str, source: list[str]) -> None:

@@ -37,7 +37,7 @@ pytestmark = pytest.mark.parallel(2)
 
 
 def solved(problem, options=None):
-    solution = solve(problem, options or NewtonOptions(tolerance=1e-10))
+    solution = solve(problem, options or NewtonOptions(tolerance=1e-12))
     assert solution.converged, solution.outcome.reason
     return solution
 
