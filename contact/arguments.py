@@ -80,6 +80,13 @@ def several(name: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...
     return every
 
 
+def one_of(name: str, /, **given: T | None) -> T | None:
+    """Return which of several names for the same is given; of more than one an InputError."""
+    names = [key for key, value in given.items() if value is not None]
+    expect(name, names, f"one of {', '.join(given)}", len(names) < 2)
+    return given[names[0]] if names else None
+
+
 def is_law(given: object) -> bool:
     """Tell whether an object has the constants of a law of the stress."""
     try:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar, cast
+from typing import cast
 
 import numpy as np
 from dolfinx.fem import Function
 
-from contact.arguments import CONSTANTS, expect, fill, is_law, several
+from contact.arguments import CONSTANTS, expect, fill, is_law, one_of, several
 from contact.body.fields import (
     Amplitude,
     Field,
@@ -25,6 +25,7 @@ from contact.body.fields import (
     field,
     knows_time,
     own_amplitude,
+    static,
     vector,
 )
 from contact.body.rigid import Bolt, Electrode, Rigid
@@ -36,8 +37,6 @@ from forms.hencky import Law, is_linear
 from forms.history import HistoryLaw
 from forms.piezo import Piezo
 from forms.plane_stress import PlaneStressElastic, PlaneStressHistory, in_plane_stress
-
-T = TypeVar("T")
 
 #: For scripts that are older than the meaning of the word.
 CHANGED = (
@@ -141,13 +140,6 @@ def _resultant(
     return cast(tuple[Number | Moving, ...] | None, found)
 
 
-def _one_of(**given: T | None) -> T | None:
-    """Return which of several names for the same is given."""
-    names = [name for name, value in given.items() if value is not None]
-    expect("Load", names, f"one of {', '.join(given)}", len(names) < 2)
-    return given[names[0]] if names else None
-
-
 @dataclass(frozen=True)
 class Load:
     """Given forces and charges: on a part, or in the whole body where `on` is None.
@@ -202,8 +194,8 @@ class Load:
     ) -> None:
         fill(self, on=None if on is None else part(on))
         inside = self.on is None
-        density = _one_of(density=density, traction=traction, body_force=body_force)
-        charge = _one_of(charge=charge, body_charge=body_charge)
+        density = one_of("Load", density=density, traction=traction, body_force=body_force)
+        charge = one_of("Load", charge=charge, body_charge=body_charge)
         for name, given, fits in (
             ("traction", traction, not inside),
             ("pressure", pressure, not inside),
@@ -262,16 +254,21 @@ class Elastic:
     """
 
     on: str
-    stiffness: tuple[Field | Moving, ...] | None
-    normal: Field | Moving | None
+    stiffness: tuple[Field, ...] | None
+    normal: Field | None
 
     def __init__(
         self,
         on: str | Sequence[str],
         stiffness: Vector | None = None,
-        normal: Scalar | None = None,
+        normal: Static | None = None,
     ) -> None:
-        fill(self, on=part(on), stiffness=vector(stiffness), normal=field(normal))
+        name, given = f"Elastic on {part(on)!r}", vector(stiffness)
+        components = tuple(
+            static(cast(Static, one), f"{name}: stiffness.{i}") for i, one in enumerate(given or ())
+        )
+        along = None if normal is None else static(normal, f"{name}: normal")
+        fill(self, on=part(on), stiffness=given and components, normal=along)
         if self.stiffness is None and self.normal is None:
             words = f"Elastic on {self.on!r}: nothing is given; accepted: stiffness or normal"
             raise InputError(words, "elastic")

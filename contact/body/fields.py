@@ -186,6 +186,20 @@ def field(value: Scalar | None) -> Field | Moving | None:
     raise InputError(f"given {value!r} for a function of position; accepted: {ACCEPTED}", "field")
 
 
+def static(value: Static, name: str) -> Field:
+    """Return a given function of position that depends on no time, as `field` does.
+
+    Raises
+    ------
+    InputError
+        If it is nothing of the kind, with the name of the value where it depends on time.
+    """
+    made = field(value)
+    accepted = "a number or a function of position, the same at all times"
+    expect(name, value, accepted, not isinstance(made, Moving))
+    return cast(Field, made)
+
+
 def vector(
     value: FreeVector | None, free: bool = False
 ) -> tuple[Field | Moving | None, ...] | None:

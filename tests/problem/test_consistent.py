@@ -12,6 +12,7 @@ from contact import (
     Cone,
     Contact,
     Cylinder,
+    Elastic,
     Electrode,
     Fixed,
     Friction,
@@ -41,6 +42,13 @@ from tests.problems.put_together import LAW, TOP, block, problem
 def hole(x: Any) -> Any:
     """Return 1e-3, and no number on the right."""
     return np.where(x[0] > 1.5, np.nan, 1e-3)
+
+
+class Growing:
+    """A value that grows with the time."""
+
+    def at(self, time: float) -> float:
+        return time
 
 
 def on(*shape: Any, **more: Any) -> Callable[[], Problem]:
@@ -112,6 +120,15 @@ WRONG = {
     "a resultant by place": (
         lambda: Load("top", force=[0, lambda x: x[0]]),
         r"Load: force: .*accepted: numbers, the resultant",
+    ),
+    "a gap of time": (lambda: Contact("bottom", Growing()), "gap: given .*; accepted: .*all times"),
+    "a spring of time": (
+        lambda: Elastic("top", [0.0, Growing()]),
+        r"Elastic on 'top': stiffness\.1: given .*; accepted: .*all times",
+    ),
+    "a spring of time along the normal": (
+        lambda: Elastic("top", normal=Growing()),
+        "Elastic on 'top': normal: given .*; accepted: .*all times",
     ),
     "a support of nothing": (lambda: Fixed("top", ["free", None]), "nothing is prescribed"),
     "an amplitude": (

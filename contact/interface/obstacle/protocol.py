@@ -5,13 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Protocol, cast
+from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
 from mpi4py import MPI
 
 from contact.arguments import LEAST, OFF, SHARE, SMOOTH, STEP, expect, naming, real
-from contact.body.fields import Field, Static, field
+from contact.body.fields import Static, static
 from contact.errors import InputError
 from contact.ranks import on_all_ranks
 from contact.settings import Internal
@@ -239,7 +239,7 @@ class GapFunction:
         InputError
             If it is nothing of these.
         """
-        return GapFunction(cast(Field, field(value)).numpy)
+        return GapFunction(static(value, "gap").numpy)
 
     direction = "body"
     is_shape = False
