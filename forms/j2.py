@@ -158,8 +158,8 @@ class J2(Isotropic):
     >>> law = J2(200e3, 0.3, yield_stress=250.0, hardening=Voce(saturation=100.0, rate=20.0))
     >>> law.respond(np.array([[1e-2, 0, 0, 0]]), {
     ...     name: np.array([value]) for name, value in law.variables(4).items()
-    ... }).variables["equivalent_plastic_strain"].round(6)
-    array([0.005538])
+    ... }).variables["equivalent_plastic_strain"].round(6).tolist()
+    [0.005538]
     """
 
     yield_stress: float = field(kw_only=True)

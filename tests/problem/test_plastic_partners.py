@@ -126,7 +126,10 @@ def test_without_coupling_the_field_changes_nothing():
         }
         potentials = [{"on": "upper_top", "potential": 1.0, "amplitude": "volts"}]
         fixed = driven + (potentials if coupling else [])
-        given = pressed(0.3, False, coupling=coupling, fixed=fixed, evolution=evolution)
+        closer = {"tolerance": 1e-12}
+        given = pressed(
+            0.3, False, coupling=coupling, fixed=fixed, evolution=evolution, solver=closer
+        )
         solution = solve(given)
         assert solution.converged and solution.equivalent_plastic_strain > 5e-4
         body = solution.problem.equilibrium

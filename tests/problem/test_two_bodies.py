@@ -94,7 +94,7 @@ def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
     def singular(operator, *given):
         calls.append(given)
         if len(calls) > 2:
-            raise SingularError("singular")
+            raise SingularError("singular", "not-held")
         return solve(operator, *given)
 
     monkeypatch.setattr(SparseOperator, "solve", singular)
