@@ -313,7 +313,7 @@ class Material:
         fill(self, law=law, piezo=piezo)
         factor = factor.copy() if isinstance(factor, Function) else factor
         names = several("on", on, str, "the name of a region, or a list of names")
-        fill(self, factor=field(factor), on=names)
+        fill(self, factor=None if factor is None else static(factor, "factor"), on=names)
         accepted = (
             "Linear(young, poisson), Log, UserLaw, forms.elasticity.Anisotropic(stiffness), of a "
             "crystal in 2-D with .in_plane(), or an object with the numbers "
@@ -325,7 +325,7 @@ class Material:
         expect("piezo", self.piezo, "Piezo(...), or None", fits)
         fits = self.factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
         accepted = "a material without coupling and internal variables"
-        expect("factor", self.factor, accepted, fits and not isinstance(self.factor, Moving))
+        expect("factor", self.factor, accepted, fits)
 
     @property
     def in_plane_stress(self) -> bool:
