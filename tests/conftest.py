@@ -23,6 +23,9 @@ from tests.problems.bar import BAR
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+# The C compiler takes most of a first run: less optimisation of forms is enough for small meshes.
+os.environ["XDG_CONFIG_HOME"] = str(Path(__file__).parent / "settings")
+
 # The same examples on every rank and in every run; forms compile at the first one, so no deadline.
 _common = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("contact", derandomize=True, database=None, **_common)
