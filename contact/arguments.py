@@ -100,6 +100,10 @@ def is_law(given: object) -> bool:
 class _Returned(ValueError):
     """A function has returned a value that is not accepted."""
 
+    def __init__(self, words: str, identifier: str = "own-function") -> None:
+        super().__init__(words)
+        self.identifier = identifier
+
 
 def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
     """Return the value of a function as numbers, inside `naming`.
@@ -135,7 +139,8 @@ def check_finite(values: Array, where: Callable[[int], str]) -> None:
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size > 0:
         raise _Returned(
-            f"not finite {where(bad[0])}; accepted: a finite number, formula or function"
+            f"not finite {where(bad[0])}; accepted: a finite number, formula or function",
+            "not-finite",
         )
 
 
@@ -147,7 +152,7 @@ def naming(name: str) -> Iterator[None]:
     except InputError:
         raise
     except _Returned as error:
-        raise InputError(f"{name}: {error}", "own-function") from None
+        raise InputError(f"{name}: {error}", error.identifier) from None
     except Exception as error:
         raise InputError(
             f"{name}: the function raises {type(error).__name__}: {shorten(str(error))}",

@@ -48,6 +48,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.problem.state import State
 from contact.ranks import on_root
+from contact.typing import Array
 
 logger = logging.getLogger("contact.steps")
 
@@ -118,7 +119,7 @@ def solve(
     folder: str | Path | None = None,
     restart: str | Path | None = None,
     start: State | Solution | None = None,
-    times: Sequence[float] | None = None,
+    times: Sequence[float] | Array | None = None,
     **replacements: Unpack[Replacements],
 ) -> Solution:
     """Build and solve a case, in load steps where it has them. Collective.
@@ -169,7 +170,8 @@ def solve(
     expect("solve", case, "a case, the name of a case file, or a Problem", fits)
     folder, restart = (None if given is None else Path(given) for given in (folder, restart))
     for name in replacements.keys() - set(REPLACEMENTS):
-        raise InputError(f"{name}: unknown; accepted: {', '.join(REPLACEMENTS)}", "no-such-name")
+        accepted = f"{', '.join(REPLACEMENTS)}; a method and its tolerances as settings"
+        raise InputError(f"{name}: unknown; accepted: {accepted}", "no-such-name")
     nested = settings.nested if isinstance(settings, NewtonOptions) else None
     if isinstance(case, ContactProblem):
         given = {"folder": folder, "restart": restart, "nested": nested or None, **replacements}
@@ -241,7 +243,7 @@ def solve(
 
 def evolve(
     problem: ContactProblem,
-    times: Sequence[float],
+    times: Sequence[float] | Array,
     settings: Options | None = None,
     monitor: Monitor | None = None,
     start: State | Solution | None = None,
@@ -438,7 +440,7 @@ def _check_options(settings: Options | None, monitor: Monitor | None) -> None:
 
 
 def _checked_times(
-    problem: ContactProblem, times: Sequence[float], begin: float
+    problem: ContactProblem, times: Sequence[float] | Array, begin: float
 ) -> tuple[float, ...]:
     """Return the ends of steps; refuse times that do not increase, and contradictory supports.
 

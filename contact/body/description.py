@@ -315,7 +315,7 @@ class Material:
         names = several("on", on, str, "the name of a region, or a list of names")
         fill(self, factor=None if factor is None else static(factor, "factor"), on=names)
         accepted = (
-            "Linear(young, poisson), Log, UserLaw, forms.elasticity.Anisotropic(stiffness), of a "
+            "Linear(young, poisson) of numbers, Log, UserLaw, forms.elasticity.Anisotropic(C) of a "
             "crystal in 2-D with .in_plane(), or an object with the numbers "
             f"{', '.join(CONSTANTS)} and a stress as forms.hencky.Hencky or "
             "forms.history.HistoryLaw have it"
@@ -408,7 +408,7 @@ class Body:
         bolts: Bolt | Sequence[Bolt] = (),
     ) -> None:
         if isinstance(law, Material | list | tuple):
-            accepted = "a law, Material(...), or a list of materials"
+            accepted = "a law, Material(law), or a list of Material(law, on=region)"
             given = several("law", law, Material, accepted)
             expect("law", law, accepted, given and piezo is None and not regions)
             (law, piezo), regions = _leading(given), given

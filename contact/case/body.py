@@ -95,7 +95,7 @@ class Fixed(Section):
         if self.potential is None and all(c == "free" for c in self.displacement or ()):
             given = self.displacement or Words("missing")
             accepted = "a component that is fixed, normal, symmetry or a potential"
-            raise fault("displacement", given, accepted)
+            raise fault("displacement", given, accepted, "supports")
         return self
 
     def build(self, key: str, case: Case, domain: Domain) -> description.Fixed:

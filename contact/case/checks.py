@@ -80,7 +80,7 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
         if SPATIAL in marks and isinstance(value, tuple) and len(value) != dimension:
             raise fault(path, as_given(value), f"{dimension} components in {dimension}-D")
         if isinstance(value, Expression) and dimension == 2 and "z" in value.names:
-            raise fault(path, value.source, "formulas in x and y in 2-D")
+            raise fault(path, value.source, "formulas in x and y in 2-D", "formula-variable")
         if PART in marks and value is not None:
             for name in members(value):
                 if name not in known:

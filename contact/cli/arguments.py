@@ -56,10 +56,8 @@ class Parser(argparse.ArgumentParser):
     """A parser that raises InputError, and prints its help on one rank alone."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise an InputError with the usage."""
-        raise InputError(
-            f"{message}; accepted: {' '.join(self.format_usage().split())}", "command-line"
-        )
+        """Raise an InputError that names the command whose help has the usage."""
+        raise InputError(f"{message}; accepted: as {self.prog} --help shows", "command-line")
 
     def _print_message(self, message: str, file: Any = None) -> None:
         if MPI.COMM_WORLD.rank == 0:

@@ -107,7 +107,7 @@ BAD = {
     "contact part clamped": ({"contact__on": "left"}, "a part that fixed.0 does not fix wholly"),
     "nothing fixed": (
         {"fixed": [{"on": "left", "displacement": ["free", "free"]}]},
-        "fixed.0.displacement: given",
+        "a component that is fixed, normal, symmetry or a potential [supports]",
     ),
     "components": ({"fixed__0__displacement": [0, 0, 0]}, "2 components in 2-D"),
     "components in space": ({"mesh": box, "load__0__on": "top"}, "3 components in 3-D"),
@@ -118,7 +118,10 @@ BAD = {
     "traction everywhere": ({"load__0": {"everywhere": True, "traction": [0, 1]}}, "body_force"),
     "unknown name": ({"load__0__traction": ["10*w", 0]}, 'load.0.traction.0: "10*w": unknown name'),
     "code": ({"contact__gap": "__import__('os')"}, "contact.gap: "),
-    "z in the plane": ({"load__0__traction": ["z", 0]}, "formulas in x and y in 2-D"),
+    "z in the plane": (
+        {"load__0__traction": ["z", 0]},
+        "formulas in x and y in 2-D [formula-variable]",
+    ),
     "power": ({"contact__gap": "9**9**9"}, "not finite"),
     "negative gap": ({"contact__gap": -0.1}, "contact.gap: -0.1 is negative"),
     "gap and shape": (

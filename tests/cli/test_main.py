@@ -34,7 +34,8 @@ def test_petsc_options_are_told_from_ours():
 @pytest.mark.parametrize(
     ("line", "fragment"),
     [
-        ("", "accepted: usage: contact"),
+        ("", "accepted: as contact --help shows"),
+        ("solve --restart", "--restart: expected one argument; accepted: as contact solve --help"),
         ("solv a.toml", "solv"),
         ("solve", "CASE.toml"),
         ("solve a.toml", "--out"),

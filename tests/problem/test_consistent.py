@@ -201,6 +201,15 @@ WRONG = {
     "a mesh": (lambda: Problem(block().mesh, Body(LAW, TOP), Contact("bottom")), "domain: "),
     "a start": (lambda: solve(problem(), start=3), "start: given 3; accepted: an earlier sol"),  # type: ignore[arg-type]
     "no problem": (lambda: solve(block()), "solve: given <Domain"),  # type: ignore[arg-type]
+    "a method": (
+        lambda: solve(problem(), method="uzawa"),
+        r"method: unknown; .*; a method and its tolerances as settings \[no-such-name\]$",
+    ),
+    "nan as support": (
+        lambda: solve(Problem(block(), Body(LAW, Fixed("top", [np.nan, 0.0])), Contact("bottom"))),
+        r"not finite at .* \[not-finite\]$",
+    ),
+    "a law in a list": (lambda: Body([LAW], TOP), r"a list of Material\(law, on=region\)"),
     "a replacement": (lambda: solve(problem(), domian=3), "domian: unknown; accepted: domain"),
     "a monitor": (lambda: solve(problem(), monitor=3), "monitor: given 3"),  # type: ignore[arg-type]
     "times": (lambda: next(evolve(problem(), 1.0)), r"times: given 1\.0; accepted: a list"),  # type: ignore[arg-type]

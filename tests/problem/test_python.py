@@ -1,5 +1,6 @@
 """What is put together in Python is what a case of the same words stands for."""
 
+import numpy as np
 import pytest
 
 from contact import (
@@ -40,7 +41,7 @@ def test_steps_of_a_problem() -> None:
     friction = Problem(made.domain, made.body, Contact("bottom"), Friction(mu=0.2))
     times = [0.5, 1.0]
     states = list(evolve(friction, times))
-    solution = solve(friction, times=times)
+    solution = solve(friction, times=np.array(times))
     assert [step.row["t"] for step in solution.steps] == times
     assert solution.state.near(states[-1], atol=1e-9)
     force = solution.steps[-1].row["contact_force_y"]

@@ -225,10 +225,12 @@ def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
         ) from None
     except OSError as error:
         raise refused(error) from None
-    except KeyError as error:
-        raise InputError(f"{path}: not as a run has left it (no {error})", "no-results") from None
-    except (ValueError, IndexError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: not as a run has left it ({error})", "no-results") from None
+    except (KeyError, ValueError, IndexError, TypeError, AttributeError) as error:
+        why = f"no {error}" if isinstance(error, KeyError) else error
+        raise InputError(
+            f"{path}: not as a run has left it ({why}); accepted: the file that solving writes",
+            "no-results",
+        ) from None
 
 
 def _table_of(path: Path) -> dict[str, Any]:
