@@ -1,4 +1,4 @@
-"""A piezoelectric sensor under a load that comes and goes: its charge over the load has a loop.
+"""A piezoelectric sensor under a cyclic load: its charge over the load has a loop.
 
 `python3 -m scripts.examples.cyclic_sensor`, also under mpirun.
 """

@@ -1,4 +1,4 @@
-"""A return mapping of your own: rock by Drucker and Prager, under a ball that comes and goes.
+"""A return mapping of your own: rock by Drucker and Prager, pressed by a ball.
 
 `make own_return_mapping`, or `python3 -m scripts.examples.own_return_mapping`, also under mpirun.
 """
