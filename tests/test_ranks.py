@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.history import BodyState
-from contact.linear.dense import DenseOperator
+from contact.linear.dense import DenseOperator, DenseStiffness
 from contact.linear.operator import Counters
 from contact.ranks import largest, on_all_ranks, on_root, summed
 from tests.conftest import _covering
@@ -41,8 +41,9 @@ def test_what_the_last_rank_raises():
 def test_a_dense_factorisation_without_room(monkeypatch):
     """The others went on to the next solve, and waited there."""
     free = np.ones((1, 2), dtype=bool)
-    operator = DenseOperator(COMM, free, np.eye(2 * COMM.size), Counters())
-    monkeypatch.setattr(DenseOperator, "_factorise", lambda *_: fails())
+    stiffness = DenseStiffness(np.eye(2 * COMM.size))
+    operator = DenseOperator(COMM, free, stiffness, Counters())
+    monkeypatch.setattr(stiffness, "factorise", lambda *_: fails())
     with pytest.raises(MemoryError, match="no room"):
         operator.update("tangent", BodyState(np.zeros(2)), np.ones((1, 2, 2)))
 

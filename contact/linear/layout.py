@@ -171,6 +171,8 @@ def times(matrix: PETSc.Mat | None, values: Array, transposed: bool = False) -> 
     if matrix is None:
         return values
     vector, image = matrix.createVecs()
+    if transposed:
+        vector, image = image, vector
     vector.array[:] = values
     (matrix.multTranspose if transposed else matrix.mult)(vector, image)
     return np.asarray(image.array)

@@ -91,7 +91,13 @@ class SchurComplement:
         # MUMPS leaves the Schur complement to the first rank, and PETSc asks for its rows there.
         own = np.concatenate(numbers)[: None if self.comm.rank == 0 else 0]
         self._numbers = PETSc.IS().createGeneral(own, matrix.comm)
-        self._matrix: PETSc.Mat | None = None
+        own_kept, (_, end) = (begin + kept).astype(PETSc.IntType), matrix.getOwnershipRange()
+        self._places = (
+            PETSc.IS().createGeneral(own_kept, matrix.comm),
+            PETSc.IS().createStride(end - begin, begin, 1, comm=matrix.comm),
+        )
+        #: Rows of the matrix at kept unknowns.
+        self._rows: PETSc.Mat | None = None
         self._ksp = PETSc.KSP().create(matrix.comm)
         self._ksp.setOptionsPrefix(prefix)
         self._ksp.setType("preonly")
@@ -111,7 +117,8 @@ class SchurComplement:
         InputError
             If there is too little memory.
         """
-        first, self._matrix = self._matrix is None, matrix
+        first = self._rows is None
+        self._rows = matrix.createSubMatrix(*self._places, self._rows)
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         # On several ranks MUMPS writes the other triangle where it factorises with an old analysis.
         if first or self.comm.size > 1:
@@ -156,18 +163,14 @@ class SchurComplement:
         solution[self._kept] = 0.0
         return solution
 
-    def multiply(self, values: Array) -> Array:
-        """Return the matrix times owned values. Collective."""
-        assert self._matrix is not None
-        return times(self._matrix, values)
-
     def condense(self, rhs: Array, interior: Array) -> Array:
         """Return a right-hand side at the kept unknowns, of all ranks, given `interior` of it."""
-        own = (rhs - self.multiply(interior))[self._kept]
+        own = rhs[self._kept] - times(self._rows, interior)
         return np.concatenate(self.comm.allgather(own))
 
     def expand(self, rhs: Array, kept: Array) -> Array:
         """Return the owned solution that goes with values of the kept unknowns of all ranks."""
-        values = np.zeros(rhs.size)
-        values[self._kept] = kept[self.offset : self.offset + self._kept.size]
-        return self.interior(rhs - self.multiply(values)) + values
+        own = kept[self.offset : self.offset + self._kept.size]
+        solution = self.interior(rhs - times(self._rows, own, transposed=True))
+        solution[self._kept] = own
+        return solution

@@ -25,6 +25,7 @@ from contact.methods.unconstrained_modes import RIGID_MOTION
 from contact.problem.condensed import Condensation, CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals
+from contact.typing import Array
 
 #: Ratio of the tolerance of the condensed contact problem to the residual before the step.
 CONTACT_PART = 1e-3
@@ -91,13 +92,17 @@ class CondensedStep:
         """Begin another loop with the same factorisation."""
         self._chord.begin()
 
-    def __call__(self, iterate: Iterate, tangent: bool, reached: Residuals) -> StepResult | None:
+    def __call__(
+        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array
+    ) -> StepResult | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
         body = self.condensation.full.equilibrium
+        last = iterate
         iterate, keep = self._chord.choose(iterate, reached.significant)
         state = iterate.state
         kind = "tangent" if tangent else "secant"
-        condensed = self.condensation.linearise(kind, state, keep, iterate.linearised_at)
+        known = internal if iterate is last and iterate.linearised_at is None else None
+        condensed = self.condensation.linearise(kind, state, keep, iterate.linearised_at, known)
         if condensed is None:
             return None
         # No more accurate than the material is linearised, nor than the end asks for.

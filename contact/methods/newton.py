@@ -73,7 +73,7 @@ from contact.methods.unconstrained_modes import RIGID_MOTION, UnconstrainedModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
-from contact.problem.residuals import Residuals, evaluate, residual_forces
+from contact.problem.residuals import Residuals, evaluate, evaluate_forces, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -383,7 +383,7 @@ class NewtonLoop:
         """
         iteration, problem, options = self.iteration, self.iteration.problem, self.iteration.options
         linear = problem.equilibrium.linear
-        residuals = evaluate(problem, iterate.state)
+        residuals, internal = evaluate_forces(problem, iterate.state)
         pressed = self._largest_pressure(iterate)
         limit = self.stagnation_limit or options.stagnation_limit
         stagnation = Stagnation(limit, PROGRESS, cumulative=True)
@@ -396,11 +396,11 @@ class NewtonLoop:
         tangent = iterate.active_set is not None and iterate.linearised_at is None and not linear
         for _ in range(min(options.max_iterations, iteration.left)):
             before, kept = residuals, iterate
-            taken = self.step(iterate, tangent, residuals)
+            taken = self.step(iterate, tangent, residuals, internal)
             if taken is None:
                 return kept, self._end(residuals, self.step.fault)
             iterate = taken.iterate
-            residuals = evaluate(problem, iterate.state)
+            residuals, internal = evaluate_forces(problem, iterate.state)
             worse = self.step.conductivity_derivative.worsened(residuals.significant)
             iteration.see(iterate, residuals)
             words = (note, taken.note, "tangent" * tangent, "rejected" * worse)
@@ -410,7 +410,7 @@ class NewtonLoop:
             )
             if worse:
                 iterate = kept
-                residuals = evaluate(problem, iterate.state)
+                residuals, internal = evaluate_forces(problem, iterate.state)
                 iteration.see(iterate, residuals)
             if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)

@@ -136,7 +136,9 @@ class Step(Protocol):
     def begin(self) -> None:
         """Forget the steps before: a new loop begins."""
 
-    def __call__(self, iterate: Iterate, tangent: bool, reached: Residuals) -> StepResult | None:
+    def __call__(
+        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array
+    ) -> StepResult | None:
         """Take a step; None if it cannot be taken. Collective.
 
         Parameters
@@ -145,8 +147,8 @@ class Step(Protocol):
             Where from.
         tangent
             Whether the material's tangent is taken, or its secant.
-        reached
-            The residuals there.
+        reached, internal
+            The residuals, and the internal forces of the material law there.
         """
 
 
@@ -229,7 +231,9 @@ class NewtonStep:
         step = self.operator.solve(-residual_forces(problem, free), rtol)
         return replace(free, x=body.prescribe(body.moved(free.x, step), free.time))
 
-    def __call__(self, iterate: Iterate, tangent: bool, reached: Residuals) -> StepResult | None:
+    def __call__(
+        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array
+    ) -> StepResult | None:
         """Take a step; see `Step`."""
         state, interface = iterate.state, self.problem.interface
         body, jump = self.problem.equilibrium, interface.jump
@@ -260,7 +264,8 @@ class NewtonStep:
         self.operator.update(kind, at, blocks, constant=body.linear or remains)
         self._kind = kind
         here = replace(state, forces=contact.forces)
-        residual = residual_forces(self.problem, here, iterate.linearised_at)
+        known = internal if iterate.linearised_at is None else None
+        residual = residual_forces(self.problem, here, iterate.linearised_at, known)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
         try:
             increment = self.operator.solve(-residual, self._forcing_term(reached.significant))

@@ -22,7 +22,7 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
 from contact.linear.constraint import ConstrainedBulk, Constraint
-from contact.linear.dense import DenseOperator
+from contact.linear.dense import DenseOperator, DenseStiffness
 from contact.linear.faults import check_overflow, petsc_options
 from contact.linear.layout import Inclined, balance, masked
 from contact.linear.operator import Counters
@@ -64,7 +64,7 @@ class CondensedBody:
     rows
         The owned rows of the Schur complement.
     stiffness
-        All of it: on the first rank alone.
+        All of it, of which the other ranks have nothing.
     residual
         Condensed internal forces minus loads where the body was linearised, all ranks.
     at, own
@@ -81,7 +81,7 @@ class CondensedBody:
     dim: int
     free: NDArray[np.bool_]
     rows: Array
-    stiffness: Array
+    stiffness: DenseStiffness
     residual: Array
     at: Array
     own: slice
@@ -221,7 +221,7 @@ class Condensation:
         self._own = slice(begin, begin + kept.size)
         self._kind = ""
         self._rows: Array = np.zeros((0, 0))
-        self._stiffness: Array = np.zeros((0, 0))
+        self._stiffness = DenseStiffness(self._rows)
 
     def set_load_step(self, full: ContactProblem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
@@ -229,7 +229,12 @@ class Condensation:
         self._interface = at_kept_nodes(full.interface)
 
     def linearise(
-        self, kind: str, state: State, keep: bool = False, linearised_at: Array | None = None
+        self,
+        kind: str,
+        state: State,
+        keep: bool = False,
+        linearised_at: Array | None = None,
+        internal: Array | None = None,
     ) -> CondensedProblem | None:
         """Condense the body, linearised at a state of the full problem. Collective.
 
@@ -241,6 +246,8 @@ class Condensation:
             Whether to take the last factorisation, wherever that was.
         linearised_at
             Unknowns at which a secant is taken; those of the state by default.
+        internal
+            The internal forces, where they are known already.
 
         Returns
         -------
@@ -259,7 +266,9 @@ class Condensation:
             self._factorise(
                 kind, state if linearised_at is None else replace(state, x=linearised_at)
             )
-        residual = body.internal_forces(state, linearised_at) - body.external(state.time)
+        if internal is None:
+            internal = body.internal_forces(state, linearised_at)
+        residual = internal - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
         reactions = body.sizes(body.reactions(residual))
         acting = body.load_sizes(state.time) + reactions + body.exchanged(state)
@@ -305,12 +314,13 @@ class Condensation:
             return None
         if not self._kind:
             self._factorise("tangent", state)
-        return self._stiffness if self._regular else None
+        return self._stiffness.matrix if self._regular else None
 
     def _factorise(self, kind: str, state: State) -> None:
         """Find the dense stiffness of the body at a state. Collective."""
         body, schur = self.full.equilibrium, self._schur
-        self._rows = self._stiffness = np.zeros((0, 0))  # room for new ones
+        self._rows = np.zeros((0, 0))
+        self._stiffness = DenseStiffness(self._rows)  # room for a new one
         # The symmetric part of a tangent converges as a chord step does, and condenses alike.
         part = "symmetric" if kind == "tangent" and not body.symmetric else kind
         self._bulk.assemble(self._matrix, part, state)
@@ -329,7 +339,7 @@ class Condensation:
         if body.comm.rank == 0 and self._free.size:
             stiffness -= self._border.T @ self._solve_q(self._border)
         self._regular = body.comm.bcast(bool(np.isfinite(stiffness).all()))
-        self._rows, self._stiffness = self._scattered(stiffness), stiffness
+        self._rows, self._stiffness = self._scattered(stiffness), DenseStiffness(stiffness)
         self._kind, self._size = kind, self._matrix.norm()
         self.counters.factorizations += 1
 

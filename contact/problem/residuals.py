@@ -116,7 +116,12 @@ class Residuals:
         return f"the {worst} residual is {value:.2e}, its floor {floor:.2e}"
 
 
-def residual_forces(problem: Problem, state: State, secant_at: Array | None = None) -> Array:
+def residual_forces(
+    problem: Problem,
+    state: State,
+    secant_at: Array | None = None,
+    internal: Array | None = None,
+) -> Array:
     """Return F(x) - loads + contact and foundation forces on the owned unknowns. Collective.
 
     Its entries at fixed unknowns are minus the reactions of the supports.
@@ -128,9 +133,13 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
     secant_at
         Unknowns at which the secant modulus of the material is taken; those of the state by
         default.
+    internal
+        The internal forces, where they are known already.
     """
     body = problem.equilibrium
-    residual = body.internal_forces(state, secant_at) - body.external(state.time)
+    if internal is None:
+        internal = body.internal_forces(state, secant_at)
+    residual = internal - body.external(state.time)
     problem.interface.add_forces(residual, state.x, state.forces)
     return residual
 
@@ -199,12 +208,17 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def evaluate(problem: Problem, state: State) -> Residuals:
     """Return the residuals of a state. Collective; nothing is changed by it.
 
     Those of a body that flies away are no numbers, which is all there is to say of them.
     """
+    return evaluate_forces(problem, state)[0]
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def evaluate_forces(problem: Problem, state: State) -> tuple[Residuals, Array]:
+    """Return the residuals of a state, and the internal forces there. Collective."""
     body, interface = problem.equilibrium, problem.interface
     loads = body.load_sizes(state.time)
     # Asked for first: laws with history keep their last response, which is then that of the state.
@@ -247,4 +261,5 @@ def evaluate(problem: Problem, state: State) -> Residuals:
         (float(first), float(contact), float(friction))
         for (first,), (contact, friction) in zip(balance, laws, strict=True)
     )
-    return Residuals(*residuals, floors, granted, _over_pressed(interface, state, pressures))
+    known_to = _over_pressed(interface, state, pressures)
+    return Residuals(*residuals, floors, granted, known_to), internal

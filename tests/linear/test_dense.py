@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.history import BodyState
-from contact.linear.dense import DenseOperator
+from contact.linear.dense import DenseOperator, DenseStiffness
 from contact.linear.operator import Counters
 
 NODES, SIZE = 40, 2
@@ -31,7 +31,7 @@ class Bulk:
         return total
 
     def operator(self):
-        return DenseOperator(MPI.COMM_SELF, self.free, self.stiffness, Counters())
+        return DenseOperator(MPI.COMM_SELF, self.free, DenseStiffness(self.stiffness), Counters())
 
 
 @pytest.mark.parametrize("kind", ["definite", "indefinite", "asymmetric"])
@@ -47,6 +47,24 @@ def test_solves_are_those_of_the_whole_matrix(kind):
     rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
     expected = np.linalg.solve(bulk.total(blocks), rhs)
     assert np.allclose(operator.solve(rhs), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_the_same_sum_is_factorised_once():
+    """By all operators of one stiffness, each of which solves with its own blocks."""
+    random, bulk = np.random.default_rng(6), Bulk()
+    stiffness, state = DenseStiffness(bulk.stiffness), BodyState(np.zeros(0))
+    given = [random.standard_normal((NODES, SIZE, SIZE)) ** 2 for _ in "ab"]
+    first, second, again = (
+        DenseOperator(MPI.COMM_SELF, bulk.free, stiffness, Counters()) for _ in "abc"
+    )
+    for operator, blocks in ((first, given[0]), (again, given[0].copy()), (second, given[1])):
+        operator.update("secant", state, blocks)
+    made = [operator.counters.factorizations for operator in (first, again, second)]
+    assert made == [1, 0, 1]
+    rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
+    for operator, blocks in ((again, given[0]), (second, given[1]), (first, given[0])):
+        expected = np.linalg.solve(bulk.total(blocks), rhs)
+        assert operator.solve(rhs) == pytest.approx(expected, abs=1e-10)
 
 
 def test_blocks_that_alone_hold_a_node_are_taken_away():
