@@ -315,8 +315,9 @@ class Material:
         names = several("on", on, str, "the name of a region, or a list of names")
         fill(self, factor=None if factor is None else static(factor, "factor"), on=names)
         accepted = (
-            "Linear(young, poisson) of numbers, Log, UserLaw, forms.elasticity.Anisotropic(C) of a "
-            "crystal in 2-D with .in_plane(), or an object with the numbers "
+            "Linear(young, poisson) of numbers, Log, UserLaw, "
+            "forms.elasticity.Anisotropic(stiffness), of a crystal in 2-D with .in_plane(), or an "
+            "object with the numbers "
             f"{', '.join(CONSTANTS)} and a stress as forms.hencky.Hencky or "
             "forms.history.HistoryLaw have it"
         )
