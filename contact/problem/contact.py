@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -77,7 +76,7 @@ class Contact:
             expect("Contact: foundation", foundation, "this, or a gap", alone)
             foundation = gap
         if not hasattr(foundation, "measure"):
-            foundation = GapFunction.of(cast(Static, foundation))
+            foundation = GapFunction.of(foundation)
         fill(self, foundation=foundation)
         expect("Contact: layer", layer, "Layer(...), or None", isinstance(layer, Layer | None))
         expect("Contact: press", press, "True or False", isinstance(press, bool | np.bool_))
