@@ -38,6 +38,7 @@ class DenseStiffness:
         """
         if self._blocks is not None and np.array_equal(blocks, self._blocks):
             return False
+        self._blocks = None  # no factors are left where memory does not do for new ones
         total = self.matrix.copy(order="F")
         rows = np.arange(len(total)).reshape(blocks.shape[:2])
         total[rows[:, :, None], rows[:, None, :]] += blocks

@@ -84,14 +84,14 @@ class SchurComplement:
 
     def __init__(self, matrix: PETSc.Mat, kept: NDArray[np.int32], prefix: str) -> None:
         self._kept, self.comm = kept, lasting(matrix.getComm().tompi4py())
-        begin, _ = matrix.getOwnershipRange()
-        numbers = self.comm.allgather((begin + kept).astype(PETSc.IntType))
+        begin, end = matrix.getOwnershipRange()
+        own_kept = (begin + kept).astype(PETSc.IntType)
+        numbers = self.comm.allgather(own_kept)
         self.size = sum(part.size for part in numbers)
         self.offset = sum(part.size for part in numbers[: self.comm.rank])
         # MUMPS leaves the Schur complement to the first rank, and PETSc asks for its rows there.
         own = np.concatenate(numbers)[: None if self.comm.rank == 0 else 0]
         self._numbers = PETSc.IS().createGeneral(own, matrix.comm)
-        own_kept, (_, end) = (begin + kept).astype(PETSc.IntType), matrix.getOwnershipRange()
         self._places = (
             PETSc.IS().createGeneral(own_kept, matrix.comm),
             PETSc.IS().createStride(end - begin, begin, 1, comm=matrix.comm),

@@ -93,7 +93,7 @@ class CondensedStep:
         self._chord.begin()
 
     def __call__(
-        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array
+        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array | None
     ) -> StepResult | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
         body = self.condensation.full.equilibrium
@@ -101,7 +101,7 @@ class CondensedStep:
         iterate, keep = self._chord.choose(iterate, reached.significant)
         state = iterate.state
         kind = "tangent" if tangent else "secant"
-        known = internal if iterate is last and iterate.linearised_at is None else None
+        known = internal if iterate is last else None
         condensed = self.condensation.linearise(kind, state, keep, iterate.linearised_at, known)
         if condensed is None:
             return None

@@ -396,7 +396,8 @@ class NewtonLoop:
         tangent = iterate.active_set is not None and iterate.linearised_at is None and not linear
         for _ in range(min(options.max_iterations, iteration.left)):
             before, kept = residuals, iterate
-            taken = self.step(iterate, tangent, residuals, internal)
+            known = internal if iterate.linearised_at is None else None
+            taken = self.step(iterate, tangent, residuals, known)
             if taken is None:
                 return kept, self._end(residuals, self.step.fault)
             iterate = taken.iterate

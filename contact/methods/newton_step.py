@@ -137,7 +137,7 @@ class Step(Protocol):
         """Forget the steps before: a new loop begins."""
 
     def __call__(
-        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array
+        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array | None
     ) -> StepResult | None:
         """Take a step; None if it cannot be taken. Collective.
 
@@ -147,8 +147,10 @@ class Step(Protocol):
             Where from.
         tangent
             Whether the material's tangent is taken, or its secant.
-        reached, internal
-            The residuals, and the internal forces of the material law there.
+        reached
+            The residuals there.
+        internal
+            The internal forces there; None where the material is linearised elsewhere.
         """
 
 
@@ -232,7 +234,7 @@ class NewtonStep:
         return replace(free, x=body.prescribe(body.moved(free.x, step), free.time))
 
     def __call__(
-        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array
+        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array | None
     ) -> StepResult | None:
         """Take a step; see `Step`."""
         state, interface = iterate.state, self.problem.interface
@@ -264,8 +266,7 @@ class NewtonStep:
         self.operator.update(kind, at, blocks, constant=body.linear or remains)
         self._kind = kind
         here = replace(state, forces=contact.forces)
-        known = internal if iterate.linearised_at is None else None
-        residual = residual_forces(self.problem, here, iterate.linearised_at, known)
+        residual = residual_forces(self.problem, here, iterate.linearised_at, internal)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
         try:
             increment = self.operator.solve(-residual, self._forcing_term(reached.significant))
