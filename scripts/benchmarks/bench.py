@@ -233,10 +233,9 @@ def phases(bench: Bench) -> None:
         rows.append({"phase": "all", "seconds": found["linear"], "s": found["whole"]})
         bench.report.table(
             f"bench-phases-{dimension}d",
-            f"Where the time goes, {found['unknowns']} unknowns in "
-            f"{'the plane' if dimension == 2 else 'space'}",
+            f"Where the time goes, {found['unknowns']} unknowns in {dimension}-D",
             {name: [row.get(name) for row in rows] for name in rows[0]},
-            "One linear solve and the nonlinear one in one process.",
+            "One linear solve and the nonlinear one in one process; seconds of the processor.",
         )
 
 

@@ -75,8 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "bench-tables",
         "Every row of the thesis's tables by every method",
         {key: [row[key] for row in found] for key in found[0]},
-        "Contact solves: Newton iterations on the condensed problem. Nested: solves on the finest "
-        "mesh; the seconds include those on the coarser ones.",
+        "Seconds of the processor. Contact solves: Newton iterations on the condensed problem. "
+        "Nested: solves on the finest mesh; the seconds include those on the coarser ones.",
     )
 
 

@@ -106,7 +106,7 @@ def write_memory(folder: Path, page: Path) -> None:
     head = ["", "unknowns", "ranks", *names]
     lines = ["| " + " | ".join(head).strip() + " |", "|" + "---|" * len(head)]
     for row in rows:
-        place = "plane" if row["dimension"] == "2" else "space"
+        place = f"{row['dimension']}-D"
         values = [float(row[name]) for name in names]
         sizes = [f"{values[0]:.0f}", f"{values[1]:.2f}", f"{values[2]:.0f}", f"{values[3]:.2f}"]
         cells = [place, f"{int(row['unknowns']):,}", row["ranks"], *sizes]

@@ -32,8 +32,8 @@ def test_the_table_of_ranks_is_replaced_where_memory_has_been_measured(tmp_path)
     Report(tmp_path).table("bench-memory", "", {key: [value] for key, value in row.items()})
     write_memory(tmp_path, page)
     text = page.read_text()
-    assert "| space | 1,234,567 | 2 | 100 | 1.23 | 50 | 1.12 |\n\n" in text
-    assert text.count("| plane |") == 0
+    assert "| 3-D | 1,234,567 | 2 | 100 | 1.23 | 50 | 1.12 |\n\n" in text
+    assert text.count("| 2-D |") == 0
     assert text.endswith(SCALING.read_text()[-500:])
 
 
