@@ -33,7 +33,7 @@ INTRODUCTION = """\
 | `contact-steps.csv` | of an evolution: `contact.csv` of all steps, with a first column `t` |
 | `adapt.csv` | with `[mesh.adapt]`: one row per mesh |
 | `fields.vtu` | all fields of the body, for ParaView, pyvista and meshio |
-| `contact.vtu` | the contact part alone, a surface (in the plane a line) |
+| `contact.vtu` | the contact part alone, a surface (in 2-D a line) |
 | `contact-against.csv`, `.vtu` | between bodies: the master side, with its stresses |
 | `fields.pvd`, `contact.pvd` | of an evolution: steps of body and contact part, for ParaView |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |

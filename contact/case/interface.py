@@ -339,7 +339,7 @@ class Contact(Section):
     """Thickness of the layer, which is touched at gap - layer. A layer thicker than the gap presses
     on the undeformed body. `inf`: no rigid part, touched at gap."""
     stiffness: Annotated[NonNegative, COMPLIANT] = 10.0
-    """c_nu."""
+    """c_nu, stiffness of the layer (force/volume)."""
     limit: Annotated[
         float, Field(gt=0, **INFINITE), COMPLIANT, Accepted("a number > 0, or inf")
     ] = 0.1

@@ -172,7 +172,8 @@ class Mesh(Section):
     inside: dict[Name, Formula] = Field(default={})
     """Parts inside of the body by name, of any mesh: the facets at all of whose corners a formula
     is not 0, such as `middle = "abs(y - 0.5) < 1e-6"`, in the coordinates before rotation.
-    `[[fixed]]`, `[[electrode]]` and `[[rigid]]` may name them: an electrode between two layers."""
+    `[[fixed]]`, `[[electrode]]`, `[[rigid]]` and `[[bolt]]` may name them: an electrode between two
+    layers."""
     regions: dict[Name, Formula] = Field(default={})
     """Further regions by name, of any mesh: the cells in whose middle a formula is not 0, likewise.
     `[[material]]` names them."""

@@ -83,7 +83,7 @@ class LoopOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class FixedPointOptions(LoopOptions):
-    """Algorithms 1, 2 and their kin: a fixed point over Uzawa block relaxation.
+    """Algorithms 1, 2 and 4 to 9: a fixed point over Uzawa block relaxation.
 
     Attributes
     ----------
