@@ -31,9 +31,6 @@ test: export OMP_NUM_THREADS := 1
 test: export OMPI_MCA_mpi_yield_when_idle := 1
 # Each of some fifty processes would compile the sources, and assertions, again.
 test test-serial: export PYTHONDONTWRITEBYTECODE :=
-# Memory that is given back to the system and taken again is cleared each time by the system.
-test test-serial: export MALLOC_MMAP_THRESHOLD_ := 33554432
-test test-serial: export MALLOC_TRIM_THRESHOLD_ := 268435456
 test:
 	@status=0; \
 	echo "== 2 ranks"; $(call MPI_TESTS,2) || status=1; \

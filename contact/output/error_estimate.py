@@ -135,7 +135,9 @@ def estimated(
         for some in in_chunks(np.arange(cells.size)):
             chosen = cells[some]
             energy = _density(material, shear[some], factor[some])
-            of, raw = geometry_nodes(body.domain, chosen), shapes @ flux[chosen]
+            of, raw = geometry_nodes(body.domain, chosen), flux[chosen]
+            if len(fields.points) > 1:  # else constant in a cell
+                raw = shapes @ raw
             volumes = measures(body.domain.revolved, shape, of, at, weights)
             volume += float(volumes.sum())
             if means is not None and places is not None:

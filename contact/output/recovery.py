@@ -50,12 +50,13 @@ def nodal_means(
     sums = np.zeros((index_map.size_local + index_map.num_ghosts, values.shape[-1] + 1))
     for part in in_chunks(np.arange(cells.size)):
         vertices = dofmap[cells[part], :corners]
-        at_corners = values[part] if values.ndim == 3 else values[part, None]
-        at_corners = np.broadcast_to(at_corners, (*vertices.shape, values.shape[-1]))
-        with_ones = np.concatenate([at_corners, np.ones((*vertices.shape, 1))], axis=2)
-        rows = np.ones(vertices.size), (vertices.ravel(), np.arange(vertices.size))
-        around = sparse.csr_array(rows, shape=(len(sums), vertices.size))
-        sums += around @ with_ones.reshape(vertices.size, values.shape[-1] + 1)
+        here = values[part].reshape(-1, values.shape[-1])
+        # What is constant in a cell goes to all of its corners.
+        column = np.repeat(np.arange(len(here)), vertices.size // max(len(here), 1))
+        rows = np.ones(vertices.size), (vertices.ravel(), column)
+        around = sparse.csr_array(rows, shape=(len(sums), len(here)))
+        sums[:, :-1] += around @ here
+        sums[:, -1] += around.sum(axis=1)
     if domain.comm.size > 1:
         total = la.vector(index_map, sums.shape[1])
         total.array[:] = sums.ravel()

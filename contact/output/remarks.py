@@ -301,12 +301,12 @@ def rounding(solution: Solution) -> Iterator[Remark]:
             f"rounding decides how well the forces balance, to {solution.rounding:.1e} of them for "
             f"a tolerance of {asked:g}"
         )
-    unknown = max(outcome.kkt.unknown, left_as_pressures(problem, state))
+    residual = residual_forces(problem, state)
+    unknown = max(outcome.kkt.unknown, left_as_pressures(problem, state, residual))
     moved = bool(problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR))
     loads = body.load_sizes(state.time)
     if solution.converged and unknown > KNOWN and (moved or loads[0].max() > 0):
         known.append(f"contact forces are known to {unknown:.1e} of their size only")
-    residual = residual_forces(problem, state)
     on_contact = np.zeros_like(residual)
     problem.interface.add_forces(on_contact, state.x, state.forces)
     acting = (loads + body.sizes(on_contact))[0]

@@ -187,10 +187,10 @@ def _as_pressures(interface: Interface, forces: Array) -> Array:
     return forces * np.sqrt(np.divide(count, area, out=np.zeros_like(area), where=area > 0))
 
 
-def left_as_pressures(problem: Problem, state: State) -> float:
+def left_as_pressures(problem: Problem, state: State, residual: Array) -> float:
     """Return the residual forces, as pressures over those that press. Collective."""
     body, interface = problem.equilibrium, problem.interface
-    left = body.sizes(body.unbalanced(residual_forces(problem, state)))[0]
+    left = body.sizes(body.unbalanced(residual))[0]
     return _over_pressed(interface, state, _as_pressures(interface, left))
 
 
