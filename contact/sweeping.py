@@ -251,13 +251,16 @@ def sweep(
             row = kept.pop(tuple(point.values()), None)
             if row is None or row["converged"] != "True":
                 begin = time.perf_counter()
-                solution = runner.solve(case)
+                with named(", ".join(_set(point))):
+                    solution = runner.solve(case)
                 if solution.outcome.signal:
                     raise Interrupted(solution.outcome.signal)
                 seconds = comm.bcast(time.perf_counter() - begin)
                 measure(solution, whole=len(columns) > 0)
+                row = {**point, **values_of(SWEEP, solution)}
                 more = summary_columns(solution, columns)
-                row = {**point, **values_of(SWEEP, solution), **more, "seconds": seconds}
+                row |= {name: value for name, value in more.items() if name not in row}
+                row["seconds"] = seconds
                 row[INPUT] = f"{given} {SEAL}={_seal(row)}".strip()
                 said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
                 tell(logger, (len(rows) + 1) / len(cases), said)

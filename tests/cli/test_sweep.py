@@ -285,6 +285,25 @@ def test_columns_of_the_summary(sweep):
     assert again == rows
 
 
+def test_columns_that_are_there_stay_as_they_are(sweep):
+    over = ("--over", "friction.mu=0.2,0.4", "--columns", "stick_nodes,converged")
+    status, rows = sweep(*over)
+    assert status == 0
+    assert all(row["stick_nodes"].isdigit() and row["converged"] == "True" for row in rows)
+    assert sweep(*over) == (0, rows)
+
+
+def test_a_row_that_is_refused_is_named(sweep, capsys):
+    """The rows before it are kept."""
+    held = ("--set", "fixed.0.displacement=[0.0, 'free']", "--set", "friction.mu=0.0")
+    over = ("--over", "load.0.traction=[0.0, -0.01],[0.0, 0.01]")
+    status, rows = sweep(*held, *over)
+    assert (status, len(rows)) == (2, 1)
+    said = capsys.readouterr().err
+    assert said.startswith("contact: load.0.traction=[0.0, 0.01]: ")
+    assert "[pulled-off]" in said
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [
