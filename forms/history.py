@@ -222,7 +222,7 @@ def _end(
     law: HistoryLaw, point: Mapping[str, NDArray[np.float64]]
 ) -> dict[str, NDArray[np.float64]]:
     """Return variables and stress, under the name of the strain, at the end of a step."""
-    found = law.respond(point[_STRAIN], {k: v for k, v in point.items() if k != _STRAIN})
+    found = law.respond(point[_STRAIN], {k: v for k, v in point.items() if k != _STRAIN}, "")
     return {**found.variables, _STRAIN: found.stress}
 
 
