@@ -169,6 +169,21 @@ def test_figures(tmp_path):
     np.testing.assert_allclose(line.get_xdata(), way)
 
 
+@pytest.mark.parametrize("frictional", [True, False])
+def test_figures_name_what_a_run_has(frictional):
+    """Without friction nothing sticks, slides or is dissipated."""
+    changes = {} if frictional else {"friction": {"law": "none"}}
+    figures = solve(case_of(**changes), comm=SELF).plot()
+    zones = [text.get_text() for text in figures["zones"].axes[0].get_legend().texts]
+    lines = [line.get_label() for line in figures["energy"].axes[0].lines]
+    if frictional:
+        assert zones == ["sticking", "sliding", "open"]
+        assert lines == ["work done", "stored and dissipated", "stored", "dissipated by friction"]
+    else:
+        assert zones == ["in contact", "open"]
+        assert lines == ["work done", "stored"]
+
+
 def test_what_is_driven_is_what_moves_not_what_is_held_before_it():
     """The load is no way either; the amplitude ends at a fifth."""
     held = {"on": "left", "displacement": [0.0, 0.0]}

@@ -193,6 +193,12 @@ def zones(ax: Axes, where: Array, outer: tuple[float, float], status: Any, rows:
     )
 
 
+def patches(frictional: bool) -> list[Patch]:
+    """Return the legend of the zones: with friction those that stick and slide, else one."""
+    words = {zone: label for zone, (_, label) in ZONES.items()} if frictional else TOUCHING
+    return [Patch(color=ZONES[zone][0], label=label) for zone, label in words.items()]
+
+
 def window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[Array, Array]:
     """Return the corners of the part that is shown: all, or a small contact zone's vicinity.
 
@@ -386,9 +392,7 @@ def draw_surface(run: Run, look: Look) -> Figure:
         label = run.units.label(r"$-\sigma_\nu$", "stress")
         bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
         figure.colorbar(shown, ax=[*lefts, right], **bar)
-    words = {zone: label for zone, (_, label) in ZONES.items()} if frictional else TOUCHING
-    handles = [Patch(color=ZONES[zone][0], label=label) for zone, label in words.items()]
-    figure.legend(handles=handles, ncols=3, loc="outside lower center")
+    figure.legend(handles=patches(frictional), ncols=3, loc="outside lower center")
     return figure
 
 

@@ -6,10 +6,9 @@ from itertools import cycle
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from contact.output.figures.contact import along, position, shown, zones
+from contact.output.figures.contact import along, patches, position, shown, zones
 from contact.output.figures.run import Run
 from contact.output.figures.style import (
     BLUE,
@@ -18,7 +17,6 @@ from contact.output.figures.style import (
     NARROW,
     ORANGE,
     SKY,
-    ZONES,
     Look,
     fitted,
     page_width,
@@ -109,13 +107,18 @@ def draw_energies(run: Run) -> Figure:
     figure = sheet(0.9 if narrow else 0.6)
     ax = figure.subplots()
     ax.plot(time, work, color=BLUE, label="work done")
-    ax.plot(time, stored + taken + plastic, "--", color=ORANGE, label="stored and dissipated")
-    ax.plot(time, stored, color=GREEN, label="stored")
-    ax.plot(time, taken, color=GREY, label="dissipated by friction")
+    loses = flows or bool(taken.any())
+    if loses:
+        ax.plot(time, stored + taken + plastic, "--", color=ORANGE, label="stored and dissipated")
+    ax.plot(time, stored, "-" if loses else "--", color=GREEN, label="stored")
+    if taken.any():
+        ax.plot(time, taken, color=GREY, label="dissipated by friction")
     if flows:
         ax.plot(time, plastic, color=SKY, label="dissipated by plastic flow")
     ax.set_xlabel("time")
-    ax.set_ylabel(f"energy{unit_of('work', run.units, run.axes == 'xy')}")
+    flat = run.axes == "xy"
+    words = "energy per unit of depth" if flat else "energy"
+    ax.set_ylabel(f"{words}{unit_of('work', run.units, flat)}")
     figure.legend(ncols=1 if narrow else 3, loc="outside lower center")
     ax.grid(alpha=0.25)
     return figure
@@ -130,8 +133,8 @@ def draw_zones(run: Run, look: Look) -> Figure:
     zones(ax, where, whole, status, _course(run, "t"))
     (ends,) = shown([run.tables[0]], run, look, [(status != "open").any(axis=0)])
     ax.set_xlim(ends)
-    handles = [Patch(color=colour, label=words) for colour, words in ZONES.values()]
-    ax.legend(handles=handles, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    frictional = any(np.any(table["bound"] > 0) for table in run.tables)
+    ax.legend(handles=patches(frictional), ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     ax.set_xlabel(along(run.tables[0], run))
     ax.set_ylabel("time")
     return figure
