@@ -81,7 +81,10 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     results = [] if options.quiet else _results(solution)
     if comm.rank == 0 and not (options.quiet and outcome.converged):
         state = "converged" if outcome.converged else "stopped"
-        text = "\n".join([f"{state}: {outcome.reason}; results in {folder.path}", *results])
+        said = f"{state}: {outcome.reason}; results in {folder.path}"
+        if outcome.signal and kept_case(folder.path) is not None:
+            said += f"; contact solve --restart {folder.path} goes on"
+        text = "\n".join([said, *results])
         print(
             f"contact: {text}" if options.quiet else text,
             file=sys.stderr if options.quiet else None,

@@ -267,7 +267,7 @@ def rows_of(out):
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, number, status):
+def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number, status):
     """They are written, and checkpoints remain to go on from, to the numbers of a whole run."""
     keep, out, case = Checkpoints.keep, tmp_path / "out", tmp_path / "case.toml"
     case.write_text(to_toml(hencky()))
@@ -281,6 +281,7 @@ def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, number, status
     with monkeypatch.context() as context:
         context.setattr(Checkpoints, "keep", interrupted)
         assert on_the_line("solve", case, "--out", out) == status
+    assert f"results in {out}; contact solve --restart {out} goes on" in capfd.readouterr().err
     assert len(rows_of(out)) == 2
     summary = json.loads((out / "summary.json").read_text())
     assert not summary["converged"]
