@@ -387,9 +387,9 @@ def straddled(domain: Domain, sides: Mapping[str, Array]) -> Domain:
         if cut > CUT * asked:
             word = "volume" if domain.dim == 3 else "area"
             found.append(
-                f"mesh.regions.{name}: its boundary cuts cells; whole ones make its {word} "
-                f"{got:.4g}, for some {asked:.3g}, and the boundary rough; "
-                "facets that lie on it have it"
+                f"mesh.regions.{name}: its boundary cuts cells; of whole cells the region has the "
+                f"{word} {got:.4g} instead of about {asked:.3g}, and a rough boundary; accepted: a "
+                "mesh with facets along the boundary"
             )
     if domain.comm.rank == 0:
         for text in found:

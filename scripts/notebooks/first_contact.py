@@ -41,7 +41,7 @@ solution.plot()
 
 # %%
 contact = solution.contact
-friction = np.linalg.norm(contact.traction - contact.pressure[:, None] * contact.normal, axis=1)
+friction = np.linalg.norm(contact.friction, axis=1)
 plt.figure(figsize=(6, 3))
 plt.plot(contact.points[:, 0], friction, label="friction stress")
 plt.plot(contact.points[:, 0], 0.3 * contact.pressure, "--", label="μ p")

@@ -307,7 +307,7 @@ def test_regions_whose_boundary_cuts_cells_are_warned_of(cell, top, got, caplog)
     notes = [note for note in domain.notes if "mesh.regions.layer" in note]
     assert len(notes) == (got is not None)
     if got is not None:
-        said = re.search(r"its area ([\d.]+), for some ([\d.]+),", notes[0])
+        said = re.search(r"the area ([\d.]+) instead of about ([\d.]+),", notes[0])
         assert said is not None and float(said[1]) == pytest.approx(got, rel=1e-3)
         assert float(said[2]) == pytest.approx(top, abs=0.005)
         assert COMM.rank > 0 or notes[0] in caplog.text
