@@ -155,7 +155,8 @@ _RUN = (
         files=_MESHES,
     ),
     Quantity(
-        "contact_area", "area", "Sum of the weights of the nodes that touch; in 2-D a length.",
+        "contact_area", "area",
+        "Sum of the tributary areas of the nodes that touch; in 2-D a length.",
         files=(SUMMARY, SWEEP),
     ),
     Quantity("max_dev_strain", "", "Largest |dev ε| over the cells (at degree 2 their nodes)."),
