@@ -51,7 +51,7 @@ def nodal_means(
     for part in in_chunks(np.arange(cells.size)):
         vertices = dofmap[cells[part], :corners]
         here = values[part].reshape(-1, values.shape[-1])
-        # What is constant in a cell goes to all of its corners.
+        # The constants of a cell go to all of its corners.
         column = np.repeat(np.arange(len(here)), vertices.size // max(len(here), 1))
         rows = np.ones(vertices.size), (vertices.ravel(), column)
         around = sparse.csr_array(rows, shape=(len(sums), len(here)))
