@@ -12,7 +12,7 @@ MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
 
 help:
 	@echo "make demo     solve Example 7.2 into results/bar, with figures"
-	@echo "make test     all tests: on 2 and 3 ranks, then the serial ones"
+	@echo "make test     all tests: the serial ones, then on 2 and 3 ranks"
 	@echo "make lint     ruff and mypy"
 	@echo "make format   let ruff format the sources"
 	@echo "make NAME     run a script: $(sort $(NAMES))"
@@ -24,18 +24,20 @@ help:
 demo:
 	$(FX) python3 -m contact solve scripts/cases/bar.toml --out results/bar --plot
 
-# The ranks first, so that the last line is the closing line of the serial tests. One BLAS
-# thread each: the workers and ranks fill the cores.
+# The serial tests first: their workers compile most forms at the same time, for which ranks wait.
+# One BLAS thread each: the workers and ranks fill the cores.
 test: export OMP_NUM_THREADS := 1
 # Ranks that wait give way: there are fewer cores than ranks, or others use them too.
 test: export OMPI_MCA_mpi_yield_when_idle := 1
 # Each of some fifty processes would compile the sources, and assertions, again.
 test test-serial: export PYTHONDONTWRITEBYTECODE :=
+test: SHELL := bash
 test:
-	@status=0; \
+	@set -o pipefail; status=0; last=$$(mktemp); trap 'rm -f $$last' EXIT; \
+	echo "== serial"; $(FX) python3 -m pytest tests -n auto --dist worksteal | tee $$last || status=1; \
 	echo "== 2 ranks"; $(call MPI_TESTS,2) || status=1; \
 	echo "== 3 ranks"; $(call MPI_TESTS,3) || status=1; \
-	echo "== serial"; $(FX) python3 -m pytest tests -n auto --dist worksteal || status=1; \
+	echo "== serial, as above"; tail -n 1 $$last; \
 	exit $$status
 
 test-serial: export OMP_NUM_THREADS := 1
