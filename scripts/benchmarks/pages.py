@@ -25,20 +25,26 @@ are those of one process.
 
 
 def write_page(folder: Path, names: Sequence[str], page: Path) -> None:
-    """Put tables and figures of a folder together, with pictures beside the page."""
+    """Put tables and figures of a folder together, with pictures beside the page.
+
+    Those that are not in the folder stay as the page has them.
+    """
     place = page.with_suffix("")
     place.mkdir(parents=True, exist_ok=True)
+    before = re.split(r"^(?=\*\*)", page.read_text() if page.is_file() else "", flags=re.MULTILINE)
+    made = ", ".join(f"{name} {version}" for name, version in versions().items())
+    measured = f"Measured on {time.strftime('%Y-%m-%d')}: {made}, {os.cpu_count()} cores.\n"
     pieces = [INTRODUCTION]
     for name in names:
+        link = f"[{name}.csv]({place.name}/{name}.csv)"
         if not (folder / f"{name}.md").is_file():
+            pieces += [piece.rstrip("\n") + "\n" for piece in before if link in piece]
             continue
         text = (folder / f"{name}.md").read_text().replace("](", f"]({place.name}/")
-        pieces.append(text.replace(f"`{name}.csv`", f"[{name}.csv]({place.name}/{name}.csv)"))
+        pieces.append(text.replace(f"`{name}.csv`", link) + f"\n{measured}")
         for path in (folder / f"{name}.csv", folder / f"{name}.png"):
             if path.is_file():
                 (place / path.name).write_bytes(path.read_bytes())
-    made = ", ".join(f"{name} {version}" for name, version in versions().items())
-    pieces.append(f"{made}, {os.cpu_count()} cores, {time.strftime('%Y-%m-%d')}\n")
     page.write_text("\n".join(pieces))
     write_summary(place)
 

@@ -6,7 +6,7 @@ import pytest
 
 import contact
 from scripts.benchmarks import bench
-from scripts.benchmarks.pages import summary, write_memory
+from scripts.benchmarks.pages import summary, write_memory, write_page
 from scripts.benchmarks.phases import PHASES
 from scripts.reporting import Report
 
@@ -60,3 +60,21 @@ def test_the_other_parts_are_measured_where_one_fails(tmp_path, monkeypatch, cap
         bench.main([*given, "--parts", "d", "e"])
     assert "no such peer" in capsys.readouterr().err
     assert "**Plain**" in pages[0].read_text()
+
+
+def test_tables_that_are_not_measured_stay_on_the_page(tmp_path):
+    """`--parts` in a fresh clone left the tables that it made alone."""
+    page, old, new = tmp_path / "page.md", tmp_path / "old", tmp_path / "new"
+    names = "peer-pair", "peer-plain", "solvers"
+    for name in names[:2]:
+        Report(old).table(name, f"First {name}", {"value": [1]})
+    write_page(old, names, page)
+    for name in names[1:]:
+        Report(new).table(name, f"Second {name}", {"value": [2]})
+    write_page(new, names, page)
+    once = page.read_text()
+    titles = [line for line in once.splitlines() if line.startswith("**")]
+    assert titles == ["**First peer-pair**", "**Second peer-plain**", "**Second solvers**"]
+    assert once.count("Measured on ") == 3
+    write_page(tmp_path / "nothing", names, page)
+    assert page.read_text() == once
