@@ -100,9 +100,12 @@ def amplitude_notes(case: Case) -> list[str]:
 
 
 def _times(case: Case) -> list[float]:
-    """Return times at which loads are looked at: ends of steps, of some where there are many."""
-    ends = [1.0] if case.evolution is None else case.evolution.ends
-    return [*ends[: -1 : 1 + len(ends) // LOOKS], ends[-1]]
+    """Return times at which loads are looked at: ends of stages and steps, of some of many."""
+    if case.evolution is None:
+        return [1.0]
+    ends, stages = case.evolution.ends, case.evolution.times[1:]
+    some = [times[:: 1 + len(times) // LOOKS] for times in (ends, stages)]
+    return sorted({*some[0], *some[1], ends[-1]})
 
 
 def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> list[str]:

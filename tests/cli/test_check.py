@@ -93,6 +93,23 @@ def test_a_load_between_times_at_which_it_is_zero_is_seen():
     assert "supports" not in rows(text)
 
 
+def test_ends_of_stages_are_looked_at():
+    """Of the many steps only some are."""
+    times = [0.0, 1.0, 2.0, 3.0]
+    data = bar(
+        fixed__0__displacement=[0.12, 0.0],
+        fixed__0__amplitude="shear",
+        evolution={
+            "times": times,
+            "steps": [20, 30, 20],
+            "amplitudes": {"shear": {"time": times, "value": [0.0, 0.0, 1.0, 1.0]}},
+        },
+    )
+    case = parse_case(data)
+    text = describe(case, build_problem(case))
+    assert rows(text)["supports"] == "displacements of up to 0.12 at t = 2"
+
+
 def test_displacements_are_not_guessed():
     """A cantilever bends by 1e-3 or more, and a block of its size is compressed by 3e-6."""
     text = said(changed(mesh__size=[40.0, 1.0], mesh__parts=None, load__0__on="top"))
