@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.interface.obstacle import Heights
+from contact.interface.obstacle import Heights, Shape
+from contact.mesh.entities import exterior_facets
 from contact.output.solution import Note, Remark, Solution
 from contact.problem.problem import ContactProblem
+from contact.tolerances import NEGLIGIBLE
+from contact.typing import Array
+
+#: Share of the largest displacement from which on a body beside its contact part has passed in.
+PASSED = 0.01
 
 
 def held_along(solution: Solution) -> Iterator[Remark]:
@@ -52,6 +59,67 @@ def fitting(problem: ContactProblem) -> Iterator[Remark]:
             "has the body's own shape; for a plane, sphere... in front of it give "
             "contact.foundation, and a gap otherwise"
         )
+
+
+def passed_beside(solution: Solution) -> Iterator[Remark]:
+    """Say where the body beside a contact part has passed into its foundation. Collective.
+
+    The zone of contact then ends where the part does, and pressures beyond are missing. Nodes that
+    are in the foundation in the reference configuration are left out.
+    """
+    problem, body, d = solution.problem, solution.problem.equilibrium, solution.problem.dim
+    rigid = [contact for contact in problem.contacts if contact.against is None]
+    facing = [(c.on, c.foundation) for c in rigid if isinstance(c.foundation, Shape)]
+    if not facing or not solution.converged:
+        return
+    points, nodes = _beside(problem, [contact.on for contact in rigid])
+    states = [record.state for record in solution.steps] or [solution.state]
+    sizes = [record.row["max_displacement"] for record in solution.steps]
+    largest = max(sizes or [solution.max_displacement])
+    tiny = NEGLIGIBLE * problem.domain.size
+    for part, shape in facing:
+        direction, gap = _gaps(shape, points)
+        moves = body.global_unknowns.of_foundation(points, body.block_size, part)
+        depth, place = -np.inf, np.zeros(d)
+        for state in states:
+            u = body.nodal(state.x)[nodes, :d]
+            if moves is not None:
+                u = u - (moves @ body.motion(state.x))[:, :d]
+            within = np.einsum("nd,nd->n", direction, u) - gap
+            within[~(gap >= -tiny) | ~np.isfinite(within)] = -np.inf
+            if within.max(initial=-np.inf) > depth:
+                depth, place = float(within.max()), points[within.argmax()]
+        depth, place = max(problem.comm.allgather((depth, tuple(place))))
+        if depth > PASSED * largest:
+            there = ", ".join(f"{x if abs(x) > tiny else 0.0:.4g}" for x in place)
+            yield (
+                f"beside the contact part {part!r} the body passes into the foundation, by "
+                f"up to {depth:.3g} at ({there}), where displacements reach {largest:.3g}: contact "
+                "reaches the end of the part, and a larger one has other pressures"
+            )
+
+
+def _beside(problem: ContactProblem, parts: list[str]) -> tuple[Array, NDArray[np.int32]]:
+    """Return the owned nodes of the boundary beside some parts, and their points. Collective."""
+    domain, space = problem.domain, problem.equilibrium.space
+    taken = np.concatenate([domain.facets(part) for part in parts])
+    rest = np.setdiff1d(exterior_facets(domain.mesh), taken).astype(np.int32)
+    found, own = (fem.locate_dofs_topological(space, domain.dim - 1, f) for f in (rest, taken))
+    nodes = np.setdiff1d(found, own).astype(np.int32)
+    nodes = nodes[nodes < space.dofmap.index_map.size_local]
+    return space.tabulate_dof_coordinates()[nodes, : domain.dim], nodes
+
+
+@np.errstate(all="ignore")
+def _gaps(shape: Shape, points: Array) -> tuple[Array, Array]:
+    """Return directions and gaps as contact nodes have them; along the body's normal the nearest.
+
+    They are no numbers, or infinite, where nothing is in front.
+    """
+    if shape.direction == "axis":
+        return shape.measure(points, points)
+    distance, normal = shape.distance(points)
+    return -normal, distance
 
 
 def without_heights(problem: ContactProblem, solution: Solution | None = None) -> Iterator[Remark]:

@@ -101,6 +101,7 @@ def review(solution: Solution) -> None:
         "small-strain": small_strain(solution),
         "curved-surface": discretisation.coarse_curves(solution),
         "held-along": foundations.held_along(solution),
+        "part-end": foundations.passed_beside(solution),
         "own-shape": foundations.fitting(solution.problem),
         "no-heights": foundations.without_heights(solution.problem, solution),
         "layer": layers(solution),

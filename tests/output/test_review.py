@@ -227,3 +227,61 @@ def test_penalties_that_move_a_body_more_than_its_loads_are_warned_of(
     assert (penalised.max_displacement > 2 * exact.max_displacement) == warned
     assert any(w.startswith("the penalties give way") for w in penalised.warnings) == warned
     assert not any("give way" in w for w in exact.warnings)
+
+
+PIECE = {"side": "bottom", "from": 1.5, "to": 2.5}
+
+
+def on_a_disc(part: str, depth: float, moved: str, direction: str, steps: int) -> Solution:
+    """Press a block and a disc of radius 5 on each other, either of which is moved."""
+    up = depth if moved == "foundation" else 0.0
+    data = {
+        "mesh": {
+            "generator": "rectangle",
+            "size": [4.0, 1.0],
+            "cells": [32, 8],
+            "parts": {"middle": PIECE},
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": [0.0, up - depth]}],
+        "contact": {
+            "on": part,
+            "foundation": {"shape": "sphere", "centre": [2.0, -5.0], "radius": 5.0},
+            "direction": direction,
+            "rigid": {"displacement": [0.0, up]},
+        },
+    }
+    if direction == "axis":
+        data["contact"]["axis"] = [0.0, -1.0]
+    if steps:
+        press = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}
+        data["fixed"][0]["amplitude"] = data["contact"]["rigid"]["amplitude"] = "press"
+        data["evolution"] = {
+            "times": [0.0, 1.0, 2.0],
+            "steps": [1, 1],
+            "amplitudes": {"press": press},
+        }
+    return solve(parse_case(data))
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("moved", "direction", "steps"),
+    [
+        ("body", "foundation", 0),
+        ("foundation", "foundation", 0),
+        ("foundation", "axis", 0),
+        ("body", "axis", 1),
+    ],
+)
+def test_a_body_that_passes_beside_its_contact_part_is_warned_of(moved, direction, steps):
+    """At x = 0.5 the disc is 0.025 lower. In steps it is so at the end of the first alone."""
+    words, given = "beside the contact part 'middle' the body passes", (moved, direction, steps)
+    deep = on_a_disc("middle", 0.1, *given)
+    assert words in said(deep.warnings, "[part-end]")
+    whole = on_a_disc("bottom", 0.1, *given)
+    assert not any("[part-end]" in text for text in whole.warnings)
+    if not steps:
+        assert deep.contact.pressure.max() > 1.2 * whole.contact.pressure.max()
+    shallow = on_a_disc("middle", 0.01, *given)
+    assert not any("[part-end]" in text for text in shallow.warnings)
