@@ -31,6 +31,9 @@ test: export OMP_NUM_THREADS := 1
 test: export OMPI_MCA_mpi_yield_when_idle := 1
 # Each of some fifty processes would compile the sources, and assertions, again.
 test test-serial: export PYTHONDONTWRITEBYTECODE :=
+# Ranks too: scripts/fx does this for single processes alone.
+test: export MALLOC_MMAP_THRESHOLD_ := 33554432
+test: export MALLOC_TRIM_THRESHOLD_ := 268435456
 test: SHELL := bash
 test:
 	@set -o pipefail; status=0; last=$$(mktemp); trap 'rm -f $$last' EXIT; \
