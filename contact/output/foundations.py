@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from dolfinx import fem
@@ -116,10 +117,8 @@ def _gaps(shape: Shape, points: Array) -> tuple[Array, Array]:
 
     They are no numbers, or infinite, where nothing is in front.
     """
-    if shape.direction == "axis":
-        return shape.measure(points, points)
-    distance, normal = shape.distance(points)
-    return -normal, distance
+    seen = shape if shape.direction == "axis" else replace(shape, direction="foundation")
+    return seen.measure(points, points)  # neither asks for normals of the body
 
 
 def without_heights(problem: ContactProblem, solution: Solution | None = None) -> Iterator[Remark]:
