@@ -44,15 +44,16 @@ def project_disc(z: Array, radius: Array) -> Array:
     Parameters
     ----------
     z
-        Vectors, shape (n, d).
+        Vectors, shape (..., n, d).
     radius
         Friction bounds s >= 0, shape (n,).
     """
-    length = np.linalg.norm(z, axis=1)
-    beyond = length > radius
+    length = np.linalg.norm(z, axis=-1)
+    bound = np.broadcast_to(radius, length.shape)
+    beyond = length > bound
     scale = np.ones_like(length)
-    scale[beyond] = radius[beyond] / length[beyond]
-    return z * scale[:, None]
+    scale[beyond] = bound[beyond] / length[beyond]
+    return z * scale[..., None]
 
 
 def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:

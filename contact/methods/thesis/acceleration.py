@@ -37,7 +37,7 @@ class ResidualMinimiser:
         Global inner products: maps two matrices (m, k) and (m, l) of local values to the
         (k, l) matrix of sums over all ranks.
     project
-        P: the contact forces that the contact laws give for z, shape (m,).
+        P: the contact forces that the contact laws give for z, shape (..., m).
     derivative
         Maps z and directions, shape (m, k), to the directional derivatives of P, (m, k).
     depth
@@ -98,7 +98,7 @@ class ResidualMinimiser:
 
     def _sizes(self, points: Sequence[Array]) -> Array:
         """Return the norms of lambda - P(z) at several points."""
-        defects = np.column_stack([self._defect(point) for point in points])
+        defects = self._defect(np.stack(points, axis=1)).T
         return np.sqrt(np.maximum(np.diag(self._inner(defects, defects)), 0.0))
 
     def _append(self, direction: Array) -> None:

@@ -105,7 +105,7 @@ class Relaxed:
 
 @dataclass
 class _Projection:
-    """Steps 2 and 3, from z of shape (n, 1 + d) to the new multipliers: (3.43) and the disc.
+    """Steps 2 and 3, from z of shape (..., n, 1 + d) to the new multipliers: (3.43) and the disc.
 
     All that is given is about `origin`.
 
@@ -132,10 +132,13 @@ class _Projection:
         """Return the new multipliers."""
         z = z + self.origin
         if self.law is None:
-            pressure = contact_multiplier(z[:, 0], self.r, 0.0, self.jump.gap)
+            pressure = contact_multiplier(z[..., 0], self.r, 0.0, self.jump.gap)
         else:
-            pressure = self.law.pressure(z[:, 0], self.r)
-        return np.column_stack([pressure, project_disc(z[:, 1:], self.bound)])
+            # Laws of users take one value a node.
+            rows = z[..., 0].reshape(-1, z.shape[-2])
+            pressure = np.reshape([self.law.pressure(row, self.r) for row in rows], z.shape[:-1])
+        friction = project_disc(z[..., 1:], self.bound)
+        return np.concatenate([pressure[..., None], friction], axis=-1)
 
     def derivative(self, z: Array, directions: Array) -> Array:
         """Return their derivatives along directions of shape (n, 1 + d, k)."""
@@ -157,7 +160,7 @@ class _Projection:
             return summed(jump.comm, a.T @ (weights[:, None] * b))
 
         def project(flat: Array) -> Array:
-            return self(flat.reshape(shape)).ravel()
+            return self(flat.reshape(*flat.shape[:-1], *shape)).reshape(flat.shape)
 
         def derivative(flat: Array, directions: Array) -> Array:
             columns = directions.reshape(*shape, directions.shape[1])
