@@ -107,12 +107,13 @@ def lasting(comm: MPI.Intracomm) -> MPI.Intracomm:
 
 
 #: Variables of the environment by which users set glibc's allocator, their numbers for `mallopt`,
-#: and values: the most arrays that are mapped, the size of one (bytes) from which it is, and the
-#: room at the end (bytes) from which that is returned.
+#: and values on one rank and on several: the most arrays that are mapped, the size of one (bytes)
+#: from which it is, and the room at the end (bytes) from which that is returned. Memory that is
+#: returned and taken again is cleared by the system; of several ranks each would keep its own.
 ALLOCATOR = (
-    ("MALLOC_MMAP_MAX_", -4, 65_536),
-    ("MALLOC_MMAP_THRESHOLD_", -3, 1 << 20),
-    ("MALLOC_TRIM_THRESHOLD_", -1, 1 << 20),
+    ("MALLOC_MMAP_MAX_", -4, (65_536, 65_536)),
+    ("MALLOC_MMAP_THRESHOLD_", -3, (32 << 20, 1 << 20)),
+    ("MALLOC_TRIM_THRESHOLD_", -1, (256 << 20, 1 << 20)),
 )
 
 
@@ -134,9 +135,9 @@ def give_memory_back() -> None:
     memory that one phase has freed would lie beside that of the next.
     """
     allocator = getattr(ctypes.CDLL(None), "mallopt", None)
-    for name, number, value in ALLOCATOR:
+    for name, number, values in ALLOCATOR:
         if allocator is not None and name not in os.environ:
-            allocator(number, value)
+            allocator(number, values[MPI.COMM_WORLD.size > 1])
 
 
 give_memory_back()

@@ -27,8 +27,6 @@ def started(words: Sequence[str], ranks: int = 1, limit: float | None = None) ->
     """
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
     parallel = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    if parallel:  # as scripts/fx starts ranks
-        environment = {k: v for k, v in environment.items() if not k.startswith("MALLOC_")}
     done = subprocess.run(
         [*parallel, *words], env=environment, capture_output=True, text=True, timeout=limit
     )
