@@ -88,6 +88,14 @@ def bar(tmp_path: Path) -> Path:
     return path
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let `make test` run the short tests alone."""
+    words = (
+        "no slow tests; each value of each parameter, not all combinations; one a test on 3 ranks"
+    )
+    parser.addoption("--short", action="store_true", help=words)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
     """Let rank 0 alone report: failures are made common by `pytest_pyfunc_call`."""
@@ -108,15 +116,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     On several ranks, those stay that have each value of each parameter: all combinations run on
     one, or on 2 where a test is not for one. Which rank has nothing, or two neighbours, depends on
-    no combination.
+    no combination. With --short that holds on one as well, and one of a test stays on 3.
     """
-    kept = set()
+    kept, short = set(), config.getoption("--short")
     for _, group in groupby(items, key=lambda item: item.nodeid.split("[")[0]):
-        some = list(group)
+        some = [item for item in group if not (short and item.get_closest_marker("slow"))]
+        if not some:
+            continue
         mark = some[0].get_closest_marker("parallel")
         if mark is None or _comm.size in _sizes(mark):
             everything = _comm.size == (1 if mark is None or mark.kwargs.get("alone", True) else 2)
-            kept |= set(some if everything else _covering(some))
+            some = some if everything and not short else _covering(some)
+            kept |= set(some[:1] if short and _comm.size > 2 else some)
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = [item for item in items if item in kept]
 

@@ -86,6 +86,7 @@ def check(case, names, keys, steps=None, tolerance=1e-6):
         assert np.all(np.abs(own - other) <= 1e-10 * np.maximum(np.abs(own), size)), key
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dim", "turning", "revolved"),
     [(2, True, False), (2, False, False), (3, True, False), (3, False, False), (2, False, True)],
@@ -143,6 +144,7 @@ def at_zero(length=1.0, young=1.2):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("length", "young"), [(1e-6, 200e9), (1e3, 1.2)])
 def test_numbers_that_are_0_in_any_units(length, young):
     data = at_zero(length, young)

@@ -208,6 +208,7 @@ def test_steps_and_their_adjoint():
         )
 
 
+@pytest.mark.slow
 def test_cattaneo_and_mindlin_by_the_friction_coefficient():
     # the closed form in numbers that were computed by themselves
     known = ball_values(2 / 3)

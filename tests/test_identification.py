@@ -147,6 +147,7 @@ def loaded(mu=0.3):
     return parse_case(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("keys", "undetermined"),
     [

@@ -70,6 +70,7 @@ def test_the_trace_is_its_mean_over_the_cell_and_the_deviator_stays(kind):
     assert by_cell(change) == pytest.approx(0.0, abs=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])
 def test_q1_p0_on_cells_no_two_of_which_are_alike(cell):
     """The trace is the cell's mean of that of the displacements, the deviator stays."""
@@ -182,6 +183,7 @@ def test_methods_agree(law):
         assert other.max_displacement == pytest.approx(newton.max_displacement, rel=rel)
 
 
+@pytest.mark.slow
 def test_multigrid_in_space():
     found = []
     for linear in ("lu", "iterative"):

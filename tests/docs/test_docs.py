@@ -50,6 +50,7 @@ def shows_code(page: Path) -> bool:
     return any(block.language in ("python", "sh", "toml") for block in blocks(page))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", filter(shows_code, PAGES), ids=lambda page: page.stem)
 def test_code_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a folder of its own, as a reader would type it."""
@@ -285,6 +286,7 @@ def test_the_paper_has_the_length_that_the_journal_asks_for() -> None:
     assert 750 <= len(text.split()) <= 1750
 
 
+@pytest.mark.slow
 def test_pages_build_without_warnings(tmp_path: Path) -> None:
     """All but the notebooks, which `make docs` executes first."""
     pytest.importorskip("sphinx")

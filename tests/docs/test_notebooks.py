@@ -19,6 +19,7 @@ def _warnings_afterwards() -> Iterator[None]:
     logger.setLevel(level)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")  # nobody sees them
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -31,6 +32,7 @@ def test_notebook(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pyplot.close("all")
 
 
+@pytest.mark.slow
 def test_one_as_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures of a solution are shown by the cell that ends with them."""
     monkeypatch.delenv("MPLBACKEND", raising=False)

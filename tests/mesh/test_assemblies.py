@@ -103,6 +103,7 @@ def turned(x: float, y: float, z: float) -> tuple[float, float, float]:
     return 1 + (z - 1), x + 2 - 1, y
 
 
+@pytest.mark.slow
 def test_two_instances_of_a_part(tmp_path):
     """Moved first, then turned about an axis of the assembly; numbers of each are its own."""
     instances = instance("One", "Cube") + instance("Two", "cube", LINES)
@@ -155,6 +156,7 @@ def test_two_parts_numbered_from_one(tmp_path):
     assert found.notes[0] == said
 
 
+@pytest.mark.slow
 def test_sets_of_the_assembly(tmp_path):
     """By numbers of an instance, of several, or behind its name; nodes and shells of its own."""
     more = "*NODE\n1, 0., 0., 9.\n*NSET, NSET=point\n1\n"

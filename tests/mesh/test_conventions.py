@@ -159,6 +159,7 @@ CASES += [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("program", "order", "dim"), CASES, ids=[f"{p}-{d}d-{len(o)}" for p, o, d in CASES]
 )

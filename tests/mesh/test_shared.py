@@ -71,6 +71,7 @@ def written(folder, name):
     return source, made
 
 
+@pytest.mark.slow
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", SOURCES)
 def test_a_shared_mesh_is_its_source(name, shared_tmp_path, capsys):

@@ -267,6 +267,7 @@ def test_quarter_disc_resolves_the_hertz_contact(half_width, contact_size):
     assert nodes(domain) < 3000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", meshes.GENERATORS)
 def test_smaller_sizes_give_more_nodes(name):
     sizes = {k: 0.7 * v for k, v in meshes.parameters(name).items() if k.endswith("size")}

@@ -96,6 +96,7 @@ def test_the_area_of_the_loop_is_what_friction_takes():
     assert work > 0.1 * max(b.energy for b in loop)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [Linear(1.0, 0.3), Log(1.0, 0.3, yield_strain=0.003)])
 def test_methods_agree_at_every_step(law):
     newton, uzawa = (steps_of(shaken(law), times(2), options) for options in TIGHT.values())
@@ -112,6 +113,7 @@ def test_methods_agree_at_every_step(law):
     assert len(kinds) == 3  # open, sticking and sliding nodes have been met
 
 
+@pytest.mark.slow
 def test_methods_agree_on_a_yielding_piezoelectric_body():
     """Hencky's law, friction and piezoelectricity together, loaded and unloaded twice."""
     changes = ["mesh.cells=[8, 4]", "material.law=log", "material.yield_strain=0.005"]

@@ -24,6 +24,7 @@ def column(**solver):
     return solve(parse_case(case))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", [0.1, 1.0])
 def test_a_small_r_does_not_end_far_from_the_pressure(r):
     """It was 3e-5 off at a tolerance of 1e-8: E/size, of a body that high, weighed no gap."""
@@ -33,6 +34,7 @@ def test_a_small_r_does_not_end_far_from_the_pressure(r):
     assert np.abs(found.pressure - exact).max() <= 5e-6 * exact.max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", [0.1, 1.0])
 def test_facets_that_are_thin_hide_nothing_either(r):
     """The pressure was 1.5e-4 off: facets of a grid in space were taken for as long as wide."""

@@ -173,6 +173,7 @@ def test_a_run_that_has_not_converged_says_so(options, words):
     assert outcome.kkt == (found[-1] if last else min(found, key=lambda kkt: kkt.largest))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {**PLAIN, "r": 3.0}])
 def test_all_digits_are_found(options):
     """What is held is about the iterate: nothing is lost beneath it."""

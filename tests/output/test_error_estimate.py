@@ -53,7 +53,12 @@ KNOWN = {
     "mean dilatation, nu = 0.4999": (0, 8),
     "the same, quadrilaterals": (16, 0),
 }
-EFFECTIVITY = [(name, p) for name, cells in KNOWN.items() for p in (1, 2) if cells[p - 1]]
+EFFECTIVITY = [
+    pytest.param(name, p, marks=pytest.mark.slow if min(filter(None, cells)) < 8 else ())
+    for name, cells in KNOWN.items()
+    for p in (1, 2)
+    if cells[p - 1]
+]
 
 
 def state_of(problem):

@@ -33,6 +33,7 @@ def pressed(cell, degree, element="standard", steps=8):
     return solve(punch(2, degree, element, cell, steps), comm=MPI.COMM_SELF)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 def test_plastic_flow_locks_in_few_steps_and_in_many(cell):
     """The secant of a step is nearly elastic: it was said nowhere, least in many steps."""

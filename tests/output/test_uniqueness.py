@@ -111,6 +111,7 @@ def test_critical_friction_beside_a_body_that_slides(tmp_path):
     assert 3 * solution.critical_factor == pytest.approx(1.4966629560336764, rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hard", [False, True])
 def test_single_solutions_are_not_warned_of(hard):
     """Problems of the sweeps at mu up to 0.5."""

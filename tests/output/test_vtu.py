@@ -105,6 +105,7 @@ def test_a_file_of_another_program_is_refused(tmp_path: Path) -> None:
             read_grid(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dim", [2, 3])
 def test_figures_are_drawn_again(dim: int, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     """From the files alone, in the formats and for the fields that are asked for."""

@@ -23,6 +23,7 @@ def problem(name, folder):
     return mesh, tables, parse_case(tables)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHOSEN)
 def test_results_are_right_by_another_assembly(name, tmp_path):
     mesh, tables, case = problem(name, tmp_path)

@@ -17,6 +17,7 @@ def shown(name: str) -> list[tuple[str, str, str]]:
     return re.findall(r"^\| (.+) \| (\S+) \| (\S+) \| .+ \|$", text, re.M)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, one in EXAMPLES.items() if not one.meshes])
 def test_an_example_has_the_values_of_its_table(name: str, tmp_path: Path) -> None:
     pytest.importorskip("gmsh")
@@ -30,6 +31,7 @@ def test_an_example_has_the_values_of_its_table(name: str, tmp_path: Path) -> No
         assert computed == pytest.approx(reference, rel=example.within)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, one in EXAMPLES.items() if one.meshes])
 def test_a_coarse_mesh_has_the_values_of_its_table(name: str, tmp_path: Path) -> None:
     """That of the example and the finest one take minutes: their rows are those of its page."""

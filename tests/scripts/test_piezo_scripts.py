@@ -18,6 +18,7 @@ def columns(path: Path) -> dict[str, list[str]]:
     return dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
 
 
+@pytest.mark.slow
 def test_theorem_5_2(tmp_path):
     """The rate of the lagged charge grows with k_e up to a limit, that of the implicit does not."""
     rates = lagged_current.theorem_5_2(Report(tmp_path), coarse=True)

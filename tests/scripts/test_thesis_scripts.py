@@ -64,6 +64,7 @@ def test_sensitivity(tmp_path):
     assert (tmp_path / "sensitivity-radius.pdf").is_file()
 
 
+@pytest.mark.slow
 def test_the_pressure_converges_in_the_dual_norm(tmp_path):
     found = pressure_convergence.main(["--coarse", "--out", str(tmp_path)])
     assert len(found) == 10

@@ -90,6 +90,7 @@ def test_a_poled_cylinder(degree):
     assert np.abs(hoop).max(initial=0.0) < 1e-8 * column.force
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [1, 2])
 def test_methods_agree(comm, degree):
     """A rough plate, a smoothed pressure, a material that yields."""
@@ -146,6 +147,7 @@ def test_a_constant_pressure_about_the_axis(comm, diagonal):
     assert np.abs(solution.pressure - 0.01).max(initial=0.0) < 1e-14
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("degree", "way", "bound"),
     [(1, "left", 0.007), (1, "right", 0.035), (1, "crossed", 0.003), (1, "whole", 0.006),

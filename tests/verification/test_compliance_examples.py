@@ -259,6 +259,7 @@ def test_iterations_are_counted_where_the_residual_ends_the_run():
     assert tables_compliance.iterations(solution) == (2, 1)
 
 
+@pytest.mark.slow
 def test_the_default_ramp_has_a_mesh_limit():
     """Its width is a length of the body; with a steep one, the mesh decides how often it touches.
 

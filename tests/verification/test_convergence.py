@@ -89,6 +89,7 @@ def test_graded_meshes_give_back_what_the_corners_take(tmp_path):
     assert orders[1] > orders[0] + 0.05
 
 
+@pytest.mark.slow
 def test_figure_7_6(tmp_path):
     found = study.figure_7_6(Report(tmp_path), coarse=True)
     for label, table in found.items():
@@ -118,6 +119,7 @@ def test_theorem_4_3(tmp_path):
         assert np.all(np.log2(table[:-1] / table[1:]) > 0.7)
 
 
+@pytest.mark.slow
 def test_rates_of_the_fixed_points(tmp_path):
     """Theorems 3.2 and 4.5: linear convergence, with friction or without."""
     rates = fixed_points(Report(tmp_path), coarse=True)
@@ -145,6 +147,7 @@ def test_theorem_4_2(tmp_path):
         assert order == pytest.approx(1.0, abs=0.1), label
 
 
+@pytest.mark.slow
 def test_table_7_2(tmp_path):
     table_7_2.table(Report(tmp_path), 8)
     with (tmp_path / "table-7-2.csv").open() as stream:
@@ -156,6 +159,7 @@ def test_table_7_2(tmp_path):
     assert counts[4:] == sorted(counts[4:])
 
 
+@pytest.mark.slow
 def test_smoothing_radius(tmp_path):
     solutions = nonlocal_friction.study(Report(tmp_path), 8, -0.005)
     forces = np.array([solution.contact_force for solution in solutions.values()])
@@ -164,6 +168,7 @@ def test_smoothing_radius(tmp_path):
     assert np.allclose(solutions["h"].pressure, solutions["0"].pressure, rtol=1e-6, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_figures_mechanics(tmp_path):
     figures_mechanics.main(["--coarse", "--out", str(tmp_path)])
     for name in ("7-4a", "7-4b", "7-5a", "7-5b", "7-7a", "7-7b", "7-8a", "7-8b"):

@@ -212,6 +212,7 @@ def test_known_contacts_on_moved_cells(tmp_path, monkeypatch) -> None:
         assert all(float(row["p in L2"]) < 0.017 for row in csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_quadrilaterals_need_fewer_unknowns_than_triangles(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(cell_orders, "ELEMENTS", ((1, 1),))
     found = cell_orders.times(Report(tmp_path), coarse=True)

@@ -53,6 +53,7 @@ def test_hydrostatic_pressure_in_space(name, degree, monkeypatch):
     check(study.hydrostatic(name, 0.1, degree, "3-D"), 0.007, 0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2])
 def test_nodes_at_a_punch_edge_in_space(order):
     """By the surface alone nodes beside the jump of its curvature are 0 to 2.2 times that."""

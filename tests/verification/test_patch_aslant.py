@@ -300,6 +300,7 @@ def test_a_cone_under_a_cylinder(degree):
 QUANTITIES = ["max_pressure", "contact_force_x", "contact_force_y", "reaction_x_left"]
 
 
+@pytest.mark.slow
 @pytest.mark.parallel
 def test_sensitivities():
     """Beside differences of solutions, by the load, the modulus, the pushes and a gap."""

@@ -43,6 +43,7 @@ def solve(problem: ContactProblem, tolerance: float = 1e-13, condense: bool = Tr
     return state
 
 
+@pytest.mark.slow
 @pytest.mark.parallel
 @pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
 @pytest.mark.parametrize(("cell", "degree", "element"), KINDS, ids=NAMES)

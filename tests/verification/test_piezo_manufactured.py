@@ -50,6 +50,7 @@ def test_orders(dim, degree, cells):
     assert np.all(orders < expected + 0.5), orders
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("degree", "cells"), [(1, (16, 32)), (2, (8, 16))])
 def test_orders_beyond_yield(degree, cells):
     """With the logarithmic law, yielded throughout: |dev eps| is between 0.02 and 0.2."""

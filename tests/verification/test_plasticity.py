@@ -157,11 +157,13 @@ def test_the_balance_sees_a_wrong_dissipation(monkeypatch):
     assert left() > 0.1
 
 
+@pytest.mark.slow
 def test_plane_strain_in_eight_times_as_many_steps():
     stress, _ = found(run("plane", material("H"), path(-0.02, steps=400), cells=1))
     assert (stress[1, 1], stress[2, 2]) == pytest.approx(FINE, abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "degree", "law"),
     [
@@ -321,6 +323,7 @@ def test_first_yield_under_hertz_and_the_fits_of_a_ball():
         assert [fit(w) for w in depths] == pytest.approx(values, rel=6e-4)
 
 
+@pytest.mark.slow
 def test_the_mean_dilatation_is_p2_p0_with_the_return_map_at_the_points():
     """The body's solution balances the mixed form, with a pressure of each cell of its own.
 

@@ -121,6 +121,7 @@ def tilted(n: float) -> float:
     return rotation(solution)
 
 
+@pytest.mark.slow
 def test_a_moment_tilts_a_circular_punch_in_space():
     """Graded towards the edge, order 2: finer meshes stand in docs/indentation.md."""
     pytest.importorskip("gmsh")

@@ -24,6 +24,7 @@ def test_a_quarter_in_space_tends_to_the_body_of_revolution():
         assert order > (1.2 if space else 1.7), (space, errors)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("conducting", [False, True])
 def test_a_piezoelectric_quarter_in_space_tends_to_the_body_of_revolution(conducting):
     """Force, and the charge drawn or the potential at the tip, of the thesis's material."""
@@ -37,6 +38,7 @@ def test_a_piezoelectric_quarter_in_space_tends_to_the_body_of_revolution(conduc
         assert np.all(order > 1.6), (space, errors)
 
 
+@pytest.mark.slow
 def test_the_tables(tmp_path):
     indentation_in_space.main(["--coarse", "--out", str(tmp_path)])
     with (tmp_path / "in-space.csv").open() as stream:

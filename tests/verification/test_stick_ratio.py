@@ -8,6 +8,7 @@ from scripts.studies import stick_limit
 from scripts.studies.stick_ratio import PRESSED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRESSED)
 def test_steps_find_what_one_step_does_not(name):
     pressed = PRESSED[name]

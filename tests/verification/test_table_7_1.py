@@ -2,9 +2,12 @@
 
 import csv
 
+import pytest
+
 from scripts.thesis import table_7_1
 
 
+@pytest.mark.slow
 def test_the_table(tmp_path, capsys):
     found = table_7_1.main(["--cells", "4", "--out", str(tmp_path)])
     assert len(found) == len(table_7_1.rows()) == 8

@@ -132,7 +132,7 @@ class _Projection:
         """Return the new multipliers."""
         z = z + self.origin
         if self.law is None:
-            pressure = contact_multiplier(z[..., 0], self.r, 0.0, self.jump.gap)
+            pressure = np.asarray(contact_multiplier(z[..., 0], self.r, 0.0, self.jump.gap))
         else:
             # Laws of users take one value a node.
             rows = z[..., 0].reshape(-1, z.shape[-2])
