@@ -12,6 +12,7 @@ FORMATS = {
     "TOO_SMALL",
     "OUT_OF_MEMORY",
     "INTERIOR_SOLVE",
+    "SPARSE_SIDE",
     "SCHUR",
     "HEADER",
     "EACH",

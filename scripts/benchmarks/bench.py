@@ -88,7 +88,8 @@ def against_one_solve(bench: Bench) -> None:
         "that is faster; their time counts. `one`: assembly, set-up and solve of linear "
         "elasticity with the same solver. Seconds and ratios are medians of three runs in which "
         "the two take turns, of meshes of more than 30 cells a unit in 3-D of one. The error "
-        "estimate and the remarks are part of a solve. The memory is the peak of the process, with "
+        "estimate and the remarks, `review`, are part of a solve, but not of the ratio *without "
+        "review*. The memory is the peak of the process, with "
         "the loaded libraries and the linear solve.",
     )
     draw_ratios(bench.report, rows)

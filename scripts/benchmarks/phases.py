@@ -61,7 +61,7 @@ def measure(dimension: int, n: int, start: str = "") -> dict[str, Any]:
     problem = build_problem(case)
 
     _, one, linear = profiled(lambda: one_linear_solve(problem))
-    solution, whole, newton = profiled(lambda: solved(case, problem, start))
+    (solution, _), whole, newton = profiled(lambda: solved(case, problem, start))
     nothing = (0, 0.0)
     return {
         "unknowns": unknowns(problem),
