@@ -12,7 +12,6 @@ FORMATS = {
     "TOO_SMALL",
     "OUT_OF_MEMORY",
     "INTERIOR_SOLVE",
-    "SPARSE_SIDE",
     "SCHUR",
     "HEADER",
     "EACH",

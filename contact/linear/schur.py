@@ -23,10 +23,6 @@ INTERIOR_SOLVE = (26, 0)
 #: MUMPS's ICNTL(19): in which form it returns a Schur complement; 0 for none.
 SCHUR = 19
 
-#: MUMPS's ICNTL(20), and its value for a sparse right-hand side: where that has no entries nothing
-#: is eliminated (Amestoy, Duff, Guermouche and Slavova, Int. J. Comput. Math. 87 (2010) 2737).
-SPARSE_SIDE = (20, 1)
-
 #: Columns that are copied at a time.
 COLUMNS = 128
 
@@ -66,20 +62,6 @@ def _mirror(matrix: Array) -> None:
         matrix[begin:end, end:] = matrix[end:, begin:end].T
         corner = np.tril(matrix[begin:end, begin:end])
         matrix[begin:end, begin:end] = corner + np.tril(corner, -1).T
-
-
-def sparse_solve(factor: PETSc.Mat, side: Array) -> Array:
-    """Solve with a right-hand side of few entries by MUMPS's factors, on one rank."""
-    n, integer, entries = side.size, PETSc.IntType, np.flatnonzero(side)
-    rows = np.array([0, entries.size], dtype=integer), entries.astype(integer), side[entries]
-    given = PETSc.Mat().createTranspose(PETSc.Mat().createAIJ((1, n), csr=rows, comm=factor.comm))
-    solution = PETSc.Mat().createDense((n, 1), array=np.zeros(n), comm=factor.comm)
-    number, value = SPARSE_SIDE
-    usual = factor.getMumpsIcntl(number)
-    factor.setMumpsIcntl(number, value)
-    factor.matSolve(given, solution)
-    factor.setMumpsIcntl(number, usual)
-    return np.array(solution.getDenseArray()[:, 0])
 
 
 class SchurComplement:
@@ -165,10 +147,10 @@ class SchurComplement:
         beyond[self._kept] = False
         return bool(beyond.any())
 
-    def interior(self, rhs: Array, sparse: bool = False) -> Array:
+    def interior(self, rhs: Array) -> Array:
         """Return the solution for an owned right-hand side, the kept unknowns being 0. Collective.
 
-        It depends on no values at kept unknowns. `sparse`: there are few others.
+        It depends on no values at kept unknowns.
         """
         inside = rhs.copy()
         inside[self._kept] = 0.0
@@ -176,11 +158,7 @@ class SchurComplement:
         # PETSc refuses solves on several ranks for the sake of those with the kept unknowns too.
         form = factor.getMumpsIcntl(SCHUR)
         factor.setMumpsIcntl(SCHUR, 0)
-        # Of several ranks PETSc takes sparse ones on the first alone.
-        if sparse and self.comm.size == 1 and inside.any():
-            solution = sparse_solve(factor, inside)
-        else:
-            solution = mat_solve(factor, inside[:, None])[:, 0]
+        solution = mat_solve(factor, inside[:, None])[:, 0]
         factor.setMumpsIcntl(SCHUR, form)
         solution[self._kept] = 0.0
         return solution
@@ -190,12 +168,9 @@ class SchurComplement:
         own = rhs[self._kept] - times(self._rows, interior)
         return np.concatenate(self.comm.allgather(own))
 
-    def expand(self, interior: Array, kept: Array) -> Array:
-        """Return the owned solution that goes with values of the kept unknowns of all ranks.
-
-        Collective. `interior` is that of its right-hand side.
-        """
+    def expand(self, rhs: Array, kept: Array) -> Array:
+        """Return the owned solution that goes with values of the kept unknowns of all ranks."""
         own = kept[self.offset : self.offset + self._kept.size]
-        solution = interior - self.interior(times(self._rows, own, transposed=True), sparse=True)
+        solution = self.interior(rhs - times(self._rows, own, transposed=True))
         solution[self._kept] = own
         return solution

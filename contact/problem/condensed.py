@@ -273,22 +273,23 @@ class Condensation:
         reactions = body.sizes(body.reactions(residual))
         acting = body.load_sizes(state.time) + reactions + body.exchanged(state)
         restricted = self._constraint.restrict(-residual)
-        rhs = body.layout.mask(restricted[: body.owned])
+        self._rhs = body.layout.mask(restricted[: body.owned])
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
         nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
-        self._interior: Array = np.zeros(body.owned)
-        if body.comm.allreduce(bool(self._schur.exceeds(rhs, nothing)), op=MPI.LOR):
-            self._interior = self._schur.interior(rhs)
-        inside = summed(body.comm, self._responses.T @ rhs)
+        interior: Array = np.zeros(body.owned)
+        if body.comm.allreduce(bool(self._schur.exceeds(self._rhs, nothing)), op=MPI.LOR):
+            interior = self._schur.interior(self._rhs)
+        inside = summed(body.comm, self._responses.T @ self._rhs)
         self._on_q = restricted[body.owned :][self._free] - inside
-        condensed = self._schur.condense(rhs, self._interior)
-        forces = self._border.T @ self._solve_q(self._on_q) - condensed
+        forces = self._border.T @ self._solve_q(self._on_q) - self._schur.condense(
+            self._rhs, interior
+        )
         if not (self._regular and np.isfinite(forces).all()):
             return None
         free, inclined = body.layout.at(self.nodes)
         jump = self.full.interface.jump
         others = body.nodal(state.x)[self.nodes[jump.nodes.size :]]
-        seen = CondensedBody(
+        condensed = CondensedBody(
             body.comm,
             body.dim,
             free,
@@ -301,7 +302,7 @@ class Condensation:
             body.component_norms.at(self.nodes),
             inclined,
         )
-        return CondensedProblem(seen, self._interface, self.full.scales, state.time)
+        return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 
     def stiffness(self, state: State) -> Array | None:
         """Return the stiffness at the kept nodes, on the first rank. Collective.
@@ -375,8 +376,8 @@ class Condensation:
         kept = np.concatenate(self.full.comm.allgather(x - condensed.equilibrium.at))
         q = np.zeros(self._constraint.free.size)
         q[self._free] = self._solve_q(self._on_q - self._border @ kept)
-        interior = self._interior - self._responses @ q[self._free]
-        return self._constraint.expand(np.concatenate([self._schur.expand(interior, kept), q]))
+        rhs = self._rhs - self._bulk.columns @ q
+        return self._constraint.expand(np.concatenate([self._schur.expand(rhs, kept), q]))
 
 
 def pays(problem: ContactProblem, kind: str) -> bool:

@@ -162,6 +162,7 @@ def ratio(dimension: str, n: str, start: str = "") -> dict[str, Any]:
         without = (computed - reviewed) / linear
         times.append((seconds, computed, reviewed, linear, computed / linear, without))
         result = described(solution)
+        del solution  # else it would lie beside the next
     seconds, computed, reviewed, linear, quotient, without = np.median(times, axis=0).tolist()
     return {
         "unknowns": result["unknowns"],
