@@ -10,7 +10,7 @@ from contact.history import BodyState
 from contact.linear.dense import DenseOperator, DenseStiffness
 from contact.linear.operator import Counters
 from contact.ranks import largest, on_all_ranks, on_root, summed
-from tests.conftest import _covering
+from tests.conftest import _covering, pytest_collection_modifyitems
 
 COMM = MPI.COMM_WORLD
 
@@ -81,3 +81,33 @@ def test_on_several_ranks_each_value_of_each_parameter_stays():
     assert {item.callspec.indices["a"] for item in kept} == {0, 1, 2}
     assert {item.callspec.indices["b"] for item in kept} == {0, 1}
     assert _covering([single := SimpleNamespace()]) == [single]
+
+
+class Collected:
+    """A collected test, as far as it is looked at."""
+
+    def __init__(self, nodeid, *marks, **indices):
+        self.nodeid, self.marks = nodeid, marks
+        self.callspec = SimpleNamespace(indices=indices)
+
+    def get_closest_marker(self, name):
+        return name if name in self.marks else None
+
+
+@pytest.mark.parametrize("short", [False, True])
+def test_short_runs_leave_out_slow_tests_and_combinations(short):
+    items = [Collected(f"both[{a}-{b}]", a=a, b=b) for a in range(2) for b in range(2)]
+    items += [Collected("long", "slow"), Collected("one[0]", a=0), Collected("one[1]", "slow", a=1)]
+    left_out = []
+    config = SimpleNamespace(
+        getoption=lambda name: short,
+        hook=SimpleNamespace(pytest_deselected=lambda items: left_out.extend(items)),
+    )
+    pytest_collection_modifyitems(config, items)
+    names = [item.nodeid for item in items]
+    if not short:
+        assert len(names) == 7
+        assert not left_out
+        return
+    assert names == ["both[0-0]", "both[1-1]", "one[0]"]
+    assert len(left_out) == 4
