@@ -333,6 +333,7 @@ def run_schedule(
             here, history = problem, IterationHistory()
             state, outcome = solve_step(problem, method, start)
             history.records += method.history.records
+    solved = time.perf_counter() - clock - setup
     counters = method.counters
     body = method.condensation if isinstance(method, Newton) else None
     critical, jammed = uniqueness(here, state, body) if outcome.converged else (np.inf, False)
@@ -348,7 +349,7 @@ def run_schedule(
         counters=counters,
         method=settings.method,
         start=BEFORE if records else ZERO if start is None else schedule.guess,
-        seconds={"setup": setup, "solve": time.perf_counter() - clock - setup, "output": 0.0},
+        seconds={"setup": setup, "solve": solved, "output": 0.0},
         steps=records,
         extra_steps=sum(record.state.time not in schedule.times for record in records),
         critical_factor=critical,

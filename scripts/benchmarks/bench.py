@@ -72,6 +72,7 @@ def against_one_solve(bench: Bench) -> None:
         3: bench.sizes((8, 12), (20, 28, 40, 56), (70,)),
     }
     for dimension, cells in sizes.items():
+        run("ratio", str(dimension), "8")  # compiles the forms, whose memory would count
         for n in cells:
             for start in ("", "cold"):
                 result = run("ratio", str(dimension), str(n), *([start] if start else []))
