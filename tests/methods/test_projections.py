@@ -1,10 +1,15 @@
 """What an iteration of the block relaxation is made of: projections and their acceleration."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from contact.interface.complementarity import disc_derivative, project_disc, project_half_line
+from contact.interface.layer import NormalLaw
 from contact.methods.thesis.acceleration import ResidualMinimiser
+from contact.methods.thesis.uzawa import _Projection
+from forms.laws import Compliance
 
 
 def test_projections():
@@ -62,3 +67,20 @@ def test_the_acceleration_solves_random_complementarity_problems(seed):
         assert fast < slow
         assert found == pytest.approx(expected, abs=1e-7)
     assert fast <= 60
+
+
+@pytest.mark.parametrize("nodes", [0, 3])
+@pytest.mark.parametrize("layer", [False, True])
+def test_several_points_are_projected_as_one_after_the_other(nodes, layer):
+    """Ranks without contact nodes too."""
+    rng = np.random.default_rng(1)
+    gap = np.full(nodes, 0.5)
+    law = NormalLaw(Compliance(2.0), np.ones(nodes), 0 * gap, gap) if layer else None
+    jump = SimpleNamespace(gap=gap)
+    project = _Projection(jump, 3.0, np.full(nodes, 0.4), law, np.zeros((nodes, 3)))
+    points = rng.normal(size=(5, nodes, 3))
+    found = project(points)
+    assert found.shape == points.shape
+    for point, one in zip(points, found, strict=True):
+        assert np.array_equal(project(point), one)
+    assert nodes == 0 or (found[..., 0] > 0).any()

@@ -18,6 +18,7 @@ problem, Appl. Math. Lett. 22 (2009) 1534.
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -135,7 +136,7 @@ class _Projection:
             pressure = np.asarray(contact_multiplier(z[..., 0], self.r, 0.0, self.jump.gap))
         else:
             # Laws of users take one value a node.
-            rows = z[..., 0].reshape(-1, z.shape[-2])
+            rows = z[..., 0].reshape(math.prod(z.shape[:-2]), z.shape[-2])
             pressure = np.reshape([self.law.pressure(row, self.r) for row in rows], z.shape[:-1])
         friction = project_disc(z[..., 1:], self.bound)
         return np.concatenate([pressure[..., None], friction], axis=-1)
