@@ -141,3 +141,7 @@ def give_memory_back() -> None:
 
 
 give_memory_back()
+
+# Threads of PT-Scotch race: a mesh would be distributed otherwise from run to run, and the problems
+# beside one, for derivatives by a number of its mesh, would have other nodes on a rank.
+os.environ.setdefault("SCOTCH_PTHREAD_NUMBER", "1")

@@ -204,3 +204,8 @@ def test_prescribed_values_reach_ghosts(comm):
     height.interpolate(lambda x: np.vstack([x[1], x[1]]))
     top = np.isclose(height.x.array, 1.0)
     assert set(np.unique(x[top]).tolist()) <= {0.02, -0.03}
+
+
+def test_a_mesh_is_distributed_in_the_same_way_each_time(comm):
+    made = [mesh.create_unit_cube(comm, 8, 8, 8).geometry.x for _ in range(8)]
+    assert all(np.array_equal(made[0], x) for x in made[1:])
