@@ -86,7 +86,10 @@ class SchurComplement:
         self._kept, self.comm = kept, lasting(matrix.getComm().tompi4py())
         begin, end = matrix.getOwnershipRange()
         own_kept = (begin + kept).astype(PETSc.IntType)
-        numbers = self.comm.allgather(own_kept)
+        # With a Schur complement MUMPS orders by minimum degree alone, and breaks its many ties by
+        # the order given. dolfinx numbers along fronts: backwards along these leaves least work.
+        self._backwards = PETSc.IS().createStride(end - begin, end - 1, -1, comm=matrix.comm)
+        numbers = self.comm.allgather(begin + end - 1 - own_kept)
         self.size = sum(part.size for part in numbers)
         self.offset = sum(part.size for part in numbers[: self.comm.rank])
         # MUMPS leaves the Schur complement to the first rank, and PETSc asks for its rows there.
@@ -96,8 +99,9 @@ class SchurComplement:
             PETSc.IS().createGeneral(own_kept, matrix.comm),
             PETSc.IS().createStride(end - begin, begin, 1, comm=matrix.comm),
         )
-        #: Rows of the matrix at kept unknowns.
+        #: Rows of the matrix at kept unknowns, and the matrix numbered backwards.
         self._rows: PETSc.Mat | None = None
+        self._reordered: PETSc.Mat | None = None
         self._ksp = PETSc.KSP().create(matrix.comm)
         self._ksp.setOptionsPrefix(prefix)
         self._ksp.setType("preonly")
@@ -119,13 +123,18 @@ class SchurComplement:
         """
         first = self._rows is None
         self._rows = matrix.createSubMatrix(*self._places, self._rows)
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        reordered = matrix.permute(self._backwards, self._backwards)
+        if self._reordered is None:
+            self._reordered = reordered
+        else:  # into the one that has been analysed
+            reordered.copy(self._reordered, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self._reordered.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         # On several ranks MUMPS writes the other triangle where it factorises with an old analysis.
         if first or self.comm.size > 1:
             self._ksp.getPC().reset()
-            self._ksp.setOperators(matrix)
+            self._ksp.setOperators(self._reordered)
             self._prepare(self._ksp.getPC())
-        self._ksp.setOperators(matrix)
+        self._ksp.setOperators(self._reordered)
         set_up_with_workspace(self._ksp, self._prepare)
         if out_of_memory(self._ksp.getPC()):
             raise no_solution(self._ksp.getPC(), self._ksp.getOptionsPrefix())
@@ -158,7 +167,7 @@ class SchurComplement:
         # PETSc refuses solves on several ranks for the sake of those with the kept unknowns too.
         form = factor.getMumpsIcntl(SCHUR)
         factor.setMumpsIcntl(SCHUR, 0)
-        solution = mat_solve(factor, inside[:, None])[:, 0]
+        solution = mat_solve(factor, inside[::-1, None])[::-1, 0]
         factor.setMumpsIcntl(SCHUR, form)
         solution[self._kept] = 0.0
         return solution
