@@ -7,8 +7,9 @@ back stresses b_k,
     db_k = (2/3) C_k de_p - gamma_k b_k da,
 
 with the terms of Chaboche, which are Armstrong and Frederick's with a recovery gamma, and
-Prager's without. It is a radial return: xi points along z = s_tr - sum b_k/(1 + gamma_k da), and
-one scalar equation is left for dg. Without recovery it is Hencky's law about a moved origin.
+Prager's without. It is a radial return (return mapping): xi points along
+z = s_tr - sum b_k/(1 + gamma_k da), and one scalar equation is left for dg. Without recovery it is
+Hencky's law about a moved origin.
 
 References
 ----------

@@ -16,16 +16,18 @@ layer and current
     `law.InterfaceLaw`; `layer` describes normal compliance.
 penalised laws
     `penalised`.
-jump, contact forces, slip history
-    `jump`; `nodes.ContactNodes` is the jump of both kinds of contact, and holds the lumped surface
-    mass.
+jump, lumped surface mass
+    `nodes.ContactNodes`, of both kinds of contact.
+contact forces, slip history
+    `multipliers`.
 contact nodes
     in front of a rigid foundation `placing`, of another body `pairing`; of several contacts
     `entries`.
 mortar coupling
     `mortar`: `search` finds the facets opposite, on whatever rank, `coupling` integrates the dual
-    operator over their `segments`, `operator` applies it, `lumping` has the areas of nodes,
-    `deviation` the distance of a curve from its chords. Each rank has the rows of its own nodes.
+    operator over their `segments`, `operator` applies it, `lumping` has the areas of nodes;
+    `contact.mesh.deviation` has the distance of a curved surface from its chords. Each rank has the
+    rows of its own nodes.
 rigid shapes
     `obstacle`: `protocol` is the base class of shapes, which `shapes` and `triangles` are.
 """

@@ -3,9 +3,13 @@
 `newton` is the semismooth Newton method (primal-dual active set) with its order of fallbacks:
 `continuation`, `unconstrained_modes`, `interior_point`. Its steps are `newton_step` on the whole
 body and `condensed_step` on the body condensed onto its contact nodes, with `chord` steps. `thesis`
-has fixed points, Uzawa block relaxation and penalty; `load_stepping` is the quasi-static load
-stepping around any method. Tolerances and limits are in `options`; c, r and gamma in
-`complementarity_parameters`.
+has fixed points, Uzawa block relaxation and penalty, on which Newton's method does not fall back;
+`load_stepping` is the quasi-static load stepping around any method.
+
+Parts of methods: `cones` (slacks and multipliers of the interior point), `conductivity_derivative`
+(Newton or Picard in the conductivity) and `stagnation`. For all methods: `method` is their
+protocol, `options` has tolerances and limits, `complementarity_parameters` c, r and gamma, `report`
+the history and the outcome; `signals` ends a solve by Ctrl-C.
 
 The methods share, and do not define: complementarity functions and active set
 (`contact.interface.complementarity`, `active_set`), static condensation

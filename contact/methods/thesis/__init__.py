@@ -1,4 +1,11 @@
 """Algorithms 1 to 9 of the thesis: fixed points, Uzawa block relaxation, penalty.
 
-Newton's method does not fall back on them.
+`fixed_point` over `uzawa` with its `acceleration`, and `penalty`; `outer_loop` is their common
+frame. Newton's method does not fall back on them. Numbers such as (3.45) are those of equations of
+the thesis.
+
+References
+----------
+Mandyly, Contact problems with Coulomb friction in elasto-plasticity and electro-elasto-plasticity
+for Hencky type materials, doctoral thesis, University Sultan Moulay Slimane, Beni Mellal (2020).
 """
