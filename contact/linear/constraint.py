@@ -14,9 +14,9 @@ Q is sparse, and Q^T K Q is made by PtAP. R is not: its columns would fill the r
 that they touch. So q borders the system, [[K, K R], [R^T K, R^T K R]], which takes one solve either
 way: a factorisation solves for the columns of K R together with the right-hand side; for an
 iterative solver q is eliminated, which takes a matrix of rank m from K and leaves its
-preconditioner as it is. Where it is asked for a few digits, the remainder is left to the rows of
-nodes: the balance of q is met to rounding. `contact.problem.condensed` condenses
-the same system.
+preconditioner as it is. Where an iterative solver is asked for a few digits only, q is corrected
+after the solve: the rows of q are met to rounding, and the residual is in those of the nodes.
+`contact.problem.condensed` condenses the same system.
 
 Right-hand sides and solutions have the values of q, the same on all ranks, behind the owned ones.
 """
@@ -41,7 +41,7 @@ from contact.typing import Array
 
 
 @dataclass(frozen=True)
-class Change:
+class BasisChange:
     """A change of basis, x = Q y, that makes jumps unknowns.
 
     Attributes
@@ -62,7 +62,7 @@ class Change:
         rows: NDArray[np.intp],
         jumps: sparse.csr_array,
         unknowns: tuple[Array, NDArray[np.bool_]],
-    ) -> Change:
+    ) -> BasisChange:
         """Return the change that makes jumps unknowns, in place of those of some nodes. Collective.
 
         Where an unknown is fixed it remains itself; the others lose their dependence on it, for it
@@ -114,7 +114,7 @@ class Change:
         vector = whole.createVecRight()
         vector.array[:] = 1 / diagonal
         whole.diagonalScale(None, vector)
-        return Change(whole, inverse)
+        return BasisChange(whole, inverse)
 
 
 def _matrix(
@@ -155,7 +155,7 @@ class Constraint:
     def __init__(
         self,
         layout: Layout,
-        change: Change | None,
+        change: BasisChange | None,
         motions: sparse.csr_array,
         free: NDArray[np.bool_],
     ) -> None:
@@ -285,11 +285,12 @@ class ConstrainedOperator:
         self._bulk, self._constraint, self._nodes = bulk, bulk.constraint, nodes
         self._inner = SparseOperator(bulk, nodes, symmetric=symmetric, counters=counters, kind=kind)
         self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.constraint.free)
-        #: Whether the responses to the columns are those of another matrix.
-        self._behind = False
+        #: Whether the responses to the columns K R are those of an earlier matrix.
+        self._outdated = False
         self._responses = np.zeros((self._owned, self._free.size))
         self._inverse: Array = np.zeros((self._free.size, self._free.size))
-        self._gives = np.zeros_like(self._inverse)
+        #: Inverse of the stiffness of the blocks alone against q.
+        self._compliance_of_q = np.zeros_like(self._inverse)
 
     @property
     def symmetric(self) -> bool:
@@ -300,8 +301,8 @@ class ConstrainedOperator:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
         if not self._inner.update(kind, state, blocks, constant=constant):
             return False
-        self._behind = self._free.size > 0
-        if self._inner.iterative and self._behind:
+        self._outdated = self._free.size > 0
+        if self._inner.iterative and self._outdated:
             self._eliminate(blocks)
         return True
 
@@ -317,9 +318,9 @@ class ConstrainedOperator:
             relative = self._inner.solve(own - columns @ (self._inverse @ forces), rtol, guess)
             moved = self._inverse @ (forces - self._on_q(columns, relative))
         else:
-            if self._behind:
+            if self._outdated:
                 first, *responses = self._inner.solve_all(np.column_stack([own, columns])).T
-                self._responses, self._behind = np.column_stack(responses), False
+                self._responses, self._outdated = np.column_stack(responses), False
                 self._inverse = self._condensed(columns, self._responses)
             else:
                 first = self._inner.solve(own)
@@ -331,7 +332,7 @@ class ConstrainedOperator:
         if self._inner.iterative and rtol is not None and free.size:
             # Blocks are stiff then: q hardly moves.
             left = rhs[self._owned :] - self.multiply(solution)[self._owned :]
-            solution[self._owned :][free] += self._gives @ left[free]
+            solution[self._owned :][free] += self._compliance_of_q @ left[free]
         return solution
 
     def multiply(self, values: Array, transposed: bool = False) -> Array:
@@ -382,7 +383,7 @@ class ConstrainedOperator:
         motion, pushed = self._pushed(blocks)
         held = self._held(pushed)
         resists = bulk.layout.comm.allreduce(motion.T @ pushed, op=MPI.SUM)
-        self._gives = np.linalg.pinv(resists, rcond=ROUNDING)
+        self._compliance_of_q = np.linalg.pinv(resists, rcond=ROUNDING)
         stiffness, turned = np.linalg.eigh(held.T @ bulk.corner[np.ix_(free, free)] @ held)
         basis = held @ turned
         self._inverse = basis / stiffness @ basis.T

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Mixing
-from contact.linear.constraint import Change
+from contact.linear.constraint import BasisChange
 from contact.mesh.owners import Halo, Owners
 from contact.typing import Array
 
@@ -49,7 +49,7 @@ class CouplingOperator:
 
     halo: Halo
     jumps: sparse.csr_array
-    change: Change
+    change: BasisChange
     numbers: NDArray[np.int64]
     between: bool
     local: NDArray[np.intp]
@@ -132,7 +132,7 @@ def coupling_operator(
     of_contact = np.isin(numbers, named)
     place = np.searchsorted(named, numbers[of_contact], sorter=order)
     every[of_contact] = unknowns[order[place]]
-    change = Change.of(comm, halo, replaced, jumps, (every, free))
+    change = BasisChange.of(comm, halo, replaced, jumps, (every, free))
     none = np.zeros(0, dtype=np.intp)
     between = comm.allreduce(any(rows.masters.size for rows in given), op=MPI.LOR)
     taken = np.flatnonzero(halo.reverse(taking)[:, 0])
