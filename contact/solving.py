@@ -32,7 +32,7 @@ from contact.case.digest import check_restart, digest
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.methods.load_stepping import Evolution, solve_step
+from contact.methods.load_stepping import LoadStepping, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
@@ -295,7 +295,7 @@ def evolve(
     ends = _checked_times(problem, times, begin)
     settings = settings or NewtonOptions()
     method = METHODS[settings.method](problem, settings, monitor)
-    for step in Evolution(problem, method, start, before).run(ends, begin):
+    for step in LoadStepping(problem, method, start, before).run(ends, begin):
         if not step.outcome.converged:
             raise NotConvergedError(
                 f"no step to {step.problem.time:g}: {step.outcome.reason}; the states before remain"
@@ -374,7 +374,7 @@ def _steps(
     history, step, end = IterationHistory(), None, schedule.times[-1]
     states = [record.state for record in records[-1:-3:-1]]
     tell(logger, 0.0, "steps to t = %g", end)
-    for step in Evolution(problem, method, *states).run(schedule.times, schedule.begin):
+    for step in LoadStepping(problem, method, *states).run(schedule.times, schedule.begin):
         now, taken = step.problem.time, step.history.records
         history.records += [replace(r, note=f"t = {now:g} {r.note}".strip()) for r in taken]
         if step.outcome.converged:

@@ -35,7 +35,7 @@ NOTHING = Residuals(np.inf, np.inf, np.inf)
 
 @dataclass(frozen=True)
 class LoadStep:
-    """A step of an evolution.
+    """A load step: its problem, its solution, and the way to it.
 
     Attributes
     ----------
@@ -56,8 +56,8 @@ class LoadStep:
     counters: Counters
 
 
-class Evolution:
-    """The steps of a problem in time.
+class LoadStepping:
+    """Quasi-static load stepping: solves the load steps of a problem one after the other.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from contact import Case, build_problem
-from contact.methods.load_stepping import Evolution
+from contact.methods.load_stepping import LoadStepping
 from contact.methods.newton import Newton
 from contact.sweeping import Axis, sweep
 from scripts.benchmarks.bench_one import LINEAR, block, unknowns
@@ -37,7 +37,7 @@ def measured(case: Case, count: int) -> dict[str, Any]:
     problem = build_problem(case)
     method = Newton(problem, case.solver)
     solves, converged = 0, True
-    for step in Evolution(problem, method).run([*(np.arange(1, count + 1) / count)]):
+    for step in LoadStepping(problem, method).run([*(np.arange(1, count + 1) / count)]):
         solves += step.counters.contact_solves
         converged &= step.outcome.converged
     return {

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from contact import evolve, solve
-from contact.methods.load_stepping import Evolution
+from contact.methods.load_stepping import LoadStepping
 from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
@@ -46,14 +46,14 @@ def test_a_solution_says_that_steps_were_halved(largest, monkeypatch):
 @pytest.mark.parametrize("parts", [1, 2, 16])
 def test_a_step_that_fails_is_halved(parts):
     problem = shaken()
-    steps = list(Evolution(problem, failing(problem, 1 / parts)).run([1.0, 2.0]))
+    steps = list(LoadStepping(problem, failing(problem, 1 / parts)).run([1.0, 2.0]))
     assert all(step.outcome.converged for step in steps)
     assert [step.state.time for step in steps] == [(k + 1) / parts for k in range(2 * parts)]
 
 
 def test_an_evolution_ends_with_what_it_has():
     problem = shaken()
-    steps = list(Evolution(problem, failing(problem, 1 / 17)).run([0.05, 1.05, 2.0]))
+    steps = list(LoadStepping(problem, failing(problem, 1 / 17)).run([0.05, 1.05, 2.0]))
     assert [step.outcome.converged for step in steps] == [True, False]
     assert steps[0].state.time == 0.05
     assert steps[1].state.time == 0.05 + 1 / 16

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from contact import build_problem, solve
 from contact.case.file import parse_case
-from contact.methods.load_stepping import Evolution
+from contact.methods.load_stepping import LoadStepping
 from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions
 from tests.problems.blocks import squares
@@ -33,7 +33,7 @@ def test_an_approach_of_two_blocks_takes_a_solve_a_step():
     """It took 2884 solves and 990 factorisations: rounding of one block was compared with none."""
     problem = build_problem(parse_case(CASE), SELF)
     method = METHODS["newton"](problem, NewtonOptions(), None)
-    steps = list(Evolution(problem, method).run([*(np.arange(1, 11) / 10)]))
+    steps = list(LoadStepping(problem, method).run([*(np.arange(1, 11) / 10)]))
     assert all(step.outcome.converged for step in steps)
     assert method.counters.factorizations == 1
     assert method.counters.linear_solves <= 10 and method.counters.contact_solves <= 10
@@ -71,7 +71,7 @@ def test_an_evolution_that_lifts_off_takes_a_solve_a_step():
     }
     problem = build_problem(parse_case(case), SELF)
     method = METHODS["newton"](problem, NewtonOptions(), None)
-    steps = list(Evolution(problem, method).run([0.3, 0.6, 0.9, 1.2, 1.5, 1.8]))
+    steps = list(LoadStepping(problem, method).run([0.3, 0.6, 0.9, 1.2, 1.5, 1.8]))
     assert all(step.outcome.converged for step in steps)
     presses = [bool(step.state.forces.pressure.max() > 0) for step in steps]
     assert presses == 3 * [True] + 3 * [False]
@@ -98,7 +98,7 @@ def test_two_blocks_unloaded_to_zero_end_at_zero(loads, condense):
     }
     problem = build_problem(parse_case(case), SELF)
     method = METHODS["newton"](problem, NewtonOptions(condense=condense), None)
-    steps = list(Evolution(problem, method).run([*(np.arange(1, 11) / 10)]))
+    steps = list(LoadStepping(problem, method).run([*(np.arange(1, 11) / 10)]))
     assert all(step.outcome.converged for step in steps)
     assert all(step.state.forces.pressure.max() > 0 for step in steps[:-1])
     assert not steps[-1].state.x.any() and not steps[-1].state.forces.pressure.any()
@@ -126,7 +126,7 @@ def test_leaves_whose_loads_vanish_go_back_to_zero():
     }
     problem = build_problem(parse_case(case), SELF, domain=leaves)
     method = METHODS["newton"](problem, NewtonOptions(), None)
-    pressed, gone = Evolution(problem, method).run([1.0, 2.0])
+    pressed, gone = LoadStepping(problem, method).run([1.0, 2.0])
     assert pressed.outcome.converged and pressed.state.forces.pressure.max() > 0
     assert gone.outcome.converged and gone.state.forces.pressure.max() == 0
     assert np.abs(gone.state.x).max() == 0

@@ -7,7 +7,7 @@ from contact import evolve
 from contact.body.description import Body, Load
 from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
-from contact.methods.load_stepping import Evolution
+from contact.methods.load_stepping import LoadStepping
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.problem.contact import Contact
@@ -55,7 +55,7 @@ def test_an_evolution_ends_where_loads_let_the_body_go(press, push, when, why):
     """Steps that end beyond are not tried; the last one before is as near as halves come."""
     problem = lying(MPI.COMM_SELF, press, push)
     method = Newton(problem, NewtonOptions())
-    *complete, last = Evolution(problem, method).run(TIMES)
+    *complete, last = LoadStepping(problem, method).run(TIMES)
     assert [step.state.time for step in complete[:3]] == [0.5, 1.0, 1.5]
     assert all(step.outcome.converged for step in complete)
     assert when - 0.5 / 16 <= complete[-1].state.time <= when * (1 + 1e-6)

@@ -7,7 +7,7 @@ from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.mesh.grid import rectangle
-from contact.methods.load_stepping import Evolution, LoadStep
+from contact.methods.load_stepping import LoadStep, LoadStepping
 from contact.methods.method import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.problem.contact import Contact
@@ -28,7 +28,7 @@ def tabulated(times, values):
 def steps_of(problem, times, options=TIGHT["newton"], start=None) -> list[LoadStep]:
     """Return all steps, which have to converge."""
     method = METHODS[options.method](problem, options, None)
-    steps = list(Evolution(problem, method, start).run(times))
+    steps = list(LoadStepping(problem, method, start).run(times))
     assert all(step.outcome.converged for step in steps)
     return steps
 
