@@ -1,4 +1,4 @@
-"""The sizes of forces that are compared with each other, and with no others.
+"""The norms of forces that are compared with each other, and with no others.
 
 Forces and charges have no common unit. And bodies that nothing connects have none in common:
 beside the loads of another component of the mesh any error of one may be small.
@@ -72,7 +72,7 @@ class ComponentNorms:
         of = np.repeat(self.component, self.block_size)
         return Components(self.comm, of, self.count) if self.count > 1 else None
 
-    def sizes(self, values: Array) -> Array:
+    def norms(self, values: Array) -> Array:
         """Return the Euclidean norms of owned values, by field and component. Collective.
 
         Returns
@@ -80,11 +80,13 @@ class ComponentNorms:
         Shape (1, k), or (2, k) where there is a potential: of forces, and of charges.
         """
         if self.block_size == self.dim:
-            return self._norms(values)[None]
+            return self._by_component(values)[None]
         chosen = self.mechanical
-        return np.stack([self._norms(np.where(part, values, 0.0)) for part in (chosen, ~chosen)])
+        return np.stack(
+            [self._by_component(np.where(part, values, 0.0)) for part in (chosen, ~chosen)]
+        )
 
-    def _norms(self, values: Array) -> Array:
+    def _by_component(self, values: Array) -> Array:
         owned = values.size - self.behind.size
         own, other = values[:owned], values[owned:]
         if self.count == 1:
@@ -94,10 +96,10 @@ class ComponentNorms:
         squares = component_sums(self.comm, component, own**2, self.count)
         return np.sqrt(squares + np.bincount(self.behind, other**2, minlength=self.count))
 
-    def spread(self, sizes: Array) -> Array:
+    def spread(self, norms: Array) -> Array:
         """Return for each owned value the norm that it is compared with."""
         component = np.concatenate([np.repeat(self.component, self.block_size), self.behind])
-        return np.where(self.mechanical, sizes[0, component], sizes[-1, component])
+        return np.where(self.mechanical, norms[0, component], norms[-1, component])
 
 
 def component_norms_of(

@@ -386,16 +386,16 @@ class BodyEquilibrium:
         own, n = np.dot(one[: self.owned], other[: self.owned]), self.owned
         return float(summed(self.comm, own) + np.dot(one[n:], other[n:]))
 
-    def sizes(self, values: Array) -> Array:
+    def norms(self, values: Array) -> Array:
         """Return the norms of forces, and of charges, of each component apart. Collective."""
-        return self.component_norms.sizes(values)
+        return self.component_norms.norms(values)
 
-    def load_sizes(self, time: float = 1.0) -> Array:
-        """Return the `sizes` of the nodal loads at a time. Collective."""
-        return self.sizes(self.external(time))
+    def load_norms(self, time: float = 1.0) -> Array:
+        """Return the `norms` of the nodal loads at a time. Collective."""
+        return self.norms(self.external(time))
 
     def exchanged(self, state: Evaluated) -> Array:
-        """Return the `sizes` of the potential's forces and the strain's charges. Collective."""
+        """Return the `norms` of the potential's forces and the strain's charges. Collective."""
         if not self.piezoelectric:
             return np.zeros((1, self.component_norms.count))
         alone = state.x.copy()
@@ -403,7 +403,7 @@ class BodyEquilibrium:
         of_all, of_potential = (
             self.internal_forces(at) for at in (state, BodyState(alone, state.history))
         )
-        return self.sizes(
+        return self.norms(
             np.where(self.component_norms.mechanical, of_potential, of_all - of_potential)
         )
 

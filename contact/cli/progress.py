@@ -29,8 +29,8 @@ OUTER = "contact.solver"
 COUNT = "iterations: {n_fmt}, {elapsed}{postfix}"
 SHARES = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
 WIDTH = 80
-#: Head of the table of iterations: linear solves, residuals and sizes of the active sets. Newton
-#: iterations on the condensed problem, within step 2, are 2.1, 2.2, ...
+#: Head of the table of iterations: linear solves, residuals, and numbers of nodes that are open,
+#: stick and slip. Newton iterations on the condensed problem, within step 2, are 2.1, 2.2, ...
 HEAD = "   step solves  equilibrium  contact friction   open  stick   slip  note"
 
 
@@ -38,7 +38,11 @@ def table(record: Record, within: str = "") -> list[str]:
     """Return the rows of an outer iteration and of those within it, below `HEAD`."""
     if not shown(record.iteration):
         return []
-    kkt, sets, number = record.kkt, record.sizes or ("", "", ""), f"{within}{record.iteration}"
+    kkt, sets, number = (
+        record.kkt,
+        record.sizes or ("", "", ""),
+        f"{within}{record.iteration}",
+    )
     row = (
         f"{number:>7} {record.inner:6}  {kkt.equilibrium:11.1e} {kkt.contact:8.1e} "
         f"{kkt.friction:8.1e} {sets[0]:6} {sets[1]:6} {sets[2]:6}  {record.note}"

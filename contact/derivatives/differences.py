@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.problem.linearised import active_set, equations, sizes
+from contact.problem.linearised import active_set, equations, reference_norms
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -143,19 +143,19 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
 
 
 def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> float:
-    """Return how far the equations at the ends change, relative to their sizes. Collective.
+    """Return how far the equations at the ends change, relative to their norms. Collective.
 
     The largest of all steps; those before one where it is enough are not asked.
     """
     found = 0.0
     for base, state in reversed(steps):
-        active, size = active_set(base, state), sizes(base, state)
+        active, norms = active_set(base, state), reference_norms(base, state)
         one, other = (
             equations(*at(problem, state), active)
             for problem in (family.problems[0], family.problems[-1])
         )
-        forces = base.equilibrium.norm(one.forces - other.forces) / size[0]
-        conditions = base.nodes.norm(one.conditions - other.conditions) / size[1]
+        forces = base.equilibrium.norm(one.forces - other.forces) / norms[0]
+        conditions = base.nodes.norm(one.conditions - other.conditions) / norms[1]
         found = max(found, forces, conditions)
         if found >= LEAST:
             break

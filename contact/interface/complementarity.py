@@ -1,4 +1,4 @@
-"""Complementarity functions of contact and friction: residuals and generalised derivative.
+"""Complementarity (NCP) functions of contact and friction: residuals, generalised derivative.
 
 With projections onto the admissible forces, a half line and a disc, the laws are equations,
 
@@ -34,7 +34,7 @@ from contact.typing import Array
 
 
 def project_half_line(z: Array) -> Array:
-    """Return max(0, z): the projection onto admissible pressures, equation (3.43)."""
+    """Return max(0, z): the projection onto admissible pressures, (3.43) of the thesis."""
     return np.maximum(z, 0.0)
 
 
@@ -100,8 +100,8 @@ def interface_residuals(
     rounding
         Norm of pressures in L2(Gamma_3) that nothing can tell from zero, of each component.
     """
-    # A gap between neighbouring nodes costs E/h: where a body is that long only because its
-    # cells are stretched, E/size hides errors of the pressure far above the tolerance.
+    # Closing a gap at one node takes a stress of E/h: where the body is that long only because its
+    # cells are stretched, E/diameter hides errors of the pressure far above the tolerance.
     c = interface.elongation * interface.stiffness
     opening = interface.opening(nodal)
     contact = forces.pressure - project_half_line(forces.pressure - c * opening)
@@ -115,18 +115,18 @@ def interface_residuals(
     now = np.linalg.norm(nodal[:, : interface.dim], axis=1)
     way = np.maximum(now, before)
     closing = interface.stiffness * interface.norms(
-        np.minimum(np.minimum(np.abs(opening), way), interface.size)
+        np.minimum(np.minimum(np.abs(opening), way), interface.diameter)
     )
     pressed = interface.norms(interface.pressure(nodal, forces))
     # Where nothing presses, nodes may have moved until they just touch: gaps are rounding too.
     moved = interface.norms(np.full_like(way, interface.rounding(nodal)))
-    covered = interface.stiffness * interface.norms(np.minimum(now, interface.size))
+    covered = interface.stiffness * interface.norms(np.minimum(now, interface.diameter))
     closing = np.where(pressed <= moved, np.maximum(closing, covered), closing)
     scale = np.maximum(pressed, 1e-4 * closing)
     scale = np.maximum(scale, EPS * scale.max())
     norms = np.array([interface.norms(contact), interface.norms(friction)])
-    size = np.where(scale > 0, scale, 1.0)
-    return worst(norms / size, np.broadcast_to(rounding / size, norms.shape))
+    scale = np.where(scale > 0, scale, 1.0)
+    return worst(norms / scale, np.broadcast_to(rounding / scale, norms.shape))
 
 
 def worst(residuals: Array, floors: Array) -> tuple[Array, Array]:
@@ -215,13 +215,13 @@ def linearise(
     total = interface.pressure(nodal, forces)
     bound = interface.friction.bound(total, length)
     if before is None:
-        active = ActiveSet.without_slip(opening <= 1e-12 * interface.size, frictional)
+        active = ActiveSet.without_slip(opening <= 1e-12 * interface.diameter, frictional)
     else:
         lam = at_bound(before, lam, slip, bound)
         known = Multipliers(p, lam)
         active = interface.active_set(nodal, known, bound, c).stopped(before, lam, slip)
     trial = lam + c * slip
-    size = np.linalg.norm(trial, axis=1)
+    norm = np.linalg.norm(trial, axis=1)
     closed, sticks, slips = active.closed, active.sticks, active.slips
     changed = before is None or not active.same(before)
     unchanged = float(summed(interface.comm, changed)) == 0
@@ -235,12 +235,12 @@ def linearise(
         friction[sticks] = (lam + parameters.gamma * slip)[sticks]
         blocks[sticks, :d, :d] += parameters.gamma * jump.tangent[sticks]
 
-        along = trial / np.maximum(size, 1e-300)[:, None]
+        along = trial / np.maximum(norm, 1e-300)[:, None]
         across = jump.tangent - along[:, :, None] * along[:, None, :]
         # Across z = lambda + c u_tau the new multiplier is s/|u_tau| times the new slip:
         # lambda = s z/|z|, linearised in u and lambda and solved for the latter.
         least = np.maximum(bound * c / parameters.gamma, 1e-300)  # turning is at most gamma
-        turning = bound * c / np.maximum(size - bound, least)
+        turning = bound * c / np.maximum(norm - bound, least)
         sliding = turning[:, None, None] * across
         friction[slips] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slips]
         limit = softening * parameters.nodal_stiffness if unchanged else None
@@ -262,9 +262,9 @@ def at_bound(before: ActiveSet, friction: Array, slip: Array, bound: Array) -> A
     The linearised bound of a coefficient that falls with the slip may be far below that of the new
     slip. A node would stick by it, be released for the same reason as before, and so on.
     """
-    size = np.linalg.norm(friction, axis=1)
-    slides = before.slips & (np.einsum("ni,ni->n", friction, slip) > 0) & (size < bound)
-    scale = np.where(slides, bound / np.where(slides, size, 1.0), 1.0)
+    norm = np.linalg.norm(friction, axis=1)
+    slides = before.slips & (np.einsum("ni,ni->n", friction, slip) > 0) & (norm < bound)
+    scale = np.where(slides, bound / np.where(slides, norm, 1.0), 1.0)
     return friction * scale[:, None]
 
 

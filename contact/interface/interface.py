@@ -37,9 +37,9 @@ class Interface:
     held
         The current through nodes that cannot move, but whose potential is free; None without.
     stiffness
-        c = E/size, which weighs displacements against stresses (stress/length); E of the regions
-        that touch.
-    size
+        c = E/diameter, which weighs displacements against stresses (stress/length); E of the
+        regions that touch.
+    diameter
         Largest extent of the body (length).
     elongation
         How many times longer than usual the cells behind Gamma_3 are, across it
@@ -54,7 +54,7 @@ class Interface:
     friction: NodalFriction
     held: InterfaceLaw | None
     stiffness: float
-    size: float
+    diameter: float
     elongation: float
     component: NDArray[np.intp]
     components: int
@@ -157,7 +157,7 @@ class Interface:
             return ActiveSet.without_slip(closed, False)
         return ActiveSet.of(closed, forces.friction, self.slip(nodal), bound, c, rounding)
 
-    def sizes(self, nodal: Array, active: ActiveSet) -> tuple[int, int, int]:
+    def node_counts(self, nodal: Array, active: ActiveSet) -> tuple[int, int, int]:
         """Return the numbers of nodes that are open, stick and slip. Collective.
 
         Parameters

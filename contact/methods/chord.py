@@ -1,8 +1,8 @@
 """Chord steps: modified Newton steps with a frozen factorisation, and when they pay.
 
 A Newton step costs a factorisation, a chord step a few substitutions. Chord steps converge
-linearly, but fast where little of the body is in the plastic range. Contact itself is solved
-exactly in each step.
+linearly, but fast where little of the body is in the plastic range. They are steps on the condensed
+body (`condensed_step`): the Schur complement is frozen, and contact is solved on it in each step.
 
 References
 ----------
@@ -23,7 +23,7 @@ RADIUS = 0.05
 
 
 class Chord:
-    """Decides by the residuals whether a factorisation is kept.
+    """Decides by the residuals whether the next step is a chord step: keeps the factorisation.
 
     All ranks decide alike.
 
@@ -31,18 +31,18 @@ class Chord:
     ----------
     goal
         The residual that is to be reached.
-    worth
-        Steps that a new factorisation is worth; 0: it is never kept.
+    most_steps
+        Most chord steps to the goal for which the factorisation is kept; 0: it never is.
     """
 
-    def __init__(self, goal: float, worth: float) -> None:
-        self._goal, self._worth = goal, worth
-        self.forget()
+    def __init__(self, goal: float, most_steps: float) -> None:
+        self._goal, self._most_steps = goal, most_steps
+        self.drop()
         self.begin()
 
-    def forget(self) -> None:
-        """Let the next step make a new factorisation."""
-        self._made = self._keeps = False
+    def drop(self) -> None:
+        """Drop the factorisation: the next step makes a new one."""
+        self._factorised = self._keeps = False
 
     def begin(self) -> None:
         """Begin another loop, with other loads or another initial guess."""
@@ -60,7 +60,7 @@ class Chord:
             The largest residual there.
         """
         before, last = self._before, self._reached
-        if not self._made or self._worth <= 0:
+        if not self._factorised or self._most_steps <= 0:
             keep = False
         elif before is None:
             keep = iterate.active_set is not None and iterate.linearised_at is None
@@ -69,10 +69,10 @@ class Chord:
         else:
             rate = reached / last
             left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
-            keep = bool(left <= self._worth and reached <= RADIUS)
+            keep = bool(left <= self._most_steps and reached <= RADIUS)
         self._before, self._reached, self._keeps = iterate, reached, keep
         return iterate, keep
 
-    def taken(self) -> None:
-        """Say that a step has been taken: there is a factorisation from now on."""
-        self._made = True
+    def note_factorisation(self) -> None:
+        """Take note that a step has made, or kept, a factorisation."""
+        self._factorised = True

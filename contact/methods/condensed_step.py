@@ -75,21 +75,21 @@ class CondensedStep:
         self.condensation, self.options, self.parameters = condensation, options, parameters
         self.counters, self.conductivity_derivative = counters, ConductivityDerivative()
         self._solve, self._history = solve, history
-        worth = MOST_STEPS if options.keep != "never" else 0.0
-        self._chord = Chord(options.tolerance, worth)
+        most_steps = MOST_STEPS if options.keep != "never" else 0.0
+        self._chord = Chord(options.tolerance, most_steps)
 
     def set_load_step(self, problem: ContactProblem, history: IterationHistory) -> None:
         """Go on with another step of the same problem."""
         self.condensation.set_load_step(problem)
         self._history = history
 
-    def forget(self) -> None:
-        """Begin another solve; keep the factorisation if that is allowed across solves."""
+    def begin_solve(self) -> None:
+        """Begin another solve; drop the factorisation unless it may be kept across solves."""
         if self.options.keep != "across":
-            self._chord.forget()
+            self._chord.drop()
 
     def begin(self) -> None:
-        """Begin another loop with the same factorisation."""
+        """Begin another loop of steps in the same solve; the factorisation remains."""
         self._chord.begin()
 
     def __call__(
@@ -129,7 +129,7 @@ class CondensedStep:
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)
         if not body.linear:
-            self._chord.taken()
+            self._chord.note_factorisation()
         notes = [record.note for record in history.records]
         taken = [word for word in FALLBACKS if any(word in note for note in notes)]
         note = ", ".join([*["chord step"] * keep, *taken])

@@ -49,8 +49,8 @@ def _mixed(x: Array, y: Array) -> Array:
 
 
 @dataclass
-class Step:
-    """Changes of slacks and multipliers.
+class ConeStep:
+    """A search direction: changes of slacks and multipliers.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Cones:
         discs = float(self.length @ self.bound + np.sum(self.slip * self.friction))
         return float(self._comm.allreduce(self.slack @ self.force + max(discs, 0.0)))
 
-    def duality_gap_after(self, step: Step, part: float) -> float:
+    def duality_gap_after(self, step: ConeStep, part: float) -> float:
         """Return the duality gap after part of a step."""
         slack, force = self.slack + part * step.slack, self.force + part * step.force
         relative = [self._lambda + part * move for move in self._scaled(step)]
@@ -165,7 +165,7 @@ class Cones:
         """Return k in d(multiplier) = k - W^-2 d(slack) without centring, (n,) and in the frame."""
         return -self.force, -self._multiplier
 
-    def target(self, affine: Step, centre: float) -> tuple[Array, Array]:
+    def target(self, affine: ConeStep, centre: float) -> tuple[Array, Array]:
         """Return k with Mehrotra's correction, for slack times multiplier = centre."""
         force = -self.force + (centre - affine.slack * affine.force) / self.slack
         cross = -_product(*self._scaled(affine))
@@ -183,7 +183,7 @@ class Cones:
         force, k = constants
         return force, k[:, 2:] + self._along(k)[:, None] * self._axis
 
-    def complete(self, constants: tuple[Array, Array], slack: Array, slip: Array) -> Step:
+    def complete(self, constants: tuple[Array, Array], slack: Array, slip: Array) -> ConeStep:
         """Return the step of all slacks and multipliers, given that of gaps and slips.
 
         Parameters
@@ -202,7 +202,7 @@ class Cones:
         plus = (lead + along * self._boost**2) / self._first
         rise = self._along(k) - along / (self._scale**2 * self._first)
         rest = k[:, 2:] - across / (self._scale**2)[:, None]
-        return Step(
+        return ConeStep(
             slack,
             force - self.force / self.slack * slack,
             np.column_stack([minus, plus, across]),
@@ -210,7 +210,7 @@ class Cones:
             (slip, rest + rise[:, None] * self._axis),
         )
 
-    def to_boundary(self, step: Step) -> float:
+    def to_boundary(self, step: ConeStep) -> float:
         """Return the part of a step that leads to the boundary of a cone; 0 of a step with NaN."""
         rates = [-step.slack / self.slack, -step.force / self.force]
         for lead, size in self._relative(step):
@@ -220,7 +220,7 @@ class Cones:
         fastest = self._comm.allreduce(fastest, op=MPI.MAX)
         return 1 / fastest if fastest > 0 else np.inf
 
-    def move(self, step: Step, part: float) -> None:
+    def move(self, step: ConeStep, part: float) -> None:
         """Take part of a step."""
         for i, (lead, size) in enumerate(self._relative(step)):
             factor = (1 + part * (lead - size)) * (1 + part * (lead + size))
@@ -244,11 +244,11 @@ class Cones:
         """Return e.k_1 + (2 w_0 |w_1| / (1 + 2 |w_1|^2)) k_0, without cancellation."""
         return k[:, 1] - _lead(k)[:, 0] / (self._boost**2 * self._first)
 
-    def _scaled(self, step: Step) -> tuple[Array, Array]:
+    def _scaled(self, step: ConeStep) -> tuple[Array, Array]:
         """Return W^-1 d(slip) and W d(friction)."""
         return step.slip / self._factor, step.friction * self._factor
 
-    def _relative(self, step: Step) -> list[tuple[Array, Array]]:
+    def _relative(self, step: ConeStep) -> list[tuple[Array, Array]]:
         """Return x_0 and |x_1| of both directions as seen with lambda turned into (1, 0)."""
         unit, found = self._lambda / self._size[:, None], []
         for moved in self._scaled(step):

@@ -11,8 +11,8 @@ whole bodies and condensed ones alike, on any number of ranks.
 3. Where the duality gap is closed the active set is known; Newton's method takes the last steps.
 4. Where these have not converged, the friction bound is that of the last solution (Haslinger's
    iteration), and the next problem begins at 2. It has a solution where this friction balances the
-   loads on rigid motions (`limit_analysis`): where not, it is once made twice as large as they ask
-   for, and the second time the method ends.
+   loads on rigid motions (`limit_analysis`). Where it does not, the bound is scaled once, to
+   twice its least multiple that does; where a later bound does not either, the method ends.
 
 References
 ----------
@@ -30,7 +30,7 @@ import numpy as np
 
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
-from contact.methods.cones import Cones, Step
+from contact.methods.cones import Cones, ConeStep
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep
 from contact.methods.report import Outcome
 from contact.methods.stagnation import PROGRESS
@@ -166,7 +166,7 @@ class InteriorPoint:
             way = jump.maximum(np.abs(moved[:, : jump.dim]).max(axis=1, initial=0.0))
             # Where no load moves the body its stiffness is that of a block, and where it meets
             # nothing by that displacement, any work will do.
-            far = jump.maximum(-opening) or SHARE * (way or interface.size)
+            far = jump.maximum(-opening) or SHARE * (way or interface.diameter)
             least = np.sqrt(SHARE) * far
             work = (total / way if total > 0 and way > 0 else block) * least**2
         else:
@@ -251,7 +251,7 @@ class InteriorPoint:
         blocks[frictional, :d, :d] += tangent @ across @ tangent
         self._whole.assemble(state, blocks / jump.weight[:, None, None])
 
-        def solve(constants: tuple[Array, Array]) -> tuple[Array, Step]:
+        def solve(constants: tuple[Array, Array]) -> tuple[Array, ConeStep]:
             force, friction = cones.reduced(constants)
             at_nodes = np.zeros((jump.nodes.size, d))
             at_nodes[near] = -(force - stiff * slack)[:, None] * normal

@@ -70,7 +70,7 @@ from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Monitor, Outcome
 from contact.methods.stagnation import PROGRESS, Best, Stagnation, undeformed_equilibrium
 from contact.methods.unconstrained_modes import RIGID_MOTION, UnconstrainedModes
-from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
+from contact.problem.condensed import Condensation, CondensedProblem, condensable, condensation_pays
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.residuals import Residuals, evaluate, evaluate_forces, residual_forces
@@ -131,7 +131,7 @@ class Newton:
         self._condensable, self._pays = False, False
         if options.condense and isinstance(problem, ContactProblem):
             self._condensable = condensable(problem, options.linear)
-            self._pays = self._condensable and pays(problem, options.linear)
+            self._pays = self._condensable and condensation_pays(problem, options.linear)
 
     @property
     def condensation(self) -> Condensation | None:
@@ -187,7 +187,7 @@ class Newton:
         """
         self._begin()
         if self._condensed is not None:
-            self._condensed.forget()
+            self._condensed.begin_solve()
         iterate = self.iteration.at if start is None else self.iterate_at(start)
         body = self.problem.equilibrium
         if not body.linear:
@@ -342,12 +342,12 @@ def _solve_condensed(
     return method.run(iterate)
 
 
-def _sizes(iterate: Iterate, problem: Problem) -> tuple[int, int, int] | None:
+def _node_counts(iterate: Iterate, problem: Problem) -> tuple[int, int, int] | None:
     """Return the numbers of nodes that are open, stick and slip, if they are known. Collective."""
     if iterate.active_set is None:
         return None
     interface = problem.interface
-    return interface.sizes(interface.jump.apply(iterate.state.x), iterate.active_set)
+    return interface.node_counts(interface.jump.apply(iterate.state.x), iterate.active_set)
 
 
 @dataclass
@@ -407,7 +407,10 @@ class NewtonLoop:
             words = (note, taken.note, "tangent" * tangent, "rejected" * worse)
             said = " ".join(word for word in words if word)
             iteration.history.record(
-                residuals, said, sizes=_sizes(iterate, problem), steps=taken.inner
+                residuals,
+                said,
+                sizes=_node_counts(iterate, problem),
+                steps=taken.condensed_steps,
             )
             if worse:
                 iterate = kept
@@ -447,11 +450,11 @@ class NewtonLoop:
         residuals are measured: nodes that touch press by a part of the largest pressure before.
         """
         problem = self.iteration.problem
-        sizes = _sizes(iterate, problem)
-        if sizes is None:
+        counts = _node_counts(iterate, problem)
+        if counts is None:
             return None
         tolerance = self.iteration.options.tolerance
-        if sizes[1] + sizes[2] > 0 and self._largest_pressure(iterate) > tolerance * pressed:
+        if counts[1] + counts[2] > 0 and self._largest_pressure(iterate) > tolerance * pressed:
             return None
         found = undeformed_equilibrium(problem, tolerance)
         if found is None:

@@ -1,7 +1,13 @@
 """One step of Newton's method: contact, friction, layer and current linearised together.
 
 The nodal multipliers are eliminated node by node (`contact.interface.complementarity.linearise`),
-so that the linear systems keep the size and the pattern of the elastic ones.
+so that the linear systems keep the size and the pattern of the elastic ones. Iterative solvers stop
+at a forcing term (inexact Newton).
+
+References
+----------
+Dembo, Eisenstat and Steihaug, Inexact Newton methods, SIAM J. Numer. Anal. 19 (1982).
+Nocedal and Wright, Numerical Optimization, Springer (2006): Levenberg-Marquardt regularisation.
 """
 
 from __future__ import annotations
@@ -81,15 +87,15 @@ class StepResult:
         The new iterate.
     note
         Its kind in the history, empty for a plain step.
-    inner
-        Newton iterations on the condensed problem that it took.
+    condensed_steps
+        Newton iterations on the condensed problem that it took, a record each.
     overloaded
         Whether friction does not balance the loads.
     """
 
     iterate: Iterate
     note: str = ""
-    inner: tuple[Record, ...] = ()
+    condensed_steps: tuple[Record, ...] = ()
     overloaded: bool = False
 
 

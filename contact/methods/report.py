@@ -42,7 +42,7 @@ class Record:
     sizes
         Numbers of nodes that are open, stick and slip after it; None where nothing is known.
     steps
-        Newton iterations on the condensed problem that it took.
+        Newton iterations on the condensed problem that it took, a record each.
     """
 
     iteration: int
@@ -55,8 +55,8 @@ class Record:
     steps: tuple[Record, ...] = ()
 
     @property
-    def contact(self) -> int:
-        """Linear systems of the condensed problem that were solved."""
+    def contact_solves(self) -> int:
+        """Number of linear solves of the condensed problem."""
         return sum(step.inner for step in self.steps)
 
 

@@ -110,7 +110,7 @@ class UnconstrainedModes:
     def _held_undeformed(self, friction: bool) -> bool:
         """Tell whether supports, and contact where it touches undeformed, hold all bodies."""
         interface, rest = self.problem.interface, self.problem.start()
-        touching = interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.size
+        touching = interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.diameter
         held = [group.held(friction, touching) for group in groups(self.problem)]
         return all(null_space(gram).size == 0 for gram in held)
 
@@ -157,7 +157,7 @@ class UnconstrainedModes:
         for group in self._unsupported:
             moved = np.abs(group.normal).sum(axis=1) + np.abs(group.tangential).sum(axis=(1, 2))
             own = np.where(moved > 0, opening, np.inf)
-            found |= own <= NEGLIGIBLE * interface.size - interface.jump.maximum(-own)
+            found |= own <= NEGLIGIBLE * interface.diameter - interface.jump.maximum(-own)
         return found
 
     @cached_property
@@ -167,10 +167,10 @@ class UnconstrainedModes:
     def separated(
         self, problem: CondensedProblem, operator: Operator, stiffness: float
     ) -> State | None:
-        """Return a state with all nodes open, by a rigid motion along the push. Collective.
+        """Return a state with all nodes open, by a rigid motion out of penetration. Collective.
 
-        None where the motion would lead aside, more than 45 degrees off the push: out of a wedge,
-        say, in which friction might hold the body.
+        None where the motion is longer than sqrt(2) times the penetration, more than 45 degrees off
+        the normal: out of a wedge, say, in which friction might hold the body.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class UnconstrainedModes:
             return None
         further = found.columns @ (found.amounts - found.wanted)
         way = jump.maximum(np.linalg.norm(further, axis=1))
-        if not way**2 <= 2 * found.depth**2:  # more than 45 degrees off the push
+        if not way**2 <= 2 * found.depth**2:  # more than 45 degrees off the normal
             return None
         moved = np.zeros((state.x.size // jump.block_size, jump.block_size))
         moved[jump.nodes, : jump.dim] = found.columns @ found.amounts
@@ -238,10 +238,10 @@ class UnconstrainedModes:
         near, opening = np.isfinite(jump.gap), interface.opening(nodal)
         rising = np.einsum("ni,nik->nk", jump.normal, moved)
         depth = jump.maximum(-(opening + rising @ wanted)[near])
-        limited = depth > NEGLIGIBLE * interface.size
+        limited = depth > NEGLIGIBLE * interface.diameter
         if limited:
             # Depths of a solution are rounding.
-            deep = opening < -NEGLIGIBLE * interface.size
+            deep = opening < -NEGLIGIBLE * interface.diameter
             room = np.where(deep, opening, np.maximum(opening, 0.0))
             parts = jump.comm.allgather((rising[near], room[near]))
             cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))

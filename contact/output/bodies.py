@@ -164,7 +164,7 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     if not solution.converged:
         return
     residual = body.unbalanced(residual_forces(problem, solution.state))
-    left = float(np.linalg.norm(body.sizes(residual)[0]))
+    left = float(np.linalg.norm(body.norms(residual)[0]))
     whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
     largest, kkt = solution.max_displacement, solution.outcome.kkt
     for group in groups(problem):

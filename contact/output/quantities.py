@@ -57,7 +57,7 @@ def _item(values: Any, index: int) -> Any:
     return None if values is None else values[index]
 
 
-def _sizes(record: Any) -> str:
+def _node_counts(record: Any) -> str:
     """Return the numbers of open, stick and slip nodes after an iteration; empty if unknown."""
     return "/".join(map(str, record.sizes or ()))
 
@@ -420,16 +420,16 @@ _HISTORY = (
     Quantity("note", "", "Kind of the iteration, for instance `tangent`.", files=(HISTORY,)),
     Quantity(
         "contact_solves", "", "Linear solves of the condensed problem in the iteration.",
-        lambda r: r.contact, (HISTORY,),
+        lambda r: r.contact_solves, (HISTORY,),
     ),
     Quantity(
         "active_set", "", "Numbers of open, stick and slip nodes at its end, for instance `3/5/1`; "
-        "empty where the active set is not known.", _sizes, (HISTORY,),
+        "empty where the active set is not known.", _node_counts, (HISTORY,),
     ),
     Quantity(
         "steps", "", "The active sets after each Newton iteration on the condensed problem, "
         "separated by blanks; `-` where one is not known.",
-        lambda r: " ".join(_sizes(step) or "-" for step in r.steps), (HISTORY,),
+        lambda r: " ".join(_node_counts(step) or "-" for step in r.steps), (HISTORY,),
     ),
 )  # fmt: skip
 

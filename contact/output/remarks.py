@@ -305,14 +305,14 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     residual = residual_forces(problem, state)
     unknown = max(outcome.kkt.unknown, left_as_pressures(problem, state, residual))
     moved = bool(problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR))
-    loads = body.load_sizes(state.time)
+    loads = body.load_norms(state.time)
     if solution.converged and unknown > KNOWN and (moved or loads[0].max() > 0):
         known.append(f"contact forces are known to {unknown:.1e} of their size only")
     on_contact = np.zeros_like(residual)
     problem.interface.add_forces(on_contact, state.x, state.forces)
-    acting = (loads + body.sizes(on_contact))[0]
-    left = body.sizes(body.unbalanced(residual))[0]
-    borne = body.sizes(body.reactions(residual))[0]
+    acting = (loads + body.norms(on_contact))[0]
+    left = body.norms(body.unbalanced(residual))[0]
+    borne = body.norms(body.reactions(residual))[0]
     # Where supports bear no more than the loads, the residual is rounding; so are all forces on a
     # body that are rounding of those on others.
     much = (acting > EPS * acting.max()) & (left > max(LEFT, asked) * acting) & (borne > acting)

@@ -26,7 +26,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
 from contact.interface.active_set import touching
 from contact.linear.operator import Counters
-from contact.problem.condensed import Condensation, condensable, pays
+from contact.problem.condensed import Condensation, condensable, condensation_pays
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import groups, null_space
 from contact.problem.state import State
@@ -72,14 +72,16 @@ def uniqueness(
         return np.inf, False
     if jump.size > MOST:
         return np.nan, False
-    if condensation is None and not (condensable(problem, "auto") and pays(problem, "auto")):
+    if condensation is None and not (
+        condensable(problem, "auto") and condensation_pays(problem, "auto")
+    ):
         return np.inf, False
     nodal = jump.apply(state.x)
     pressure = interface.pressure(nodal, state.forces)
     rounding = interface.negligible(nodal, pressure)
     closed = touching(pressure, interface.opening(nodal), interface.stiffness, rounding)
     if jump.maximum(closed.astype(float)) == 0:
-        closed = jump.gap <= EPS * interface.size
+        closed = jump.gap <= EPS * interface.diameter
     mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(nodal))
     condensation = condensation or Condensation(problem, Counters())
     stiffness = condensation.stiffness(state)

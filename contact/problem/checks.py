@@ -354,7 +354,7 @@ def _flows(
     interface = problem.interface
     law, held = interface.law, interface.held
     if state is None:
-        return _conducts(law, interface.size), _conducts(held, interface.size)
+        return _conducts(law, interface.diameter), _conducts(held, interface.diameter)
     found = [
         law.current_block(nodal, pressure, full=True)[:, -1, -1] != 0
         for law, nodal, pressure in interface.acting(state.x, state.forces)

@@ -70,7 +70,7 @@ class CondensedBody:
     at, own
         The owned kept unknowns there, and where these are among those of all ranks.
     acting
-        `sizes` of all that acts on the whole body: loads, reactions, and one field on the other.
+        `norms` of all that acts on the whole body: loads, reactions, and one field on the other.
     component_norms
         Which forces are compared with each other.
     inclined
@@ -135,12 +135,12 @@ class CondensedBody:
         """Return the forces on fixed unknowns."""
         return forces - masked(self.free, self.inclined, forces)
 
-    def sizes(self, values: Array) -> Array:
+    def norms(self, values: Array) -> Array:
         """Return the norms of forces, and of charges, of each component apart. Collective."""
-        return self.component_norms.sizes(values)
+        return self.component_norms.norms(values)
 
-    def load_sizes(self, time: float = 1.0) -> Array:
-        """Return the `sizes` of all that acts on the whole body."""
+    def load_norms(self, time: float = 1.0) -> Array:
+        """Return the `norms` of all that acts on the whole body."""
         return self.acting
 
     def exchanged(self, state: Evaluated) -> Array:
@@ -270,8 +270,8 @@ class Condensation:
             internal = body.internal_forces(state, linearised_at)
         residual = internal - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
-        reactions = body.sizes(body.reactions(residual))
-        acting = body.load_sizes(state.time) + reactions + body.exchanged(state)
+        reactions = body.norms(body.reactions(residual))
+        acting = body.load_norms(state.time) + reactions + body.exchanged(state)
         restricted = self._constraint.restrict(-residual)
         self._rhs = body.layout.mask(restricted[: body.owned])
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
@@ -380,15 +380,14 @@ class Condensation:
         return self._constraint.expand(np.concatenate([self._schur.expand(rhs, kept), q]))
 
 
-def pays(problem: ContactProblem, kind: str) -> bool:
-    """Tell whether dense steps at the contact nodes cost less than sparse ones of the body.
+def condensation_pays(problem: ContactProblem, kind: str) -> bool:
+    """Tell whether Newton steps on the condensed problem cost less than those on the whole body.
 
     Large bodies in 3-D are left to multigrid, unless a direct solver is asked for by `kind`.
 
     A dense factorisation costs k^3 operations with k kept unknowns. A sparse one costs n b^2 with
-    n unknowns and fronts of b: in 2-D the body's depth, n/k nodes, in
-    3-D some n^(1/2).
-    Of a slender body the contact nodes are too large a part.
+    n unknowns and fronts of b: in 2-D the body's depth, n/k nodes, in 3-D some n^(1/2). On slender
+    bodies condensation does not pay: the contact nodes are too large a part.
     """
     layout = problem.equilibrium.layout
     if kind == "auto" and multigrid.is_large(layout):

@@ -83,7 +83,7 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     return Equations(forces, conditions)
 
 
-def sizes(problem: ContactProblem, state: State) -> tuple[float, float]:
+def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float]:
     """Return the norms that changes of the equations are compared with. Collective.
 
     Those of the forces, and of the stresses and jumps at the contact nodes in L2(Gamma_3); of a

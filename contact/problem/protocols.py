@@ -111,14 +111,14 @@ class Equilibrium(Protocol):
     def reactions(self, forces: Array) -> Array:
         """Return the part of forces that the supports bear."""
 
-    def sizes(self, values: Array) -> Array:
+    def norms(self, values: Array) -> Array:
         """Return the norms of owned forces, and of charges, of each component apart. Collective."""
 
-    def load_sizes(self, time: float = 1.0) -> Array:
-        """Return the `sizes` of the loads at a time. Collective."""
+    def load_norms(self, time: float = 1.0) -> Array:
+        """Return the `norms` of the loads at a time. Collective."""
 
     def exchanged(self, state: Evaluated) -> Array:
-        """Return the `sizes` of the forces of each field on the other. Collective."""
+        """Return the `norms` of the forces of each field on the other. Collective."""
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""

@@ -168,7 +168,7 @@ def force_rounding(
     body, (moved, there) = problem.equilibrium, beside or _beside(problem, state)
     change = there - internal
     problem.interface.add_current(change, state.x, moved - state.x, state.forces)
-    return MARGIN * EPS / PERTURBATION * body.sizes(body.unbalanced(change))
+    return MARGIN * EPS / PERTURBATION * body.norms(body.unbalanced(change))
 
 
 def _beside(problem: Problem, state: State) -> _Beside:
@@ -190,7 +190,7 @@ def _as_pressures(interface: Interface, forces: Array) -> Array:
 def left_as_pressures(problem: Problem, state: State, residual: Array) -> float:
     """Return the residual forces, as pressures over those that press. Collective."""
     body, interface = problem.equilibrium, problem.interface
-    left = body.sizes(body.unbalanced(residual))[0]
+    left = body.norms(body.unbalanced(residual))[0]
     return _over_pressed(interface, state, _as_pressures(interface, left))
 
 
@@ -220,16 +220,16 @@ def evaluate(problem: Problem, state: State) -> Residuals:
 def evaluate_forces(problem: Problem, state: State) -> tuple[Residuals, Array]:
     """Return the residuals of a state, and the internal forces there. Collective."""
     body, interface = problem.equilibrium, problem.interface
-    loads = body.load_sizes(state.time)
+    loads = body.load_norms(state.time)
     # Asked for first: laws with history keep their last response, which is then that of the state.
     beside = None if (loads > 0).all() else _beside(problem, state)
     internal = body.internal_forces(state)
     on_contact = np.zeros_like(internal)
     interface.add_forces(on_contact, state.x, state.forces)
     residual = internal - body.external(state.time) + on_contact
-    answers = body.sizes(on_contact) + body.exchanged(state)
-    scale = loads + answers + body.sizes(body.reactions(residual))
-    unbalanced = body.sizes(body.unbalanced(residual))
+    answers = body.norms(on_contact) + body.exchanged(state)
+    scale = loads + answers + body.norms(body.reactions(residual))
+    unbalanced = body.norms(body.unbalanced(residual))
     most, acted = body.most_rounding * scale, loads > 0
     asked = ~acted | (unbalanced <= most)
     rounding, unknown = np.zeros_like(scale), np.zeros(interface.components)
@@ -242,10 +242,10 @@ def evaluate_forces(problem: Problem, state: State) -> tuple[Residuals, Array]:
         largest = rounding.max(axis=1, keepdims=True)
         rounding = np.where(acted, np.minimum(rounding, most), largest)
         nothing = ~acted & (unbalanced <= rounding)
-        unbalanced, rounding = (np.where(nothing, 0.0, sizes) for sizes in (unbalanced, rounding))
+        unbalanced, rounding = (np.where(nothing, 0.0, norms) for norms in (unbalanced, rounding))
         if not acted.any():
             # Bodies that have moved freely: beside the forces that would have held them.
-            held = body.sizes(residual_forces(problem, problem.start()))
+            held = body.norms(residual_forces(problem, problem.start()))
             scale = scale + held.max(axis=1, keepdims=True)
             body.internal_forces(state)  # laws with history keep their last response
     # Of a component on which nothing acts there is the rounding of the others, and of charges, in

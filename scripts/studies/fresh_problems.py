@@ -62,7 +62,7 @@ def solves(solution: Solution) -> tuple[float, ...]:
     """Return the solves of the body, of its contact nodes, and both in linear solves, a step.
 
     A dense step of k unknowns has k^3 operations, a sparse factorisation of n with fronts of b
-    n b^2, at a fiftieth of the speed (`contact.problem.condensed.pays`).
+    n b^2, at a fiftieth of the speed (`contact.problem.condensed.condensation_pays`).
     """
     steps, counters, problem = max(1, len(solution.steps)), solution.counters, solution.problem
     n, k = problem.equilibrium.layout.unknowns, 2 * problem.nodes.size

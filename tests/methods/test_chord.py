@@ -80,7 +80,7 @@ def begun(reached: float) -> tuple[Chord, Iterate]:
     kept = Chord(1e-8, 10.0)
     iterate, keep = kept.choose(Iterate(state), 1.0)
     assert not keep
-    kept.taken()
+    kept.note_factorisation()
     iterate, keep = kept.choose(Iterate(state), reached)
     assert keep
     return kept, iterate

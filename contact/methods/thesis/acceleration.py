@@ -78,10 +78,10 @@ class ResidualMinimiser:
         self._append(new - old)
         # Where nothing touches there is no slope to follow: look between the points as well.
         starts = [old + t * (new - old) for t in BETWEEN]
-        sizes = self._sizes(starts)
-        first = int(np.argmin(sizes))
-        point, size = self._descend(starts[first], float(sizes[first]))
-        if size < (1 - 1e-9) * sizes[0]:
+        norms = self._defect_norms(starts)
+        first = int(np.argmin(norms))
+        point, norm = self._descend(starts[first], float(norms[first]))
+        if norm < (1 - 1e-9) * norms[0]:
             self._best = point
             return point[1]
         beyond = self._beyond(old, new)
@@ -96,44 +96,44 @@ class ResidualMinimiser:
     def _defect(self, point: Array) -> Array:
         return point[0] - self._project(point[1])
 
-    def _sizes(self, points: Sequence[Array]) -> Array:
+    def _defect_norms(self, points: Sequence[Array]) -> Array:
         """Return the norms of lambda - P(z) at several points."""
         defects = self._defect(np.stack(points, axis=1)).T
         return np.sqrt(np.maximum(np.diag(self._inner(defects, defects)), 0.0))
 
     def _append(self, direction: Array) -> None:
         """Add a direction, orthonormal in z to the others; nothing if it depends on them."""
-        length = self._length(direction)
+        length = self._norm(direction)
         for _ in range(2):  # twice is enough, in spite of cancellation
             if self._directions:
                 basis = np.stack(self._directions, axis=-1)
                 direction = direction - basis @ self._inner(basis[1], direction[1][:, None])[:, 0]
-        rest = self._length(direction)
+        rest = self._norm(direction)
         if rest > 1e-10 * length:
             self._directions.append(direction * (1 / rest))
 
-    def _length(self, direction: Array) -> float:
+    def _norm(self, direction: Array) -> float:
         column = direction[1][:, None]
         return float(np.sqrt(self._inner(column, column)[0, 0]))
 
-    def _descend(self, point: Array, size: float) -> tuple[Array, float]:
+    def _descend(self, point: Array, norm: float) -> tuple[Array, float]:
         """Minimise the residual over the directions by damped Gauss-Newton steps."""
         if not self._directions:
-            return point, size
+            return point, norm
         basis = np.stack(self._directions, axis=-1)
         for _ in range(SWEEPS):
             slopes = basis[0] - self._derivative(point[1], basis[1])
             load = self._inner(slopes, self._defect(point)[:, None])[:, 0]
             step = -basis @ least_squares(self._inner(slopes, slopes), load)
             trials = [point + t * step for t in DAMPED]
-            sizes = self._sizes(trials)
-            k = int(np.argmin(sizes))
-            if not sizes[k] < (1 - 1e-6) * size:
+            norms = self._defect_norms(trials)
+            k = int(np.argmin(norms))
+            if not norms[k] < (1 - 1e-6) * norm:
                 break
-            point, size, old = trials[k], float(sizes[k]), size
-            if size > 0.99 * old:
+            point, norm, old = trials[k], float(norms[k]), norm
+            if norm > 0.99 * old:
                 break
-        return point, size
+        return point, norm
 
     def _beyond(self, old: Array, new: Array) -> Array | None:
         """Go on from a step that changed nothing as far as nothing gets worse; None if it did.
@@ -143,13 +143,13 @@ class ResidualMinimiser:
         """
         before, after = self._defect(old), self._defect(new)
         changes = np.column_stack([after - before, after])
-        change, size = np.sqrt(np.maximum(np.diag(self._inner(changes, changes)), 0.0))
-        if change > 1e-6 * size:
+        change, norm = np.sqrt(np.maximum(np.diag(self._inner(changes, changes)), 0.0))
+        if change > 1e-6 * norm:
             return None
         trials = [new, *(new + t * (new - old) for t in BEYOND)]
-        sizes = self._sizes(trials)
-        level = (1 + 1e-6) * np.min(sizes)
-        return trials[int(np.flatnonzero(sizes <= level)[-1])]
+        norms = self._defect_norms(trials)
+        level = (1 + 1e-6) * np.min(norms)
+        return trials[int(np.flatnonzero(norms <= level)[-1])]
 
 
 def least_squares(gram: Array, load: Array) -> Array:

@@ -49,7 +49,7 @@ class PenalisedProblem:
     """The nonlinear problem of an outer iteration, in the owned unknowns.
 
     SNES asks `SparseOperator` for its linear solves, through a shell preconditioner. Its residual
-    are forces, and charges, over the sizes of those that act. Its options have the prefix
+    are forces, and charges, over the norms of those that act. Its options have the prefix
     ``penalty_``, for instance ``-penalty_snes_monitor``.
     """
 
@@ -149,9 +149,9 @@ class PenalisedProblem:
         residual = residual_forces(self._problem, state)
         on_contact = np.zeros_like(residual)
         interface.add_forces(on_contact, state.x, state.forces)
-        sizes = body.load_sizes(state.time) + body.sizes(residual)
-        sizes = sizes + body.sizes(on_contact) + body.exchanged(state)
-        self._units = body.component_norms.spread(np.where(sizes > 0, sizes, 1.0))
+        norms = body.load_norms(state.time) + body.norms(residual)
+        norms = norms + body.norms(on_contact) + body.exchanged(state)
+        self._units = body.component_norms.spread(np.where(norms > 0, norms, 1.0))
         self.snes.setTolerances(
             rtol=1e-14,
             # Rounding is magnified by 1/eps: the residual may stay above any tolerance.
@@ -181,7 +181,7 @@ class PenalisedProblem:
         closest = jump.maximum(opening, -np.inf)
         if closest >= 0:
             return np.zeros_like(body.owned_part(state.x))
-        stiffness = (opening >= closest - 1e-9 * interface.size) / self._eps.contact
+        stiffness = (opening >= closest - 1e-9 * interface.diameter) / self._eps.contact
         n, d = jump.normal.shape
         blocks = np.zeros((n, jump.block_size, jump.block_size))
         blocks[:, :d, :d] = stiffness[:, None, None] * outer(jump.normal, jump.normal)
