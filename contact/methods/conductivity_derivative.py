@@ -33,6 +33,8 @@ class ConductivityDerivative:
     def worsened(self, residual: float) -> bool:
         """Tell whether the last step included the derivative and has raised the residual.
 
+        If so, it is included again only below a tenth of the residual before that step.
+
         Parameters
         ----------
         residual

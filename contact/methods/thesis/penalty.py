@@ -5,7 +5,8 @@ so that the penalised problem (PV_eps) is one nonlinear equation in the displace
 iteration freezes the secant modulus of the material and the friction modulus of (4.33); the rest
 of (4.32), the unilateral [u_nu - rho]^+ of the *new* iterate, is solved by SNES as a
 semismooth equation, with a compliant layer where there is one. An outer count is that of
-Algorithm 3; the inner one counts SNES's iterations.
+Algorithm 3; the inner one counts SNES's iterations. SNES takes full steps while friction is lagged,
+and has a backtracking line search with implicit friction and with a layer that is not lagged.
 
 Convergence. A penalty run solves the penalised problem: it has converged when the equilibrium
 residual with the forces of the regularised laws at the final displacement is below the
