@@ -208,14 +208,17 @@ def test_steps_and_their_adjoint():
         )
 
 
-@pytest.mark.slow
-def test_cattaneo_and_mindlin_by_the_friction_coefficient():
-    # the closed form in numbers that were computed by themselves
+def test_the_closed_form_of_cattaneo_and_mindlin():
+    # in numbers that were computed by themselves
     known = ball_values(2 / 3)
     assert known.way == pytest.approx(0.0292078206, rel=1e-8)
     assert known.by_mu == pytest.approx(-0.0228280623, rel=1e-8)
     assert known.stick_by_mu == pytest.approx(1.54080, rel=1e-5)
-    # and two cylinders, 24 elements on the half width of contact
+
+
+@pytest.mark.slow
+def test_cattaneo_and_mindlin_by_the_friction_coefficient():
+    # two cylinders, 24 elements on the half width of contact
     (found, _), exact = cylinders(24, 1), cylinder_values(2 / 3)
     assert found.by_mu == pytest.approx(exact.by_mu, rel=0.025)
     assert found.way == pytest.approx(exact.way, rel=0.04)

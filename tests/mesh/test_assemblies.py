@@ -156,7 +156,6 @@ def test_two_parts_numbered_from_one(tmp_path):
     assert found.notes[0] == said
 
 
-@pytest.mark.slow
 def test_sets_of_the_assembly(tmp_path):
     """By numbers of an instance, of several, or behind its name; nodes and shells of its own."""
     more = "*NODE\n1, 0., 0., 9.\n*NSET, NSET=point\n1\n"

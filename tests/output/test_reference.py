@@ -92,7 +92,6 @@ def header(path: Path) -> list[str]:
     return next(csv.reader(path.open()))
 
 
-@pytest.mark.slow
 def test_summary(written: list[Path]) -> None:
     agree([list(json.loads((f / SUMMARY).read_text())) for f in written], SUMMARY)
 

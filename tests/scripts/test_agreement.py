@@ -45,7 +45,6 @@ def test_block_relaxation_is_given_up_after_its_solves(monkeypatch, tmp_path):
     assert row["uzawa's"] == "20"
 
 
-@pytest.mark.slow
 def test_newton_and_block_relaxation_agree_or_find_different_solutions(folder):
     found = {row["example"]: row for row in rows(folder / "agreement.csv")}
     assert len(found) == 8
