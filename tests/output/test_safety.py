@@ -107,8 +107,7 @@ def test_a_full_disk_keeps_the_earlier_results(ranks: int, good: Path, small_dis
             assert whole(out) and not (out / "checkpoint.npz").exists()
 
 
-@pytest.mark.slow
-@RANKS
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_library_that_fails_to_write_does_not_end_in_an_abort(
     ranks: int, good: Path, tmp_path: Path
 ) -> None:
