@@ -41,6 +41,11 @@ PAGES = sorted(
     for path in DOCS.glob("*.md")
     if path.name not in ("architecture.md", "results.md") and not path.name.startswith("thesis-")
 )
+#: Pages whose code takes seconds.
+LONG = (
+    "api-derivatives", "derivatives", "evolution", "example-bracket", "how-to", "output", "python",
+    "tutorial",
+)  # fmt: skip
 #: What makes the problems of a page small.
 SMALL = {'bar.toml")': 'bar.toml", ["mesh.cells=[16, 4]"])'}
 
@@ -50,8 +55,13 @@ def shows_code(page: Path) -> bool:
     return any(block.language in ("python", "sh", "toml") for block in blocks(page))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", filter(shows_code, PAGES), ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, id=page.stem, marks=pytest.mark.slow if page.stem in LONG else ())
+        for page in filter(shows_code, PAGES)
+    ],
+)
 def test_code_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a folder of its own, as a reader would type it."""
     for module in ("gmsh", "pyvista", "meshio"):

@@ -10,6 +10,10 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "scripts" / "notebooks").glob("[a-z]*.py"))
 
 
+#: Those that run in short runs too.
+SHORT = ("two_bodies",)
+
+
 @pytest.fixture(autouse=True)
 def _warnings_afterwards() -> Iterator[None]:
     """Let no notebook that silences warnings do so for the tests after it."""
@@ -19,9 +23,14 @@ def _warnings_afterwards() -> Iterator[None]:
     logger.setLevel(level)
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")  # nobody sees them
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=() if path.stem in SHORT else pytest.mark.slow)
+        for path in NOTEBOOKS
+    ],
+)
 def test_notebook(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MPLBACKEND", "Agg")
     pyplot = pytest.importorskip("matplotlib.pyplot")

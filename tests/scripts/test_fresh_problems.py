@@ -17,14 +17,23 @@ CHOSEN = [
 ]  # fmt: skip
 
 
+#: Those of them that take more than half a second.
+LONG = (
+    "rings-0", "stacks-1", "driven_wedges-1", "snap_fits-2", "lifted_off-0", "clouds-0",
+    "small_bodies-0",
+)  # fmt: skip
+
+
 def problem(name, folder):
     family, number = name.rsplit("-", 1)
     mesh, tables = families.draw(getattr(families, family), int(number), folder)
     return mesh, tables, parse_case(tables)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", CHOSEN)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in CHOSEN],
+)
 def test_results_are_right_by_another_assembly(name, tmp_path):
     mesh, tables, case = problem(name, tmp_path)
     solution = solve(case, comm=MPI.COMM_SELF)

@@ -10,6 +10,9 @@ from scripts.cases import CASES
 from scripts.gallery import EXAMPLES, FOLDER, on_meshes, row, solved
 from tests.docs.pages import ROOT
 
+#: Examples that take less than half a second.
+SHORT = ("hertz", "press-fit", "column", "layer")
+
 
 def shown(name: str) -> list[tuple[str, str, str]]:
     """Return the rows of a table: quantity, computed, reference."""
@@ -17,8 +20,14 @@ def shown(name: str) -> list[tuple[str, str, str]]:
     return re.findall(r"^\| (.+) \| (\S+) \| (\S+) \| .+ \|$", text, re.M)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, one in EXAMPLES.items() if not one.meshes])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in SHORT else pytest.mark.slow)
+        for name, one in EXAMPLES.items()
+        if not one.meshes
+    ],
+)
 def test_an_example_has_the_values_of_its_table(name: str, tmp_path: Path) -> None:
     pytest.importorskip("gmsh")
     example = EXAMPLES[name]
