@@ -147,11 +147,12 @@ def loaded(mu=0.3):
     return parse_case(data)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("keys", "undetermined"),
     [
-        (["material.young", "load.0.traction.0"], ["load.0.traction.0"]),
+        pytest.param(
+            ["material.young", "load.0.traction.0"], ["load.0.traction.0"], marks=pytest.mark.slow
+        ),
         (
             ["load.1.traction.0", "material.young", "load.2.traction.0"],
             ["load.1.traction.0", "load.2.traction.0"],

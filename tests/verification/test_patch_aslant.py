@@ -298,32 +298,36 @@ def test_a_cone_under_a_cylinder(degree):
 
 
 QUANTITIES = ["max_pressure", "contact_force_x", "contact_force_y", "reaction_x_left"]
+POINT = {"pressure": PRESSURE, "young": 1e3, "sliding": -0.01, "gap": 1e-4, "down": 0.01}
 
 
-@pytest.mark.slow
 @pytest.mark.parallel
-def test_sensitivities():
+@pytest.mark.parametrize(
+    "names",
+    [("sliding", "gap"), pytest.param((*POINT,), marks=pytest.mark.slow)],
+    ids=["two", "all"],
+)
+def test_sensitivities(names):
     """Beside differences of solutions, by the load, the modulus, the pushes and a gap."""
-    point = {"pressure": PRESSURE, "young": 1e3, "sliding": -0.01, "gap": 1e-4, "down": 0.01}
 
     def made(name, value):
-        return ramp(mu=0.2, slope=-SLOPE, **(point | {name: value}))
+        return ramp(mu=0.2, slope=-SLOPE, **(POINT | {name: value}))
 
     solution = solve(made("young", 1e3), METHODS["dense"])
     assert solution.converged
     at = int(np.argmax(np.concatenate(COMM.allgather(solution.pressure))))
     points = np.concatenate(COMM.allgather(solution.problem.nodes.points))
     assert points[at, 0] < 1e-9  # the largest pressure is at the side
-    parameters = {name: Parameter(value, partial(made, name)) for name, value in point.items()}
+    parameters = {name: Parameter(POINT[name], partial(made, name)) for name in names}
     found = [
         sensitivity(solution, QUANTITIES, parameters, method=method)
         for method in ("tangent", "adjoint")
     ]
     known = named_quantities(solution.problem)
     for name, parameter in parameters.items():
-        step, ends = 1e-4 * point[name], []
+        step, ends = 1e-4 * POINT[name], []
         for sign in (1, -1):
-            beside = solve(parameter.problem(point[name] + sign * step), METHODS["dense"])
+            beside = solve(parameter.problem(POINT[name] + sign * step), METHODS["dense"])
             ends.append([known[q](beside.problem, beside.state) for q in QUANTITIES])
         slope = (np.array(ends[0]) - np.array(ends[1])) / (2 * step)
         for one in found:
