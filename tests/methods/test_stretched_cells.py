@@ -24,8 +24,7 @@ def column(**solver):
     return solve(parse_case(case))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("r", [0.1, 1.0])
+@pytest.mark.parametrize("r", [pytest.param(0.1, marks=pytest.mark.slow), 1.0])
 def test_a_small_r_does_not_end_far_from_the_pressure(r):
     """It was 3e-5 off at a tolerance of 1e-8: E/size, of a body that high, weighed no gap."""
     exact = column(tolerance=1e-13).pressure

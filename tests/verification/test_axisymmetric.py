@@ -90,8 +90,7 @@ def test_a_poled_cylinder(degree):
     assert np.abs(hoop).max(initial=0.0) < 1e-8 * column.force
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("degree", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_methods_agree(comm, degree):
     """A rough plate, a smoothed pressure, a material that yields."""
     newton = solved(pressed_cylinder(comm, 6, degree, 0.3))

@@ -259,6 +259,14 @@ def test_iterations_are_counted_where_the_residual_ends_the_run():
     assert tables_compliance.iterations(solution) == (2, 1)
 
 
+def test_a_mesh_that_does_not_resolve_the_default_ramp_is_warned_of():
+    """The ramp's width is a length of the body: finer meshes resolve it."""
+    for cells, said in ((48, True), (96, False)):
+        run = solved("8-4", cells, NEWTON)
+        assert run.problem.interface.law.conductor.psi.delta == pytest.approx(1 / 0.3, rel=1e-12)
+        assert ("the mesh decides" in " ".join(run.warnings)) is said
+
+
 @pytest.mark.slow
 def test_the_default_ramp_has_a_mesh_limit():
     """Its width is a length of the body; with a steep one, the mesh decides how often it touches.

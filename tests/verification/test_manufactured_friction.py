@@ -39,9 +39,9 @@ def test_orders_of_sliding_blocks(name, degree, cells):
     assert np.all(orders > np.array([degree, degree + 1]) - 0.15), orders
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("dim", "cells", "most", "order"), [(2, (16, 32), 0.015, 1.7), (3, (4, 8), 0.08, 0.9)]
+    ("dim", "cells", "most", "order"),
+    [(2, (16, 32), 0.015, 1.7), pytest.param(3, (4, 8), 0.08, 0.9, marks=pytest.mark.slow)],
 )
 @pytest.mark.parametrize("laws", [(ONE,), (ONE, OTHER)])
 def test_pressures_friction_and_slip(dim, cells, most, order, laws):

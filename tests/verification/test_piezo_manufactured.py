@@ -50,8 +50,9 @@ def test_orders(dim, degree, cells):
     assert np.all(orders < expected + 0.5), orders
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("degree", "cells"), [(1, (16, 32)), (2, (8, 16))])
+@pytest.mark.parametrize(
+    ("degree", "cells"), [(1, (16, 32)), pytest.param(2, (8, 16), marks=pytest.mark.slow)]
+)
 def test_orders_beyond_yield(degree, cells):
     """With the logarithmic law, yielded throughout: |dev eps| is between 0.02 and 0.2."""
     law = Log(YOUNG, POISSON, yield_strain=0.01)

@@ -8,8 +8,10 @@ from scripts.studies import stick_limit
 from scripts.studies.stick_ratio import PRESSED
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", PRESSED)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name == "ball" else pytest.mark.slow) for name in PRESSED],
+)
 def test_steps_find_what_one_step_does_not(name):
     pressed = PRESSED[name]
     static, stepped = pressed.ratios(0.2, [1, 32], cells=100)
