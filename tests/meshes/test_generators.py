@@ -267,8 +267,17 @@ def test_quarter_disc_resolves_the_hertz_contact(half_width, contact_size):
     assert nodes(domain) < 3000
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", meshes.GENERATORS)
+#: Generators that take more than two tenths of a second.
+LONG = ("bracket", "sphere", "half_space", "half_cylinder", "two_half_cylinders", "two_spheres")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in LONG else ())
+        for name in meshes.GENERATORS
+    ],
+)
 def test_smaller_sizes_give_more_nodes(name):
     sizes = {k: 0.7 * v for k, v in meshes.parameters(name).items() if k.endswith("size")}
     assert nodes(from_generator(COMM, name, **sizes)) > nodes(from_generator(COMM, name))
