@@ -268,7 +268,10 @@ def test_quarter_disc_resolves_the_hertz_contact(half_width, contact_size):
 
 
 #: Generators that take more than two tenths of a second.
-LONG = ("bracket", "sphere", "half_space", "half_cylinder", "two_half_cylinders", "two_spheres")
+LONG = (
+    "ball_between_plates", "bracket", "cylinder_on_block", "half_cylinder", "half_space", "sphere",
+    "two_boxes", "two_half_cylinders", "two_spheres",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(

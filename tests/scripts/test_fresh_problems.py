@@ -20,7 +20,7 @@ CHOSEN = [
 #: Those of them that take more than half a second.
 LONG = (
     "rings-0", "stacks-1", "driven_wedges-1", "snap_fits-2", "lifted_off-0", "clouds-0",
-    "small_bodies-0",
+    "small_bodies-0", "wedges-2",
 )  # fmt: skip
 
 

@@ -121,6 +121,12 @@ def tilted(n: float) -> float:
     return rotation(solution)
 
 
+def test_a_moment_tilts_a_circular_punch_in_space_its_own_way():
+    """On a coarse mesh, which is too stiff."""
+    pytest.importorskip("gmsh")
+    assert 0 < 1 - tilted(0.5) < 0.15
+
+
 @pytest.mark.slow
 def test_a_moment_tilts_a_circular_punch_in_space():
     """Graded towards the edge, order 2: finer meshes stand in docs/indentation.md."""
