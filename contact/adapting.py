@@ -17,7 +17,8 @@ from contact.methods.report import tell
 from contact.nesting import prolong
 from contact.output.error_estimate import estimated
 from contact.output.intervals import intervals
-from contact.output.quantities import ADAPT, values_of
+from contact.output.quantities import values_of
+from contact.output.quantity import ADAPT
 from contact.output.solution import Remark, Solution
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

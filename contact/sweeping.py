@@ -35,8 +35,8 @@ from contact.methods.report import Monitor, tell
 from contact.methods.signals import Interrupted, stop_on_signal
 from contact.output.folder import replace_whole
 from contact.output.formats import write_csv
-from contact.output.quantities import SUMMARY, SWEEP, quantities, values_of
-from contact.output.quantity import is_of
+from contact.output.quantities import quantities, values_of
+from contact.output.quantity import SUMMARY, SWEEP, is_of
 from contact.output.remarks import measure
 from contact.output.solution import Solution
 from contact.problem.checks import check_potential

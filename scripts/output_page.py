@@ -9,7 +9,7 @@ from argparse import ArgumentParser
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from contact.output import quantities as q
+from contact.output import quantity as q
 from contact.output.reference import described
 
 #: Formulas in Markdown for the symbols of the command line's help.

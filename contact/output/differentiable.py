@@ -269,7 +269,8 @@ def _largest(problem: ContactProblem, values: Array) -> Array:
 def named_quantities(problem: ContactProblem) -> dict[str, Quantity]:
     """Return the results of a problem that have derivatives, by their columns. Collective.
 
-    They are all columns of ``steps.csv`` but times, counts, residuals and the work in a step.
+    They are columns of ``steps.csv``: no times, counts, residuals or work in a step, nor a column
+    that is not listed here.
     """
     axes, body = AXES[: problem.dim], problem.equilibrium
     found: dict[str, Quantity] = {

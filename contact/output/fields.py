@@ -25,7 +25,8 @@ from contact.history import BodyState, Evaluated
 from contact.mesh.cells import shape_of
 from contact.mesh.geometry import volumes
 from contact.mesh.together import pieces
-from contact.output.quantities import BODY, values_of
+from contact.output.quantities import values_of
+from contact.output.quantity import BODY
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

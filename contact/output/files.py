@@ -13,8 +13,9 @@ import numpy as np
 from contact.arguments import expect
 from contact.output.field_files import write_fields
 from contact.output.folder import ResultFolder, result_folder
-from contact.output.formats import gathered, write_csv, write_rows, write_share
-from contact.output.quantities import (
+from contact.output.formats import gathered, write_mappings, write_rows, write_share
+from contact.output.quantities import quantities, values_of
+from contact.output.quantity import (
     ADAPT,
     AGAINST,
     HISTORY,
@@ -23,8 +24,6 @@ from contact.output.quantities import (
     STEPS,
     SUMMARY,
     SURFACE,
-    quantities,
-    values_of,
 )
 from contact.output.solution import Solution
 from contact.output.surface import (
@@ -87,15 +86,14 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             write_share(comm, opposite, new / OPPOSITE, pieces)
 
         def write_tables() -> None:
-            rows = [values_of(HISTORY, record) for record in solution.history.records]
-            header = [quantity.name for quantity in quantities(HISTORY)]
-            write_csv(new / "history.csv", header, (row.values() for row in rows))
+            records = [values_of(HISTORY, record) for record in solution.history.records]
+            write_mappings(
+                new / "history.csv", records, [quantity.name for quantity in quantities(HISTORY)]
+            )
             if solution.steps:
-                steps = [record.row for record in solution.steps]
-                write_csv(new / STEPS, steps[0], (row.values() for row in steps))
+                write_mappings(new / STEPS, [record.row for record in solution.steps])
             if solution.adaptation:
-                rows = solution.adaptation
-                write_csv(new / ADAPT, rows[0], (row.values() for row in rows))
+                write_mappings(new / ADAPT, solution.adaptation)
 
         on_root(comm, write_tables)
         if solution.steps:

@@ -212,6 +212,14 @@ def write_csv(
         writer.writerows(rows)
 
 
+def write_mappings(
+    path: Path, rows: Sequence[Mapping[str, Any]], header: Iterable[str] = ()
+) -> None:
+    """Write rows of named values, under the names in the header and all others. On one rank."""
+    names = list(dict.fromkeys([*header, *(name for row in rows for name in row)]))
+    write_csv(path, names, ([row.get(name) for name in names] for row in rows))
+
+
 def read_data(path: str | Path) -> dict[str, Array]:
     """Read measurements from a CSV file with a row of names.
 

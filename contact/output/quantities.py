@@ -12,21 +12,19 @@ from typing import Any
 import numpy as np
 
 from contact.output.environment import versions
+from contact.output.field_quantities import AT_NODES, AT_OPPOSITE_NODES, FIELDS
 from contact.output.quantity import (
     ADAPT,
-    AGAINST,
     BODY,
     ENDS,
     HISTORY,
-    NODES,
-    OPPOSITE,
     ROWS,
-    STATUS,
     STEPS,
     SUMMARY,
-    SURFACE,
     SWEEP,
+    VECTOR,
     Quantity,
+    elsewhere,
 )
 
 
@@ -44,10 +42,6 @@ def values_of(file: str, given: Any, only: str = "") -> dict[str, Any]:
     return found
 
 
-def _elsewhere(given: Any) -> None:
-    """Return nothing: the value of a quantity that is written by who knows it."""
-
-
 def _error(given: Any) -> float:
     """Return the estimated error; no number where the equations are not solved."""
     return float("nan") if given.error is None else float(given.error.relative)
@@ -62,11 +56,11 @@ def _node_counts(record: Any) -> str:
     return "/".join(map(str, record.sizes or ()))
 
 
-_ALL, _VECTOR = (SUMMARY, STEPS, SWEEP), "{name}_{axis}"
+_ALL = (SUMMARY, STEPS, SWEEP)
 _MESHES = (*_ALL, ADAPT)
 
 _RUN = (
-    Quantity("KEY", "", "A swept key, a column each: its value in this row.", _elsewhere, (SWEEP,)),
+    Quantity("KEY", "", "A swept key, a column each: its value in this row.", elsewhere, (SWEEP,)),
     Quantity("title", "", "Title of the case."),
     Quantity("units", "", "Names of the units, those of `[case] units`.", lambda r: r.units.given),
     Quantity("t", "time", "End of the step.", lambda r: r.state.time, (STEPS,)),
@@ -98,19 +92,19 @@ _RUN = (
         "contact_force", "force", "Force that the body exerts on the foundation, a vector; in 2-D "
         "per unit of depth. Between bodies the one that the body with `on` exerts on the other. "
         "With several contacts their sum; `traction`, `weight` and `entry` of `contact.vtu` have "
-        "the force of each.", files=_MESHES, component=_VECTOR,
+        "the force of each.", files=_MESHES, component=VECTOR,
     ),
     Quantity(
         "contact_moment", "force · length", "Moment of the contact forces about the origin of "
         "coordinates, at points of the reference configuration: in 2-D a list of one number, about "
-        "z and counter-clockwise, in 3-D a vector.", component=_VECTOR,
+        "z and counter-clockwise, in 3-D a vector.", component=VECTOR,
     ),
     Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(
         "reactions", "force", "Force of the support of each part on the body, a vector per part. "
         "A node of two parts counts for the first of them in the case. Their sum plus the loads "
         "minus `contact_force` is zero, if forces between bodies are left out of the latter.",
-        lambda r: {part: held.force for part, held in r.supports.items()}, component=_VECTOR,
+        lambda r: {part: held.force for part, held in r.supports.items()}, component=VECTOR,
     ),
     Quantity(
         "reaction_AXIS_PART", "force", "Force of each support: `reaction_x_left`, ...",
@@ -118,12 +112,12 @@ _RUN = (
     ),
     Quantity(
         "reaction_moments", "force · length", "Moments of the reactions, as `contact_moment`.",
-        lambda r: {part: held.moment for part, held in r.supports.items()}, component=_VECTOR,
+        lambda r: {part: held.moment for part, held in r.supports.items()}, component=VECTOR,
     ),
     Quantity(
         "region", "", "Place of the cell's region among `regions` of the summary, from 0; of "
         "several regions that of the fewest cells. In `fields.vtu` alone, cell by cell.",
-        _elsewhere, (BODY,),
+        elsewhere, (BODY,),
     ),
     Quantity(
         "error", "",
@@ -135,7 +129,7 @@ _RUN = (
         "pressure at a corner. All are `null` where the equations are not solved.",
         lambda r: {
             "energy": _error(r), "effectivity": None, "intervals": r.intervals,
-        }, component=_VECTOR, entries=ENDS,
+        }, component=VECTOR, entries=ENDS,
     ),
     Quantity(
         "max_pressure", "stress", "Largest contact pressure, -σ_ν >= 0.",
@@ -167,7 +161,7 @@ _RUN = (
     ),
     Quantity(
         "volume_ratio", "", "Least and largest deformed volume of a cell over its own.",
-        lambda r: r.deformation and [*r.deformation[1:]], component=_VECTOR, entries=ENDS,
+        lambda r: r.deformation and [*r.deformation[1:]], component=VECTOR, entries=ENDS,
     ),
     Quantity(
         "max_von_mises", "stress",
@@ -246,11 +240,11 @@ _RUN = (
         "rigid", "", "The foundation that moves: its `displacement` and `rotation` (degrees), and "
         "the `force` and `moment` on it from outside, given or reactions. With several such "
         "foundations one entry per part.",
-        lambda r: r.movements.get("rigid"), component=_VECTOR,
+        lambda r: r.movements.get("rigid"), component=VECTOR,
     ),
     Quantity(
         "rigid_parts", "", "As `rigid`, of each part that moves as a rigid body.",
-        lambda r: r.movements.get("rigid_parts"), component=_VECTOR,
+        lambda r: r.movements.get("rigid_parts"), component=VECTOR,
     ),
     Quantity(
         "electrodes", "",
@@ -287,12 +281,12 @@ _RUN = (
     ),
     Quantity(
         "driven", "length", "Mean displacement of the part that is moved or loaded in time.",
-        lambda r: _item(r.driven, 0), (STEPS,), _VECTOR,
+        lambda r: _item(r.driven, 0), (STEPS,), VECTOR,
     ),
     Quantity(
         "driven_force", "force",
         "Force of its own supports and loads on it: with `driven_x` it makes the loop.",
-        lambda r: _item(r.driven, 1), (STEPS,), _VECTOR,
+        lambda r: _item(r.driven, 1), (STEPS,), VECTOR,
     ),
     Quantity("notes", "", "Assumptions that are met, or have not been checked, in words."),
     Quantity("warnings", "", "Reasons for care, in words."),
@@ -323,81 +317,9 @@ _RUN = (
     ),
     Quantity("seconds", "s", "For `setup`, `solve` and `output`."),
     Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: versions()),
-    Quantity("files", "", "Files of this run: a later run replaces them.", _elsewhere),
-    Quantity("seconds", "s", "Time for this row.", _elsewhere, (SWEEP,)),
-    Quantity("input", "", "Digests of the case's files, and of the row.", _elsewhere, (SWEEP,)),
-)  # fmt: skip
-
-#: Of the contact nodes; fields of the contact part are NaN, or -1, at nodes that are held.
-_NODES = (
-    Quantity(
-        "on", "", "Part of the node; where there are several contacts.", lambda n: n.part, (NODES,),
-    ),
-    Quantity("x", "length", "Reference place of the node.", lambda n: n.points, (NODES,), "{axis}"),
-    Quantity(
-        "weight", "area", "Tributary area of the node; sums with it are integrals over Γ₃.",
-        files=(NODES, SURFACE),
-    ),
-    Quantity(
-        "gap", "length", "Initial distance to the foundation, along the contact direction ν.",
-        files=(NODES, SURFACE),
-    ),
-    Quantity(
-        "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. If "
-        "the foundation moves, all displacements here are relative to it. At degree 2 on "
-        "triangular facets it is (u - (u₁ + u₂)/5)/(3/5) at mid-edge nodes, with u₁ and u₂ at the "
-        "ends of the edge, and gaps likewise: the pressure there acts on it, not on u.",
-        lambda n: n.normal_displacement, (NODES,),
-    ),
-    Quantity(
-        "u_t", "length", "Tangential displacement u_τ: its components in 3-D, `u_t` in 2-D.",
-        lambda n: n.tangential(n.slip), (NODES,), "{name}{axis}",
-    ),
-    Quantity(
-        "pressure", "stress", "Contact pressure -σ_ν, of the foundation and its layer.",
-        files=(NODES, SURFACE),
-    ),
-    Quantity(
-        "tau", "stress",
-        "Friction stress -σ_τ of the body on the foundation: its components, `tau` in 2-D.",
-        lambda n: n.tangential(n.friction), (NODES,), _VECTOR,
-    ),
-    Quantity(
-        "bound", "stress", "Friction bound: `tau` is no larger.",
-        lambda n: n.friction_bound, (NODES,),
-    ),
-    Quantity("status", "", "`open`, `stick` or `slip`.", files=(NODES,)),
-    Quantity(
-        "phi", "potential", "Potential; of piezoelectric bodies.", lambda n: n.potential, (NODES,),
-    ),
-    Quantity(
-        "d_n", "charge/area", "Charge D·ν that leaves through the foundation; of piezoelectric "
-        "bodies. Nodes that supports hold conduct too, but have no row: `charges` of the summary "
-        "includes them.",
-        lambda n: n.charge, (NODES,),
-    ),
-    Quantity(
-        "traction", "stress", "Stress of the body on the foundation, a vector: p ν - σ_τ.",
-        files=(SURFACE,),
-    ),
-    Quantity("opening", "length", "gap - u_n: the open gap.", files=(SURFACE,)),
-    Quantity("slip", "length", "Tangential displacement, a vector.", files=(SURFACE,)),
-    Quantity("friction_bound", "stress", "As `bound`.", files=(SURFACE,)),
-    Quantity("normal", "", "Contact direction ν, out of the body.", files=(SURFACE,)),
-    Quantity("charge", "charge/area", "As `d_n`; of piezoelectric bodies.", files=(SURFACE,)),
-    Quantity(
-        "status", "", "0 open, 1 stick, 2 slip; -1 for a node that is held.",
-        lambda n: np.array([STATUS[name] for name in n.status], np.int32), (SURFACE,),
-    ),
-    Quantity(
-        "row", "", "Row of the node in `contact.csv`, from 0; -1 for none.",
-        lambda n: np.arange(n.status.size, dtype=np.int32), (SURFACE,),
-    ),
-    Quantity("entry", "", "Number of its `[[contact]]`, from 0.", _elsewhere, (SURFACE,)),
-    Quantity(
-        "rigid", "", "1 in front of a rigid foundation, 0 in front of another body.",
-        _elsewhere, (SURFACE,),
-    ),
+    Quantity("files", "", "Files of this run: a later run replaces them.", elsewhere),
+    Quantity("seconds", "s", "Time for this row.", elsewhere, (SWEEP,)),
+    Quantity("input", "", "Digests of the case's files, and of the row.", elsewhere, (SWEEP,)),
 )  # fmt: skip
 
 _HISTORY = (
@@ -433,63 +355,5 @@ _HISTORY = (
     ),
 )  # fmt: skip
 
-_AGAINST = (
-    Quantity("on", "", "Part of the node: one that is `against` in a contact.", files=(AGAINST,)),
-    Quantity("x", "length", "Reference place of the node.", None, (AGAINST,), "{axis}"),
-    Quantity("weight", "area", "Tributary area of the node.", files=(AGAINST, OPPOSITE)),
-    Quantity(
-        "pressure", "stress", "Normal contact force on the node over its area.",
-        files=(AGAINST, OPPOSITE),
-    ),
-    Quantity(
-        "traction", "stress", "Whole contact force on the node over its area, a vector.",
-        None, (AGAINST, OPPOSITE), _VECTOR,
-    ),
-    Quantity(
-        "u", "length", "Displacement of the node.",
-        lambda f: f["displacement"], (AGAINST,), _VECTOR,
-    ),
-    Quantity("displacement", "length", "Displacement.", files=(OPPOSITE,)),
-    Quantity("normal", "", "Out of the body.", files=(OPPOSITE,)),
-    Quantity("entry", "", "Number of its contact, from 0.", files=(OPPOSITE,)),
-)  # fmt: skip
 
-#: Fields of the body; the derived ones have a companion NAME_cell, cell by cell.
-_BODY = (
-    Quantity("displacement", "length", "Displacement.", _elsewhere, (BODY, SURFACE)),
-    Quantity(
-        "potential", "potential", "Potential; of piezoelectric bodies.",
-        _elsewhere, (BODY, SURFACE),
-    ),
-    Quantity(
-        "stress", "stress", "σ, nine components, row by row; tension is positive.", files=(BODY,),
-    ),
-    Quantity(
-        "principal_stress", "stress", "σ1 ≥ σ2 ≥ σ3, eigenvalues of `stress`: at nodes those of "
-        "the averaged tensor.", files=(BODY,),
-    ),
-    Quantity(
-        "von_mises", "stress", "Von Mises stress; at nodes the average of those of the cells, "
-        "which is not less than that of the averaged tensor.", files=(BODY,),
-    ),
-    Quantity("strain", "", "ε, nine components as of the stress.", files=(BODY,)),
-    Quantity("dev_strain", "", "|dev ε|, the norm of the strain deviator.", files=(BODY,)),
-    Quantity(
-        "plastic_strain", "", "Of `j2`, nine components; `back_stress_1`, ... likewise.",
-        _elsewhere, (BODY,),
-    ),
-    Quantity(
-        "equivalent_plastic_strain", "", "Of `j2`; other internal variables have fields too.",
-        _elsewhere, (BODY,),
-    ),
-    Quantity("electric_displacement", "charge/area", "D; of piezoelectric bodies.", files=(BODY,)),
-    Quantity("electric_field", "potential/length", "E = -grad φ; likewise.", files=(BODY,)),
-    Quantity(
-        "error", "",
-        "Estimated discretisation error of the cell over the energy norm of the solution: the "
-        "squares add up to that of `error` in the summary. In `fields.vtu` alone, cell by cell.",
-        _elsewhere, (BODY,),
-    ),
-)  # fmt: skip
-
-QUANTITIES = (*_RUN, *_NODES, *_HISTORY, *_AGAINST, *_BODY)
+QUANTITIES = (*_RUN, *AT_NODES, *_HISTORY, *AT_OPPOSITE_NODES, *FIELDS)

@@ -18,8 +18,14 @@ BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
 ROWS = (STEPS, SWEEP, ADAPT)
 #: Names of the entries of a vector, and of an interval.
 AXES, ENDS = ("x", "y", "z"), ("least", "largest")
+#: Column of an entry of a vector.
+VECTOR = "{name}_{axis}"
 #: Status of a node -> its number in ``contact.vtu``.
 STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
+
+
+def elsewhere(given: Any) -> None:
+    """Return nothing: the value of a quantity that is written by who knows it."""
 
 
 def is_of(column: str, key: str) -> bool:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 
-from contact.output.quantities import Quantity, quantities
+from contact.output.quantities import quantities
+from contact.output.quantity import Quantity
 
 
 def described(file: str) -> Iterator[tuple[str, Quantity, str]]:

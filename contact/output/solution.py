@@ -23,7 +23,8 @@ from contact.output.error_estimate import Estimate
 from contact.output.fields import Deformation, DerivedFields, unknowns
 from contact.output.intervals import Intervals
 from contact.output.options import OutputOptions, Source, Units
-from contact.output.quantities import STEPS, values_of
+from contact.output.quantities import values_of
+from contact.output.quantity import STEPS
 from contact.output.resultants import (
     ChargeBalance,
     DrivenPart,

@@ -14,7 +14,8 @@ from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import shape_of
 from contact.mesh.owners import Owners
 from contact.output.formats import Grid, Table, Values
-from contact.output.quantities import AGAINST, NODES, SURFACE, values_of
+from contact.output.quantities import values_of
+from contact.output.quantity import AGAINST, NODES, SURFACE
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from contact.typing import Array

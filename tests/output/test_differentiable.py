@@ -11,10 +11,6 @@ from scripts.studies.derivatives import FAMILIES, problem
 
 SELF = MPI.COMM_SELF
 
-#: Columns of no derivative: times, counts, residuals, and work, which asks for two ends.
-OTHERS = {"t", "contact_nodes", "stick_nodes", "slip_nodes", "work", "kkt"}
-OTHERS |= {"linear_solves", "factorizations"}
-
 
 def plate():
     """Return a block under a turning plate that sinks, with a foundation that moves too."""
@@ -55,19 +51,23 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_columns(name):
+#: Columns with derivatives, at least: all but times, counts, residuals and work, which asks for
+#: two ends. A new column may be without one.
+COUNTS = {"plate": 18, "slip": 12, "log": 12, "j2": 13, "electrode": 15, "ring": 15}
+
+
+@pytest.mark.parametrize(("name", "count"), COUNTS.items())
+def test_columns(name, count):
     run = solve(CASES[name](), comm=SELF)
     known = named_quantities(run.problem)
+    assert len(known) >= count
     for record in run.steps:
         here = run.problem.at(record.state.time, record.state.history)
-        given = {k: v for k, v in record.row.items() if k not in OTHERS}
-        found = {k: quantity(here, record.state) for k, quantity in known.items()}
-        assert given.keys() == found.keys()
-        for key, value in given.items():
+        for key, quantity in known.items():
             # Of Hencky's law the energy is a quadrature of the way, in one step or in several.
             close = 1e-5 if key == "energy" and name == "log" else 1e-9
-            assert found[key] == pytest.approx(value, rel=close, abs=1e-12), key
+            value = quantity(here, record.state)
+            assert value == pytest.approx(record.row[key], rel=close, abs=1e-12), key
 
 
 @pytest.mark.parametrize("name", ["plate", "slip", "log", "j2", "electrode"])

@@ -26,7 +26,7 @@ from contact.output.figures.style import Look, smooth
 from contact.output.figures.sweep import Swept
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions, Units
-from contact.output.quantities import STATUS
+from contact.output.quantity import STATUS
 from contact.output.solution import Solution
 from contact.solving import solve
 from tests.problems.written import block, electric

@@ -16,7 +16,8 @@ from contact.methods.options import NewtonOptions
 from contact.output.figures.figures import figures_of
 from contact.output.figures.run import read_grid, read_run
 from contact.output.files import write_outputs
-from contact.output.quantities import AGAINST, OPPOSITE, quantities
+from contact.output.quantities import quantities
+from contact.output.quantity import AGAINST, OPPOSITE
 from contact.output.surface import opposite_surface
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

@@ -10,18 +10,8 @@ import pytest
 from contact.output import quantities as registry
 from contact.output.figures.run import read_grid
 from contact.output.files import write_outputs
-from contact.output.quantities import (
-    BODY,
-    HISTORY,
-    NODES,
-    QUANTITIES,
-    STEPS,
-    SUMMARY,
-    SURFACE,
-    SWEEP,
-    Quantity,
-    quantities,
-)
+from contact.output.quantities import QUANTITIES, quantities
+from contact.output.quantity import BODY, HISTORY, NODES, STEPS, SUMMARY, SURFACE, SWEEP, Quantity
 from contact.output.reference import files_help
 from contact.solving import solve
 from scripts.output_page import PAGE, page

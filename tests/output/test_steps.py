@@ -12,6 +12,7 @@ from contact.case.build import build_problem
 from contact.output.figures.figures import plot
 from contact.output.figures.run import read_grid, read_run
 from contact.output.figures.steps import draw_loop
+from contact.output.formats import write_mappings
 from contact.output.resultants import rigid_columns
 from contact.solving import evolve
 from tests.problems.bar import changed
@@ -255,3 +256,12 @@ def test_the_loop_is_drawn_along_the_way_of_a_rigid_part_with_units_of_force(tmp
     axes = draw_loop(read_run(tmp_path / "out"), "rigid").axes[0]
     assert axes.get_xlabel() == "displacement $u_x$ (mm)"
     assert axes.get_ylabel() == "force along $x$ (N/mm)"
+
+
+def test_a_quantity_that_the_first_step_does_not_have_keeps_the_columns(tmp_path):
+    write_mappings(tmp_path / "table.csv", [{"t": 1.0, "force": 2.0}, {"t": 2.0, "slip": 0.1}])
+    rows = list(csv.DictReader((tmp_path / "table.csv").open()))
+    assert rows == [
+        {"t": "1.0", "force": "2.0", "slip": ""},
+        {"t": "2.0", "force": "", "slip": "0.1"},
+    ]

@@ -5,7 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.output.quantities import NODES, values_of
+from contact.output.quantities import values_of
+from contact.output.quantity import NODES
 from contact.ranks import on_root
 from tests.output.test_steps import case_of
 

@@ -34,7 +34,7 @@ from contact.output.figures.style import (
     smooth,
 )
 from contact.output.formats import Table
-from contact.output.quantities import STATUS
+from contact.output.quantity import STATUS
 from contact.typing import Array
 
 #: Names of the zones without friction.

@@ -20,7 +20,7 @@ from contact.errors import InputError
 from contact.output.figures.style import heading
 from contact.output.formats import Table
 from contact.output.options import Units
-from contact.output.quantities import OPPOSITE
+from contact.output.quantity import OPPOSITE
 from contact.ranks import refused
 from contact.typing import Array
 

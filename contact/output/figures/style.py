@@ -16,7 +16,8 @@ from matplotlib.tri import Triangulation
 from contact.errors import InputError
 from contact.library.units import force_of
 from contact.output.options import Units
-from contact.output.quantities import BODY, quantities
+from contact.output.quantities import quantities
+from contact.output.quantity import BODY
 from contact.typing import Array
 
 #: Settings of all figures.

@@ -34,8 +34,8 @@ from contact.output.figures.style import (
 )
 from contact.output.folder import replace_whole
 from contact.output.options import Units
-from contact.output.quantities import SUMMARY, SWEEP, quantities
-from contact.output.quantity import AXES, ENDS, is_of
+from contact.output.quantities import quantities
+from contact.output.quantity import AXES, ENDS, SUMMARY, SWEEP, is_of
 from contact.ranks import refused
 from contact.typing import Array
 
