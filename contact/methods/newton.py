@@ -279,7 +279,12 @@ class Newton:
                 return iterate, outcome
         if iteration.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
-            iterate, outcome = interior_point(iteration, self.whole, self._modes, self.last_steps)
+            try:
+                return interior_point(iteration, self.whole, self._modes, self.last_steps)
+            except SingularError:  # as in `_without_forces`
+                if self.problem.equilibrium.linear:
+                    raise
+                self.whole.renew()
         return iterate, outcome
 
     def _continuation(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:

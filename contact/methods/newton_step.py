@@ -177,8 +177,6 @@ class NewtonStep:
         step, and it decreases with the residual.
     """
 
-    fault = "no contact constrains the body at that displacement"
-
     def __init__(
         self,
         problem: Problem,
@@ -188,6 +186,8 @@ class NewtonStep:
         underconstrained: bool = False,
     ) -> None:
         self._underconstrained = underconstrained
+        lost = "no contact constrains the body" if underconstrained else "the stiffness is singular"
+        self.fault = f"{lost} at that displacement"
         self.problem, self.options, self.parameters = problem, options, parameters
         self.counters = counters
         self._operator: Operator | None = None
@@ -277,10 +277,10 @@ class NewtonStep:
         try:
             increment = self.operator.solve(-residual, self._forcing_term(reached.significant))
         except SingularError:
-            if body.linear or iterate.active_set is None:
+            if body.linear or (self._underconstrained and iterate.active_set is None):
                 raise
             self.renew()
-            return None  # the first step was possible: it has been moved too far since
+            return None  # it has been moved too far, or the material has softened too much
         moved = jump.apply(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)
         vectors = contact.forces.vectors(jump) + change[:, : interface.dim]

@@ -193,3 +193,42 @@ def test_a_law_cannot_change_the_history():
     """Trials of a step would be in it, where one law has all cells."""
     with pytest.raises(ValueError, match="read-only"):
         solve(case(cells=2, stages=1), law=Careless(YOUNG, POISSON), comm=MPI.COMM_SELF)
+
+
+@dataclass(frozen=True)
+class Softening(Isotropic):
+    """Stress (1 - d) C eps that falls to nothing."""
+
+    def variables(self, size) -> Mapping[str, float]:
+        return {"damage": 0.0}
+
+    def respond(self, strain, variables, kind=""):
+        elastic = isotropic_stiffness(self.bulk, self.shear, strain.shape[1])
+        force = np.einsum("ni,ij,nj->n", strain, elastic, strain)
+        damage = np.maximum(variables["damage"], 1 - np.exp(-force / 2e-4))
+        secant = (1 - damage)[:, None, None] * elastic
+        stress = np.einsum("nij,nj->ni", secant, strain)
+        return Response(stress, {"damage": damage}, secant if kind == "secant" else None)
+
+
+@pytest.mark.parametrize(
+    ("held", "traction", "steps", "cells"), [(0.0, 0.05, 1, 8), ("free", 0.02, 2, 16)]
+)
+def test_a_material_that_softens_too_far_ends_the_steps(held, traction, steps, cells):
+    """Without an error: what has been solved is kept, and no support is missed."""
+    given = parse_case(
+        {
+            "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [cells, cells // 2]},
+            "material": {"young": 10.0, "poisson": 0.3},
+            "fixed": [
+                {"on": "top", "displacement": [held, "-0.005*t"]},
+                {"on": "left", "displacement": [0.0, "free"]},
+            ],
+            "load": [{"on": "right", "traction": [f"{traction}*t", 0.0]}],
+            "contact": {"on": "bottom"},
+            "evolution": {"times": [0.0, 1.0], "steps": [steps]},
+        }
+    )
+    solution = solve(given, law=Softening(YOUNG, POISSON), comm=MPI.COMM_SELF)
+    assert not solution.converged and len(solution.steps) >= 1
+    assert "the stiffness is singular at that displacement" in solution.outcome.reason
