@@ -97,8 +97,8 @@ def is_law(given: object) -> bool:
         return False
 
 
-class _Returned(ValueError):
-    """A function has returned a value that is not accepted."""
+class Returned(ValueError):
+    """A function has returned a value that is not accepted; for `naming`."""
 
     def __init__(self, words: str, identifier: str = "own-function") -> None:
         super().__init__(words)
@@ -124,11 +124,11 @@ def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
     except ValueError:  # lists of different lengths
         array = np.asarray(None)
     if array.dtype.kind not in "biuf":
-        raise _Returned(f"the function returns {shorten(repr(values))}; accepted: {each}")
+        raise Returned(f"the function returns {shorten(repr(values))}; accepted: {each}")
     try:
         array = np.broadcast_to(array, shape)
     except ValueError:
-        raise _Returned(
+        raise Returned(
             f"the function returns values of shape {array.shape}; accepted: {each}"
         ) from None
     return array.astype(float)
@@ -138,7 +138,7 @@ def check_finite(values: Array, where: Callable[[int], str]) -> None:
     """Refuse infinity and NaN, shape (n,), inside `naming`; ``where(i)`` names the i-th place."""
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size > 0:
-        raise _Returned(
+        raise Returned(
             f"not finite {where(bad[0])}; accepted: a finite number, formula or function",
             "not-finite",
         )
@@ -151,7 +151,7 @@ def naming(name: str) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except _Returned as error:
+    except Returned as error:
         raise InputError(f"{name}: {error}", error.identifier) from None
     except Exception as error:
         raise InputError(

@@ -40,6 +40,7 @@ from contact.methods.report import IterationHistory, Monitor, Outcome, tell
 from contact.methods.signals import SIGNALLED, stop_on_signal
 from contact.nesting import nested_start, pays
 from contact.output.checkpoint import Checkpoints, read_steps
+from contact.output.fields import check_variables
 from contact.output.remarks import announce
 from contact.output.solution import Solution, StepRecord, StepRecorder
 from contact.output.uniqueness import uniqueness
@@ -293,6 +294,7 @@ def evolve(
     expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
     begin = 0.0 if start is None else start.time
     ends = _checked_times(problem, times, begin)
+    check_variables(problem.equilibrium)
     settings = settings or NewtonOptions()
     method = METHODS[settings.method](problem, settings, monitor)
     for step in LoadStepping(problem, method, start, before).run(ends, begin):
@@ -322,6 +324,7 @@ def run_schedule(
         that of another problem.
     """
     clock = time.perf_counter()
+    check_variables(problem.equilibrium)
     start = None if schedule.start is None else _prescribed(problem, schedule.start)
     records = list(schedule.kept)
     with stop_on_signal(problem.comm, monitor) as stop:

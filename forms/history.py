@@ -123,6 +123,8 @@ class HistoryLaw(Protocol):
     def variables(self, size: int) -> Mapping[str, ArrayLike]:
         """Return the names of the variables, with their values in the reference configuration.
 
+        Names are identifiers in ASCII that no other field of the results has.
+
         Parameters
         ----------
         size

@@ -21,6 +21,7 @@ from ufl.core.expr import Expr
 
 from contact.body.description import Material
 from contact.body.pointwise import Pointwise
+from contact.body.stress_updates import check_law, respond
 from contact.errors import InputError
 from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
 from contact.mesh.cells import shape_of
@@ -35,7 +36,6 @@ from forms.history import (
     components,
     differential,
     to_vector,
-    with_stiffness,
 )
 from forms.kinematics import Strained, strain
 
@@ -72,7 +72,7 @@ class QuadratureLaws:
     Raises
     ------
     InputError
-        If materials give different shapes to a variable of one name.
+        If materials give different shapes to a variable of one name, or a law fails on one rank.
     """
 
     def __init__(
@@ -92,6 +92,8 @@ class QuadratureLaws:
         self._laws = [(law, own) for law, own in pairs if isinstance(law, HistoryLaw)]
         mesh = domain.mesh
         self._owned = mesh.topology.index_map(mesh.topology.dim).size_local
+        for law, _ in self._laws:
+            check_law(law, self._size, domain.comm)
         #: With which variables, kind and unknowns the forms' functions were evaluated last.
         self._seen: tuple[InternalVariables | None, str, Array] | None = None
         self.initial: InternalVariables | None = None
@@ -188,10 +190,7 @@ class QuadratureLaws:
             "tangent", its "symmetric" part, or "secant"; empty without stiffness.
         """
         for law, cells, strains, variables in self._points(state, state.x):
-            asked = "tangent" if kind == "symmetric" else kind
-            response = law.respond(strains, variables, asked)
-            _check(law, strains, variables, response)
-            found = with_stiffness(law, strains, variables, asked, response)
+            found = respond(law, strains, variables, "tangent" if kind == "symmetric" else kind)
             yield cells, found.symmetrised() if kind == "symmetric" else found
 
     def _points(
@@ -468,27 +467,6 @@ def _gradient(
 def _dot(one: Array, other: Array) -> Array:
     """Return the products of values at each point, shape (n,)."""
     return np.asarray((one * other).reshape(len(one), -1).sum(axis=1))
-
-
-def _check(
-    law: HistoryLaw, strain: Array, variables: Mapping[str, ArrayLike], found: Response
-) -> None:
-    """Refuse a response of other shapes than asked for."""
-    n, size = strain.shape
-    shapes: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {}
-    for name, value in variables.items():
-        shapes[name] = np.shape(found.variables.get(name, ())), np.shape(value)
-    shapes["stress"] = np.shape(found.stress), (n, size)
-    if found.stiffness is not None:
-        shapes["stiffness"] = np.shape(found.stiffness), (n, size, size)
-    for name in ("dissipation", "energy"):
-        if (energies := getattr(found, name)) is not None:
-            shapes[name] = np.shape(energies), (n,)
-    for name, (given, accepted) in shapes.items():
-        if given != accepted:
-            place = f"{type(law).__name__}: respond: {name}"
-            words = f"{place}: given the shape {given}; accepted: {accepted}, a row per point"
-            raise InputError(words, "law-variables")
 
 
 def _fill(function: fem.Function, cells: Indices, values: Array) -> None:

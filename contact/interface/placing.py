@@ -215,12 +215,17 @@ def _refuse_within(
         )
 
 
-def check_gap(domain: Domain, gap: Array, key: str, press: bool) -> None:
-    """Refuse given gaps that are no numbers, or none as nothing is to be pressed. Collective."""
+def _refuse_none(domain: Domain, gap: Array, key: str) -> None:
+    """Refuse gaps that are no numbers. Collective."""
     if domain.comm.allreduce(bool(np.isnan(gap).any()), op=MPI.LOR):
         raise InputError(
             f"{key}: the gap is no number at a node; accepted: lengths, or inf", "negative"
         )
+
+
+def check_gap(domain: Domain, gap: Array, key: str, press: bool) -> None:
+    """Refuse given gaps that are no numbers, or none as nothing is to be pressed. Collective."""
+    _refuse_none(domain, gap, key)
     least = domain.comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
     if least < -1e-12 * domain.size and not press:
         raise InputError(
@@ -274,6 +279,7 @@ def find_nodes(
         )
     unknown, cut = np.zeros_like(gap), 0.0
     if obstacle.is_shape:
+        _refuse_none(domain, gap, f"{key}.foundation: {type(obstacle).__name__}")
         try:
             gap, unknown, cut = _place(domain, space, obstacle, found, direction, gap, press)
         except InputError as error:

@@ -186,7 +186,7 @@ def _other(path: Path) -> str:
     return f"{path}: the checkpoint does not fit the problem; accepted: that of the same case"
 
 
-def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
+def read_steps(folder: str | Path, problem: ContactProblem) -> list[StepRecord]:
     """Return the records of the steps that a run has left in a folder, up to a damaged one.
 
     Collective.
@@ -197,7 +197,7 @@ def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
         If there are none, or they belong to another mesh.
     """
     comm, found = problem.comm, list[StepRecord]()
-    files: list[Path] = on_root(comm, lambda: files_of(folder))
+    files: list[Path] = on_root(comm, lambda: files_of(Path(folder)))
     nodes: dict[str, _Nodes] = {}
     for path in files:
         try:

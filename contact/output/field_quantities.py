@@ -15,6 +15,7 @@ from contact.output.quantity import (
     VECTOR,
     Quantity,
     elsewhere,
+    of_law,
 )
 
 #: Of the contact nodes; fields of the contact part are NaN, or -1, at nodes that are held.
@@ -133,11 +134,11 @@ FIELDS = (
     Quantity("dev_strain", "", "|dev ε|, the norm of the strain deviator.", files=(BODY,)),
     Quantity(
         "plastic_strain", "", "Of `j2`, nine components; `back_stress_1`, ... likewise.",
-        elsewhere, (BODY,),
+        of_law, (BODY,),
     ),
     Quantity(
         "equivalent_plastic_strain", "", "Of `j2`; other internal variables have fields too.",
-        elsewhere, (BODY,),
+        of_law, (BODY,),
     ),
     Quantity("electric_displacement", "charge/area", "D; of piezoelectric bodies.", files=(BODY,)),
     Quantity("electric_field", "potential/length", "E = -grad φ; likewise.", files=(BODY,)),

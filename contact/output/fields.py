@@ -17,16 +17,18 @@ from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
 from contact import _compat
+from contact.arguments import expect
 from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import form_law, piezo_with_constants
+from contact.body.stress_updates import NAME, name_of
 from contact.history import BodyState, Evaluated
 from contact.mesh.cells import shape_of
 from contact.mesh.geometry import volumes
 from contact.mesh.together import pieces
-from contact.output.quantities import values_of
-from contact.output.quantity import BODY
+from contact.output.quantities import quantities, values_of
+from contact.output.quantity import BODY, of_law
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -87,6 +89,23 @@ def unknowns(body: BodyEquilibrium, x: Array, family: str = "Lagrange") -> dict[
     if body.piezoelectric:
         given["potential"] = body.phi_scale * body.nodal(x)[:, body.dim :], ()
     return {k: nodal_function(k, body.space, *value, family) for k, value in given.items()}
+
+
+def check_variables(body: BodyEquilibrium) -> None:
+    """Refuse internal variables whose names are those of other fields.
+
+    Raises
+    ------
+    InputError
+        On all ranks, with the law and the name.
+    """
+    taken = [*(each.name for each in quantities(BODY) if each.value is not of_law), ACROSS]
+    words = f"{NAME} that is the name of no other field ({', '.join(taken)})"
+    for law in (material.law for material in body.body.materials):
+        within = law.base if isinstance(law, PlaneStressHistory) else law
+        for name in body.laws.variables(within):
+            place = f"{name_of(within)}: variables: the name"
+            expect(place, name, words, name not in taken, "law-variables")
 
 
 class Extremes(NamedTuple):

@@ -28,6 +28,10 @@ def elsewhere(given: Any) -> None:
     """Return nothing: the value of a quantity that is written by who knows it."""
 
 
+def of_law(given: Any) -> None:
+    """Return nothing: the value of an internal variable, which laws may have by this name."""
+
+
 def is_of(column: str, key: str) -> bool:
     """Tell whether a column of a table is that of a key: itself, or an entry of it.
 

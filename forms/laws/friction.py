@@ -83,7 +83,11 @@ class SlipCoefficient:
 
     def __post_init__(self) -> None:
         """Refuse coefficients that do not resist at every slip."""
-        if not (self.a >= 0 and self.a + self.b / 2 >= 0 and self.rho >= 0):
+        try:
+            fits = self.a >= 0 and self.a + self.b / 2 >= 0 and self.rho >= 0
+        except TypeError:  # no numbers
+            fits = False
+        if not fits:
             raise ValueError(f"a, a + b/2 and rho must be >= 0; given: {self}")
 
     @property

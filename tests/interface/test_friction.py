@@ -52,8 +52,11 @@ def test_what_resists_is_not_negative(friction, said):
         problem(Contact("bottom", friction=friction))
 
 
-@pytest.mark.parametrize("given", [(-0.3, 0.8, 1.0), (0.1, -0.3, 1.0), (0.3, 0.2, -1.0)])
-def test_a_coefficient_of_the_slip_is_not_negative(given):
+@pytest.mark.parametrize(
+    "given",
+    [(-0.3, 0.8, 1.0), (0.1, -0.3, 1.0), (0.3, 0.2, -1.0), ("a", 0.2, 1.0), (0.3, 0.2, None)],
+)
+def test_a_coefficient_of_the_slip_is_a_number_and_not_negative(given):
     with pytest.raises(ValueError, match=r"a, a \+ b/2 and rho must be >= 0; given: Slip"):
         SlipCoefficient(*given)
 

@@ -170,6 +170,11 @@ WRONG = {
     "a direction": (lambda: Plane((0, 0), (0, 1), direction="up"), '"foundation", "body", "axis"'),
     "a radius": (lambda: Sphere((0, 0), "1"), "Sphere: radius: given '1'"),  # type: ignore[arg-type]
     "an angle": (lambda: Cone((0, 0), (0, 1), 90.0), "Cone: half_angle: "),
+    "an angle in words": (lambda: Cone((0, 0), (0, 1), "a"), "Cone: half_angle: given 'a'"),  # type: ignore[arg-type]
+    "an edge in words": (
+        lambda: Punch((0, 0), (0, 1), 1.0, "a"),  # type: ignore[arg-type]
+        "Punch: edge_radius: given 'a'; accepted: a length from 0",
+    ),
     "an edge": (lambda: Punch((0, 0), (0, 1), 1.0, 2.0), "Punch: edge_radius: "),
     "a distance": (
         on(Level(lambda x: x[1])),

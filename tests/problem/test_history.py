@@ -4,7 +4,8 @@ The secant modulus is E (1 - d(kappa)), and kappa the largest strain so far. A b
 onto a frictionless foundation is in a homogeneous state, known in closed form.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -16,7 +17,8 @@ from contact import InputError, Material, evolve, parse_case, solve
 from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
 from contact.output.checkpoint import read_steps
-from contact.output.fields import DerivedFields
+from contact.output.field_files import body_share
+from contact.output.fields import DerivedFields, check_variables
 from forms.hencky import Isotropic
 from forms.history import HistoryLaw, Response, isotropic_stiffness
 from scripts.examples.own_return_mapping import DruckerPrager
@@ -114,7 +116,7 @@ def test_a_restart_goes_on_with_the_same_history(tmp_path):
     )
     whole = solve(given, law=law, comm=comm, folder=tmp_path)
     assert np.ptp(comm.allreduce(kappa_after(whole).tolist(), op=MPI.SUM)) > 1e-4
-    steps = read_steps(tmp_path, build_problem(given, comm, law=law))
+    steps = read_steps(str(tmp_path), build_problem(given, comm, law=law))
     for one, two in zip(whole.steps, steps, strict=True):
         assert one.state.near(two.state, rtol=1e-12, atol=1e-15)
         assert two.state.history.keys() == {"slip", "material"}
@@ -181,6 +183,109 @@ def test_drucker_and_prager_s_cone_of_the_example(size):
 
 
 @dataclass(frozen=True)
+class Other(Damage):
+    """Damage with a variable of another name, and another answer on the last rank, or on all."""
+
+    name: object = "kappa"
+    first: object = 0.0
+    changed: Callable[[Response], object] = lambda found: found
+    everywhere: bool = True
+
+    @property
+    def acts(self):
+        return self.everywhere or MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1
+
+    def variables(self, size):
+        return {self.name if self.acts else "kappa": self.first}
+
+    def respond(self, strain, variables, kind=""):
+        before = variables[self.name]
+        found = super().respond(strain, {"kappa": before.reshape(len(strain), -1)[:, 0]}, kind)
+        after = (found.variables["kappa"] + 0 * before.T).T
+        found = replace(found, variables={self.name: after})
+        return self.changed(found) if self.acts else found
+
+
+@pytest.mark.parametrize("name", ["", "\N{LATIN SMALL LETTER E WITH ACUTE}", "a b", "2a", 3, None])
+def test_a_variable_has_the_name_of_a_field(name):
+    words = rf"^case: Other: variables: the name: given {name!r}; accepted: an identifier of ASCII"
+    with pytest.raises(InputError, match=words):
+        build_problem(case(cells=2), MPI.COMM_SELF, law=Other(YOUNG, POISSON, name))
+
+
+@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
+def test_a_variable_has_a_name_that_no_field_has(kinematics):
+    """The fields are those that a solution writes."""
+    given = case(cells=2, space={"kinematics": kinematics})
+    problem = build_problem(given, MPI.COMM_SELF, law=Damage(YOUNG, POISSON))
+    check_variables(problem.equilibrium)
+    written = {*body_share(problem, problem.start()).at_points} - {"kappa"}
+    assert written >= {"displacement", "stress"}
+    for name in written:
+        words = rf"^case: Other: variables: the name: given '{name}'; .*no other field \(.*{name}"
+        with pytest.raises(InputError, match=words):
+            solve(given, law=Other(YOUNG, POISSON, name), comm=MPI.COMM_SELF)
+    problem = build_problem(given, MPI.COMM_SELF, law=Other(YOUNG, POISSON, written.pop()))
+    with pytest.raises(InputError, match="the name of no other field"):
+        next(evolve(problem, [1.0]))
+
+
+CHANGED = {
+    "a tuple": (lambda r: (r.stress, r.variables), r": the function returns \(.*a Response"),
+    "None": (lambda _: None, ": the function returns None; accepted: a Response"),
+    "a list": (lambda r: replace(r, stress=r.stress.tolist()), r": stress: .*returns \[\[.*array"),
+    "a row": (lambda r: replace(r, stress=r.stress[0]), r": stress: .*shape \(4,\).*\(17, 4\)"),
+    "complex": (lambda r: replace(r, stress=r.stress + 0j), ": stress: .*complex128.*real numbers"),
+    "NaN": (lambda r: replace(r, stress=np.nan * r.stress), r": stress: not finite at .*\[0\.0,"),
+    "energy": (lambda r: replace(r, energy=np.zeros(3)), r": energy: .*\(3,\).*\(17,\)"),
+    "another": (
+        lambda r: replace(r, variables={**r.variables, "x": r.stress}),
+        r": variables: .*\['kappa', 'x'\]; accepted: .*\['kappa'\]",
+    ),
+    "no variables": (lambda r: replace(r, variables=None), ": variables: .*None; accepted: a map"),
+    "error": (lambda r: 1 / 0, ": the function raises ZeroDivisionError: division by zero"),
+}
+
+
+@pytest.mark.parallel(2)
+@pytest.mark.parametrize("everywhere", [True, False])
+@pytest.mark.parametrize("kind", CHANGED)
+def test_a_wrong_response_is_refused_by_all_ranks_before_the_solve(kind, everywhere):
+    changed, words = CHANGED[kind]
+    law = Other(YOUNG, POISSON, changed=changed, everywhere=everywhere)
+    with pytest.raises(InputError, match=f"^case: Other: respond{words}"):
+        build_problem(case(cells=2), MPI.COMM_WORLD, law=law)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["kappa"], r": the function returns \['kappa'\]; accepted: a mapping"),
+        (None, ": the function returns None; accepted: a mapping"),
+        ({"kappa": "a"}, ": 'kappa': the function returns 'a'; accepted: a real number"),
+        ({"kappa": 1j}, ": 'kappa': the function returns 1j; accepted: a real number"),
+    ],
+)
+def test_wrong_variables_are_refused(monkeypatch, given, words):
+    monkeypatch.setattr(Damage, "variables", lambda self, size: given)
+    with pytest.raises(InputError, match=f"^case: Damage: variables{words}"):
+        build_problem(case(cells=2), MPI.COMM_SELF, law=Damage(YOUNG, POISSON))
+
+
+@pytest.mark.parallel(2)
+@pytest.mark.parametrize("other", [{"name": "x"}, {"first": np.zeros(2)}])
+def test_variables_are_the_same_on_all_ranks(other):
+    comm = MPI.COMM_WORLD
+    law = Other(YOUNG, POISSON, **other, everywhere=False)
+    if comm.rank < comm.size - 1:
+        law = Damage(YOUNG, POISSON)
+    words = ": variables: given .*: the same names and shapes on all ranks"
+    apart = pytest.raises(InputError, match=words) if comm.size > 1 else nullcontext()
+    with apart:
+        build_problem(case(cells=2), comm, law=law)
+
+
+@dataclass(frozen=True)
 class Careless(Damage):
     """A law that writes into the variables it is given."""
 
@@ -191,7 +296,7 @@ class Careless(Damage):
 
 def test_a_law_cannot_change_the_history():
     """Trials of a step would be in it, where one law has all cells."""
-    with pytest.raises(ValueError, match="read-only"):
+    with pytest.raises(InputError, match=r"Careless: respond: .*read-only"):
         solve(case(cells=2, stages=1), law=Careless(YOUNG, POISSON), comm=MPI.COMM_SELF)
 
 

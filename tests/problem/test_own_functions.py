@@ -1,7 +1,8 @@
 """What a user's own function raises, or returns and may not, names the argument that it is."""
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -20,11 +21,15 @@ from contact import (
     Load,
     Motion,
     Problem,
+    Response,
     Rigid,
+    Shape,
     UserLaw,
     solve,
 )
 from contact.mesh.grid import rectangle
+from contact.typing import Array
+from forms.hencky import Isotropic
 from forms.laws import Coulomb, PotentialFactor
 
 pytestmark = pytest.mark.parallel(2)
@@ -36,10 +41,15 @@ Own = Callable[..., Any]
 
 
 def solved(
-    fixed: Fixed = TOP, load: Any = (), contact: Any = None, mu: Any = None, rigid: Any = ()
+    fixed: Fixed = TOP,
+    load: Any = (),
+    contact: Any = None,
+    mu: Any = None,
+    rigid: Any = (),
+    law: Any = LAW,
 ) -> object:
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
-    body = Body(LAW, fixed, load, rigid=rigid)
+    body = Body(law, fixed, load, rigid=rigid)
     return solve(Problem(domain, body, contact or Contact("bottom"), Friction(mu=mu)))
 
 
@@ -60,6 +70,20 @@ class Given:
 
     def __init__(self, function: Own) -> None:
         self.ufl, self.numpy = function, lambda points: function(points.T)
+
+
+@dataclass(frozen=True)
+class Updated(Isotropic):
+    """A stress update whose components are those of a function at the points."""
+
+    function: Own
+
+    def variables(self, size: int) -> dict[str, float]:
+        return {}
+
+    def respond(self, strain: Array, variables: object, kind: str = "") -> Response:
+        found = self.function(strain.T)
+        return Response(found[:, None] + 0 * strain if np.ndim(found) == 1 else found, {})
 
 
 def moved(function: Own) -> object:
@@ -86,6 +110,7 @@ PLACES: dict[str, tuple[Callable[[Own], object], str]] = {
         lambda f: solved(load=Load("right", [0.1, 0.0], amplitude=f)),
         "Load on 'right': amplitude",
     ),
+    "stress": (lambda f: solved(law=Updated(10.0, 0.3, f)), "Updated: respond(: stress)?"),
     "motion": (moved, r"Motion: displacement\.1"),
 }
 
@@ -130,7 +155,9 @@ def test_a_message_names_the_argument(place: str, function: Own) -> None:
         assert isinstance(error.value.__cause__, KeyError)
 
 
-@pytest.mark.parametrize("place", ["support", "traction", "gap", "mu", "coefficient", "shape"])
+@pytest.mark.parametrize(
+    "place", ["support", "traction", "gap", "mu", "coefficient", "shape", "stress"]
+)
 def test_what_one_rank_alone_meets_is_refused_by_all(place: str) -> None:
     last = MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1
     give, name = PLACES[place]
@@ -140,6 +167,24 @@ def test_what_one_rank_alone_meets_is_refused_by_all(place: str) -> None:
                 fails() if last else 0.01 * np.ones(np.shape(x)[0 if place == "shape" else -1])
             )
         )
+
+
+@dataclass(frozen=True)
+class Holed(Shape):
+    """A plane whose distance is no number at one corner of the body."""
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        distance = np.where(points[:, 0] < 0.1, np.nan, points[:, 1])
+        return distance, np.broadcast_to([0.0, 1.0], points.shape)
+
+
+@pytest.mark.parametrize("direction", ["foundation", "body"])
+def test_a_shape_without_a_distance_at_a_node_is_named(
+    direction: Literal["foundation", "body"],
+) -> None:
+    """Left out, the contact of that node would be missing without a word."""
+    with pytest.raises(InputError, match=r"^contact\.foundation: Holed: the gap is no number"):
+        solved(contact=Contact("bottom", Holed(direction=direction)))
 
 
 class Springs:

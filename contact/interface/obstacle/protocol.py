@@ -169,16 +169,18 @@ class Shape(ABC):
     def ray(self, points: Array, rays: Array) -> Array:
         """Return how far the surface is along unit vectors, (n,). Infinite where it is never met.
 
+        NaN where the distance of the point is.
+
         From outside a step by the distance leads through no surface (sphere tracing, Hart, The
         Visual Computer 12 (1996) 527), however the body is shaped; near it, and for rays that graze
         it, Newton's method takes over, which from afar would pass by a side of a body that is not
         convex.
         """
-        found = np.full(len(points), np.inf)
         left = np.arange(len(points))
         at = np.zeros(len(points))
         reach = np.zeros(len(points))
         near = np.asarray(np.abs(self.distance(points)[0]) / STEPS)
+        found = np.where(np.isnan(near), np.nan, np.inf)
         for step in range(STEPS):
             value, normal = self.distance(points[left] + at[left, None] * rays[left])
             slope = -np.einsum("ni,ni->n", normal, rays[left])

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Annotated, Literal
 
 import numpy as np
@@ -160,7 +161,8 @@ class Cone(AboutAxis):
         """Refuse an angle that is none of a cone."""
         super().__post_init__()
         angle = self.half_angle
-        expect("Cone: half_angle", angle, "degrees between 0 and 90", 0 < angle < 90)
+        fits = isinstance(angle, Real) and 0 < angle < 90
+        expect("Cone: half_angle", angle, "degrees between 0 and 90", fits)
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals; those of the tip where it is nearest."""
@@ -243,7 +245,7 @@ class Punch(AboutAxis):
     def __post_init__(self) -> None:
         """Refuse an edge that is rounder than the punch."""
         super().__post_init__()
-        fits = 0 <= self.edge_radius <= self.radius
+        fits = isinstance(self.edge_radius, Real) and 0 <= self.edge_radius <= self.radius
         expect("Punch: edge_radius", self.edge_radius, "a length from 0 to the radius", fits)
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
