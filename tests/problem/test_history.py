@@ -257,6 +257,13 @@ def test_a_wrong_response_is_refused_by_all_ranks_before_the_solve(kind, everywh
         build_problem(case(cells=2), MPI.COMM_WORLD, law=law)
 
 
+def test_a_law_that_fails_at_larger_strains_is_named():
+    law = Other(YOUNG, POISSON, changed=lambda r: r if np.abs(r.stress).max() < 1e-3 else 1 / 0)
+    problem = build_problem(case(cells=2, stages=1), MPI.COMM_SELF, law=law)
+    with pytest.raises(InputError, match=r"^Other: respond: the function raises ZeroDivisionError"):
+        next(evolve(problem, [1.0]))
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
