@@ -25,10 +25,10 @@ OFTEN, SELDOM = 0.2, 10.0
 #: Loggers, each within the next: the iterations of a solve, its steps, the cases of a sweep.
 RANKS = ("contact.inner", "contact.solver", "contact.steps", "contact.sweep")
 OUTER = "contact.solver"
-#: The bar of one solve, the bar of many, and its width where the terminal does not tell its own.
+#: The bar of one solve, the bar of many, and its size where the terminal does not tell its own.
 COUNT = "iterations: {n_fmt}, {elapsed}{postfix}"
 SHARES = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
-WIDTH = 80
+WIDTH, HEIGHT = 80, 20
 #: Head of the table of iterations: linear solves, residuals, and numbers of nodes that are open,
 #: stick and slip. Newton iterations on the condensed problem, within step 2, are 2.1, 2.2, ...
 HEAD = "   step solves  equilibrium  contact friction   open  stick   slip  note"
@@ -85,9 +85,15 @@ def progress(
         if not (quiet or verbose) and sys.stderr.isatty():
             from tqdm import tqdm
 
-            # tqdm takes a terminal that does not tell its width for one of width 0.
-            width = os.get_terminal_size(sys.stderr.fileno()).columns or WIDTH
-            bar = tqdm(file=sys.stderr, ncols=width, bar_format=COUNT, leave=False)
+            # tqdm takes a terminal that does not tell its size for one of size 0.
+            columns, lines = os.get_terminal_size(sys.stderr.fileno())
+            bar = tqdm(
+                file=sys.stderr,
+                ncols=columns or WIDTH,
+                nrows=lines or HEIGHT,
+                bar_format=COUNT,
+                leave=False,
+            )
         monitor = Console(quiet, bar, verbose)
         handlers.append(monitor)
     logger = logging.getLogger("contact")
