@@ -164,7 +164,7 @@ def test_pressures_that_the_tolerance_leaves_open_are_warned_of() -> None:
     off = np.sqrt(weight @ (solution.pressure / 1e-10 - 1.0) ** 2 / weight.sum())
     assert solution.converged
     (said,) = [text for text in solution.warnings if "contact forces are known to" in text]
-    # Far above the tolerance; how far is up to PETSc's multigrid: 1.6e-5 by that of 3.24.
+    # Far above the tolerance; how far is up to PETSc's multigrid: 1.6e-5 by that of 3.25.
     assert 1e-6 < off < float(said.split("known to ")[1].split()[0])
 
 
