@@ -209,8 +209,7 @@ def test_steps_and_their_adjoint():
 
 
 def test_the_closed_form_of_cattaneo_and_mindlin():
-    # in numbers that were computed by themselves
-    known = ball_values(2 / 3)
+    known = ball_values(2 / 3)  # beside numbers that were computed by themselves
     assert known.way == pytest.approx(0.0292078206, rel=1e-8)
     assert known.by_mu == pytest.approx(-0.0228280623, rel=1e-8)
     assert known.stick_by_mu == pytest.approx(1.54080, rel=1e-5)
@@ -222,9 +221,8 @@ def test_cattaneo_and_mindlin_by_the_friction_coefficient():
     (found, _), exact = cylinders(24, 1), cylinder_values(2 / 3)
     assert found.by_mu == pytest.approx(exact.by_mu, rel=0.025)
     assert found.way == pytest.approx(exact.way, rel=0.04)
-    assert (found.stick, found.stick_by_mu) == pytest.approx(
-        (exact.stick, exact.stick_by_mu), rel=5e-3
-    )
+    stick = exact.stick, exact.stick_by_mu
+    assert (found.stick, found.stick_by_mu) == pytest.approx(stick, rel=5e-3)
 
 
 def test_a_problem_in_python_and_a_function():

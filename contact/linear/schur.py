@@ -128,6 +128,7 @@ class SchurComplement:
             self._reordered = reordered
         else:  # into the one that has been analysed
             reordered.copy(self._reordered, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            reordered.destroy()
         self._reordered.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         # On several ranks MUMPS writes the other triangle where it factorises with an old analysis.
         if first or self.comm.size > 1:

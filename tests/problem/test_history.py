@@ -39,11 +39,14 @@ class Damage(Isotropic):
         return {"kappa": 0.0}
 
     def respond(self, strain, variables, kind=""):
-        elastic = isotropic_stiffness(self.bulk, self.shear, strain.shape[1])
         kappa = np.maximum(variables["kappa"], np.linalg.norm(strain, axis=1))
-        secant = (1 - damage(kappa))[:, None, None] * elastic
+        return self.damaged(strain, damage(kappa), {"kappa": kappa}, kind)
+
+    def damaged(self, strain, part, variables, kind):
+        elastic = isotropic_stiffness(self.bulk, self.shear, strain.shape[1])
+        secant = (1 - part)[:, None, None] * elastic
         stress = np.einsum("nij,nj->ni", secant, strain)
-        return Response(stress, {"kappa": kappa}, secant if kind == "secant" else None)
+        return Response(stress, variables, secant if kind == "secant" else None)
 
 
 def case(cells=4, degree=1, stages=3, **more):
@@ -307,20 +310,14 @@ def test_a_law_cannot_change_the_history():
         solve(case(cells=2, stages=1), law=Careless(YOUNG, POISSON), comm=MPI.COMM_SELF)
 
 
-@dataclass(frozen=True)
-class Softening(Isotropic):
+class Softening(Damage):
     """Stress (1 - d) C eps that falls to nothing."""
-
-    def variables(self, size) -> Mapping[str, float]:
-        return {"damage": 0.0}
 
     def respond(self, strain, variables, kind=""):
         elastic = isotropic_stiffness(self.bulk, self.shear, strain.shape[1])
         force = np.einsum("ni,ij,nj->n", strain, elastic, strain)
-        damage = np.maximum(variables["damage"], 1 - np.exp(-force / 2e-4))
-        secant = (1 - damage)[:, None, None] * elastic
-        stress = np.einsum("nij,nj->ni", secant, strain)
-        return Response(stress, {"damage": damage}, secant if kind == "secant" else None)
+        kappa = np.maximum(variables["kappa"], 1 - np.exp(-force / 2e-4))
+        return self.damaged(strain, kappa, {"kappa": kappa}, kind)
 
 
 @pytest.mark.parametrize(
