@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
 
 from contact.history import Evaluated
@@ -19,7 +20,9 @@ from contact.typing import Array
 class DenseStiffness:
     """A dense matrix of the first rank, and the factors of its last sum with nodal blocks.
 
-    Chord steps that change no active set take the same sum again.
+    Chord steps that change no active set take the same sum again. Unknowns at which no block has
+    acted yet are eliminated first, once for all sums: those along the contact boundary without
+    friction, and all of nodes that stay open.
 
     Parameters
     ----------
@@ -30,6 +33,9 @@ class DenseStiffness:
     def __init__(self, matrix: Array) -> None:
         self.matrix = matrix
         self._blocks: Array | None = None
+        self._solve: Callable[[Array], Array] | None = None
+        #: Number of each unknown among those that are left, negative if it is eliminated.
+        self._place: NDArray[np.intp] | None = None
 
     def factorise(self, blocks: Array) -> bool:
         """Add blocks at the nodes and factorise, unless the last ones were the same.
@@ -38,24 +44,74 @@ class DenseStiffness:
         """
         if self._blocks is not None and np.array_equal(blocks, self._blocks):
             return False
-        self._blocks = None  # no factors are left where memory does not do for new ones
-        total = self.matrix.copy(order="F")
-        rows = np.arange(len(total)).reshape(blocks.shape[:2])
-        total[rows[:, :, None], rows[:, None, :]] += blocks
-        fault = 1
-        if np.array_equal(blocks, blocks.transpose(0, 2, 1)):
-            lower, fault = dpotrf(total, lower=True, clean=False)
-            self._solve = partial(dpotrs, lower, lower=True)
-        if fault:  # a potential makes it indefinite
-            lower_upper, pivots, _ = dgetrf(total, overwrite_a=True)
-            self._solve = partial(dgetrs, lower_upper, pivots)
+        self._blocks = self._solve = None  # room for new factors
+        acted = (blocks.any(axis=1) | blocks.any(axis=2)).ravel()
+        if self._place is None or (self._place[acted] < 0).any():
+            self._eliminate(acted if self._place is None else acted | (self._place >= 0))
+        self._solve = self._factors(blocks)
         self._blocks = blocks
         return True
 
+    def _factors(self, blocks: Array) -> Callable[[Array], Array]:
+        """Return the solves for the unknowns at which blocks act."""
+        if not self._rows.size:
+            return lambda rhs: rhs
+        if np.array_equal(blocks, blocks.transpose(0, 2, 1)):
+            lower, fault = dpotrf(self._sum(blocks), lower=True, clean=False, overwrite_a=True)
+            if not fault:
+                return lambda rhs: np.asarray(dpotrs(lower, rhs, lower=True)[0])
+        # A potential makes it indefinite.
+        factors, pivots, _ = dgetrf(self._sum(blocks), overwrite_a=True)
+        return lambda rhs: np.asarray(dgetrs(factors, pivots, rhs)[0])
+
+    def _sum(self, blocks: Array) -> Array:
+        """Return the reduced matrix plus the blocks."""
+        assert self._place is not None
+        total = self._reduced.copy(order="F")
+        node, i, j = np.nonzero(blocks)
+        first = node * blocks.shape[1]
+        total[self._place[first + i], self._place[first + j]] += blocks[node, i, j]
+        return np.asarray(total)
+
+    def _eliminate(self, acted: NDArray[np.bool_]) -> None:
+        """Eliminate the unknowns at which no block acts, nor has acted."""
+        matrix, rows, others = self.matrix, np.flatnonzero(acted), np.flatnonzero(~acted)
+        self._place, self._reduced, self._border = None, matrix[:0], matrix[:0]
+        lower, fault = _cholesky(matrix, others)
+        if fault:  # a potential makes it indefinite, or nothing else holds the body
+            rows, others = np.arange(acted.size), others[:0]
+            lower, _ = _cholesky(matrix, others)
+        border = _forward(lower, matrix[np.ix_(others, rows)])
+        self._reduced = matrix[np.ix_(rows, rows)] - border.T @ border
+        self._rows, self._others, self._lower, self._border = rows, others, lower, border
+        self._place = np.full(acted.size, -1)
+        self._place[rows] = np.arange(rows.size)
+
+    @np.errstate(over="ignore", invalid="ignore")  # of a singular sum
     def solve(self, blocks: Array, rhs: Array) -> Array:
         """Solve with the sum with some blocks."""
         self.factorise(blocks)
-        return np.asarray(self._solve(rhs)[0])
+        assert self._solve is not None
+        inner = _forward(self._lower, rhs[self._others])
+        solution = np.empty_like(rhs)
+        solution[self._rows] = self._solve(rhs[self._rows] - self._border.T @ inner)
+        inner -= self._border @ solution[self._rows]
+        solution[self._others] = solve_triangular(
+            self._lower, inner, lower=True, trans="T", check_finite=False
+        )
+        return solution
+
+
+def _cholesky(matrix: Array, rows: NDArray[np.intp]) -> tuple[Array, int]:
+    """Return the lower factor of a principal submatrix, and whether there is none."""
+    if not rows.size:
+        return np.zeros((0, 0)), 0
+    lower, fault = dpotrf(matrix[np.ix_(rows, rows)].T, lower=True, clean=False, overwrite_a=True)
+    return lower, fault
+
+
+def _forward(lower: Array, rhs: Array) -> Array:
+    return np.asarray(solve_triangular(lower, rhs, lower=True, check_finite=False))
 
 
 class DenseOperator:

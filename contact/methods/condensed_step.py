@@ -22,6 +22,7 @@ from contact.methods.newton_step import Iterate, StepResult
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Outcome
 from contact.methods.unconstrained_modes import RIGID_MOTION
+from contact.methods.working_set import WORKING_SET
 from contact.problem.condensed import Condensation, CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals
@@ -35,7 +36,7 @@ CONTACT_PART = 1e-3
 UNSOLVED = 0.05
 
 #: Notes of fallbacks that a record of the whole problem repeats.
-FALLBACKS = CONTINUATION, RIGID_MOTION, INTERIOR_POINT
+FALLBACKS = WORKING_SET, CONTINUATION, RIGID_MOTION, INTERIOR_POINT
 
 #: Solves a condensed problem from an iterate, with a history of its own.
 Solver = Callable[

@@ -36,7 +36,7 @@ from contact.methods.report import Outcome
 from contact.methods.stagnation import PROGRESS
 from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
 from contact.problem.protocols import Problem
-from contact.problem.residuals import evaluate, residual_forces
+from contact.problem.residuals import evaluate, evaluate_forces, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
 from contact.tolerances import EPS
@@ -183,14 +183,15 @@ class InteriorPoint:
 
     def run(self, iteration: Iteration) -> Outcome:
         """Take steps until the duality gap is closed. Collective."""
-        kkt, ended = evaluate(self.problem, self.state), "the interior point was given no step"
+        kkt, self._internal = evaluate_forces(self.problem, self.state)
+        ended = "the interior point was given no step"
         for steps in range(1, min(LIMIT, iteration.left) + 1):
             try:
                 taken = self.step()
             except InputError:
                 self._whole.renew()
                 taken = False
-            kkt = evaluate(self.problem, self.state)
+            kkt, self._internal = evaluate_forces(self.problem, self.state)
             iteration.see(Iterate(self.state), kkt)
             iteration.history.record(kkt, INTERIOR_POINT, 2)
             ended = f"the interior point has not converged in {steps} steps"
@@ -227,7 +228,7 @@ class InteriorPoint:
         slips = interface.slip_length(nodal)[self._frictional]
         contact = float(summed(jump.comm, cones.force @ ways[self._near] + cones.bound @ slips))
         own = body.owned_part(x)[: body.owned]
-        forces = body.internal_forces(replace(self._state, x=x)), body.external(self._state.time)
+        forces = self._internal, body.external(self._state.time)
         works = [abs(float(summed(jump.comm, own @ force[: body.owned]))) for force in forces]
         return cones.duality_gap() / ((contact + sum(works)) or 1.0)
 
@@ -240,7 +241,7 @@ class InteriorPoint:
         jump, near, frictional = interface.jump, self._near, self._frictional
         body, d = self.problem.equilibrium, jump.dim
         nodal = jump.apply(state.x)
-        residual = -residual_forces(self.problem, state)
+        residual = -residual_forces(self.problem, state, internal=self._internal)
         slack = interface.opening(nodal)[near] - cones.slack
         slip = interface.slip(nodal)[frictional] - cones.slip
         cones.scale()

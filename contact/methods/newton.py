@@ -18,7 +18,8 @@
 
 Where steps on the condensed body have ended without convergence, those on the whole body follow.
 Then the state with all nodes open is tried, by one linear solve, where the supports constrain all
-rigid-body modes. If it is no solution the fallbacks follow, in this order:
+rigid-body modes, and from there contact at few nodes (`working_set`). If neither is a solution the
+fallbacks follow, in this order:
 
 1. the condensed body, where the whole one has come first;
 2. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
@@ -70,6 +71,7 @@ from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Monitor, Outcome
 from contact.methods.stagnation import PROGRESS, Best, Stagnation, undeformed_equilibrium
 from contact.methods.unconstrained_modes import RIGID_MOTION, UnconstrainedModes
+from contact.methods.working_set import WORKING_SET, working_set
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, condensation_pays
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
@@ -217,7 +219,7 @@ class Newton:
         self.history.restart()
         iterate, outcome = self._iterate(iterate)
         if not outcome.converged and not outcome.overloaded:
-            found = self._without_forces(iterate)
+            found = self._from_open(iterate)
             iterate, outcome = found or self._fall_back(iterate, outcome)
         elif not self._pays and self._modes.pushed_aside(self.problem, iterate.state):
             found = self._fall_back(iterate, outcome)
@@ -229,8 +231,8 @@ class Newton:
         iteration.at = iterate
         return iterate, outcome
 
-    def _without_forces(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
-        """Return the state with all nodes open, if it solves the problem. Collective.
+    def _from_open(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
+        """Return a solution with all nodes open, or one that few nodes touch. Collective.
 
         Active sets may cycle on contact forces that are rounding of the other forces. Not tried
         where contact constrains a mode: a body moved aside may be in balance too, though friction
@@ -244,9 +246,26 @@ class Newton:
             self.whole.renew()
             return None
         residuals = evaluate(self.problem, state)
-        if residuals.excess(self.options.allowed):
+        if not residuals.excess(self.options.allowed):
+            return Iterate(state), Outcome(residuals, self.options.allowed, "")
+        found = working_set(self.problem, Iterate(state), self._with_gaps)
+        if found is None:
             return None
-        return Iterate(state), Outcome(residuals, self.options.allowed, "")
+        residuals = evaluate(self.problem, found.state)
+        self.iteration.see(found, residuals)
+        outcome = Outcome(residuals, self.options.allowed, "")
+        return (found, outcome) if outcome.converged else None
+
+    def _with_gaps(self, gap: Array, iterate: Iterate) -> tuple[Iterate, Outcome]:
+        """Solve with other gaps of the unilateral constraint, from an iterate on. Collective."""
+        problem, interface = self.problem, self.problem.interface
+        less = problem.with_interface(replace(interface, jump=replace(interface.jump, gap=gap)))
+        self.whole.problem = less
+        try:
+            iteration = replace(self.iteration, problem=less, best=Best())
+            return NewtonLoop(iteration, self.whole).run(iterate, WORKING_SET)
+        finally:
+            self.whole.problem = problem
 
     def _iterate(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Take Newton's steps, with the body condensed where that pays."""
@@ -281,7 +300,7 @@ class Newton:
             logger.info("%s; going on with an interior point", outcome.ended)
             try:
                 return interior_point(iteration, self.whole, self._modes, self.last_steps)
-            except SingularError:  # as in `_without_forces`
+            except SingularError:  # as in `_from_open`
                 if self.problem.equilibrium.linear:
                     raise
                 self.whole.renew()
@@ -295,7 +314,7 @@ class Newton:
 
         def solve(part: float, iterate: Iterate) -> tuple[Iterate, Outcome]:
             law = interface.law.conducting(part)
-            less = replace(problem, interface=replace(interface, law=law))
+            less = problem.with_interface(replace(interface, law=law))
             iteration = (
                 self.iteration if part == 1 else replace(self.iteration, problem=less, best=Best())
             )

@@ -166,6 +166,10 @@ class CondensedProblem:
         x = self.equilibrium.prescribe(self.equilibrium.rest())
         return State(x, Multipliers.zero(self.interface.jump), self.time)
 
+    def with_interface(self, interface: Interface) -> CondensedProblem:
+        """Return the problem with other laws, or gaps, at the same contact nodes."""
+        return replace(self, interface=interface)
+
     def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> DenseOperator:
         """Return the dense operator; it has blocks at all nodes, in their order."""
         body = self.equilibrium

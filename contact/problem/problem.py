@@ -192,6 +192,12 @@ class ContactProblem:
         step.interface = self.interface.at(time, slip)
         return step
 
+    def with_interface(self, interface: Interface) -> ContactProblem:
+        """Return the problem with other laws, or gaps, at the same contact nodes."""
+        other = copy(self)
+        other.interface = interface
+        return other
+
     def commit(self, state: State) -> History:
         """Return the history of the step that follows a state of this problem. Collective.
 

@@ -149,5 +149,8 @@ class Problem(Protocol):
         Those of another time than the problem's, where one is given.
         """
 
+    def with_interface(self, interface: Interface) -> Problem:
+        """Return the problem with other laws, or gaps, at the same contact nodes."""
+
     def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> Operator:
         """Return the operator of its linear systems, with blocks where the interface has some."""

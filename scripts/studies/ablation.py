@@ -19,6 +19,8 @@ from itertools import islice
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
+
 from contact import Solution, load_case, solve
 from contact.case.file import Case, parse_case
 from contact.interface import complementarity
@@ -38,11 +40,12 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.methods.working_set import working_set
 from contact.problem.residuals import evaluate
 from scripts.benchmarks import bench_one
 from scripts.cases import CASES
 from scripts.reporting import Report, append, parser
-from scripts.studies import sweep
+from scripts.studies import cantilevers, sweep
 from scripts.thesis.tables_compliance import case_of
 
 #: Times as long as with the device, and seconds more, from which on a problem counts as slow.
@@ -145,6 +148,19 @@ def _slender() -> Case:
         "friction": {"law": "coulomb", "mu": 0.8},
     }
     return _named(parse_case(tables), "beam-1000")
+
+
+def _stop() -> Case:
+    """Return a cantilever whose tip touches a stop."""
+    return _named(
+        parse_case(cantilevers.cantilever(cantilevers.TIP, [800, 8], 1, 0.3, 0.5)), "stop"
+    )
+
+
+def _lying() -> Case:
+    """Return a cantilever most of which lies on the ground."""
+    load = cantilevers.UNIFORM
+    return _named(parse_case(cantilevers.cantilever(load, [800, 8], 1, 0.0, 0.5)), "lying")
 
 
 def _dragged() -> Case:
@@ -262,8 +278,10 @@ DEVICES = (
            ((newton, "CONTINUATION_LIMIT", None),), (), _conducting),
     Device("zero displacement where nothing acts", (stagnation.undeformed_equilibrium,), "-",
            ((newton.NewtonLoop, "_loss_of_contact", _nothing),), (), _unloaded),
-    Device("no contact forces where supports hold a body", (Newton._without_forces,), "-",
-           ((Newton, "_without_forces", _nothing),)),
+    Device("all nodes open where supports hold a body", (Newton._from_open,), "-",
+           ((Newton, "_from_open", _nothing),)),
+    Device("working set of few nodes", (working_set,), "Goldfarb and Idnani 1983",
+           ((newton, "working_set", _nothing),), (), _stop),
 )  # fmt: skip
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
@@ -274,6 +292,9 @@ LINEAR = (
     Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
            ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _of_sweep("lifted-8", hard=True)),
+    Device("elimination of unknowns without contact", (), "Golub and Van Loan 2013",
+           ((dense, "_cholesky", lambda _, rows: (np.zeros((0, 0)), int(rows.size > 0))),), (),
+           _lying),
     Device("coarse levels kept from step to step", (multigrid.Hierarchy,),
            "Karlin, Manasse, Rudolph and Sleator 1988", ((multigrid, "PRICE", 0),), (), _block),
     Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",

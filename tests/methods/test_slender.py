@@ -1,10 +1,13 @@
-"""Bodies that bend over a gap: solved for sure at their contact nodes, in one solve of the body."""
+"""Bodies that bend over a gap: active sets cycle, a working set or an interior point solves."""
+
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact.case.file import parse_case
+from contact.methods import newton
 from contact.methods.options import FixedPointOptions
 from contact.solving import solve
 
@@ -31,15 +34,15 @@ UNIFORM = {"on": "top", "traction": [0.0, -1e-5]}
 
 
 @pytest.mark.parametrize(
-    ("case", "force", "nodes"),
+    ("case", "force", "nodes", "fallback"),
     [
-        (beam(100.0, [200, 2], TIP, 0.5), [0.0, -9.9734515e-05], 1),
-        (beam(100.0, [200, 2], TIP, 0.5, 0.3), FRICTION, 1),
-        (beam(100.0, [400, 4], UNIFORM, 0.5), [0.0, -8.3181908e-04], 303),
+        (beam(100.0, [200, 2], TIP, 0.5), [0.0, -9.9734515e-05], 1, "working set"),
+        (beam(100.0, [200, 2], TIP, 0.5, 0.3), FRICTION, 1, "working set"),
+        (beam(100.0, [400, 4], UNIFORM, 0.5), [0.0, -8.3181908e-04], 303, "interior point"),
     ],
     ids=["tip", "friction", "uniform"],
 )
-def test_a_cantilever_that_touches_a_stop(case, force, nodes):
+def test_a_cantilever_that_touches_a_stop(case, force, nodes, fallback):
     """Newton's method alone ended at a residual of 0.9 with no contact at all."""
     solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
@@ -47,17 +50,40 @@ def test_a_cantilever_that_touches_a_stop(case, force, nodes):
     assert np.count_nonzero(solution.status != "open") == nodes
     assert solution.counters.linear_solves <= 3
     assert solution.counters.factorizations <= 3
+    assert fallback in solution.history.records[-1].note
+    assert fallback == "interior point" or solution.counters.contact_solves <= 6
 
 
-def test_a_fine_mesh_of_a_long_beam_takes_few_steps_of_an_interior_point():
-    """Sparse steps came first there, in vain: nine of them, and then others at its nodes."""
+def test_a_fine_mesh_of_a_long_beam_touches_at_a_working_set():
+    """Nine steps came first there, in vain, and then others at its nodes."""
     load = {"on": "top", "traction": [0.0, -1e-13]}
     case = beam(1000.0, [400, 1], load, 0.1, 0.8, space={"degree": 2})
     solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
     assert solution.counters.linear_solves <= 24
     assert solution.counters.factorizations <= 12
-    assert {record.note for record in solution.history.records} == {"", "interior point"}
+    assert {record.note for record in solution.history.records} == {"", "working set"}
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_a_bridge_that_touches_at_several_nodes_is_that_of_an_interior_point(mu):
+    """A beam clamped at both ends, over a foundation that is nearest at two places."""
+    load = {"on": "top", "traction": [0.0, -2.5e-7]}
+    case = beam(100.0, [100, 1], load, 0.0, mu, space={"degree": 2})
+    case["fixed"].append({"on": "right", "displacement": [0.0, 0.0]})
+    case["contact"]["gap"] = "0.5 + 0.2*(1 - cos(6*pi*x/100))"
+    found = solve(parse_case(case))
+    with patch.object(newton, "working_set", lambda *_: None):
+        other = solve(parse_case(case))
+    assert found.converged and other.converged
+    notes = [" ".join(r.note for r in s.history.records) for s in (found, other)]
+    assert "working set" in notes[0] and "interior point" not in notes[0]
+    assert "interior point" in notes[1]
+    touching = np.count_nonzero(found.status != "open")
+    assert found.problem.comm.allreduce(touching) == 2
+    size = np.abs(other.contact_force).max()
+    assert np.allclose(found.contact_force, other.contact_force, rtol=0, atol=1e-6 * size)
 
 
 @pytest.mark.parametrize(("mu", "force"), [(0.0, [0, -9.9734515e-05]), (0.3, FRICTION)])
@@ -174,7 +200,7 @@ def test_a_bent_piezoelectric_beam_meets_a_conductor():
 
 
 @pytest.mark.parallel
-def test_ranks_agree_on_the_sure_road():
+def test_ranks_agree_on_the_working_set():
     case = beam(100.0, [100, 1], TIP, 0.5, 0.3)
     shared, alone = solve(parse_case(case)), solve(parse_case(case), comm=SELF)
     assert shared.converged and alone.converged
