@@ -18,8 +18,8 @@
 
 Where steps on the condensed body have ended without convergence, those on the whole body follow.
 Then the state with all nodes open is tried, by one linear solve, where the supports constrain all
-rigid-body modes, and from there contact at few nodes (`working_set`). If neither is a solution the
-fallbacks follow, in this order:
+rigid-body modes, and from there contact at one node more in turn (`working_set`). If neither is a
+solution the fallbacks follow, in this order:
 
 1. the condensed body, where the whole one has come first;
 2. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
@@ -232,7 +232,7 @@ class Newton:
         return iterate, outcome
 
     def _from_open(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
-        """Return a solution with all nodes open, or one that few nodes touch. Collective.
+        """Return a solution with all nodes open, or with a working set. Collective.
 
         Active sets may cycle on contact forces that are rounding of the other forces. Not tried
         where contact constrains a mode: a body moved aside may be in balance too, though friction

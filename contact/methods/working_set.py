@@ -1,9 +1,10 @@
-"""Working set of contact nodes, for bodies that touch at few: stops, tips, corners.
+"""Working set of contact nodes, for bodies that touch at one node or two: at stops, tips, corners.
 
-What bends over a gap mostly touches at one or two nodes, but without contact most of its nodes
-penetrate: active sets of all that do cycle. Contact is therefore stated at the node of largest
-penetration alone, and at one more in turn as long as others penetrate, as a dual active set method
-adds the constraint that is violated most. Each of these problems is solved by Newton's method.
+A body that bends over a gap mostly touches at one node, but without contact most of its nodes
+penetrate: active sets of all these cycle. Contact is therefore stated at the node of largest
+penetration alone, and at one more in turn while others penetrate, as a dual active set method
+adds the constraint that is violated most. Each of these problems is solved by Newton's method. An
+interior point takes fewer steps where a node does not halve the number of those that penetrate.
 
 References
 ----------
@@ -17,20 +18,19 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from contact.interface.interface import Interface
 from contact.methods.newton_step import Iterate
 from contact.methods.report import Outcome
+from contact.methods.stagnation import PROGRESS
 from contact.problem.protocols import Problem
+from contact.problem.state import State
 from contact.ranks import summed
-from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 #: Note of its steps in the history.
 WORKING_SET = "working set"
-
-#: Most nodes of a working set, and most others that may penetrate once it has one: an interior
-#: point takes fewer steps for more.
-MOST, OTHERS = 4, 16
 
 
 def working_set(
@@ -38,7 +38,7 @@ def working_set(
     iterate: Iterate,
     solve: Callable[[Array, Iterate], tuple[Iterate, Outcome]],
 ) -> Iterate | None:
-    """Return an iterate that penetrates nowhere; None where the working set grows. Collective.
+    """Return an iterate that penetrates nowhere; None where this takes many nodes. Collective.
 
     Parameters
     ----------
@@ -52,20 +52,25 @@ def working_set(
     """
     interface, jump = problem.interface, problem.interface.jump
     inside = np.zeros(jump.gap.shape, dtype=bool)
-    for _ in range(MOST):
+    deepest, count = _penetrating(interface, iterate.state, inside)
+    while count > 0:
         opening = interface.opening(jump.apply(iterate.state.x))
-        deepest = jump.maximum(-opening)
-        if deepest <= 0:
-            return None
         inside |= opening <= -deepest
         iterate, outcome = solve(np.where(inside, jump.gap, np.inf), iterate)
-        if not outcome.converged:
+        before = count
+        deepest, count = _penetrating(interface, iterate.state, inside)
+        if not outcome.converged or count > PROGRESS * before:
             return None
-        opening = interface.opening(jump.apply(iterate.state.x))
-        others = np.count_nonzero(~inside & (opening < -NEGLIGIBLE * deepest))
-        found = int(summed(jump.comm, others))
-        if found == 0:
-            return iterate
-        if found > OTHERS:
-            return None
-    return None
+    return iterate
+
+
+def _penetrating(
+    interface: Interface, state: State, inside: NDArray[np.bool_]
+) -> tuple[float, int]:
+    """Return the largest penetration of other nodes (length), and how many do. Collective."""
+    nodal = interface.jump.apply(state.x)
+    depth = np.where(inside, 0.0, -interface.opening(nodal))
+    deepest = interface.jump.maximum(depth)
+    rounding = interface.rounding(nodal) / interface.stiffness
+    count = int(summed(interface.comm, np.count_nonzero(depth > rounding)))
+    return deepest, count

@@ -280,7 +280,7 @@ DEVICES = (
            ((newton.NewtonLoop, "_loss_of_contact", _nothing),), (), _unloaded),
     Device("all nodes open where supports hold a body", (Newton._from_open,), "-",
            ((Newton, "_from_open", _nothing),)),
-    Device("working set of few nodes", (working_set,), "Goldfarb and Idnani 1983",
+    Device("working set of contact nodes", (working_set,), "Goldfarb and Idnani 1983",
            ((newton, "working_set", _nothing),), (), _stop),
 )  # fmt: skip
 

@@ -23,6 +23,7 @@ from contact.methods import (
     newton,
     newton_step,
     unconstrained_modes,
+    working_set,
 )
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.thesis import fixed_point, outer_loop, penalty, uzawa
@@ -228,6 +229,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"in 2-D from [{multigrid.LARGE[2, False]:,}] on": True,
         f"k is at most [{condensed.ALWAYS}]": True,
         f"less than [{condensed.DENSE_IS_FASTER:g}] sparse ones": True,
+        "is more than [half] of that before": working_set.PROGRESS == 0.5,
         f"is [{unconstrained_modes.STUCK:g}] times all loads": True,
         "is [10⁻²] f b²/d": interior_point.SHARE == 1e-2,
         f"is [{interior_point.SHARE_UNSUPPORTED}] of that of the loads": True,
