@@ -141,14 +141,24 @@ def _sizes(mark: pytest.Mark) -> set[int]:
 
 def _covering(items: list[pytest.Item]) -> list[pytest.Item]:
     """Return the few of a test's items that have each value of each parameter."""
-    specs = [getattr(item, "callspec", None) for item in items]
-    values = [set(spec.indices.items()) if spec else {("", 0)} for spec in specs]
+    values = [_values(item) for item in items]
     missing, kept = set().union(*values), []
     while missing:
         best = max(range(len(items)), key=lambda k: len(missing & values[k]))
         kept.append(items[best])
         missing -= values[best]
     return kept
+
+
+def _values(item: pytest.Item) -> set[tuple[str, ...]]:
+    """Return an item's row of each list of parameters, by names and identities of its values."""
+    values = dict(item.callspec.params) if hasattr(item, "callspec") else {"": 0}
+    found = set()
+    for mark in item.iter_markers("parametrize"):
+        given = mark.args[0]
+        names = [name.strip() for name in given.split(",")] if isinstance(given, str) else given
+        found.add(tuple(f"{name} {id(values.pop(name))}" for name in names))
+    return found | {(f"{name} {id(value)}",) for name, value in values.items()}
 
 
 @pytest.hookimpl(wrapper=True)
