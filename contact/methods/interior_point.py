@@ -180,6 +180,7 @@ class InteriorPoint:
         zeros = np.zeros((limit.size, jump.dim))
         length = np.maximum(work / limit, slips)
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
+        self._first = self.cones.duality_gap()
 
     def run(self, iteration: Iteration) -> Outcome:
         """Take steps until the duality gap is closed. Collective."""
@@ -230,7 +231,8 @@ class InteriorPoint:
         own = body.owned_part(x)[: body.owned]
         forces = self._internal, body.external(self._state.time)
         works = [abs(float(summed(jump.comm, own @ force[: body.owned]))) for force in forces]
-        return cones.duality_gap() / ((contact + sum(works)) or 1.0)
+        # Where all nodes stick as they are no work is done, and the gap falls from its first value.
+        return cones.duality_gap() / (max(contact + sum(works), CLOSED * self._first) or 1.0)
 
     @np.errstate(over="ignore", invalid="ignore")  # of a body that falls; no such step is taken
     def step(self) -> bool:
