@@ -90,6 +90,9 @@ class Aggregation:
         sizes, self._range = tentative.getSizes(), tentative.getOwnershipRangeColumn()
         self._find_others()
         starts, columns, values = _smoothed(matrix, tentative, steps)
+        #: A power of two by which P is multiplied.
+        self.unit = self._unit()
+        values *= self.unit
         #: Lengths of the rows that others ask for.
         self._counts = np.diff(starts)[self._asked]
         sent = columns[_places(starts, self._asked)].astype(np.int64)
@@ -119,6 +122,15 @@ class Aggregation:
         self._product: PETSc.Mat | None = None
         #: The coarse operator of the last update.
         self.coarse: Any = None
+
+    def _unit(self) -> float:
+        """Return the factor that brings P^T K P to numbers near 1. Collective.
+
+        From 3.25 on PETSc takes pivots below 2e-14 of coarse levels for zero, in any units.
+        """
+        diagonal = self._matrix.getDiagonal()
+        size = diagonal.norm(PETSc.NormType.NORM_1) / diagonal.getSize()
+        return 2.0 ** round(-np.log2(size) / 2) if 0 < size < np.inf else 1.0
 
     @property
     def _width(self) -> int:

@@ -74,7 +74,7 @@ def test_the_interpolation_is_smoothed_by_one_step_of_jacobi() -> None:
     damping = []
     for fine, rough in zip(*modes, strict=True):
         assert abs(rough.norm() - 1) <= 1e-12
-        strained, moved = matrix * fine, fine - level.interpolation * rough
+        strained, moved = matrix * fine, fine - level.interpolation * rough / level.unit
         moved.pointwiseMult(moved, diagonal)
         damping.append(moved.dot(strained) / strained.dot(strained))
         moved.axpy(-damping[-1], strained)
@@ -94,7 +94,7 @@ def test_the_interpolation_is_smoothed_as_often_as_asked_for(steps: int) -> None
     levels = (level.update(), once.update())
     modes = (each.getNearNullSpace().getVecs() for each in (matrix, *levels))
     for fine, rough, other in zip(*modes, strict=True):
-        step = fine - once.interpolation * other
+        step = fine - once.interpolation * other / once.unit
         strained = matrix * fine
         strained.pointwiseDivide(strained, diagonal)
         damping = step.dot(strained) / strained.dot(strained)
@@ -103,8 +103,21 @@ def test_the_interpolation_is_smoothed_as_often_as_asked_for(steps: int) -> None
             strained = matrix * expected
             strained.pointwiseDivide(strained, diagonal)
             expected.axpy(-damping, strained)
-        assert (level.interpolation * rough - expected).norm() <= 1e-12 * fine.norm()
+        assert (level.interpolation * rough / level.unit - expected).norm() <= 1e-12 * fine.norm()
         assert step.norm() > 1e-3 * fine.norm()
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("stress", [1.0, 2.0**-60, 2.0**80])
+def test_the_coarse_operator_has_numbers_near_one(stress: float) -> None:
+    """Those below 2e-14 are zero to PETSc."""
+    problem = mechanics.leaning_block(WORLD, 8)
+    matrix, _ = level_of(problem)
+    modes = matrix.getNearNullSpace()
+    matrix.scale(stress)
+    matrix.setNearNullSpace(modes)
+    diagonal = Aggregation(matrix, aggregates(matrix)).update().getDiagonal()
+    assert 0.1 < diagonal.norm(PETSc.NormType.NORM_1) / diagonal.getSize() < 100
 
 
 @pytest.mark.parallel
