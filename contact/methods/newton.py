@@ -51,6 +51,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -65,28 +66,28 @@ from contact.methods.complementarity_parameters import (
 )
 from contact.methods.condensed_step import CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation
-from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED, interior_point
-from contact.methods.newton_step import Iterate, Iteration, NewtonStep, Step
+from contact.methods.interior_point import INTERIOR_POINT, interior_point
+from contact.methods.newton_loop import NewtonLoop
+from contact.methods.newton_step import Iterate, Iteration, NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Monitor, Outcome
-from contact.methods.stagnation import PROGRESS, Best, Stagnation, undeformed_equilibrium
+from contact.methods.stagnation import Best
 from contact.methods.unconstrained_modes import RIGID_MOTION, UnconstrainedModes
 from contact.methods.working_set import WORKING_SET, working_set
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, condensation_pays
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
-from contact.problem.residuals import Residuals, evaluate, evaluate_forces, residual_forces
+from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
 
+T = TypeVar("T")
+
 #: Stagnation limit in a continuation: condensed steps cost little beside another value of the
 #: parameter, and Example 8.4 with ten times its conductivity needs them.
 CONTINUATION_LIMIT = 20
-
-#: Why an iteration ends whose complementarity parameter overestimates the stiffness.
-OVERESTIMATED = "the complementarity parameter is far above the stiffness of the body"
 
 
 @dataclass
@@ -240,10 +241,8 @@ class Newton:
         """
         if not self._modes.constrained_by_supports:
             return None
-        try:
-            state = self.whole.without_contact(iterate.state)
-        except SingularError:  # at large strains, where the material has no stiffness any more
-            self.whole.renew()
+        state = self._unless_singular(partial(self.whole.without_contact, iterate.state))
+        if state is None:
             return None
         residuals = evaluate(self.problem, state)
         if not residuals.excess(self.options.allowed):
@@ -298,13 +297,22 @@ class Newton:
                 return iterate, outcome
         if iteration.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
-            try:
-                return interior_point(iteration, self.whole, self._modes, self.last_steps)
-            except SingularError:  # as in `_from_open`
-                if self.problem.equilibrium.linear:
-                    raise
-                self.whole.renew()
+            attempt = partial(interior_point, iteration, self.whole, self._modes, self.last_steps)
+            return self._unless_singular(attempt) or (iterate, outcome)
         return iterate, outcome
+
+    def _unless_singular(self, attempt: Callable[[], T]) -> T | None:
+        """Return the result of an attempt; None where the stiffness is singular. Collective.
+
+        At large strains the material may have no stiffness any more.
+        """
+        try:
+            return attempt()
+        except SingularError:
+            if self.problem.equilibrium.linear:
+                raise
+            self.whole.renew()
+            return None
 
     def _continuation(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
         """Solve by continuation in the conductivity of the foundation, if it conducts."""
@@ -364,129 +372,3 @@ def _solve_condensed(
     method = Newton(problem, options, parameters=parameters, modes=modes)
     method.history = history
     return method.run(iterate)
-
-
-def _node_counts(iterate: Iterate, problem: Problem) -> tuple[int, int, int] | None:
-    """Return the numbers of nodes that are open, stick and slip, if they are known. Collective."""
-    if iterate.active_set is None:
-        return None
-    interface = problem.interface
-    return interface.node_counts(interface.jump.apply(iterate.state.x), iterate.active_set)
-
-
-@dataclass
-class NewtonLoop:
-    """Steps of one kind, until the residuals say that they have converged or stagnate.
-
-    Attributes
-    ----------
-    iteration
-        The problem with the tolerances; told of every iterate.
-    step
-        Takes the steps.
-    stagnation_limit
-        Stagnation limit; that of the options by default.
-    give_up
-        Asked after the first step from the zero initial guess whether to give up; None to go on.
-    """
-
-    iteration: Iteration
-    step: Step
-    stagnation_limit: int | None = None
-    give_up: Callable[[State], bool] | None = None
-
-    def run(self, iterate: Iterate, note: str = "") -> tuple[Iterate, Outcome]:
-        """Iterate. Collective.
-
-        Parameters
-        ----------
-        iterate
-            Initial guess.
-        note
-            Note of the steps in the history.
-        """
-        iteration, problem, options = self.iteration, self.iteration.problem, self.iteration.options
-        linear = problem.equilibrium.linear
-        residuals, internal = evaluate_forces(problem, iterate.state)
-        pressed = self._largest_pressure(iterate)
-        limit = self.stagnation_limit or options.stagnation_limit
-        stagnation = Stagnation(limit, PROGRESS, cumulative=True)
-        if iterate.active_set is not None and residuals.significant <= options.tolerance:
-            iteration.see(iterate, residuals)
-            iteration.history.record(residuals, f"{note} initial guess".strip(), inner=0)
-            return iterate, self._end(residuals)
-        self.step.begin()
-        # A start from elsewhere is near the solution; zero displacement has no better tangent.
-        tangent = iterate.active_set is not None and iterate.linearised_at is None and not linear
-        for _ in range(min(options.max_iterations, iteration.left)):
-            before, kept = residuals, iterate
-            known = internal if iterate.linearised_at is None else None
-            taken = self.step(iterate, tangent, residuals, known)
-            if taken is None:
-                return kept, self._end(residuals, self.step.fault)
-            iterate = taken.iterate
-            residuals, internal = evaluate_forces(problem, iterate.state)
-            worse = self.step.conductivity_derivative.worsened(residuals.significant)
-            iteration.see(iterate, residuals)
-            words = (note, taken.note, "tangent" * tangent, "rejected" * worse)
-            said = " ".join(word for word in words if word)
-            iteration.history.record(
-                residuals,
-                said,
-                sizes=_node_counts(iterate, problem),
-                steps=taken.condensed_steps,
-            )
-            if worse:
-                iterate = kept
-                residuals, internal = evaluate_forces(problem, iterate.state)
-                iteration.see(iterate, residuals)
-            if residuals.significant <= options.tolerance:
-                return iterate, self._end(residuals)
-            if taken.overloaded:
-                return iterate, replace(self._end(residuals, OVERLOADED), overloaded=True)
-            if (found := self._loss_of_contact(iterate, pressed, note)) is not None:
-                return found
-            pressed = max(pressed, self._largest_pressure(iterate))
-            if self.give_up is not None and kept.active_set is None and self.give_up(iterate.state):
-                return iterate, self._end(residuals, OVERESTIMATED)
-            if not np.isfinite(residuals.significant):
-                return iterate, self._end(residuals, "Newton's method diverged")
-            if not linear:
-                falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
-                # After a tangent that overshoots, the secant (Kacanov), as where unloading differs
-                # from loading.
-                tangent = falls or not tangent
-            if stagnation(residuals.significant):
-                ended = f"Newton's method stalled at {stagnation.best:.1e}"
-                return iterate, self._end(residuals, ended)
-        steps = len(iteration.history.records)
-        return iterate, self._end(residuals, f"not converged in {steps} steps")
-
-    def _largest_pressure(self, iterate: Iterate) -> float:
-        return self.iteration.problem.interface.jump.maximum(iterate.state.forces.pressure)
-
-    def _loss_of_contact(
-        self, iterate: Iterate, pressed: float, note: str
-    ) -> tuple[Iterate, Outcome] | None:
-        """Return zero displacement where nothing touches any more and nothing acts. Collective.
-
-        Displacements fall by their rounding in each step then, and so do the forces beside which
-        residuals are measured: nodes that touch press by a part of the largest pressure before.
-        """
-        problem = self.iteration.problem
-        counts = _node_counts(iterate, problem)
-        if counts is None:
-            return None
-        tolerance = self.iteration.options.tolerance
-        if counts[1] + counts[2] > 0 and self._largest_pressure(iterate) > tolerance * pressed:
-            return None
-        found = undeformed_equilibrium(problem, tolerance)
-        if found is None:
-            return None
-        iterate = replace(iterate, state=found[0])
-        self.iteration.see(iterate, found[1])
-        self.iteration.history.record(found[1], f"{note} zero displacement".strip(), inner=0)
-        return iterate, self._end(found[1])
-
-    def _end(self, residuals: Residuals, ended: str = "") -> Outcome:
-        return Outcome(residuals, self.iteration.options.allowed, ended)
