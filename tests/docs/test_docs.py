@@ -21,6 +21,7 @@ from contact.methods import (
     interior_point,
     load_stepping,
     newton,
+    newton_loop,
     newton_step,
     unconstrained_modes,
     working_set,
@@ -199,7 +200,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
     page = (DOCS / "algorithms.md").read_text()
     options = NewtonOptions()
     said = {
-        f"after [{options.stagnation_limit}] steps in which": newton.PROGRESS == 0.5,
+        f"after [{options.stagnation_limit}] steps in which": newton_loop.PROGRESS == 0.5,
         f"after [{options.max_iterations}] steps;": True,
         "is [10³] times all loads": complementarity_parameters.OVERESTIMATE == 1e3,
         "limited to [1/4] κ": options.softening == 0.25,
