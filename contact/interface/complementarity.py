@@ -186,6 +186,7 @@ class LinearisedContact:
     unchanged: bool
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a body that flies away
 def linearise(
     interface: Interface,
     nodal: Array,
@@ -247,7 +248,7 @@ def linearise(
         rate = _bound_gradient(interface, total, slip, length, limit)
         # The bound follows the pressure of this very step.
         by_pressure = interface.friction.by_pressure(total, length)
-        ahead = np.where(closed, -by_pressure * parameters.gamma * opening, 0.0)
+        ahead = -by_pressure * parameters.gamma * np.where(closed, opening, 0.0)
         rate[:, :d] += by_pressure[:, None] * slope
         rate += by_pressure[:, None] * interface.law.layer_gradient(nodal)
         friction[slips] += (ahead[:, None] * along)[slips]
@@ -263,7 +264,9 @@ def at_bound(before: ActiveSet, friction: Array, slip: Array, bound: Array) -> A
     slip. A node would stick by it, be released for the same reason as before, and so on.
     """
     norm = np.linalg.norm(friction, axis=1)
-    slides = before.slips & (np.einsum("ni,ni->n", friction, slip) > 0) & (norm < bound)
+    slides = (
+        before.slips & (np.einsum("ni,ni->n", friction, slip) > 0) & (norm < bound) & (norm > 0)
+    )
     scale = np.where(slides, bound / np.where(slides, norm, 1.0), 1.0)
     return friction * scale[:, None]
 

@@ -76,6 +76,7 @@ def test_a_ring_that_a_lid_pushes_aside():
     assert solution.error is not None and solution.error.relative == 0
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")  # NumPy warned of steps that went too far
 @pytest.mark.parametrize("seed", [1, 2, 6, 8])
 def test_a_loaded_ring_that_lies_on_a_plate(seed):
     """By friction at all nodes that may touch, it would hang between the plates at first."""

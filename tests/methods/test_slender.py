@@ -96,6 +96,16 @@ def test_a_soft_body_that_cannot_be_condensed_is_solved_as_a_whole(mu, force):
     assert solution.counters.contact_solves == 0
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_working_set_with_a_smoothed_pressure():
+    """Others have infinite gaps there, and a bound that does not follow their own pressure."""
+    case = beam(100.0, [100, 2], TIP, 0.5)
+    case["friction"] = {"law": "coulomb", "mu": 0.3, "radius": 1.0}
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert "working set" in solution.history.records[-1].note
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.3])
 def test_a_plate_over_a_gap_is_solved_without_its_dense_matrix(mu):
     """As with more than 4200 unknowns at the contact nodes, on which it has to lie down."""
