@@ -156,6 +156,7 @@ class SparseOperator:
             pc.setFactorSolverType("mumps")
         with petsc_options(prefix):
             self.ksp.setFromOptions()
+        self._tolerance = self.ksp.getTolerances()[0]
 
     def multiply(self, values: Array, transposed: bool = False) -> Array:
         """Return the matrix, or its transpose, times owned values. Collective."""
@@ -234,7 +235,7 @@ class SparseOperator:
         rhs
             Owned right-hand side.
         rtol
-            Relative tolerance of an iterative solver; a direct one ignores it.
+            Relative tolerance of an iterative solver, its own by default; a direct one ignores it.
         guess
             Where an iterative solver starts, of the owned unknowns; zero by default.
 
@@ -244,8 +245,7 @@ class SparseOperator:
             If the operator is singular, for a rigid-body mode is free, or its numbers overflow.
         """
         self._rhs.array[:] = self.layout.mask(rhs)
-        if rtol is not None:
-            self.ksp.setTolerances(rtol=rtol)
+        self.ksp.setTolerances(rtol=self._tolerance if rtol is None else rtol)
         if self.iterative:
             self.ksp.setInitialGuessNonzero(guess is not None)
             if self._split is not None:

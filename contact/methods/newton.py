@@ -259,12 +259,13 @@ class Newton:
         """Solve with other gaps of the unilateral constraint, from an iterate on. Collective."""
         problem, interface = self.problem, self.problem.interface
         less = problem.with_interface(replace(interface, jump=replace(interface.jump, gap=gap)))
-        self.whole.problem = less
+        # Of one stiff node in a soft body a forcing term leaves pressures of any size and sign.
+        self.whole.problem, self.whole.exact = less, True
         try:
             iteration = replace(self.iteration, problem=less, best=Best())
             return NewtonLoop(iteration, self.whole).run(iterate, WORKING_SET)
         finally:
-            self.whole.problem = problem
+            self.whole.problem, self.whole.exact = problem, False
 
     def _iterate(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Take Newton's steps, with the body condensed where that pays."""

@@ -191,6 +191,8 @@ class NewtonStep:
         self.problem, self.options, self.parameters = problem, options, parameters
         self.counters = counters
         self._operator: Operator | None = None
+        #: Whether iterative solvers go to their own tolerance in place of the forcing term.
+        self.exact = False
         self.begin()
 
     def begin(self) -> None:
@@ -203,8 +205,10 @@ class NewtonStep:
         """Make a new operator in the next step: MUMPS does not recover from a failed solve."""
         self._kind, self._operator = "", None
 
-    def _forcing_term(self, reached: float) -> float:
-        """Return the forcing term of a step, given the residual before it."""
+    def _forcing_term(self, reached: float) -> float | None:
+        """Return the forcing term of a step, given the residual before it; None without one."""
+        if self.exact:
+            return None
         self._stagnant = 0 if reached < self._nearest else self._stagnant + 1
         self._nearest = min(self._nearest, reached)
         if self._stagnant >= STAGNANT:

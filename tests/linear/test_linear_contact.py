@@ -157,6 +157,17 @@ def test_forces_that_contact_carries_do_not_blur_the_solution() -> None:
     assert body.norm(found - exact) <= 1e-5 * body.norm(exact)
 
 
+def test_a_tolerance_is_that_of_one_solve() -> None:
+    """A solve to the solver's own tolerance was one to that of the solve before."""
+    problem = mechanics.leaning_block(SELF, 4)
+    operator, rhs = operator_of(problem, "iterative"), problem.equilibrium.external()
+    operator.update("secant", problem.start(), sticking(problem))
+    first = operator.solve(rhs)
+    rough = operator.solve(rhs, 1e-2)
+    assert np.abs(rough - first).max() > 1e-4 * np.abs(first).max()
+    assert np.array_equal(operator.solve(rhs), first)
+
+
 def test_without_contact_the_interpolation_is_that_of_the_body() -> None:
     problem = mechanics.leaning_block(SELF, 4)
     x, operator = problem.start().x, operator_of(problem, "iterative")
