@@ -82,7 +82,8 @@ class DenseStiffness:
             rows, others = np.arange(acted.size), others[:0]
             lower, _ = _cholesky(matrix, others)
         border = _forward(lower, matrix[np.ix_(others, rows)])
-        self._reduced = matrix[np.ix_(rows, rows)] - border.T @ border
+        # No copy where none is eliminated.
+        self._reduced = matrix[np.ix_(rows, rows)] - border.T @ border if others.size else matrix
         self._rows, self._others, self._lower, self._border = rows, others, lower, border
         self._place = np.full(acted.size, -1)
         self._place[rows] = np.arange(rows.size)

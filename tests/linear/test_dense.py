@@ -1,5 +1,7 @@
 """The dense operator: a matrix plus blocks at nodes, factorised by the first rank."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -47,6 +49,19 @@ def test_solves_are_those_of_the_whole_matrix(kind):
     rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
     expected = np.linalg.solve(bulk.total(blocks), rhs)
     assert np.allclose(operator.solve(rhs), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_one_copy_of_the_matrix_is_made_where_blocks_act_at_all_unknowns():
+    """There were two: the matrix without what is eliminated was a copy too."""
+    stiffness = DenseStiffness(np.eye(1000))
+    blocks = np.tile(np.eye(2), (500, 1, 1))
+    tracemalloc.start()
+    try:
+        stiffness.factorise(blocks)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 1.2 * stiffness.matrix.nbytes
 
 
 def test_the_same_sum_is_factorised_once():
