@@ -45,7 +45,7 @@ def working_set(
     problem
         The contact problem.
     iterate
-        Equilibrium without contact.
+        After a linear solve without contact.
     solve
         Newton's method with given gaps, shape (n,), infinite outside of the working set, from an
         iterate on.
