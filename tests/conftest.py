@@ -152,7 +152,8 @@ def _covering(items: list[pytest.Item]) -> list[pytest.Item]:
 
 def _values(item: pytest.Item) -> set[tuple[str, ...]]:
     """Return an item's row of each list of parameters, by names and identities of its values."""
-    values = dict(item.callspec.params) if hasattr(item, "callspec") else {"": 0}
+    spec = getattr(item, "callspec", None)
+    values = dict(spec.params if spec else {}) or {"": 0}
     found = set()
     for mark in item.iter_markers("parametrize"):
         given = mark.args[0]

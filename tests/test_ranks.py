@@ -69,29 +69,37 @@ def test_the_largest_over_all_ranks():
     assert largest(COMM, -np.inf) == -np.inf
 
 
-def test_on_several_ranks_each_value_of_each_parameter_stays():
-    """Not each combination; of a test without parameters itself."""
-    found = [
-        SimpleNamespace(callspec=SimpleNamespace(indices={"a": a, "b": b}))
-        for a in range(3)
-        for b in range(2)
-    ]
-    kept = _covering(found)
-    assert len(kept) == 3
-    assert {item.callspec.indices["a"] for item in kept} == {0, 1, 2}
-    assert {item.callspec.indices["b"] for item in kept} == {0, 1}
-    assert _covering([single := SimpleNamespace()]) == [single]
-
-
 class Collected:
     """A collected test, as far as it is looked at."""
 
-    def __init__(self, nodeid, *marks, **indices):
+    def __init__(self, nodeid, *marks, **params):
         self.nodeid, self.marks = nodeid, marks
-        self.callspec = SimpleNamespace(indices=indices)
+        self.callspec = SimpleNamespace(params=params)
 
     def get_closest_marker(self, name):
         return name if name in self.marks else None
+
+    def iter_markers(self, name):
+        """Yield the lists of values: each parameter has one of its own."""
+        yield from (SimpleNamespace(args=(given,)) for given in self.callspec.params)
+
+
+def test_on_several_ranks_each_value_of_each_parameter_stays():
+    """Not each combination; of a test without parameters itself."""
+    found = [Collected("both", a=a, b=b) for a in range(3) for b in range(2)]
+    kept = _covering(found)
+    assert len(kept) == 3
+    assert {item.callspec.params["a"] for item in kept} == {0, 1, 2}
+    assert {item.callspec.params["b"] for item in kept} == {0, 1}
+    assert _covering([single := Collected("single")]) == [single]
+
+
+def test_rows_of_a_list_of_parameters_stay_whole():
+    """Each row of values for several names is one: two with the same second value both stay."""
+    found = [Collected("rows", a=a, b=b) for a, b in ((1, 2), (1, 3), (2, 2))]
+    for item in found:
+        item.iter_markers = lambda _: iter([SimpleNamespace(args=("a, b",))])
+    assert _covering(found) == found
 
 
 @pytest.mark.parametrize("short", [False, True])
