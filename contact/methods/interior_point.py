@@ -180,7 +180,9 @@ class InteriorPoint:
         zeros = np.zeros((limit.size, jump.dim))
         length = np.maximum(work / limit, slips)
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
-        self._first = self.cones.duality_gap()
+        #: Work beside which the duality gap is small in any case. Beside that of the displacement
+        #: without contact a gap may be small, and contact not known yet.
+        self._least_work = 0.0 if supported else CLOSED * self.cones.duality_gap()
 
     def run(self, iteration: Iteration) -> Outcome:
         """Take steps until the duality gap is closed. Collective."""
@@ -232,7 +234,7 @@ class InteriorPoint:
         forces = self._internal, body.external(self._state.time)
         works = [abs(float(summed(jump.comm, own @ force[: body.owned]))) for force in forces]
         # Where all nodes stick as they are no work is done, and the gap falls from its first value.
-        return cones.duality_gap() / (max(contact + sum(works), CLOSED * self._first) or 1.0)
+        return cones.duality_gap() / (max(contact + sum(works), self._least_work) or 1.0)
 
     @np.errstate(over="ignore", invalid="ignore")  # of a body that falls; no such step is taken
     def step(self) -> bool:
