@@ -299,18 +299,20 @@ class Newton:
         if iteration.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
             attempt = partial(interior_point, iteration, self.whole, self._modes, self.last_steps)
-            return self._unless_singular(attempt) or (iterate, outcome)
+            fatal = self.problem.equilibrium.linear
+            return self._unless_singular(attempt, fatal) or (iterate, outcome)
         return iterate, outcome
 
-    def _unless_singular(self, attempt: Callable[[], T]) -> T | None:
+    def _unless_singular(self, attempt: Callable[[], T], fatal: bool = False) -> T | None:
         """Return the result of an attempt; None where the stiffness is singular. Collective.
 
-        At large strains the material may have no stiffness any more.
+        At large strains the material may have no stiffness any more, and without contact nothing
+        may hold the potential. An error where that is fatal.
         """
         try:
             return attempt()
         except SingularError:
-            if self.problem.equilibrium.linear:
+            if fatal:
                 raise
             self.whole.renew()
             return None
