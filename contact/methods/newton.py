@@ -21,15 +21,16 @@ Then the state with all nodes open is tried, by one linear solve, where the supp
 rigid-body modes, and from there contact at one node more in turn (`working_set`). If neither is a
 solution the fallbacks follow, in this order:
 
-1. the condensed body, where the whole one has come first;
-2. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
+1. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
    foundation (`continuation`);
-3. on a condensed body that the supports do not constrain, a rigid motion to a state in which
+2. on a condensed body that the supports do not constrain, a rigid motion to a state in which
    all nodes are open (`unconstrained_modes`);
-4. a primal-dual interior point on the same operator, which finds the active sets, with the friction
+3. a primal-dual interior point on the same operator, which finds the active sets, with the friction
    bound updated outside, and Newton's last steps from there (`interior_point`). A converged
    solution in which contact has moved a body to where nothing constrains it, although friction
-   could, gives way to that of the interior point if there is one.
+   could, gives way to that of the interior point if there is one;
+4. the condensed body, where it has many contact nodes: its dense steps cost more than those on the
+   whole one.
 
 The notes of the history name them.
 
@@ -218,6 +219,7 @@ class Newton:
         self._begin(iterate)
         iteration = self.iteration
         self.history.restart()
+        self._least_penetrating: State | None = None
         iterate, outcome = self._iterate(iterate)
         if not outcome.converged and not outcome.overloaded:
             found = self._from_open(iterate)
@@ -247,8 +249,9 @@ class Newton:
         residuals = evaluate(self.problem, state)
         if not residuals.excess(self.options.allowed):
             return Iterate(state), Outcome(residuals, self.options.allowed, "")
-        found = working_set(self.problem, Iterate(state), self._with_gaps)
-        if found is None:
+        found, solved = working_set(self.problem, Iterate(state), self._with_gaps)
+        self._least_penetrating = found.state
+        if not solved:
             return None
         residuals = evaluate(self.problem, found.state)
         self.iteration.see(found, residuals)
@@ -290,18 +293,27 @@ class Newton:
             found = self._continuation(self.problem) or self._separated(self.problem, outcome)
             if found is not None:
                 return found
-        elif self._condensable and not self._pays and iteration.left > 0:
-            logger.info("%s; going on with the condensed body", outcome.ended)
-            begin = Iterate(self.problem.start())
-            iterate, outcome = NewtonLoop(iteration, self._condensed_step()).run(begin)
-            if outcome.converged:
-                return iterate, outcome
+        last = not self._condensable or self._pays
         if iteration.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
-            attempt = partial(interior_point, iteration, self.whole, self._modes, self.last_steps)
-            fatal = self.problem.equilibrium.linear
-            return self._unless_singular(attempt, fatal) or (iterate, outcome)
-        return iterate, outcome
+            # Half of the steps remain for the condensed body, where that is still to come.
+            most = iteration.options.max_outer - (0 if last else iteration.left // 2)
+            limited = replace(iteration.options, max_outer=most)
+            attempt = partial(
+                interior_point,
+                replace(iteration, options=limited),
+                self.whole,
+                self._modes,
+                self.last_steps,
+                self._least_penetrating,
+            )
+            fatal = last and self.problem.equilibrium.linear
+            iterate, outcome = self._unless_singular(attempt, fatal) or (iterate, outcome)
+        if last or outcome.converged or outcome.overloaded or iteration.left <= 0:
+            return iterate, outcome
+        logger.info("%s; going on with the condensed body", outcome.ended)
+        begin = Iterate(self.problem.start())
+        return NewtonLoop(iteration, self._condensed_step()).run(begin)
 
     def _unless_singular(self, attempt: Callable[[], T], fatal: bool = False) -> T | None:
         """Return the result of an attempt; None where the stiffness is singular. Collective.

@@ -37,8 +37,10 @@ def working_set(
     problem: Problem,
     iterate: Iterate,
     solve: Callable[[Array, Iterate], tuple[Iterate, Outcome]],
-) -> Iterate | None:
-    """Return an iterate that penetrates nowhere; None where this takes many nodes. Collective.
+) -> tuple[Iterate, bool]:
+    """Return the last iterate, and whether it penetrates nowhere. Collective.
+
+    It does where this takes many nodes.
 
     Parameters
     ----------
@@ -56,12 +58,14 @@ def working_set(
     while count > 0:
         opening = interface.opening(jump.apply(iterate.state.x))
         inside |= opening <= -deepest
-        iterate, outcome = solve(np.where(inside, jump.gap, np.inf), iterate)
-        before = count
+        found, outcome = solve(np.where(inside, jump.gap, np.inf), iterate)
+        if not outcome.converged:
+            return iterate, False
+        iterate, before = found, count
         deepest, count = _penetrating(interface, iterate.state, inside)
-        if not outcome.converged or count > PROGRESS * before:
-            return None
-    return iterate
+        if count > PROGRESS * before:
+            return iterate, False
+    return iterate, True
 
 
 def _penetrating(

@@ -232,7 +232,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"less than [{condensed.DENSE_IS_FASTER:g}] sparse ones": True,
         "is more than [half] of that before": working_set.PROGRESS == 0.5,
         f"is [{unconstrained_modes.STUCK:g}] times all loads": True,
-        "is [10⁻²] f b²/d": interior_point.SHARE == 1e-2,
+        "is [10⁻⁴] f b²/d": interior_point.SHARE == 1e-4,
         f"is [{interior_point.SHARE_UNSUPPORTED}] of that of the loads": True,
         "below\n   [10⁻⁴]": interior_point.FORCING == 1e-4,
         "below [half] of the least": interior_point.PROGRESS == 0.5,

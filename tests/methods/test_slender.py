@@ -9,6 +9,8 @@ from mpi4py import MPI
 from contact.case.file import parse_case
 from contact.methods import newton
 from contact.methods.options import FixedPointOptions
+from contact.methods.report import Outcome
+from contact.problem.residuals import evaluate
 from contact.solving import solve
 
 SELF = MPI.COMM_SELF
@@ -74,7 +76,7 @@ def test_a_bridge_that_touches_at_several_nodes_is_that_of_an_interior_point(mu)
     case["fixed"].append({"on": "right", "displacement": [0.0, 0.0]})
     case["contact"]["gap"] = "0.5 + 0.2*(1 - cos(6*pi*x/100))"
     found = solve(parse_case(case))
-    with patch.object(newton, "working_set", lambda *_: None):
+    with patch.object(newton, "working_set", lambda _, at, *__: (at, False)):
         other = solve(parse_case(case))
     assert found.converged and other.converged
     notes = [" ".join(r.note for r in s.history.records) for s in (found, other)]
@@ -208,6 +210,28 @@ def test_a_bent_piezoelectric_beam_meets_a_conductor():
     assert solution.converged, solution.outcome.reason
     assert solution.counters.linear_solves <= 3
     assert solution.contact_force[1] < 0
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_a_beam_with_many_contact_nodes_takes_the_sparse_interior_point(mu):
+    """Dense steps took five times as long; they remain for where the sparse ones fail."""
+    case = parse_case(beam(100.0, [600, 2], UNIFORM, 0.5, mu))
+
+    def none(iteration, *_):
+        residuals = evaluate(iteration.problem, iteration.at.state)
+        return iteration.at, Outcome(residuals, iteration.options.allowed, "no interior point")
+
+    sparse = solve(case, comm=SELF)
+    whole = newton.interior_point
+    first = [none]
+    with patch.object(newton, "interior_point", lambda *a: (first.pop() if first else whole)(*a)):
+        dense = solve(case, comm=SELF)
+    assert sparse.converged and dense.converged
+    assert sparse.counters.contact_solves == 0 < dense.counters.contact_solves
+    assert sparse.counters.linear_solves <= 40
+    assert np.count_nonzero(sparse.status != "open") > 300
+    size = np.abs(dense.contact_force).max()
+    assert np.allclose(sparse.contact_force, dense.contact_force, rtol=0, atol=1e-7 * size)
 
 
 @pytest.mark.parallel
