@@ -49,10 +49,8 @@ Methods Appl. Sci. 5 (1983).
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -83,8 +81,6 @@ from contact.problem.state import State
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
-
-T = TypeVar("T")
 
 #: Stagnation limit in a continuation: condensed steps cost little beside another value of the
 #: parameter, and Example 8.4 with ten times its conductivity needs them.
@@ -222,7 +218,7 @@ class Newton:
         self._least_penetrating: State | None = None
         iterate, outcome = self._iterate(iterate)
         if not outcome.converged and not outcome.overloaded:
-            found = self._from_open(iterate)
+            found = self._from_open()
             iterate, outcome = found or self._fall_back(iterate, outcome)
         elif not self._pays and self._modes.pushed_aside(self.problem, iterate.state):
             found = self._fall_back(iterate, outcome)
@@ -234,17 +230,20 @@ class Newton:
         iteration.at = iterate
         return iterate, outcome
 
-    def _from_open(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
+    def _from_open(self) -> tuple[Iterate, Outcome] | None:
         """Return a solution with all nodes open, or with a working set. Collective.
 
         Active sets may cycle on contact forces that are rounding of the other forces. Not tried
         where contact constrains a mode: a body moved aside may be in balance too, though friction
         has another solution that holds it.
         """
+        best = self.iteration.best.found
         if not self._modes.constrained_by_supports:
             return None
-        state = self._unless_singular(partial(self.whole.without_contact, iterate.state))
-        if state is None:
+        try:
+            state = self.whole.without_contact(self.problem.start() if best is None else best.state)
+        except SingularError:  # without contact nothing may hold the potential
+            self.whole.renew()
             return None
         residuals = evaluate(self.problem, state)
         if not residuals.excess(self.options.allowed):
@@ -288,7 +287,7 @@ class Newton:
         Their many steps cost one factorisation of the body there. They start from the zero initial
         guess: where the active sets cycle, a body may have moved far away.
         """
-        iteration = self.iteration
+        iteration, singular = self.iteration, None
         if isinstance(self.problem, CondensedProblem):
             found = self._continuation(self.problem) or self._separated(self.problem, outcome)
             if found is not None:
@@ -298,36 +297,21 @@ class Newton:
             logger.info("%s; going on with an interior point", outcome.ended)
             # Half of the steps remain for the condensed body, where that is still to come.
             most = iteration.options.max_outer - (0 if last else iteration.left // 2)
-            limited = replace(iteration.options, max_outer=most)
-            attempt = partial(
-                interior_point,
-                replace(iteration, options=limited),
-                self.whole,
-                self._modes,
-                self.last_steps,
-                self._least_penetrating,
-            )
-            fatal = last and self.problem.equilibrium.linear
-            iterate, outcome = self._unless_singular(attempt, fatal) or (iterate, outcome)
-        if last or outcome.converged or outcome.overloaded or iteration.left <= 0:
-            return iterate, outcome
-        logger.info("%s; going on with the condensed body", outcome.ended)
-        begin = Iterate(self.problem.start())
-        return NewtonLoop(iteration, self._condensed_step()).run(begin)
-
-    def _unless_singular(self, attempt: Callable[[], T], fatal: bool = False) -> T | None:
-        """Return the result of an attempt; None where the stiffness is singular. Collective.
-
-        At large strains the material may have no stiffness any more, and without contact nothing
-        may hold the potential. An error where that is fatal.
-        """
-        try:
-            return attempt()
-        except SingularError:
-            if fatal:
-                raise
-            self.whole.renew()
-            return None
+            limited = replace(iteration, options=replace(iteration.options, max_outer=most))
+            method = self.whole, self._modes, self.last_steps, self._least_penetrating
+            try:
+                iterate, outcome = interior_point(limited, *method)
+            except SingularError as error:
+                self.whole.renew()
+                singular = error
+        if not (last or outcome.converged or outcome.overloaded) and iteration.left > 0:
+            logger.info("%s; going on with the condensed body", outcome.ended)
+            begin = Iterate(self.problem.start())
+            iterate, outcome = NewtonLoop(iteration, self._condensed_step()).run(begin)
+        # Another material may have softened too much at the strains of a step.
+        if singular is not None and self.problem.equilibrium.linear and not outcome.converged:
+            raise singular
+        return iterate, outcome
 
     def _continuation(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
         """Solve by continuation in the conductivity of the foundation, if it conducts."""

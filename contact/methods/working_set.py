@@ -40,7 +40,7 @@ def working_set(
 ) -> tuple[Iterate, bool]:
     """Return the last iterate, and whether it penetrates nowhere. Collective.
 
-    It does where this takes many nodes.
+    One that does is returned where many nodes would have to join.
 
     Parameters
     ----------
