@@ -1,10 +1,11 @@
 """Solution methods: each takes an initial guess of a problem to a `State` and its `Outcome`.
 
 `newton` is the semismooth Newton method (primal-dual active set) with its order of fallbacks:
-`continuation`, `unconstrained_modes`, `interior_point`. Its steps are `newton_step` on the whole
-body and `condensed_step` on the body condensed onto its contact nodes, with `chord` steps. `thesis`
-has fixed points, Uzawa block relaxation and penalty, on which Newton's method does not fall back;
-`load_stepping` is the quasi-static load stepping around any method.
+`working_set`, `continuation`, `unconstrained_modes`, `interior_point`. `newton_loop` iterates its
+steps: `newton_step` on the whole body, `condensed_step` on the body condensed onto its contact
+nodes, with `chord` steps. `thesis` has fixed points, Uzawa block relaxation and penalty, on which
+Newton's method does not fall back; `load_stepping` is the quasi-static load stepping around any
+method.
 
 Parts of methods: `cones` (slacks and multipliers of the interior point), `conductivity_derivative`
 (Newton or Picard in the conductivity) and `stagnation`. For all methods: `method` is their

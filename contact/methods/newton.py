@@ -288,6 +288,7 @@ class Newton:
         guess: where the active sets cycle, a body may have moved far away.
         """
         iteration, singular = self.iteration, None
+        found: tuple[Iterate, Outcome] | None
         if isinstance(self.problem, CondensedProblem):
             found = self._continuation(self.problem) or self._separated(self.problem, outcome)
             if found is not None:
@@ -307,7 +308,9 @@ class Newton:
         if not (last or outcome.converged or outcome.overloaded) and iteration.left > 0:
             logger.info("%s; going on with the condensed body", outcome.ended)
             begin = Iterate(self.problem.start())
-            iterate, outcome = NewtonLoop(iteration, self._condensed_step()).run(begin)
+            found = NewtonLoop(iteration, self._condensed_step()).run(begin)
+            # Else the interior point says more of the reason.
+            iterate, outcome = found if found[1].converged else (iterate, outcome)
         # Another material may have softened too much at the strains of a step.
         if singular is not None and self.problem.equilibrium.linear and not outcome.converged:
             raise singular
