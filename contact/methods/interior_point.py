@@ -93,8 +93,8 @@ def interior_point(
     finish
         Newton's method, from a state on.
     begin
-        State without contact or with little of it, whose gaps the slacks start from; by default
-        that of one linear solve, where the supports constrain all modes.
+        State without contact, whose gaps the slacks start from; by default that of one linear
+        solve, where the supports constrain all modes.
     """
     problem, interface = iteration.problem, iteration.problem.interface
     if begin is None and modes.constrained_by_supports:

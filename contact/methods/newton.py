@@ -215,7 +215,7 @@ class Newton:
         self._begin(iterate)
         iteration = self.iteration
         self.history.restart()
-        self._least_penetrating: State | None = None
+        self._without_contact: State | None = None
         iterate, outcome = self._iterate(iterate)
         if not outcome.converged and not outcome.overloaded:
             found = self._from_open()
@@ -248,9 +248,9 @@ class Newton:
         residuals = evaluate(self.problem, state)
         if not residuals.excess(self.options.allowed):
             return Iterate(state), Outcome(residuals, self.options.allowed, "")
-        found, solved = working_set(self.problem, Iterate(state), self._with_gaps)
-        self._least_penetrating = found.state
-        if not solved:
+        self._without_contact = state
+        found = working_set(self.problem, Iterate(state), self._with_gaps)
+        if found is None:
             return None
         residuals = evaluate(self.problem, found.state)
         self.iteration.see(found, residuals)
@@ -299,7 +299,7 @@ class Newton:
             # Half of the steps remain for the condensed body, where that is still to come.
             most = iteration.options.max_outer - (0 if last else iteration.left // 2)
             limited = replace(iteration, options=replace(iteration.options, max_outer=most))
-            method = self.whole, self._modes, self.last_steps, self._least_penetrating
+            method = self.whole, self._modes, self.last_steps, self._without_contact
             try:
                 iterate, outcome = interior_point(limited, *method)
             except SingularError as error:

@@ -37,10 +37,8 @@ def working_set(
     problem: Problem,
     iterate: Iterate,
     solve: Callable[[Array, Iterate], tuple[Iterate, Outcome]],
-) -> tuple[Iterate, bool]:
-    """Return the last iterate, and whether it penetrates nowhere. Collective.
-
-    One that does is returned where many nodes would have to join.
+) -> Iterate | None:
+    """Return an iterate that penetrates nowhere; None where this takes many nodes. Collective.
 
     Parameters
     ----------
@@ -58,14 +56,12 @@ def working_set(
     while count > 0:
         opening = interface.opening(jump.apply(iterate.state.x))
         inside |= opening <= -deepest
-        found, outcome = solve(np.where(inside, jump.gap, np.inf), iterate)
-        if not outcome.converged:
-            return iterate, False
-        iterate, before = found, count
+        iterate, outcome = solve(np.where(inside, jump.gap, np.inf), iterate)
+        before = count
         deepest, count = _penetrating(interface, iterate.state, inside)
-        if count > PROGRESS * before:
-            return iterate, False
-    return iterate, True
+        if not outcome.converged or count > PROGRESS * before:
+            return None
+    return iterate
 
 
 def _penetrating(

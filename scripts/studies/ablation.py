@@ -100,10 +100,6 @@ def _nothing(*_: Any, **__: Any) -> None:
     return None
 
 
-def _no_working_set(_: Any, iterate: Any, __: Any) -> tuple[Any, bool]:
-    return iterate, False
-
-
 def _no_fallback(iteration: Any, *_: Any) -> tuple[Any, Outcome]:
     residuals = evaluate(iteration.problem, iteration.at.state)
     return iteration.at, Outcome(residuals, iteration.options.allowed, "no interior point")
@@ -271,7 +267,7 @@ DEVICES = (
     Device("all nodes open where supports hold a body", (Newton._from_open,), "-",
            ((Newton, "_from_open", _nothing),)),
     Device("working set of contact nodes", (working_set,), "Goldfarb and Idnani 1983",
-           ((newton, "working_set", _no_working_set),), (), _stop),
+           ((newton, "working_set", _nothing),), (), _stop),
 )  # fmt: skip
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
