@@ -297,11 +297,13 @@ class Newton:
         if iteration.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
             # Half of the steps remain for the condensed body, where that is still to come.
-            most = iteration.options.max_outer - (0 if last else iteration.left // 2)
+            most = iteration.options.max_outer - (0 if last else (iteration.left + 1) // 2)
             limited = replace(iteration, options=replace(iteration.options, max_outer=most))
-            method = self.whole, self._modes, self.last_steps, self._without_contact
+            finish = partial(self.last_steps, limited)
             try:
-                iterate, outcome = interior_point(limited, *method)
+                iterate, outcome = interior_point(
+                    limited, self.whole, self._modes, finish, self._without_contact
+                )
             except SingularError as error:
                 self.whole.renew()
                 singular = error
@@ -309,8 +311,9 @@ class Newton:
             logger.info("%s; going on with the condensed body", outcome.ended)
             begin = Iterate(self.problem.start())
             found = NewtonLoop(iteration, self._condensed_step()).run(begin)
-            # Else the interior point says more of the reason.
-            iterate, outcome = found if found[1].converged else (iterate, outcome)
+            # Where steps are left the interior point says more of the reason.
+            if found[1].converged or iteration.left <= 0:
+                iterate, outcome = found
         # Another material may have softened too much at the strains of a step.
         if singular is not None and self.problem.equilibrium.linear and not outcome.converged:
             raise singular
@@ -357,9 +360,9 @@ class Newton:
         self.iteration.see(Iterate(state), residuals)
         return (Iterate(state), outcome) if outcome.converged else None
 
-    def last_steps(self, state: State) -> tuple[Iterate, Outcome]:
+    def last_steps(self, iteration: Iteration, state: State) -> tuple[Iterate, Outcome]:
         """Take Newton's last steps from the state that a fallback has reached. Collective."""
-        return NewtonLoop(self.iteration, self.whole).run(self.iterate_at(state), INTERIOR_POINT)
+        return NewtonLoop(iteration, self.whole).run(self.iterate_at(state), INTERIOR_POINT)
 
 
 def _solve_condensed(

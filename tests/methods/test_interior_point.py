@@ -1,5 +1,6 @@
 """What Newton's method falls back on, and what is left where nothing helps."""
 
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -57,9 +58,8 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     state, outcome = Newton(problem, NewtonOptions()).solve()
     assert outcome.converged
     method = Newton(problem, NewtonOptions(condense=False))
-    found, outcome = interior_point(
-        method.iteration, method.whole, method._modes, method.last_steps
-    )
+    finish = partial(method.last_steps, method.iteration)
+    found, outcome = interior_point(method.iteration, method.whole, method._modes, finish)
     assert outcome.converged, outcome.reason
     assert found.state.near(state, rtol=1e-6, atol=1e-9)
 
@@ -71,9 +71,8 @@ def interior(
     problem = build_problem(parse_case(case), SELF)
     state, _ = Newton(problem, NewtonOptions()).solve()
     method = Newton(problem, NewtonOptions(condense=False, linear=linear))
-    found, outcome = interior_point(
-        method.iteration, method.whole, method._modes, method.last_steps
-    )
+    finish = partial(method.last_steps, method.iteration)
+    found, outcome = interior_point(method.iteration, method.whole, method._modes, finish)
     return outcome, found.state.near(state, rtol=1e-6, atol=atol)
 
 

@@ -248,6 +248,20 @@ def test_a_beam_on_the_ground_whose_tip_is_pressed(condense):
     assert counters.contact_solves + counters.linear_solves <= 100
 
 
+@pytest.mark.parametrize("most", [4, 20])
+def test_half_of_the_steps_remain_for_the_condensed_body(most):
+    """The last steps after the interior point took all, and so did a single step that was left."""
+    case = beam(30.0, [100, 2], {"on": "top", "traction": [0.0, -6e-4]}, 0.3, 0.3)
+    case["fixed"].append({"on": "right", "displacement": [0.0, 0.0]})
+    case["material"]["poisson"] = 0.45
+    case["solver"] = {"max_outer": most}
+    with patch.object(newton, "condensation_pays", return_value=False):
+        solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert solution.counters.contact_solves > 0
+    assert len(solution.history.records) <= most
+
+
 @pytest.mark.parallel
 def test_ranks_agree_on_the_working_set():
     case = beam(100.0, [100, 1], TIP, 0.5, 0.3)
