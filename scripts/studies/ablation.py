@@ -122,9 +122,9 @@ def _large(name: str, *changes: str) -> Callable[[], Case]:
     return lambda: load_case(CASES / f"{name}.toml", changes)
 
 
-def _of_sweep(name: str, hard: bool = False) -> Callable[[], Case]:
-    """Return how a problem of the sweeps is made."""
-    return lambda: next(case for _, case in sweep.problems(False, name, hard=hard))
+def _of_sweep(name: str) -> Callable[[], Case]:
+    """Return how a problem of the sweep is made."""
+    return lambda: next(case for _, case in sweep.problems(False, name, hard=False))
 
 
 def _named(case: Case, name: str) -> Case:
@@ -232,11 +232,15 @@ def _plane() -> Case:
     return _named(bench_one.problem_case(2, 256, "solver.nested=false"), "plane-256")
 
 
-def _steep() -> Case:
-    """Return a bar whose friction falls steeply with slip, with many contact nodes."""
-    bar = _of_sweep("bar-67")()
-    mesh = bar.mesh.model_copy(update={"cells": (640, 160)})
-    return _named(bar.model_copy(update={"mesh": mesh}), "bar-67 on a finer mesh")
+def _finer(name: str, cells: tuple[int, ...]) -> Callable[[], Case]:
+    """Return how a problem of the sweep is made on a finer mesh."""
+
+    def make() -> Case:
+        case = _of_sweep(name)()
+        mesh = case.mesh.model_copy(update={"cells": cells})
+        return _named(case.model_copy(update={"mesh": mesh}), f"{name} on a finer mesh")
+
+    return make
 
 
 DEVICES = (
@@ -258,9 +262,10 @@ DEVICES = (
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
     Device("limited softening", (), "-", (), (("softening", float("inf")),),
-           _of_sweep("bar-80")),
+           _finer("block-33", (24, 12, 12))),
     Device("sliding nodes at their bound", (complementarity.at_bound,), "-",
-           ((complementarity, "at_bound", lambda _, friction, *__: friction),), (), _steep),
+           ((complementarity, "at_bound", lambda _, friction, *__: friction),), (),
+           _finer("bar-67", (640, 160))),
     Device("derivative of the conductivity by the gap", (conductivity_derivative,), "-",
            ((conductivity_derivative.ConductivityDerivative, "__call__", lambda *_: False),)),
     Device("stagnation limit of the continuation", (), "-",
