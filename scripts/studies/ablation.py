@@ -272,10 +272,8 @@ DEVICES = (
            ((newton, "CONTINUATION_LIMIT", None),), (), _conducting),
     Device("zero displacement where nothing acts", (stagnation.undeformed_equilibrium,), "-",
            ((newton.NewtonLoop, "_loss_of_contact", _nothing),), (), _unloaded),
-    Device("all nodes open where supports hold a body", (Newton._from_open,), "-",
-           ((Newton, "_from_open", _nothing),)),
-    Device("working set of contact nodes", (working_set,), "Goldfarb and Idnani 1983",
-           ((newton, "working_set", _nothing),), (), _stop),
+    Device("working set of contact nodes, from all open", (Newton._from_open, working_set),
+           "Goldfarb and Idnani 1983", ((Newton, "_from_open", _nothing),), (), _stop),
 )  # fmt: skip
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
