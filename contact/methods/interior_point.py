@@ -62,7 +62,7 @@ CLOSED = 1e-10
 FORCING = 1e-4
 
 #: Slack times force of each node at the start, over the work of the loads in the penetration of
-#: the displacement without contact. With a hundred times that slender bodies take a third more.
+#: the displacement without contact. With a hundred times that slender bodies take a quarter more.
 SHARE = 1e-4
 
 #: The same where rigid-body modes are not constrained by the supports, over the work of the loads

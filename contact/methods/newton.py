@@ -237,9 +237,9 @@ class Newton:
         where contact constrains a mode: a body moved aside may be in balance too, though friction
         has another solution that holds it.
         """
-        best = self.iteration.best.found
         if not self._modes.constrained_by_supports:
             return None
+        best = self.iteration.best.found
         try:
             state = self.whole.without_contact(self.problem.start() if best is None else best.state)
         except SingularError:  # without contact nothing may hold the potential

@@ -122,11 +122,6 @@ def _large(name: str, *changes: str) -> Callable[[], Case]:
     return lambda: load_case(CASES / f"{name}.toml", changes)
 
 
-def _of_sweep(name: str) -> Callable[[], Case]:
-    """Return how a problem of the sweep is made."""
-    return lambda: next(case for _, case in sweep.problems(False, name, hard=False))
-
-
 def _named(case: Case, name: str) -> Case:
     case._source = name
     return case
@@ -236,7 +231,7 @@ def _finer(name: str, cells: tuple[int, ...]) -> Callable[[], Case]:
     """Return how a problem of the sweep is made on a finer mesh."""
 
     def make() -> Case:
-        case = _of_sweep(name)()
+        case = next(case for _, case in sweep.problems(False, name, hard=False))
         mesh = case.mesh.model_copy(update={"cells": cells})
         return _named(case.model_copy(update={"mesh": mesh}), f"{name} on a finer mesh")
 
