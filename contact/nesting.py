@@ -20,6 +20,7 @@ from contact.mesh import grid
 from contact.mesh.transfer import carry
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
+from contact.problem.condensed import condensation_pays
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import neighbours
@@ -28,9 +29,9 @@ from contact.typing import Array
 #: Tolerance on the coarser levels: their discretisation error is larger by far.
 COARSE_TOLERANCE = 1e-3
 
-#: Unknowns, in 2-D and in 3-D, from which a start on coarser meshes saves more time than
-#: it takes.
-MANY = {2: 100_000, 3: 40_000}
+#: Unknowns from which a start on coarser meshes saves more time than it takes: where each step
+#: solves with the whole body, and where a nonlinear one is condensed onto its contact nodes in 2-D.
+MANY = {"whole": 40_000, "condensed": 100_000}
 
 #: Meshes with fewer cells along the shortest edge do not tell much of the solution.
 COARSEST = 4
@@ -42,15 +43,17 @@ SMALL = 500
 def pays(case: Case, problem: ContactProblem) -> bool:
     """Tell whether a start from coarser meshes saves time: where Newton's steps are many solves.
 
-    In 3-D those of a body that is condensed onto its contact nodes are few in any case. In the
-    plane they are where it is linear; else the tangent is factorised near the solution, once.
+    On whole bodies, as slender ones in the plane, each step has a matrix of its own. Of a body that
+    is condensed onto its contact nodes the steps are few where it is linear, and in 3-D; in the
+    plane the tangent of a nonlinear one is then factorised near the solution, once.
     """
-    body = problem.equilibrium
-    if body.layout.dim == 2:
-        slow = not body.linear
+    body, kind = problem.equilibrium, case.solver.linear
+    condensed = body.layout.dim == 2 and condensation_pays(problem, kind)
+    if body.layout.dim == 3:
+        slow = multigrid.is_large(body.layout) and kind != "lu"
     else:
-        slow = multigrid.is_large(body.layout) and case.solver.linear != "lu"
-    enough = body.layout.unknowns >= MANY[body.layout.dim]
+        slow = not (body.linear and condensed)
+    enough = body.layout.unknowns >= MANY["condensed" if condensed else "whole"]
     return slow and enough and case.evolution is None and has_coarser(case)
 
 

@@ -131,7 +131,7 @@ class Newton:
         self._condensable, self._pays = False, False
         if options.condense and isinstance(problem, ContactProblem):
             self._condensable = condensable(problem, options.linear)
-            self._pays = self._condensable and condensation_pays(problem, options.linear)
+            self._pays = condensation_pays(problem, options.linear)
 
     @property
     def condensation(self) -> Condensation | None:

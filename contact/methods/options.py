@@ -163,8 +163,9 @@ class NewtonOptions(Options):
     ----------
     nested
         `true`: solve on coarser meshes first and start from there. Default: where that saves time
-        and there are coarser meshes: in 3-D with multigrid from 40000 unknowns on, in 2-D with a
-        nonlinear material from 100000 on.
+        and there are coarser meshes: from 40000 unknowns on in 3-D with multigrid, and in 2-D where
+        a body is not condensed onto its contact nodes, as slender ones; from 100000 on in 2-D
+        with a nonlinear material.
     nested_levels
         Number of meshes, the finest one included. Default: all that save time.
     max_iterations

@@ -26,7 +26,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
 from contact.interface.active_set import touching
 from contact.linear.operator import Counters
-from contact.problem.condensed import Condensation, condensable, condensation_pays
+from contact.problem.condensed import Condensation, condensation_pays
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import groups, null_space
 from contact.problem.state import State
@@ -72,9 +72,7 @@ def uniqueness(
         return np.inf, False
     if jump.size > MOST:
         return np.nan, False
-    if condensation is None and not (
-        condensable(problem, "auto") and condensation_pays(problem, "auto")
-    ):
+    if condensation is None and not condensation_pays(problem, "auto"):
         return np.inf, False
     nodal = jump.apply(state.x)
     pressure = interface.pressure(nodal, state.forces)

@@ -394,7 +394,7 @@ def condensation_pays(problem: ContactProblem, kind: str) -> bool:
     bodies condensation does not pay: the contact nodes are too large a part.
     """
     layout = problem.equilibrium.layout
-    if kind == "auto" and multigrid.is_large(layout):
+    if not condensable(problem, kind) or (kind == "auto" and multigrid.is_large(layout)):
         return False
     kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
     front = unknowns / kept * layout.block_size if layout.dim == 2 else unknowns**0.5

@@ -248,8 +248,8 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         "Below a residual of [10⁻²]": outer_loop.NEAR == 1e-2,
         "the residual is below [10⁻²], friction": outer_loop.NEAR == 1e-2,
         "to [10⁻³], and each": nesting.COARSE_TOLERANCE == 1e-3,
-        f"from [{nesting.MANY[3]:,}] unknowns on": True,
-        f"[{nesting.MANY[2]:,}] on": True,
+        f"from [{nesting.MANY['whole']:,}] unknowns on": True,
+        f"[{nesting.MANY['condensed']:,}] on": True,
     }
     assert [words for words, holds in said.items() if words not in page or not holds] == []
     rows = [found.span() for words in said for found in re.finditer(re.escape(words), page)]

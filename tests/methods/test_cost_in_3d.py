@@ -21,7 +21,7 @@ LARGEST = 0.0366836772
 @pytest.fixture
 def small_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a mesh of some thousand unknowns be solved like one of a million."""
-    monkeypatch.setitem(nesting.MANY, 3, 1000)
+    monkeypatch.setitem(nesting.MANY, "whole", 1000)
     monkeypatch.setitem(multigrid.LARGE, (3, False), 1000)
     monkeypatch.setitem(multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit", "200")
 
