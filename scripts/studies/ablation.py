@@ -21,7 +21,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from contact import Solution, load_case, solve
+from contact import Solution, load_case, nesting, solve
 from contact.case.file import Case, parse_case
 from contact.interface import complementarity
 from contact.linear import block, dense, multigrid
@@ -132,16 +132,22 @@ def _block() -> Case:
 
 
 def _stop() -> Case:
-    """Return a cantilever whose tip touches a stop."""
-    return _named(
-        parse_case(cantilevers.cantilever(cantilevers.TIP, [1600, 16], 1, 0.3, 0.5)), "stop"
-    )
+    """Return a cantilever whose tip touches a stop, on one mesh alone, as of a file."""
+    tables = cantilevers.cantilever(cantilevers.TIP, [1600, 16], 1, 0.3, 0.5)
+    return _named(parse_case({**tables, "solver": {"nested": False}}), "stop")
 
 
 def _lying() -> Case:
     """Return a cantilever most of which lies on the ground, and that is condensed."""
     load = cantilevers.UNIFORM
     return _named(parse_case(cantilevers.cantilever(load, [500, 20], 2, 0.0, 0.5)), "lying")
+
+
+def _pulled() -> Case:
+    """Return a pressed strip, clamped at one end and pulled at the other: half of it slides."""
+    loads = [{"on": "top", "traction": [0.0, -1e-3]}, {"on": "right", "traction": [0.015, 0.0]}]
+    tables = cantilevers.cantilever({}, [1600, 16], 1, 0.3, 0.0)
+    return _named(parse_case({**tables, "load": loads}), "pulled-strip")
 
 
 def _dragged() -> Case:
@@ -273,6 +279,8 @@ DEVICES = (
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
 LINEAR = (
+    Device("nested iteration", (nesting,), "Bornemann and Deuflhard 1996", (),
+           (("nested", False),), _pulled),
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
            _block),
     Device("chord steps", (chord,), "Kelley 1995", (), (("keep", "never"),), _plane),
@@ -307,8 +315,9 @@ def run(case: Case, options: NewtonOptions) -> tuple[Solution, float]:
     """Solve a problem; return the seconds of the processor too."""
     begin = time.process_time()
     given = {name: getattr(case.solver, name) for name in ("tolerance", "linear")}
-    nested = getattr(case.solver, "nested", None)
-    solution = solve(case, replace(options, nested=nested, **given))
+    if options.nested is None:
+        given["nested"] = getattr(case.solver, "nested", None)
+    solution = solve(case, replace(options, **given))
     return solution, time.process_time() - begin
 
 
