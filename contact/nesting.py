@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Unpack
 
 import numpy as np
@@ -25,6 +26,8 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import neighbours
 from contact.typing import Array
+
+logger = logging.getLogger("contact.solver")
 
 #: Tolerance on the coarser levels: their discretisation error is larger by far.
 COARSE_TOLERANCE = 1e-3
@@ -55,6 +58,17 @@ def pays(case: Case, problem: ContactProblem) -> bool:
         slow = not (body.linear and condensed)
     enough = body.layout.unknowns >= MANY["condensed" if condensed else "whole"]
     return slow and enough and case.evolution is None and has_coarser(case)
+
+
+def default_start(case: Case, problem: ContactProblem) -> State | None:
+    """Return a start from coarser meshes where that pays, and the case fits these. Collective."""
+    if not pays(case, problem):
+        return None
+    try:
+        return nested_start(case, problem)
+    except InputError as error:  # the user does not know of the coarser mesh
+        logger.info("no start from a coarser mesh: %s", error)
+        return None
 
 
 def nested_start(

@@ -38,7 +38,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import IterationHistory, Monitor, Outcome, tell
 from contact.methods.signals import SIGNALLED, stop_on_signal
-from contact.nesting import nested_start, pays
+from contact.nesting import default_start, nested_start
 from contact.output.checkpoint import Checkpoints, read_steps
 from contact.output.fields import check_variables
 from contact.output.remarks import announce
@@ -228,13 +228,13 @@ def solve(
                 text, files = to_toml(case, anchored=True), on_root(comm, lambda: digest(case))
                 keep = Checkpoints(folder, problem, text, kept, here, files).keep
             solution = run(problem, kept=kept, keep=keep)
-        elif nested or (
-            nested is None and start is None and not replacements and pays(case, problem)
-        ):
-            coarse = nested_start(case, problem, **replacements)
-            solution = run(problem, coarse, guess=COARSE)
         else:
-            solution = run(problem, start)
+            guess, chosen = GIVEN, case.model_copy(update={"solver": settings})
+            if nested:
+                start, guess = nested_start(chosen, problem, **replacements), COARSE
+            elif nested is None and start is None and not replacements:
+                start, guess = default_start(chosen, problem), COARSE
+            solution = run(problem, start, guess=guess)
     solution.title, solution.output, solution.units = case.title, case.output, case.case.units
     if not replacements:
         solution.case, solution.source = to_toml(case), case

@@ -165,7 +165,7 @@ class NewtonOptions(Options):
         `true`: solve on coarser meshes first and start from there. Default: where that saves time
         and there are coarser meshes: from 40000 unknowns on in 3-D with multigrid, and in 2-D where
         a body is not condensed onto its contact nodes, as slender ones; from 100000 on in 2-D
-        with a nonlinear material.
+        where a nonlinear one is.
     nested_levels
         Number of meshes, the finest one included. Default: all that save time.
     max_iterations

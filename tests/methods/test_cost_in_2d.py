@@ -7,6 +7,7 @@ import pytest
 
 from contact import nesting, solve
 from contact.case.file import parse_case
+from contact.errors import InputError
 from scripts.cases import bar
 from scripts.studies.cantilevers import UNIFORM, cantilever
 
@@ -44,3 +45,17 @@ def test_a_slender_body_starts_from_a_coarser_mesh(monkeypatch: pytest.MonkeyPat
     assert found.converged and cold.converged
     assert 2 * found.counters.factorizations < cold.counters.factorizations
     assert np.allclose(found.state.x, cold.state.x, rtol=0, atol=1e-7)
+
+
+def test_a_coarser_mesh_that_does_not_fit_the_case_is_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With an odd number of cells it has other nodes, at one of which this gap is negative."""
+    monkeypatch.setitem(nesting.MANY, "whole", 1000)
+    beam = cantilever(UNIFORM, [803, 9], 1, 0.0, 0.5)
+    beam["mesh"]["size"] = [402.0, 1.0]
+    beam["contact"]["gap"] = "0.05 * sqrt(abs(x - 200)) - 0.0005"
+    found = solve(parse_case(beam))
+    assert (found.start, found.converged) == ("the zero initial guess", True)
+    with pytest.raises(InputError, match=r"gap: .* at a node"):
+        solve(parse_case({**beam, "solver": {"nested": True}}))
