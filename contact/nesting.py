@@ -51,12 +51,12 @@ def pays(case: Case, problem: ContactProblem) -> bool:
     plane the tangent of a nonlinear one is then factorised near the solution, once.
     """
     body, kind = problem.equilibrium, case.solver.linear
-    condensed = body.layout.dim == 2 and condensation_pays(problem, kind)
     if body.layout.dim == 3:
-        slow = multigrid.is_large(body.layout) and kind != "lu"
+        slow, many = multigrid.is_large(body.layout) and kind != "lu", MANY["whole"]
     else:
-        slow = not (body.linear and condensed)
-    enough = body.layout.unknowns >= MANY["condensed" if condensed else "whole"]
+        condensed = condensation_pays(problem, kind)
+        slow, many = not (body.linear and condensed), MANY["condensed" if condensed else "whole"]
+    enough = body.layout.unknowns >= many
     return slow and enough and case.evolution is None and has_coarser(case)
 
 

@@ -24,7 +24,7 @@ from contact import Case, build_problem, load_case, solve
 from contact.case.file import parse_case
 from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
-from contact.nesting import nested_start, pays
+from contact.nesting import default_start
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from scripts.cases import CASES, bar
@@ -139,7 +139,7 @@ def solved(case: Case, problem: ContactProblem, start: str) -> tuple[Solution, f
 
     The second is the time of the review behind it: the error estimate and remarks (s).
     """
-    begun = nested_start(case, problem) if start != "cold" and pays(case, problem) else None
+    begun = None if start == "cold" else default_start(case, problem)
     begin = time.perf_counter()
     solution = solve(problem, case.solver, start=begun)
     return solution, time.perf_counter() - begin - sum(solution.seconds.values())
