@@ -1,67 +1,95 @@
-"""Static condensation: a dense Schur complement at kept nodes.
+"""Static condensation: a dense Schur complement at kept unknowns, by substructuring.
 
-It is made by a sparse factorisation of MUMPS that stops before them. In 2-D the kept nodes are so
-few that the dense matrix has about as many entries as the mesh has nodes.
+Each rank eliminates the unknowns that are coupled to its own and to kept ones alone. What is left
+between the ranks is eliminated by pairs of groups of them: what no other group has. That is the
+multifrontal method with the ranks for a tree. In 2-D the kept unknowns are so few that the dense
+matrix has about as many entries as the mesh has nodes.
+
+References
+----------
+Smith, Bjorstad and Gropp, Domain Decomposition, Cambridge (1996), section 4.1.
+Liu, The multifrontal method for sparse matrix solution, SIAM Review 34 (1992).
 """
 
 from __future__ import annotations
 
-import ctypes
+from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from contact._compat import lasting
-from contact.linear.faults import mat_solve, no_solution, out_of_memory, set_up_with_workspace
-from contact.linear.layout import times
+from contact.linear.elimination import Elimination, entries, stride
+from contact.ranks import on_each, summed
 from contact.typing import Array
 
-#: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
-INTERIOR_SOLVE = (26, 0)
 
-#: MUMPS's ICNTL(19): in which form it returns a Schur complement; 0 for none.
-SCHUR = 19
+class Merge:
+    """What two groups of ranks have left, added up, without what no other group has.
 
-#: Columns that are copied at a time.
-COLUMNS = 128
+    Parameters
+    ----------
+    other
+        The first rank of the other group.
+    own, others
+        Places of the unknowns of each group among those of both.
+    done
+        Which of those of both are eliminated.
+    """
 
-# petsc4py has no Schur complements of factorisations.
-_petsc = ctypes.CDLL(PETSc.__file__)
+    def __init__(
+        self,
+        other: int,
+        own: NDArray[np.intp],
+        others: NDArray[np.intp],
+        done: NDArray[np.bool_],
+    ) -> None:
+        self.other, self._parts, self._size = other, (own, others), done.size
+        self._done, self._rest = np.flatnonzero(done), np.flatnonzero(~done)
 
+    @property
+    def size(self) -> int:
+        """Number of unknowns that the other group has left."""
+        return self._parts[1].size
 
-def _check(code: int) -> None:
-    if code != 0:
-        raise PETSc.Error(code)
+    @property
+    def eliminated(self) -> int:
+        """Number of unknowns that are eliminated."""
+        return self._done.size
 
+    def eliminate(self, *matrices: Array) -> Array:
+        """Return the Schur complement of the sum of symmetric matrices of both groups."""
+        total = np.zeros((self._size, self._size))
+        for part, matrix in zip(self._parts, matrices, strict=True):
+            total[np.ix_(part, part)] += matrix
+        self._coupling = total[np.ix_(self._rest, self._done)]
+        if self._done.size:
+            # A potential makes it indefinite.
+            self._factors = dgetrf(total[np.ix_(self._done, self._done)].T, overwrite_a=True)
+        through = self._solve(self._coupling.T)
+        return np.asarray(total[np.ix_(self._rest, self._rest)] - self._coupling @ through)
 
-def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
-    _check(_petsc.MatFactorSetSchurIS(ctypes.c_void_p(factor.handle), ctypes.c_void_p(kept.handle)))
+    def reduce(self, *sides: Array) -> tuple[Array, Array]:
+        """Return right-hand sides of both groups added up: reduced to the rest, and eliminated."""
+        total = np.zeros((self._size, sides[0].shape[1]))
+        for part, side in zip(self._parts, sides, strict=True):
+            total[part] += side
+        inside = total[self._done]
+        return total[self._rest] - self._coupling @ self._solve(inside), inside
 
+    def expand(self, inside: Array, rest: Array) -> tuple[Array, Array]:
+        """Return the values in each group, of eliminated right-hand sides and values of the rest."""
+        total = np.empty((self._size, rest.shape[1]))
+        total[self._rest] = rest
+        total[self._done] = self._solve(inside - self._coupling.T @ rest)
+        own, others = self._parts
+        return total[own], total[others]
 
-def _complement(factor: PETSc.Mat, size: int) -> Array:
-    """Return a copy of the Schur complement that a factorisation holds, stored by columns."""
-    if size == 0:
-        return np.zeros((0, 0))
-    handle, values, status = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_int()
-    held = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
-    _check(_petsc.MatFactorGetSchurComplement(*held, ctypes.byref(status)))
-    _check(_petsc.MatDenseGetArrayRead(handle, ctypes.byref(values)))
-    pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
-    matrix = np.ctypeslib.as_array(pointer, (size, size)).copy().T
-    _check(_petsc.MatDenseRestoreArrayRead(handle, ctypes.byref(values)))
-    _check(_petsc.MatFactorRestoreSchurComplement(*held, status))
-    _mirror(matrix)
-    return matrix
-
-
-def _mirror(matrix: Array) -> None:
-    """Copy the entries below the diagonal, all that MUMPS promises, above it."""
-    for begin in range(0, len(matrix), COLUMNS):
-        end = begin + COLUMNS
-        matrix[begin:end, end:] = matrix[end:, begin:end].T
-        corner = np.tril(matrix[begin:end, begin:end])
-        matrix[begin:end, begin:end] = corner + np.tril(corner, -1).T
+    def _solve(self, sides: Array) -> Array:
+        return np.asarray(dgetrs(*self._factors[:2], sides)[0]) if sides.size else sides
 
 
 class SchurComplement:
@@ -69,10 +97,13 @@ class SchurComplement:
 
     Parameters
     ----------
-    matrix
-        The assembled matrix, for its pattern; `factorise` takes its values.
+    comm
+        Communicator.
     kept
         Owned unknowns that are kept, local numbers; the result has them in rank order.
+    shared
+        Owned unknowns that other ranks know, local numbers: finite elements couple no others of two
+        ranks. What constraints couple is found.
     prefix
         Prefix of PETSc options of the factorisation.
 
@@ -82,105 +113,180 @@ class SchurComplement:
         Number of kept unknowns, and where those of this rank begin.
     """
 
-    def __init__(self, matrix: PETSc.Mat, kept: NDArray[np.int32], prefix: str) -> None:
-        self._kept, self.comm = kept, lasting(matrix.getComm().tompi4py())
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        kept: NDArray[np.integer[Any]],
+        shared: NDArray[np.integer[Any]],
+        prefix: str,
+    ) -> None:
+        self.comm, self._kept, self._shared, self._prefix = lasting(comm), kept, shared, prefix
+        sizes = self.comm.allgather(kept.size)
+        self.size, self.offset = sum(sizes), sum(sizes[: self.comm.rank])
+        self._part: list[PETSc.Mat] = []
+
+    def _divide(self, matrix: PETSc.Mat) -> None:
+        """Divide the unknowns of a matrix among the ranks. Collective."""
         begin, end = matrix.getOwnershipRange()
-        own_kept = (begin + kept).astype(PETSc.IntType)
+        row, column = self._outside(matrix)
+        known = self._gathered(begin + np.union1d(self._kept, self._shared))
+        # Of two others of two ranks one is left.
+        others = row[(column < begin) & ~np.isin(column, known)]
+        between = np.setdiff1d(np.union1d(self._shared, others), self._kept)
+        self._left = np.concatenate([between, self._kept])
+        inside = np.ones(end - begin, dtype=bool)
+        inside[self._left] = False
         # With a Schur complement MUMPS orders by minimum degree alone, and breaks its many ties by
         # the order given. dolfinx numbers along fronts: backwards along these leaves least work.
-        self._backwards = PETSc.IS().createStride(end - begin, end - 1, -1, comm=matrix.comm)
-        numbers = self.comm.allgather(begin + end - 1 - own_kept)
-        self.size = sum(part.size for part in numbers)
-        self.offset = sum(part.size for part in numbers[: self.comm.rank])
-        # MUMPS leaves the Schur complement to the first rank, and PETSc asks for its rows there.
-        own = np.concatenate(numbers)[: None if self.comm.rank == 0 else 0]
-        self._numbers = PETSc.IS().createGeneral(own, matrix.comm)
-        self._places = (
-            PETSc.IS().createGeneral(own_kept, matrix.comm),
-            PETSc.IS().createStride(end - begin, begin, 1, comm=matrix.comm),
-        )
-        #: Rows of the matrix at kept unknowns, and the matrix numbered backwards.
-        self._rows: PETSc.Mat | None = None
-        self._reordered: PETSc.Mat | None = None
-        self._ksp = PETSc.KSP().create(matrix.comm)
-        self._ksp.setOptionsPrefix(prefix)
-        self._ksp.setType("preonly")
-        pc = self._ksp.getPC()
-        pc.setType("cholesky")
-        pc.setFactorSolverType("mumps")
-        pc.setFromOptions()
+        self._inside = np.flatnonzero(inside)[::-1]
+        left = np.concatenate([self._gathered(begin + part) for part in (between, self._kept)])
+        owned = (left >= begin) & (left < end)
+        places = np.flatnonzero(owned | np.isin(left, column))
+        self._owned = owned[places]
+        part = np.concatenate([begin + self._inside, left[places]]).astype(PETSc.IntType)
+        self._local = [PETSc.IS().createGeneral(part, PETSc.COMM_SELF)]
+        self._part = matrix.createSubMatrices(self._local, self._local)
+        self._elimination = Elimination(self._inside.size, self._prefix)
+        self._plan(places, left.size)
+
+    def _outside(self, matrix: PETSc.Mat) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the owned rows, local numbers, and columns of entries in columns of others."""
+        if self.comm.size == 1:
+            return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+        begin, end = matrix.getOwnershipRange()
+        starts, column, _ = matrix.getValuesCSR()
+        outside = np.flatnonzero((column < begin) | (column >= end))
+        return np.searchsorted(starts, outside, side="right") - 1, column[outside]
+
+    def _gathered(self, numbers: NDArray[np.integer[Any]]) -> NDArray[np.integer[Any]]:
+        """Return the numbers of all ranks, in rank order. Collective."""
+        return np.concatenate(self.comm.allgather(numbers))
+
+    def _plan(self, places: NDArray[np.intp], total: int) -> None:
+        """Plan how groups of ranks are merged, pair by pair. Collective.
+
+        Parameters
+        ----------
+        places
+            Of what this rank has left, ascending, among what all have, the kept unknowns last.
+        total
+            How many all have.
+        """
+        comm, ranks = self.comm, np.ones(places.size)
+        every = np.zeros(total)
+        every[places] = 1.0
+        every = summed(comm, every)
+        self._merges: list[Merge] = []
+        #: The rank that this one's group is merged with the group of, after its own merges.
+        self._above: int | None = None
+        distance = 1
+        while distance < comm.size and self._above is None:
+            other = comm.rank + distance
+            if comm.rank % (2 * distance):
+                self._above = comm.rank - distance
+                comm.send((places, ranks), self._above)
+            elif other < comm.size:
+                others, of_others = comm.recv(source=other)
+                both = np.union1d(places, others)
+                here, there = np.searchsorted(both, places), np.searchsorted(both, others)
+                have = np.zeros(both.size)
+                have[here] += ranks
+                have[there] += of_others
+                done = (both < total - self.size) & (have == every[both])
+                self._merges.append(Merge(other, here, there, done))
+                places, ranks = both[~done], have[~done]
+            distance *= 2
+        self._sent = places.size
 
     def factorise(self, matrix: PETSc.Mat) -> Array:
         """Eliminate; return the Schur complement, of which the other ranks have nothing.
 
-        It is stored by columns, and not a number where the eliminated block is singular.
-        Collective.
+        It is symmetric, and not a number where an eliminated block is singular. Collective.
+
+        Parameters
+        ----------
+        matrix
+            Another one has the same pattern.
 
         Raises
         ------
         InputError
             If there is too little memory.
         """
-        first = self._rows is None
-        self._rows = matrix.createSubMatrix(*self._places, self._rows)
-        reordered = matrix.permute(self._backwards, self._backwards)
-        if self._reordered is None:
-            self._reordered = reordered
-        else:  # into the one that has been analysed
-            reordered.copy(self._reordered, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            reordered.destroy()
-        self._reordered.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        # On several ranks MUMPS writes the other triangle where it factorises with an old analysis.
-        if first or self.comm.size > 1:
-            self._ksp.getPC().reset()
-            self._ksp.setOperators(self._reordered)
-            self._prepare(self._ksp.getPC())
-        self._ksp.setOperators(self._reordered)
-        set_up_with_workspace(self._ksp, self._prepare)
-        if out_of_memory(self._ksp.getPC()):
-            raise no_solution(self._ksp.getPC(), self._ksp.getOptionsPrefix())
-        factor = self._ksp.getPC().getFactorMatrix()
-        factor.setMumpsIcntl(*INTERIOR_SOLVE)
-        left = _complement(factor, self.size if self.comm.rank == 0 else 0)
-        return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
+        if self._part:
+            matrix.createSubMatrices(self._local, self._local, submats=self._part)
+        else:
+            self._divide(matrix)
+        (part,) = self._part
+        left = on_each(self.comm, lambda: self._elimination.factorise(part))
+        if not self._owned.all():
+            # An entry of two ranks counts half in the part of each, and others not at all.
+            beyond = stride(self._inside.size, part.getSize()[0])
+            corner = entries(part.createSubMatrix(beyond, beyond)).tocoo()
+            row, column = corner.coords
+            owners = self._owned[row].astype(float) + self._owned[column]
+            left[row, column] -= (1 - owners / 2) * corner.data
+        for merge in self._merges:
+            other = np.empty((merge.size, merge.size))
+            self.comm.Recv(other, merge.other)
+            left = merge.eliminate(left, other)
+        if self._above is not None:
+            self.comm.Send(np.ascontiguousarray(left), self._above)
+            return np.zeros((0, 0))
+        return left
 
-    def _prepare(self, pc: PETSc.PC) -> None:
-        """Let a factorisation keep unknowns before it begins."""
-        pc.setFactorSetUpSolverType()
-        pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
-        if self.size > 0:
-            _set_kept(pc.getFactorMatrix(), self._numbers)
+    def condense(self, rhs: Array, rounding: Array | float = 0.0) -> Array:
+        """Reduce owned right-hand sides, shape (owned, k), to the kept unknowns. Collective.
 
-    def exceeds(self, rhs: Array, rounding: Array) -> bool:
-        """Tell whether an owned right-hand side is more than rounding at eliminated unknowns."""
-        beyond = np.abs(rhs) > rounding
-        beyond[self._kept] = False
-        return bool(beyond.any())
+        Parameters
+        ----------
+        rhs
+            The right-hand sides.
+        rounding
+            What counts as nothing where a rank eliminates, shape (owned, 1).
 
-    def interior(self, rhs: Array) -> Array:
-        """Return the solution for an owned right-hand side, the kept unknowns being 0. Collective.
-
-        It depends on no values at kept unknowns.
+        Returns
+        -------
+        Those at the kept unknowns of all ranks, the same on all, and behind them what this rank
+        needs to `expand`, shape (size + n, k).
         """
-        inside = rhs.copy()
-        inside[self._kept] = 0.0
-        factor = self._ksp.getPC().getFactorMatrix()
-        # PETSc refuses solves on several ranks for the sake of those with the kept unknowns too.
-        form = factor.getMumpsIcntl(SCHUR)
-        factor.setMumpsIcntl(SCHUR, 0)
-        solution = mat_solve(factor, inside[::-1, None])[::-1, 0]
-        factor.setMumpsIcntl(SCHUR, form)
-        solution[self._kept] = 0.0
-        return solution
+        left = np.zeros((self._owned.size, rhs.shape[1]))
+        left[self._owned] = rhs[self._left]
+        if (np.abs(rhs) > rounding)[self._inside].any():
+            left += self._elimination.reduce(rhs[self._inside])
+        insides = []
+        for merge in self._merges:
+            other = np.empty((merge.size, rhs.shape[1]))
+            self.comm.Recv(other, merge.other)
+            left, inside = merge.reduce(left, other)
+            insides.append(inside)
+        if self._above is not None:
+            self.comm.Send(left, self._above)
+            left = np.zeros((self.size, rhs.shape[1]))
+        return np.concatenate([summed(self.comm, left), *insides])
 
-    def condense(self, rhs: Array, interior: Array) -> Array:
-        """Return a right-hand side at the kept unknowns, of all ranks, given `interior` of it."""
-        own = rhs[self._kept] - times(self._rows, interior)
-        return np.concatenate(self.comm.allgather(own))
+    def expand(self, rhs: Array, condensed: Array, kept: Array) -> Array:
+        """Return the owned solutions that go with values of the kept unknowns. Collective.
 
-    def expand(self, rhs: Array, kept: Array) -> Array:
-        """Return the owned solution that goes with values of the kept unknowns of all ranks."""
-        own = kept[self.offset : self.offset + self._kept.size]
-        solution = self.interior(rhs - times(self._rows, own, transposed=True))
-        solution[self._kept] = own
+        Parameters
+        ----------
+        rhs, condensed
+            Right-hand sides, shape (owned, k), and what `condense` returns of them.
+        kept
+            Values of all ranks, shape (size, k).
+        """
+        left = kept
+        if self._above is not None:
+            left = np.empty((self._sent, rhs.shape[1]))
+            self.comm.Recv(left, self._above)
+        end = len(condensed)
+        for merge in reversed(self._merges):
+            inside = condensed[end - merge.eliminated : end]
+            end -= merge.eliminated
+            left, other = merge.expand(inside, left)
+            self.comm.Send(other, merge.other)
+        solution = np.empty_like(rhs)
+        inside = rhs[self._inside] - self._elimination.coupling @ left
+        solution[self._inside] = self._elimination.solve(inside)
+        solution[self._left] = left[self._owned]
         return solution
