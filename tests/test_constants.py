@@ -11,8 +11,9 @@ MOST = 68
 FORMATS = {
     "TOO_SMALL",
     "OUT_OF_MEMORY",
-    "INTERIOR_SOLVE",
-    "SCHUR",
+    "INTERIOR",
+    "REDUCE",
+    "INVERTED",
     "HEADER",
     "EACH",
     "SIGNALLED",

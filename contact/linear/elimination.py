@@ -66,6 +66,7 @@ def _mirror(matrix: Array) -> None:
 
 
 def stride(begin: int, end: int) -> PETSc.IS:
+    """Return the numbers from one to before another, on one rank."""
     return PETSc.IS().createStride(end - begin, begin, 1, PETSc.COMM_SELF)
 
 
@@ -80,19 +81,23 @@ class Elimination:
 
     Parameters
     ----------
+    matrix
+        Whose values may change, but not its pattern.
     first
-        How many they are.
+        How many are eliminated.
     prefix
         Prefix of PETSc options of the factorisation.
 
     Attributes
     ----------
     coupling
-        Rows of the other unknowns at the first ones, of the last matrix.
+        Rows of the first unknowns at the others, where the matrix was factorised last.
     """
 
-    def __init__(self, first: int, prefix: str) -> None:
-        self._first, self._matrix, self._regular = first, None, True
+    def __init__(self, matrix: PETSc.Mat, first: int, prefix: str) -> None:
+        self._matrix, self._first, self._regular = matrix, first, True
+        self._others = matrix.getSize()[0] - first
+        self._analysed = False
         self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
         self._ksp.setOptionsPrefix(prefix)
         self._ksp.setType("preonly")
@@ -101,44 +106,38 @@ class Elimination:
         pc.setFactorSolverType("mumps")
         pc.setFromOptions()
 
-    def factorise(self, matrix: PETSc.Mat) -> Array:
+    def factorise(self) -> Array:
         """Return the Schur complement, stored by columns; not a number where there is none.
-
-        All matrices have the same pattern.
 
         Raises
         ------
         InputError
             If there is too little memory.
         """
-        first, size = self._first, matrix.getSize()[0]
-        self.coupling = entries(matrix.createSubMatrix(stride(0, first), stride(first, size)))
-        if first == 0:
-            return np.asfortranarray(entries(matrix).toarray())
-        pc, new = self._ksp.getPC(), self._matrix is None
-        if new:
-            self._matrix = matrix
-        elif matrix != self._matrix:  # into the one that has been analysed
-            matrix.copy(self._matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        first, behind = stride(0, self._first), stride(self._first, self._first + self._others)
+        self.coupling = entries(self._matrix.createSubMatrix(first, behind))
+        if self._first == 0:
+            return np.asfortranarray(entries(self._matrix).toarray())
+        pc = self._ksp.getPC()
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self._ksp.setOperators(self._matrix)
-        if new:
+        if not self._analysed:
             self._prepare(pc)
+            self._analysed = True
         set_up_with_workspace(self._ksp, self._prepare)
         if out_of_memory(pc):
             raise no_solution(pc, self._ksp.getOptionsPrefix())
         factor = pc.getFactorMatrix()
         self._regular = factor.getMumpsInfog(1) >= 0
-        left = _complement(factor, size - first)
+        left = _complement(factor, self._others)
         return left if self._regular else np.full_like(left, np.nan)
 
     def _prepare(self, pc: PETSc.PC) -> None:
         """Let a factorisation stop before the other unknowns."""
         pc.setFactorSetUpSolverType()
         pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
-        size = self._matrix.getSize()[0]
-        if self._first < size:
-            _set_kept(pc.getFactorMatrix(), stride(self._first, size))
+        if self._others > 0:
+            _set_kept(pc.getFactorMatrix(), stride(self._first, self._first + self._others))
 
     def reduce(self, sides: Array) -> Array:
         """Return what right-hand sides at the first unknowns, (first, k), are at the others."""
@@ -149,14 +148,18 @@ class Elimination:
         return self._solved(INTERIOR, sides)[: self._first]
 
     def _solved(self, mode: tuple[int, int], sides: Array) -> Array:
-        found = np.full((sum(self.coupling.shape), sides.shape[1]), 0.0 if self._regular else np.nan)
-        # Without others there is nothing to reduce to.
-        if self._regular and self._first > 0 and (mode == INTERIOR or self.coupling.shape[1] > 0):
-            factor = self._ksp.getPC().getFactorMatrix()
-            factor.setMumpsIcntl(*mode)
-            solution, rhs = factor.createVecs()
-            for k, side in enumerate(sides.T):
-                rhs.array[: self._first] = side
-                factor.solve(rhs, solution)
-                found[:, k] = solution.array
+        """Return what MUMPS makes of right-hand sides, at all unknowns."""
+        shape = (self._first + self._others, sides.shape[1])
+        if not self._regular:
+            return np.full(shape, np.nan)
+        found = np.zeros(shape)
+        if self._first == 0 or (mode == REDUCE and self._others == 0):
+            return found
+        factor = self._ksp.getPC().getFactorMatrix()
+        factor.setMumpsIcntl(*mode)
+        solution, rhs = factor.createVecs()
+        for k, side in enumerate(sides.T):
+            rhs.array[: self._first] = side
+            factor.solve(rhs, solution)
+            found[:, k] = solution.array
         return found

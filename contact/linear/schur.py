@@ -19,6 +19,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.linalg.blas import dgemm
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from contact._compat import lasting
@@ -66,11 +67,14 @@ class Merge:
         for part, matrix in zip(self._parts, matrices, strict=True):
             total[np.ix_(part, part)] += matrix
         self._coupling = total[np.ix_(self._rest, self._done)]
+        rest = total[np.ix_(self._rest, self._rest)].T
         if self._done.size:
             # A potential makes it indefinite.
             self._factors = dgetrf(total[np.ix_(self._done, self._done)].T, overwrite_a=True)
-        through = self._solve(self._coupling.T)
-        return np.asarray(total[np.ix_(self._rest, self._rest)] - self._coupling @ through)
+        if self._coupling.size:
+            through = self._solve(self._coupling.T)
+            rest = dgemm(-1.0, self._coupling, through, 1.0, rest, overwrite_c=True)
+        return np.asarray(rest)
 
     def reduce(self, *sides: Array) -> tuple[Array, Array]:
         """Return right-hand sides of both groups added up: reduced to the rest, and eliminated."""
@@ -81,7 +85,7 @@ class Merge:
         return total[self._rest] - self._coupling @ self._solve(inside), inside
 
     def expand(self, inside: Array, rest: Array) -> tuple[Array, Array]:
-        """Return the values in each group, of eliminated right-hand sides and values of the rest."""
+        """Return the values in each group, given those of the rest and right-hand sides inside."""
         total = np.empty((self._size, rest.shape[1]))
         total[self._rest] = rest
         total[self._done] = self._solve(inside - self._coupling.T @ rest)
@@ -146,7 +150,7 @@ class SchurComplement:
         part = np.concatenate([begin + self._inside, left[places]]).astype(PETSc.IntType)
         self._local = [PETSc.IS().createGeneral(part, PETSc.COMM_SELF)]
         self._part = matrix.createSubMatrices(self._local, self._local)
-        self._elimination = Elimination(self._inside.size, self._prefix)
+        self._elimination = Elimination(self._part[0], self._inside.size, self._prefix)
         self._plan(places, left.size)
 
     def _outside(self, matrix: PETSc.Mat) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -175,7 +179,7 @@ class SchurComplement:
         comm, ranks = self.comm, np.ones(places.size)
         every = np.zeros(total)
         every[places] = 1.0
-        every = summed(comm, every)
+        every[:] = summed(comm, every)
         self._merges: list[Merge] = []
         #: The rank that this one's group is merged with the group of, after its own merges.
         self._above: int | None = None
@@ -218,7 +222,7 @@ class SchurComplement:
         else:
             self._divide(matrix)
         (part,) = self._part
-        left = on_each(self.comm, lambda: self._elimination.factorise(part))
+        left = on_each(self.comm, self._elimination.factorise)
         if not self._owned.all():
             # An entry of two ranks counts half in the part of each, and others not at all.
             beyond = stride(self._inside.size, part.getSize()[0])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy import sparse
 
 from contact.history import BodyState
 from contact.interface.friction import Friction
@@ -57,6 +58,45 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
         again = schur.factorise(operator.matrix)
         assert np.allclose(again, times * stiffness, rtol=0, atol=1e-12)
         assert np.allclose(schur.condense(times * rhs), times * reduced)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("seed", range(6))
+def test_any_unknowns_of_any_ranks_may_be_coupled(seed):
+    """As constraints couple them; also on ranks with few unknowns, or none, and indefinite."""
+    random = np.random.default_rng(seed)
+    size = 60
+    coupled = np.triu(random.random((size, size)) < 0.05, 1)
+    dense = np.where(coupled, random.standard_normal((size, size)), 0.0)
+    dense += dense.T + np.diag(random.choice([-3.0, 5.0], size) if seed % 2 else np.full(size, 5.0))
+    ends = np.sort(random.integers(0, size, WORLD.size - 1)) if seed else np.zeros(WORLD.size - 1)
+    ends = np.concatenate([[0], ends, [size]]).astype(int)
+    begin, end = ends[WORLD.rank : WORLD.rank + 2]
+    own = sparse.csr_array(dense[begin:end])
+    shape = ((end - begin, size),) * 2
+    matrix = PETSc.Mat().createAIJ(shape, csr=(own.indptr, own.indices, own.data), comm=WORLD)
+    matrix.assemble()
+    chosen = random.random(size) < 0.2
+    kept, others = np.flatnonzero(chosen), np.flatnonzero(~chosen)
+    here = kept[(kept >= begin) & (kept < end)] - begin
+
+    schur = SchurComplement(WORLD, here, here[:0], "contact_")
+    for times in (1.0, 2.0):
+        found = schur.factorise(matrix)
+        inverse = np.linalg.inv(dense[np.ix_(others, others)])
+        coupling = dense[np.ix_(kept, others)]
+        expected = dense[np.ix_(kept, kept)] - coupling @ inverse @ coupling.T
+        if WORLD.rank == 0:
+            assert np.allclose(found, times * expected, rtol=1e-9, atol=1e-9)
+        rhs = random.standard_normal((size, 2))
+        condensed = schur.condense(rhs[begin:end])
+        assert np.allclose(condensed[: schur.size], rhs[kept] - coupling @ inverse @ rhs[others])
+        at_kept = random.standard_normal((kept.size, 2))
+        solution = np.empty_like(rhs)
+        solution[kept] = at_kept
+        solution[others] = inverse @ (rhs[others] / times - coupling.T @ at_kept)
+        assert np.allclose(schur.expand(rhs[begin:end], condensed, at_kept), solution[begin:end])
+        matrix.scale(2.0)
 
 
 @pytest.mark.parametrize("few", [1, 5, 10])
