@@ -140,7 +140,7 @@ class Elimination:
             _set_kept(pc.getFactorMatrix(), stride(self._first, self._first + self._others))
 
     def reduce(self, sides: Array) -> Array:
-        """Return what right-hand sides at the first unknowns, (first, k), are at the others."""
+        """Reduce right-hand sides at the first unknowns, (first, k), to the others, (n, k)."""
         return self._solved(REDUCE, sides)[self._first :]
 
     def solve(self, sides: Array) -> Array:
@@ -148,7 +148,7 @@ class Elimination:
         return self._solved(INTERIOR, sides)[: self._first]
 
     def _solved(self, mode: tuple[int, int], sides: Array) -> Array:
-        """Return what MUMPS makes of right-hand sides, at all unknowns."""
+        """Return the result of a solve of MUMPS at all unknowns."""
         shape = (self._first + self._others, sides.shape[1])
         if not self._regular:
             return np.full(shape, np.nan)

@@ -1,9 +1,10 @@
 """Static condensation: a dense Schur complement at kept unknowns, by substructuring.
 
-Each rank eliminates the unknowns that are coupled to its own and to kept ones alone. What is left
-between the ranks is eliminated by pairs of groups of them: what no other group has. That is the
-multifrontal method with the ranks for a tree. In 2-D the kept unknowns are so few that the dense
-matrix has about as many entries as the mesh has nodes.
+Each rank eliminates its interior: the unknowns that are coupled to its own and to kept ones alone.
+A dense matrix of its border is left. Groups of ranks add up their matrices pair by pair, and
+eliminate the unknowns that no other group has in its border: the multifrontal method, its tree that
+of the ranks. In 2-D the kept unknowns are so few that the dense matrix has about as many entries as
+the mesh has nodes.
 
 References
 ----------
@@ -29,14 +30,14 @@ from contact.typing import Array
 
 
 class Merge:
-    """What two groups of ranks have left, added up, without what no other group has.
+    """The borders of two groups of ranks put together, without unknowns of no other group.
 
     Parameters
     ----------
     other
         The first rank of the other group.
     own, others
-        Places of the unknowns of each group among those of both.
+        Places of the unknowns of each border among those of both.
     done
         Which of those of both are eliminated.
     """
@@ -53,7 +54,7 @@ class Merge:
 
     @property
     def size(self) -> int:
-        """Number of unknowns that the other group has left."""
+        """Number of unknowns in the border of the other group."""
         return self._parts[1].size
 
     @property
@@ -107,7 +108,7 @@ class SchurComplement:
         Owned unknowns that are kept, local numbers; the result has them in rank order.
     shared
         Owned unknowns that other ranks know, local numbers: finite elements couple no others of two
-        ranks. What constraints couple is found.
+        ranks. Those that constraints couple are found.
     prefix
         Prefix of PETSc options of the factorisation.
 
@@ -172,9 +173,9 @@ class SchurComplement:
         Parameters
         ----------
         places
-            Of what this rank has left, ascending, among what all have, the kept unknowns last.
+            Of this rank's border, ascending, among the borders of all ranks, kept unknowns last.
         total
-            How many all have.
+            Number of unknowns in all borders.
         """
         comm, ranks = self.comm, np.ones(places.size)
         every = np.zeros(total)
@@ -224,7 +225,7 @@ class SchurComplement:
         (part,) = self._part
         left = on_each(self.comm, self._elimination.factorise)
         if not self._owned.all():
-            # An entry of two ranks counts half in the part of each, and others not at all.
+            # An entry of two ranks counts half for each of them, and those of others not at all.
             beyond = stride(self._inside.size, part.getSize()[0])
             corner = entries(part.createSubMatrix(beyond, beyond)).tocoo()
             row, column = corner.coords
@@ -247,12 +248,12 @@ class SchurComplement:
         rhs
             The right-hand sides.
         rounding
-            What counts as nothing where a rank eliminates, shape (owned, 1).
+            Values that count as zero in an interior, shape (owned, 1).
 
         Returns
         -------
-        Those at the kept unknowns of all ranks, the same on all, and behind them what this rank
-        needs to `expand`, shape (size + n, k).
+        Those at the kept unknowns of all ranks, the same on all, and behind them those at the
+        unknowns that this rank eliminates from borders, shape (size + n, k).
         """
         left = np.zeros((self._owned.size, rhs.shape[1]))
         left[self._owned] = rhs[self._left]
@@ -275,7 +276,7 @@ class SchurComplement:
         Parameters
         ----------
         rhs, condensed
-            Right-hand sides, shape (owned, k), and what `condense` returns of them.
+            Right-hand sides, shape (owned, k), and their result of `condense`.
         kept
             Values of all ranks, shape (size, k).
         """

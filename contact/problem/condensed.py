@@ -334,7 +334,7 @@ class Condensation:
         self._reduced_columns = schur.condense(columns)
         #: Forces on q by kept unknowns, shape (free, kept).
         self._border = self._reduced_columns[: schur.size].T
-        #: What the columns make of the body where the kept unknowns are 0.
+        #: Responses to the columns where the kept unknowns are 0.
         none = np.zeros_like(self._border.T)
         self._responses = schur.expand(columns, self._reduced_columns, none)
         inside = summed(body.comm, columns.T @ self._responses)
