@@ -52,12 +52,12 @@ def _complement(factor: PETSc.Mat, size: int) -> Array:
     np.fill_diagonal(there, 1.0)
     _check(_petsc.MatDenseRestoreArray(handle, ctypes.byref(values)))
     _check(_petsc.MatFactorRestoreSchurComplement(*held, INVERTED))
-    _mirror(matrix)
+    mirror(matrix)  # MUMPS promises the entries below the diagonal alone
     return matrix
 
 
-def _mirror(matrix: Array) -> None:
-    """Copy the entries below the diagonal, all that MUMPS promises, above it."""
+def mirror(matrix: Array) -> None:
+    """Copy the entries of a matrix below the diagonal above it."""
     for begin in range(0, len(matrix), COLUMNS):
         end = begin + COLUMNS
         matrix[begin:end, end:] = matrix[end:, begin:end].T

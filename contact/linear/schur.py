@@ -24,7 +24,7 @@ from scipy.linalg.blas import dgemm
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from contact._compat import lasting
-from contact.linear.elimination import Elimination, entries, stride
+from contact.linear.elimination import Elimination, entries, mirror, stride
 from contact.ranks import on_each, summed
 from contact.typing import Array
 
@@ -75,6 +75,7 @@ class Merge:
         if self._coupling.size:
             through = self._solve(self._coupling.T)
             rest = dgemm(-1.0, self._coupling, through, 1.0, rest, overwrite_c=True)
+            mirror(rest)  # symmetric but for rounding
         return np.asarray(rest)
 
     def reduce(self, *sides: Array) -> tuple[Array, Array]:
