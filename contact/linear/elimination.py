@@ -37,7 +37,8 @@ def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
 def _complement(factor: PETSc.Mat, size: int) -> Array:
     """Take the Schur complement, stored by columns, out of a factorisation.
 
-    PETSc solves with its inverse where a right-hand side is reduced, and is left the identity.
+    The identity is left in its place, as its inverse: PETSc multiplies reduced right-hand sides by
+    that, which so remain as they are.
     """
     if size == 0:
         return np.zeros((0, 0))
@@ -92,10 +93,12 @@ class Elimination:
     ----------
     coupling
         Rows of the first unknowns at the others, where the matrix was factorised last.
+    regular
+        Whether they could be eliminated then.
     """
 
     def __init__(self, matrix: PETSc.Mat, first: int, prefix: str) -> None:
-        self._matrix, self._first, self._regular = matrix, first, True
+        self._matrix, self._first, self.regular = matrix, first, True
         self._others = matrix.getSize()[0] - first
         self._analysed = False
         self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
@@ -128,9 +131,9 @@ class Elimination:
         if out_of_memory(pc):
             raise no_solution(pc, self._ksp.getOptionsPrefix())
         factor = pc.getFactorMatrix()
-        self._regular = factor.getMumpsInfog(1) >= 0
+        self.regular = factor.getMumpsInfog(1) >= 0
         left = _complement(factor, self._others)
-        return left if self._regular else np.full_like(left, np.nan)
+        return left if self.regular else np.full_like(left, np.nan)
 
     def _prepare(self, pc: PETSc.PC) -> None:
         """Let a factorisation stop before the other unknowns."""
@@ -150,7 +153,7 @@ class Elimination:
     def _solved(self, mode: tuple[int, int], sides: Array) -> Array:
         """Return the result of a solve of MUMPS at all unknowns."""
         shape = (self._first + self._others, sides.shape[1])
-        if not self._regular:
+        if not self.regular:
             return np.full(shape, np.nan)
         found = np.zeros(shape)
         if self._first == 0 or (mode == REDUCE and self._others == 0):

@@ -108,8 +108,8 @@ class SchurComplement:
     kept
         Owned unknowns that are kept, local numbers; the result has them in rank order.
     shared
-        Owned unknowns that other ranks know, local numbers: finite elements couple no others of two
-        ranks. Those that constraints couple are found.
+        Owned unknowns that other ranks know, local numbers, none on one rank. Unknowns of two ranks
+        that finite elements couple are among these; those that constraints couple are found.
     prefix
         Prefix of PETSc options of the factorisation.
 
@@ -136,7 +136,7 @@ class SchurComplement:
         begin, end = matrix.getOwnershipRange()
         row, column = self._outside(matrix)
         known = self._gathered(begin + np.union1d(self._kept, self._shared))
-        # Of two others of two ranks one is left.
+        # Of two unknowns of two ranks that a constraint couples one joins the border.
         others = row[(column < begin) & ~np.isin(column, known)]
         between = np.setdiff1d(np.union1d(self._shared, others), self._kept)
         self._left = np.concatenate([between, self._kept])
@@ -225,6 +225,7 @@ class SchurComplement:
             self._divide(matrix)
         (part,) = self._part
         left = on_each(self.comm, self._elimination.factorise)
+        regular = summed(self.comm, self._elimination.regular) == self.comm.size
         if not self._owned.all():
             # An entry of two ranks counts half for each of them, and those of others not at all.
             beyond = stride(self._inside.size, part.getSize()[0])
@@ -239,7 +240,7 @@ class SchurComplement:
         if self._above is not None:
             self.comm.Send(np.ascontiguousarray(left), self._above)
             return np.zeros((0, 0))
-        return left
+        return left if regular else np.full_like(left, np.nan)
 
     def condense(self, rhs: Array, rounding: Array | float = 0.0) -> Array:
         """Reduce owned right-hand sides, shape (owned, k), to the kept unknowns. Collective.
@@ -249,7 +250,8 @@ class SchurComplement:
         rhs
             The right-hand sides.
         rounding
-            Values that count as zero in an interior, shape (owned, 1).
+            Values that count as zero in an interior, shape (owned, 1); a rank that has no others
+            there solves nothing.
 
         Returns
         -------
