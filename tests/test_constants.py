@@ -11,9 +11,10 @@ MOST = 68
 FORMATS = {
     "TOO_SMALL",
     "OUT_OF_MEMORY",
-    "INTERIOR",
+    "INTERIOR_SOLVE",
     "REDUCE",
     "INVERTED",
+    "SCHUR",
     "HEADER",
     "EACH",
     "SIGNALLED",

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from contact.ranks import exchanged
 from contact.typing import Array
 
 
@@ -157,13 +156,6 @@ class Layout:
         if self.inclined is not None:
             some[self.inclined.nodes] = True
         return np.flatnonzero(some).astype(np.int32)
-
-    @property
-    def shared(self) -> NDArray[np.int64]:
-        """The owned nodes that other ranks know, ascending. Collective."""
-        known = self.index_map
-        _, numbers = exchanged(self.comm, known.owners, known.ghosts)
-        return np.unique(numbers) - known.local_range[0]
 
     def mask(self, values: Array) -> Array:
         """Return owned values, 0 where the unknown is fixed, and along fixed directions."""

@@ -1,101 +1,78 @@
-"""Static condensation: a dense Schur complement at kept unknowns, by substructuring.
+"""Static condensation: a dense Schur complement at kept nodes.
 
-Each rank eliminates its interior: the unknowns that are coupled to its own and to kept ones alone.
-A dense matrix of its border is left. Groups of ranks add up their matrices pair by pair, and
-eliminate the unknowns that no other group has in its border: the multifrontal method, its tree that
-of the ranks. In 2-D the kept unknowns are so few that the dense matrix has about as many entries as
-the mesh has nodes.
-
-References
-----------
-Smith, Bjorstad and Gropp, Domain Decomposition, Cambridge (1996), section 4.1.
-Liu, The multifrontal method for sparse matrix solution, SIAM Review 34 (1992).
+It is made by a sparse factorisation of MUMPS that stops before them. In 2-D the kept nodes are so
+few that the dense matrix has about as many entries as the mesh has nodes.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import ctypes
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.linalg.blas import dgemm
-from scipy.linalg.lapack import dgetrf, dgetrs
 
 from contact._compat import lasting
-from contact.linear.elimination import Elimination, entries, mirror, stride
-from contact.ranks import on_each, summed
+from contact.linear.faults import mat_solve, no_solution, out_of_memory, set_up_with_workspace
+from contact.linear.layout import times
 from contact.typing import Array
 
+#: MUMPS's ICNTL(26): to solve with the eliminated unknowns, the kept ones being 0; to reduce a
+#: right-hand side to the kept ones, which takes the first of the two substitutions alone.
+INTERIOR_SOLVE, REDUCE = (26, 0), (26, 1)
 
-class Merge:
-    """The borders of two groups of ranks put together, without unknowns of no other group.
+#: PETSc's MAT_FACTOR_SCHUR_INVERTED.
+INVERTED = 2
 
-    Parameters
-    ----------
-    other
-        The first rank of the other group.
-    own, others
-        Places of the unknowns of each border among those of both.
-    done
-        Which of those of both are eliminated.
+#: MUMPS's ICNTL(19): in which form it returns a Schur complement; 0 for none.
+SCHUR = 19
+
+#: Columns that are copied at a time.
+COLUMNS = 128
+
+# petsc4py has no Schur complements of factorisations.
+_petsc = ctypes.CDLL(PETSc.__file__)
+
+
+def _check(code: int) -> None:
+    if code != 0:
+        raise PETSc.Error(code)
+
+
+def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
+    _check(_petsc.MatFactorSetSchurIS(ctypes.c_void_p(factor.handle), ctypes.c_void_p(kept.handle)))
+
+
+def _complement(factor: PETSc.Mat, size: int) -> Array:
+    """Take the Schur complement, stored by columns, out of a factorisation.
+
+    The identity is left in its place, as its inverse: PETSc multiplies reduced right-hand sides by
+    that, which so remain as they are.
     """
+    if size == 0:
+        return np.zeros((0, 0))
+    handle, values, status = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_int()
+    held = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
+    _check(_petsc.MatFactorGetSchurComplement(*held, ctypes.byref(status)))
+    _check(_petsc.MatDenseGetArray(handle, ctypes.byref(values)))
+    pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
+    there = np.ctypeslib.as_array(pointer, (size, size))
+    matrix = there.copy().T
+    there[:] = 0.0
+    np.fill_diagonal(there, 1.0)
+    _check(_petsc.MatDenseRestoreArray(handle, ctypes.byref(values)))
+    _check(_petsc.MatFactorRestoreSchurComplement(*held, INVERTED))
+    _mirror(matrix)
+    return matrix
 
-    def __init__(
-        self,
-        other: int,
-        own: NDArray[np.intp],
-        others: NDArray[np.intp],
-        done: NDArray[np.bool_],
-    ) -> None:
-        self.other, self._parts, self._size = other, (own, others), done.size
-        self._done, self._rest = np.flatnonzero(done), np.flatnonzero(~done)
 
-    @property
-    def size(self) -> int:
-        """Number of unknowns in the border of the other group."""
-        return self._parts[1].size
-
-    @property
-    def eliminated(self) -> int:
-        """Number of unknowns that are eliminated."""
-        return self._done.size
-
-    def eliminate(self, *matrices: Array) -> Array:
-        """Return the Schur complement of the sum of symmetric matrices of both groups."""
-        total = np.zeros((self._size, self._size))
-        for part, matrix in zip(self._parts, matrices, strict=True):
-            total[np.ix_(part, part)] += matrix
-        self._coupling = total[np.ix_(self._rest, self._done)]
-        rest = total[np.ix_(self._rest, self._rest)].T
-        if self._done.size:
-            # A potential makes it indefinite.
-            self._factors = dgetrf(total[np.ix_(self._done, self._done)].T, overwrite_a=True)
-        if self._coupling.size:
-            through = self._solve(self._coupling.T)
-            rest = dgemm(-1.0, self._coupling, through, 1.0, rest, overwrite_c=True)
-            mirror(rest)  # symmetric but for rounding
-        return np.asarray(rest)
-
-    def reduce(self, *sides: Array) -> tuple[Array, Array]:
-        """Return right-hand sides of both groups added up: reduced to the rest, and eliminated."""
-        total = np.zeros((self._size, sides[0].shape[1]))
-        for part, side in zip(self._parts, sides, strict=True):
-            total[part] += side
-        inside = total[self._done]
-        return total[self._rest] - self._coupling @ self._solve(inside), inside
-
-    def expand(self, inside: Array, rest: Array) -> tuple[Array, Array]:
-        """Return the values in each group, given those of the rest and right-hand sides inside."""
-        total = np.empty((self._size, rest.shape[1]))
-        total[self._rest] = rest
-        total[self._done] = self._solve(inside - self._coupling.T @ rest)
-        own, others = self._parts
-        return total[own], total[others]
-
-    def _solve(self, sides: Array) -> Array:
-        return np.asarray(dgetrs(*self._factors[:2], sides)[0]) if sides.size else sides
+def _mirror(matrix: Array) -> None:
+    """Copy the entries below the diagonal, all that MUMPS promises, above it."""
+    for begin in range(0, len(matrix), COLUMNS):
+        end = begin + COLUMNS
+        matrix[begin:end, end:] = matrix[end:, begin:end].T
+        corner = np.tril(matrix[begin:end, begin:end])
+        matrix[begin:end, begin:end] = corner + np.tril(corner, -1).T
 
 
 class SchurComplement:
@@ -103,13 +80,10 @@ class SchurComplement:
 
     Parameters
     ----------
-    comm
-        Communicator.
+    matrix
+        The assembled matrix, for its pattern; `factorise` takes its values.
     kept
         Owned unknowns that are kept, local numbers; the result has them in rank order.
-    shared
-        Owned unknowns that other ranks know, local numbers, none on one rank. Unknowns of two ranks
-        that finite elements couple are among these; those that constraints couple are found.
     prefix
         Prefix of PETSc options of the factorisation.
 
@@ -119,182 +93,120 @@ class SchurComplement:
         Number of kept unknowns, and where those of this rank begin.
     """
 
-    def __init__(
-        self,
-        comm: MPI.Intracomm,
-        kept: NDArray[np.integer[Any]],
-        shared: NDArray[np.integer[Any]],
-        prefix: str,
-    ) -> None:
-        self.comm, self._kept, self._shared, self._prefix = lasting(comm), kept, shared, prefix
-        sizes = self.comm.allgather(kept.size)
-        self.size, self.offset = sum(sizes), sum(sizes[: self.comm.rank])
-        self._part: list[PETSc.Mat] = []
-
-    def _divide(self, matrix: PETSc.Mat) -> None:
-        """Divide the unknowns of a matrix among the ranks. Collective."""
+    def __init__(self, matrix: PETSc.Mat, kept: NDArray[np.int32], prefix: str) -> None:
+        self._kept, self.comm = kept, lasting(matrix.getComm().tompi4py())
         begin, end = matrix.getOwnershipRange()
-        row, column = self._outside(matrix)
-        known = self._gathered(begin + np.union1d(self._kept, self._shared))
-        # Of two unknowns of two ranks that a constraint couples one joins the border.
-        others = row[(column < begin) & ~np.isin(column, known)]
-        between = np.setdiff1d(np.union1d(self._shared, others), self._kept)
-        self._left = np.concatenate([between, self._kept])
-        inside = np.ones(end - begin, dtype=bool)
-        inside[self._left] = False
+        own_kept = (begin + kept).astype(PETSc.IntType)
         # With a Schur complement MUMPS orders by minimum degree alone, and breaks its many ties by
         # the order given. dolfinx numbers along fronts: backwards along these leaves least work.
-        self._inside = np.flatnonzero(inside)[::-1]
-        left = np.concatenate([self._gathered(begin + part) for part in (between, self._kept)])
-        owned = (left >= begin) & (left < end)
-        places = np.flatnonzero(owned | np.isin(left, column))
-        self._owned = owned[places]
-        part = np.concatenate([begin + self._inside, left[places]]).astype(PETSc.IntType)
-        self._local = [PETSc.IS().createGeneral(part, PETSc.COMM_SELF)]
-        self._part = matrix.createSubMatrices(self._local, self._local)
-        self._elimination = Elimination(self._part[0], self._inside.size, self._prefix)
-        self._plan(places, left.size)
-
-    def _outside(self, matrix: PETSc.Mat) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the owned rows, local numbers, and columns of entries in columns of others."""
-        if self.comm.size == 1:
-            return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-        begin, end = matrix.getOwnershipRange()
-        starts, column, _ = matrix.getValuesCSR()
-        outside = np.flatnonzero((column < begin) | (column >= end))
-        return np.searchsorted(starts, outside, side="right") - 1, column[outside]
-
-    def _gathered(self, numbers: NDArray[np.integer[Any]]) -> NDArray[np.integer[Any]]:
-        """Return the numbers of all ranks, in rank order. Collective."""
-        return np.concatenate(self.comm.allgather(numbers))
-
-    def _plan(self, places: NDArray[np.intp], total: int) -> None:
-        """Plan how groups of ranks are merged, pair by pair. Collective.
-
-        Parameters
-        ----------
-        places
-            Of this rank's border, ascending, among the borders of all ranks, kept unknowns last.
-        total
-            Number of unknowns in all borders.
-        """
-        comm, ranks = self.comm, np.ones(places.size)
-        every = np.zeros(total)
-        every[places] = 1.0
-        every[:] = summed(comm, every)
-        self._merges: list[Merge] = []
-        #: The rank that this one's group is merged with the group of, after its own merges.
-        self._above: int | None = None
-        distance = 1
-        while distance < comm.size and self._above is None:
-            other = comm.rank + distance
-            if comm.rank % (2 * distance):
-                self._above = comm.rank - distance
-                comm.send((places, ranks), self._above)
-            elif other < comm.size:
-                others, of_others = comm.recv(source=other)
-                both = np.union1d(places, others)
-                here, there = np.searchsorted(both, places), np.searchsorted(both, others)
-                have = np.zeros(both.size)
-                have[here] += ranks
-                have[there] += of_others
-                done = (both < total - self.size) & (have == every[both])
-                self._merges.append(Merge(other, here, there, done))
-                places, ranks = both[~done], have[~done]
-            distance *= 2
-        self._sent = places.size
+        self._backwards = PETSc.IS().createStride(end - begin, end - 1, -1, comm=matrix.comm)
+        numbers = self.comm.allgather(begin + end - 1 - own_kept)
+        self.size = sum(part.size for part in numbers)
+        self.offset = sum(part.size for part in numbers[: self.comm.rank])
+        # MUMPS leaves the Schur complement to the first rank, and PETSc asks for its rows there.
+        own = np.concatenate(numbers)[: None if self.comm.rank == 0 else 0]
+        self._numbers = PETSc.IS().createGeneral(own, matrix.comm)
+        self._places = (
+            PETSc.IS().createGeneral(own_kept, matrix.comm),
+            PETSc.IS().createStride(end - begin, begin, 1, comm=matrix.comm),
+        )
+        #: Rows of the matrix at kept unknowns, and the matrix numbered backwards.
+        self._rows: PETSc.Mat | None = None
+        self._reordered: PETSc.Mat | None = None
+        self._ksp = PETSc.KSP().create(matrix.comm)
+        self._ksp.setOptionsPrefix(prefix)
+        self._ksp.setType("preonly")
+        pc = self._ksp.getPC()
+        pc.setType("cholesky")
+        pc.setFactorSolverType("mumps")
+        pc.setFromOptions()
 
     def factorise(self, matrix: PETSc.Mat) -> Array:
         """Eliminate; return the Schur complement, of which the other ranks have nothing.
 
-        It is symmetric, and not a number where an eliminated block is singular. Collective.
-
-        Parameters
-        ----------
-        matrix
-            Another one has the same pattern.
+        It is stored by columns, and not a number where the eliminated block is singular.
+        Collective.
 
         Raises
         ------
         InputError
             If there is too little memory.
         """
-        if self._part:
-            matrix.createSubMatrices(self._local, self._local, submats=self._part)
-        else:
-            self._divide(matrix)
-        (part,) = self._part
-        left = on_each(self.comm, self._elimination.factorise)
-        regular = summed(self.comm, self._elimination.regular) == self.comm.size
-        if not self._owned.all():
-            # An entry of two ranks counts half for each of them, and those of others not at all.
-            beyond = stride(self._inside.size, part.getSize()[0])
-            corner = entries(part.createSubMatrix(beyond, beyond)).tocoo()
-            row, column = corner.coords
-            owners = self._owned[row].astype(float) + self._owned[column]
-            left[row, column] -= (1 - owners / 2) * corner.data
-        for merge in self._merges:
-            other = np.empty((merge.size, merge.size))
-            self.comm.Recv(other, merge.other)
-            left = merge.eliminate(left, other)
-        if self._above is not None:
-            self.comm.Send(np.ascontiguousarray(left), self._above)
-            return np.zeros((0, 0))
-        return left if regular else np.full_like(left, np.nan)
+        first = self._rows is None
+        self._rows = matrix.createSubMatrix(*self._places, self._rows)
+        reordered = matrix.permute(self._backwards, self._backwards)
+        if self._reordered is None:
+            self._reordered = reordered
+        else:  # into the one that has been analysed
+            reordered.copy(self._reordered, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            reordered.destroy()
+        self._reordered.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        # On several ranks MUMPS writes the other triangle where it factorises with an old analysis.
+        if first or self.comm.size > 1:
+            self._ksp.getPC().reset()
+            self._ksp.setOperators(self._reordered)
+            self._prepare(self._ksp.getPC())
+        self._ksp.setOperators(self._reordered)
+        set_up_with_workspace(self._ksp, self._prepare)
+        if out_of_memory(self._ksp.getPC()):
+            raise no_solution(self._ksp.getPC(), self._ksp.getOptionsPrefix())
+        factor = self._ksp.getPC().getFactorMatrix()
+        factor.setMumpsIcntl(*INTERIOR_SOLVE)
+        left = _complement(factor, self.size if self.comm.rank == 0 else 0)
+        return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
 
-    def condense(self, rhs: Array, rounding: Array | float = 0.0) -> Array:
-        """Reduce owned right-hand sides, shape (owned, k), to the kept unknowns. Collective.
+    def _prepare(self, pc: PETSc.PC) -> None:
+        """Let a factorisation keep unknowns before it begins."""
+        pc.setFactorSetUpSolverType()
+        pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
+        if self.size > 0:
+            _set_kept(pc.getFactorMatrix(), self._numbers)
 
-        Parameters
-        ----------
-        rhs
-            The right-hand sides.
-        rounding
-            Values that count as zero in an interior, shape (owned, 1); a rank that has no others
-            there solves nothing.
+    def exceeds(self, rhs: Array, rounding: Array) -> bool:
+        """Tell whether an owned right-hand side is more than rounding at eliminated unknowns."""
+        beyond = np.abs(rhs) > rounding
+        beyond[self._kept] = False
+        return bool(beyond.any())
 
-        Returns
-        -------
-        Those at the kept unknowns of all ranks, the same on all, and behind them those at the
-        unknowns that this rank eliminates from borders, shape (size + n, k).
+    def interior(self, rhs: Array) -> Array:
+        """Return the solution for an owned right-hand side, the kept unknowns being 0. Collective.
+
+        It depends on no values at kept unknowns.
         """
-        left = np.zeros((self._owned.size, rhs.shape[1]))
-        left[self._owned] = rhs[self._left]
-        if (np.abs(rhs) > rounding)[self._inside].any():
-            left += self._elimination.reduce(rhs[self._inside])
-        insides = []
-        for merge in self._merges:
-            other = np.empty((merge.size, rhs.shape[1]))
-            self.comm.Recv(other, merge.other)
-            left, inside = merge.reduce(left, other)
-            insides.append(inside)
-        if self._above is not None:
-            self.comm.Send(left, self._above)
-            left = np.zeros((self.size, rhs.shape[1]))
-        return np.concatenate([summed(self.comm, left), *insides])
+        inside = rhs.copy()
+        inside[self._kept] = 0.0
+        factor = self._ksp.getPC().getFactorMatrix()
+        # PETSc refuses solves on several ranks for the sake of those with the kept unknowns too.
+        form = factor.getMumpsIcntl(SCHUR)
+        factor.setMumpsIcntl(SCHUR, 0)
+        solution = mat_solve(factor, inside[::-1, None])[::-1, 0]
+        factor.setMumpsIcntl(SCHUR, form)
+        solution[self._kept] = 0.0
+        return solution
 
-    def expand(self, rhs: Array, condensed: Array, kept: Array) -> Array:
-        """Return the owned solutions that go with values of the kept unknowns. Collective.
+    def reduce(self, rhs: Array) -> Array:
+        """Return a right-hand side at the kept unknowns, of all ranks. Collective.
 
-        Parameters
-        ----------
-        rhs, condensed
-            Right-hand sides, shape (owned, k), and their result of `condense`.
-        kept
-            Values of all ranks, shape (size, k).
+        PETSc reduces it by half a solve on one rank alone.
         """
-        left = kept
-        if self._above is not None:
-            left = np.empty((self._sent, rhs.shape[1]))
-            self.comm.Recv(left, self._above)
-        end = len(condensed)
-        for merge in reversed(self._merges):
-            inside = condensed[end - merge.eliminated : end]
-            end -= merge.eliminated
-            left, other = merge.expand(inside, left)
-            self.comm.Send(other, merge.other)
-        solution = np.empty_like(rhs)
-        inside = rhs[self._inside] - self._elimination.coupling @ left
-        solution[self._inside] = self._elimination.solve(inside)
-        solution[self._left] = left[self._owned]
+        if self.comm.size > 1:
+            return self.condense(rhs, self.interior(rhs))
+        factor = self._ksp.getPC().getFactorMatrix()
+        factor.setMumpsIcntl(*REDUCE)
+        reduced, given = factor.createVecs()
+        given.array[:] = rhs[::-1]
+        factor.solve(given, reduced)
+        factor.setMumpsIcntl(*INTERIOR_SOLVE)
+        return reduced.array[::-1][self._kept]
+
+    def condense(self, rhs: Array, interior: Array) -> Array:
+        """Return a right-hand side at the kept unknowns, of all ranks, given `interior` of it."""
+        own = rhs[self._kept] - times(self._rows, interior)
+        return np.concatenate(self.comm.allgather(own))
+
+    def expand(self, rhs: Array, kept: Array) -> Array:
+        """Return the owned solution that goes with values of the kept unknowns of all ranks."""
+        own = kept[self.offset : self.offset + self._kept.size]
+        solution = self.interior(rhs - times(self._rows, own, transposed=True))
+        solution[self._kept] = own
         return solution

@@ -161,17 +161,13 @@ def solve_step(
 
     Of solutions that differ by a free rigid motion the one with the least displacements is taken.
     """
-
-    def solved(start: State | None, linearised_at: Array | None = None) -> tuple[State, Outcome]:
-        try:
-            state, outcome = method.solve(start, linearised_at)
-        except Interrupted as interrupt:
-            state = method.state
-            outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
-        return measured(problem, state, replace(outcome, allowed=method.options.allowed))
-
-    found = solved(start, linearised_at)
-    return with_least_displacements(modes or UnconstrainedModes(problem), *found, solved)
+    try:
+        state, outcome = method.solve(start, linearised_at)
+    except Interrupted as interrupt:
+        state = method.state
+        outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
+    found = measured(problem, state, replace(outcome, allowed=method.options.allowed))
+    return with_least_displacements(modes or UnconstrainedModes(problem), *found)
 
 
 def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:

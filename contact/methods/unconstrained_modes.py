@@ -15,7 +15,7 @@ inequalities by non-negative least squares.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -280,10 +280,7 @@ def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array
 
 
 def with_least_displacements(
-    modes: UnconstrainedModes,
-    state: State,
-    outcome: Outcome,
-    again: Callable[[State], tuple[State, Outcome]] | None = None,
+    modes: UnconstrainedModes, state: State, outcome: Outcome
 ) -> tuple[State, Outcome]:
     """Take a rigid motion that costs nothing off a solution, whatever found it. Collective.
 
@@ -294,8 +291,6 @@ def with_least_displacements(
     state, outcome
         Where a method has ended; without convergence nothing is changed but where the bodies are in
         balance without any contact force.
-    again
-        Solves from a state; None where that is not wanted.
 
     Returns
     -------
@@ -322,11 +317,6 @@ def with_least_displacements(
         residuals = evaluate(problem, least)
         if not residuals.excess(outcome.allowed):
             return least, replace(outcome, kkt=residuals)
-    # Far away rounding is larger, and contact forces are known less well than here.
-    if again is not None:
-        nearer = with_least_displacements(modes, *again(replace(state, x=x)))
-        if nearer[1].converged:
-            return nearer
     return state, outcome
 
 

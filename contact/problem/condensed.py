@@ -218,11 +218,9 @@ class Condensation:
         self._bulk = ConstrainedBulk(body, self._constraint, BodyState(body.rest()))
         self._free = np.flatnonzero(self._constraint.free)
         self._matrix = self._bulk.create_matrix()
-        kept, shared = (
-            (nodes[:, None] * body.block_size + np.arange(body.block_size)).ravel()
-            for nodes in (self.nodes, body.layout.shared)
-        )
-        self._schur = SchurComplement(body.comm, kept, shared, PREFIX)
+        size = body.block_size
+        kept = (self.nodes[:, None] * size + np.arange(size)).astype(np.int32).ravel()
+        self._schur = SchurComplement(self._matrix, kept, PREFIX)
         begin = self._schur.offset
         self._own = slice(begin, begin + kept.size)
         self._kind = ""
@@ -282,10 +280,12 @@ class Condensation:
         self._rhs = body.layout.mask(restricted[: body.owned])
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
         nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
-        self._reduced = self._schur.condense(self._rhs[:, None], nothing[:, None])
+        if body.comm.allreduce(bool(self._schur.exceeds(self._rhs, nothing)), op=MPI.LOR):
+            kept = self._schur.reduce(self._rhs)
+        else:
+            kept = self._schur.condense(self._rhs, np.zeros(body.owned))
         inside = summed(body.comm, self._responses.T @ self._rhs)
         self._on_q = restricted[body.owned :][self._free] - inside
-        kept = self._reduced[: self._schur.size, 0]
         forces = self._border.T @ self._solve_q(self._on_q) - kept
         if not (self._regular and np.isfinite(forces).all()):
             return None
@@ -330,14 +330,13 @@ class Condensation:
         balance(self._matrix, body.layout)
         with petsc_options(PREFIX):
             stiffness = schur.factorise(self._matrix)
-        columns = self._bulk.columns[:, self._free]
-        self._reduced_columns = schur.condense(columns)
+        columns = self._bulk.columns[:, self._free].T
+        responses = [schur.interior(np.asarray(column)) for column in columns]
+        border = [schur.condense(*pair) for pair in zip([*columns], responses, strict=True)]
+        self._responses = np.reshape(responses, columns.shape).T
         #: Forces on q by kept unknowns, shape (free, kept).
-        self._border = self._reduced_columns[: schur.size].T
-        #: Responses to the columns where the kept unknowns are 0.
-        none = np.zeros_like(self._border.T)
-        self._responses = schur.expand(columns, self._reduced_columns, none)
-        inside = summed(body.comm, columns.T @ self._responses)
+        self._border = np.reshape(border, (self._free.size, schur.size))
+        inside = summed(body.comm, columns @ self._responses)
         corner = self._bulk.corner[np.ix_(self._free, self._free)] - inside
         self._corner = lu_factor(corner, check_finite=False) if self._free.size else None
         if body.comm.rank == 0 and self._free.size:
@@ -378,13 +377,10 @@ class Condensation:
         self.counters.linear_solves += 1
         self.counters.linear_iterations += 1
         kept = np.concatenate(self.full.comm.allgather(x - condensed.equilibrium.at))
-        moved = self._solve_q(self._on_q - self._border @ kept)
-        rhs = self._rhs - self._bulk.columns[:, self._free] @ moved
-        reduced = self._reduced[:, 0] - self._reduced_columns @ moved
-        increment = self._schur.expand(rhs[:, None], reduced[:, None], kept[:, None])[:, 0]
         q = np.zeros(self._constraint.free.size)
-        q[self._free] = moved
-        return self._constraint.expand(np.concatenate([increment, q]))
+        q[self._free] = self._solve_q(self._on_q - self._border @ kept)
+        rhs = self._rhs - self._bulk.columns @ q
+        return self._constraint.expand(np.concatenate([self._schur.expand(rhs, kept), q]))
 
 
 def condensation_pays(problem: ContactProblem, kind: str) -> bool:
