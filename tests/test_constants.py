@@ -12,8 +12,6 @@ FORMATS = {
     "TOO_SMALL",
     "OUT_OF_MEMORY",
     "INTERIOR_SOLVE",
-    "REDUCE",
-    "INVERTED",
     "SCHUR",
     "HEADER",
     "EACH",
