@@ -24,14 +24,15 @@ from scripts.benchmarks.bench_one import (
     warm,
 )
 
-#: Phase -> the end of the file's name, and the function; none of them calls another one.
+#: Phase -> the end of the file's name, and the function. None of them calls another one, but that a
+#: factorisation for a Schur complement is a set-up too.
 PHASES = {
     "assembly of matrices": ("body/equilibrium.py", "assemble"),
     "set-up of multigrid, factorisation": ("~", "<method 'setUp' of 'petsc4py.PETSc.KSP' objects>"),
     "Schur complement, factorisation": ("linear/schur.py", "factorise"),
     "contact in multigrid": ("linear/multigrid.py", "follow"),
     "iterations, solves": ("~", "<method 'solve' of 'petsc4py.PETSc.KSP' objects>"),
-    "solves with the factors": ("~", "<method 'solve' of 'petsc4py.PETSc.Mat' objects>"),
+    "solves with the factors": ("~", "<method 'matSolve' of 'petsc4py.PETSc.Mat' objects>"),
     "residual forces": ("body/loads.py", "assembled"),
     "contact laws": ("interface/complementarity.py", "linearise"),
     "iterations on the condensed problem": ("methods/newton.py", "_solve_condensed"),
