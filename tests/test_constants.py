@@ -12,6 +12,8 @@ FORMATS = {
     "TOO_SMALL",
     "OUT_OF_MEMORY",
     "INTERIOR_SOLVE",
+    "REDUCE",
+    "INVERTED",
     "SCHUR",
     "HEADER",
     "EACH",

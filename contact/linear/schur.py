@@ -17,8 +17,12 @@ from contact.linear.faults import mat_solve, no_solution, out_of_memory, set_up_
 from contact.linear.layout import times
 from contact.typing import Array
 
-#: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
-INTERIOR_SOLVE = (26, 0)
+#: MUMPS's ICNTL(26): to solve with the eliminated unknowns, the kept ones being 0; to reduce a
+#: right-hand side to the kept ones, which takes the first of the two substitutions alone.
+INTERIOR_SOLVE, REDUCE = (26, 0), (26, 1)
+
+#: PETSc's MAT_FACTOR_SCHUR_INVERTED.
+INVERTED = 2
 
 #: MUMPS's ICNTL(19): in which form it returns a Schur complement; 0 for none.
 SCHUR = 19
@@ -40,17 +44,24 @@ def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
 
 
 def _complement(factor: PETSc.Mat, size: int) -> Array:
-    """Return a copy of the Schur complement that a factorisation holds, stored by columns."""
+    """Take the Schur complement, stored by columns, out of a factorisation.
+
+    The identity is left in its place, as its inverse: PETSc multiplies reduced right-hand sides by
+    that, which so remain as they are.
+    """
     if size == 0:
         return np.zeros((0, 0))
     handle, values, status = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_int()
     held = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
     _check(_petsc.MatFactorGetSchurComplement(*held, ctypes.byref(status)))
-    _check(_petsc.MatDenseGetArrayRead(handle, ctypes.byref(values)))
+    _check(_petsc.MatDenseGetArray(handle, ctypes.byref(values)))
     pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
-    matrix = np.ctypeslib.as_array(pointer, (size, size)).copy().T
-    _check(_petsc.MatDenseRestoreArrayRead(handle, ctypes.byref(values)))
-    _check(_petsc.MatFactorRestoreSchurComplement(*held, status))
+    there = np.ctypeslib.as_array(pointer, (size, size))
+    matrix = there.copy().T
+    there[:] = 0.0
+    np.fill_diagonal(there, 1.0)
+    _check(_petsc.MatDenseRestoreArray(handle, ctypes.byref(values)))
+    _check(_petsc.MatFactorRestoreSchurComplement(*held, INVERTED))
     _mirror(matrix)
     return matrix
 
@@ -172,6 +183,21 @@ class SchurComplement:
         factor.setMumpsIcntl(SCHUR, form)
         solution[self._kept] = 0.0
         return solution
+
+    def reduce(self, rhs: Array) -> Array:
+        """Return a right-hand side at the kept unknowns, of all ranks. Collective.
+
+        PETSc reduces it by half a solve on one rank alone.
+        """
+        if self.comm.size > 1:
+            return self.condense(rhs, self.interior(rhs))
+        factor = self._ksp.getPC().getFactorMatrix()
+        factor.setMumpsIcntl(*REDUCE)
+        reduced, given = factor.createVecs()
+        given.array[:] = rhs[::-1]
+        factor.solve(given, reduced)
+        factor.setMumpsIcntl(*INTERIOR_SOLVE)
+        return reduced.array[::-1][self._kept]
 
     def condense(self, rhs: Array, interior: Array) -> Array:
         """Return a right-hand side at the kept unknowns, of all ranks, given `interior` of it."""

@@ -280,14 +280,13 @@ class Condensation:
         self._rhs = body.layout.mask(restricted[: body.owned])
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
         nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
-        interior: Array = np.zeros(body.owned)
         if body.comm.allreduce(bool(self._schur.exceeds(self._rhs, nothing)), op=MPI.LOR):
-            interior = self._schur.interior(self._rhs)
+            kept = self._schur.reduce(self._rhs)
+        else:
+            kept = self._schur.condense(self._rhs, np.zeros(body.owned))
         inside = summed(body.comm, self._responses.T @ self._rhs)
         self._on_q = restricted[body.owned :][self._free] - inside
-        forces = self._border.T @ self._solve_q(self._on_q) - self._schur.condense(
-            self._rhs, interior
-        )
+        forces = self._border.T @ self._solve_q(self._on_q) - kept
         if not (self._regular and np.isfinite(forces).all()):
             return None
         free, inclined = body.layout.at(self.nodes)

@@ -46,6 +46,7 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     assert np.allclose(stiffness, stiffness.T, rtol=0, atol=1e-13)
     rhs = body.layout.mask(body.external())
     forces = schur.condense(rhs, schur.interior(rhs))
+    assert np.allclose(schur.reduce(rhs), forces, rtol=0, atol=1e-13 * np.abs(forces).max())
     found = schur.expand(rhs, on_root(WORLD, lambda: np.linalg.solve(stiffness, forces)))
     largest = WORLD.allreduce(np.abs(whole).max(initial=0.0), op=MPI.MAX)
     assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
