@@ -1,19 +1,22 @@
-"""Primal-dual interior-point method, the last fallback of Newton's: sparse or dense.
+"""Primal-dual interior-point method, a fallback of Newton's, on whole and condensed bodies.
 
 Frictionless contact and Tresca's friction are convex. The linear systems of an interior point are
-those of a Newton step with other nodal blocks: force over slack in place of gamma. So it runs on
-whole bodies and condensed ones alike, on any number of ranks.
+those of a Newton step with other nodal blocks: along the normal, force over slack in place of
+gamma. So it runs on whole bodies and condensed ones alike, on any number of ranks.
 
-1. The friction bound is zero at first; where friction alone constrains a rigid-body mode, it is
-   above all loads.
+1. The friction bound is zero at first. Where friction alone constrains a rigid-body mode, or has to
+   balance loads on one, it is above all loads at the nodes that touch first.
 2. A step of the interior point is Mehrotra's predictor and corrector with the scaling of Nesterov
-   and Todd (`cones`), both with one matrix. Every step linearises material, layer and current.
-3. Where the duality gap is closed the active set is known; Newton's method takes the last steps.
-4. Where these have not converged, the friction bound is that of the last solution (Haslinger's
-   iteration), and the next problem begins at 2. It has a solution where this friction balances the
-   loads on rigid motions (`limit_analysis`). Where it does not, the bound is scaled once, to
-   twice its least multiple that does; where a later bound does not either, or is the last one
-   again, the method ends.
+   and Todd (`cones`), both with one matrix. Every step linearises layer and current, and the
+   material by its secant.
+3. Where the duality gap is closed the active set is known. From there, or where rounding ends the
+   steps before, Newton's method takes the last steps.
+4. Where these have not converged, or contact has moved a body aside, the friction bound becomes
+   that of the pressures found (Haslinger's fixed point on the friction bound), and the next problem
+   begins at 2. It has a solution where this friction balances the loads on rigid motions
+   (`limit_analysis`). Where it does not, the bound is scaled once, to twice its least multiple that
+   does. The method ends where no multiple does, where a later bound does not either or is the last
+   one again, where no node presses, or after a number of bounds.
 
 References
 ----------
@@ -29,7 +32,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contact.errors import InputError
+from contact.errors import InputError, SingularError
 from contact.interface.multipliers import Multipliers
 from contact.methods.cones import Cones, ConeStep
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep
@@ -94,12 +97,10 @@ def interior_point(
     finish
         Newton's method, from a state on.
     begin
-        State without contact, whose gaps the slacks start from; by default that of one linear
-        solve, where the supports constrain all modes.
+        State without contact, whose gaps the slacks start from; None where nothing but contact
+        constrains a rigid-body mode or the potential.
     """
     problem, interface = iteration.problem, iteration.problem.interface
-    if begin is None and modes.constrained_by_supports:
-        begin = whole.without_contact(problem.start(), FORCING)
     stuck = modes.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
     aside: tuple[Iterate, Outcome] | None = None
@@ -109,7 +110,10 @@ def interior_point(
         outcome, state = method.run(iteration), method.state
         iterate = Iterate(state)
         if not outcome.converged and iteration.left > 0:
-            iterate, outcome = finish(state)
+            try:
+                iterate, outcome = finish(state)
+            except SingularError:  # with another bound other nodes may hold the body
+                whole.renew()
         if outcome.converged and modes.pushed_aside(problem, iterate.state):
             aside = iterate, outcome
         elif outcome.converged or not interface.friction.acts:
@@ -153,7 +157,7 @@ class InteriorPoint:
     bound
         Friction bound, shape (n,) (stress).
     begin
-        State whose gaps the slacks start from; None where the supports do not constrain all modes.
+        State whose gaps the slacks start from; None where there is none without contact.
     """
 
     def __init__(

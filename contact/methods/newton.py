@@ -7,19 +7,22 @@
 2. A step linearises material, contact, friction, layer and current together (`newton_step`). The
    multipliers are eliminated node by node with the augmentation parameter gamma, so that one
    linear system in the unknowns of the body is left: with gamma far above the stiffness of the
-   body its solution meets u_nu = rho and u_tau = 0. Steps are taken whole, without a line search:
-   the residuals may rise while the active set changes, and the stagnation limit bounds how long.
+   body its solution nearly meets u_nu = rho where a node touches, and u_tau = 0 where it sticks.
+   The material is linearised by its tangent while the residual of equilibrium falls, else by its
+   secant (Kacanov). Steps are taken whole, without a line search: the residuals may rise while the
+   active set changes, and the stagnation limit bounds how long.
 3. Where the contact nodes are few, the body is condensed onto them first: a step then linearises
    the material, and a Newton method of its own solves contact on the Schur complement
    (`condensed_step`).
 4. The iteration ends by the residuals of the problem, computed from scratch, or by their
-   stagnation: the active sets cycle. On the whole body it also ends after a first step whose
-   penetration shows that c is far above the stiffness of the body, as on slender ones.
+   stagnation: the active sets cycle. Where the body is not condensed first, it also ends after a
+   first step whose penetration shows that c is far above the stiffness of the body, as of slender
+   ones. Loads that friction is found not to balance end the solve, without further fallbacks.
 
 Where steps on the condensed body have ended without convergence, those on the whole body follow.
 Then the state with all nodes open is tried, by one linear solve, where the supports constrain all
 rigid-body modes, and from there contact at one node more in turn (`working_set`). If neither is a
-solution the fallbacks follow, in this order:
+solution the fallbacks follow, in this order; each condensed contact problem has 1 to 3 of its own:
 
 1. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
    foundation (`continuation`);
@@ -28,11 +31,10 @@ solution the fallbacks follow, in this order:
 3. a primal-dual interior point on the same operator, which finds the active sets, with the friction
    bound updated outside, and Newton's last steps from there (`interior_point`). A converged
    solution in which contact has moved a body to where nothing constrains it, although friction
-   could, gives way to that of the interior point if there is one;
-4. the condensed body, where it has many contact nodes: its dense steps cost more than those on the
-   whole one.
+   could, gives way to that of a fallback if there is one;
+4. the condensed body, where it has so many contact nodes that it was not condensed before.
 
-The notes of the history name them.
+The notes of the history name the first three.
 
 References
 ----------
@@ -297,16 +299,15 @@ class Newton:
         if iteration.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
             # Half of the steps remain for the condensed body, where that is still to come.
-            most = iteration.options.max_outer - (0 if last else (iteration.left + 1) // 2)
-            limited = replace(iteration, options=replace(iteration.options, max_outer=most))
-            finish = partial(self.last_steps, limited)
+            iteration.reserved = 0 if last else (iteration.left + 1) // 2
             try:
                 iterate, outcome = interior_point(
-                    limited, self.whole, self._modes, finish, self._without_contact
+                    iteration, self.whole, self._modes, self.last_steps, self._without_contact
                 )
             except SingularError as error:
                 self.whole.renew()
                 singular = error
+            iteration.reserved = 0
         if not (last or outcome.converged or outcome.overloaded) and iteration.left > 0:
             logger.info("%s; going on with the condensed body", outcome.ended)
             begin = Iterate(self.problem.start())
@@ -360,9 +361,9 @@ class Newton:
         self.iteration.see(Iterate(state), residuals)
         return (Iterate(state), outcome) if outcome.converged else None
 
-    def last_steps(self, iteration: Iteration, state: State) -> tuple[Iterate, Outcome]:
+    def last_steps(self, state: State) -> tuple[Iterate, Outcome]:
         """Take Newton's last steps from the state that a fallback has reached. Collective."""
-        return NewtonLoop(iteration, self.whole).run(self.iterate_at(state), INTERIOR_POINT)
+        return NewtonLoop(self.iteration, self.whole).run(self.iterate_at(state), INTERIOR_POINT)
 
 
 def _solve_condensed(

@@ -113,6 +113,8 @@ class Iteration:
         The last iterate.
     best
         The iterate with the least residual.
+    reserved
+        Number of steps of the limit that are kept for what follows.
     """
 
     problem: Problem
@@ -120,11 +122,12 @@ class Iteration:
     history: IterationHistory
     at: Iterate
     best: Best[Iterate] = field(default_factory=Best)
+    reserved: int = 0
 
     @property
     def left(self) -> int:
         """Number of steps that are left of the limit."""
-        return self.options.max_outer - len(self.history.records)
+        return self.options.max_outer - self.reserved - len(self.history.records)
 
     def see(self, iterate: Iterate, residuals: Residuals) -> None:
         """Take note of an iterate."""

@@ -1,6 +1,6 @@
 """What Newton's method falls back on, and what is left where nothing helps."""
 
-from functools import partial
+import signal
 from typing import Any, Literal
 
 import numpy as np
@@ -16,7 +16,8 @@ from contact.methods.cones import Cones
 from contact.methods.interior_point import interior_point
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.methods.report import Outcome
+from contact.methods.report import Outcome, Record
+from contact.methods.signals import Interrupted
 from contact.problem.residuals import Residuals, evaluate
 from contact.solving import solve
 from forms.laws import ConstantCoefficient
@@ -58,10 +59,29 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     state, outcome = Newton(problem, NewtonOptions()).solve()
     assert outcome.converged
     method = Newton(problem, NewtonOptions(condense=False))
-    finish = partial(method.last_steps, method.iteration)
-    found, outcome = interior_point(method.iteration, method.whole, method._modes, finish)
+    found, outcome = interior_point(
+        method.iteration, method.whole, method._modes, method.last_steps
+    )
     assert outcome.converged, outcome.reason
     assert found.state.near(state, rtol=1e-6, atol=1e-9)
+
+
+def test_what_an_interior_point_has_reached_is_kept_when_it_is_interrupted():
+    """The state from before it was handed on."""
+    problem = mechanics.bar(SELF, 8, -0.05, friction=COULOMB)
+    seen = []
+
+    def interrupt(record: Record) -> None:
+        if record.note.startswith("interior point"):
+            seen.append(record)
+        if len(seen) == 5:
+            raise Interrupted(signal.SIGTERM)
+
+    options = NewtonOptions(max_iterations=2, condense=False)
+    method = Newton(problem, options, monitor=interrupt)
+    with pytest.raises(Interrupted):
+        method.solve()
+    assert evaluate(problem, method.state).equilibrium == seen[-1].kkt.equilibrium
 
 
 def interior(
@@ -71,8 +91,11 @@ def interior(
     problem = build_problem(parse_case(case), SELF)
     state, _ = Newton(problem, NewtonOptions()).solve()
     method = Newton(problem, NewtonOptions(condense=False, linear=linear))
-    finish = partial(method.last_steps, method.iteration)
-    found, outcome = interior_point(method.iteration, method.whole, method._modes, finish)
+    supported = method._modes.constrained_by_supports
+    begin = method.whole.without_contact(problem.start()) if supported else None
+    found, outcome = interior_point(
+        method.iteration, method.whole, method._modes, method.last_steps, begin
+    )
     return outcome, found.state.near(state, rtol=1e-6, atol=atol)
 
 
