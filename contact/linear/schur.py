@@ -1,7 +1,7 @@
 """Static condensation: a dense Schur complement at kept nodes.
 
-It is made by a sparse factorisation of MUMPS that stops before them. In 2-D the kept nodes are so
-few that the dense matrix has about as many entries as the mesh has nodes.
+MUMPS makes it in a sparse factorisation that leaves out the kept unknowns. In 2-D the kept nodes
+are so few that the dense matrix has about as many entries as the mesh has nodes.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from contact._compat import lasting
 from contact.linear.faults import mat_solve, no_solution, out_of_memory, set_up_with_workspace
 from contact.linear.layout import times
+from contact.ranks import on_each
 from contact.typing import Array
 
 #: MUMPS's ICNTL(26): to solve with the eliminated unknowns, the kept ones being 0; to reduce a
@@ -46,8 +47,8 @@ def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
 def _complement(factor: PETSc.Mat, size: int) -> Array:
     """Take the Schur complement, stored by columns, out of a factorisation.
 
-    The identity is left in its place, as its inverse: PETSc multiplies reduced right-hand sides by
-    that, which so remain as they are.
+    PETSc multiplies the right-hand sides that MUMPS reduces by the inverse of the one it holds. The
+    identity is left there, so that they remain as they are.
     """
     if size == 0:
         return np.zeros((0, 0))
@@ -122,10 +123,9 @@ class SchurComplement:
         pc.setFromOptions()
 
     def factorise(self, matrix: PETSc.Mat) -> Array:
-        """Eliminate; return the Schur complement, of which the other ranks have nothing.
+        """Eliminate; return the Schur complement on rank 0, on the others nothing. Collective.
 
-        It is stored by columns, and not a number where the eliminated block is singular.
-        Collective.
+        It is stored by columns; its entries are NaN where the eliminated block is singular.
 
         Raises
         ------
@@ -152,7 +152,8 @@ class SchurComplement:
             raise no_solution(self._ksp.getPC(), self._ksp.getOptionsPrefix())
         factor = self._ksp.getPC().getFactorMatrix()
         factor.setMumpsIcntl(*INTERIOR_SOLVE)
-        left = _complement(factor, self.size if self.comm.rank == 0 else 0)
+        size = self.size if self.comm.rank == 0 else 0
+        left = on_each(self.comm, lambda: _complement(factor, size))
         return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
 
     def _prepare(self, pc: PETSc.PC) -> None:
@@ -163,7 +164,7 @@ class SchurComplement:
             _set_kept(pc.getFactorMatrix(), self._numbers)
 
     def exceeds(self, rhs: Array, rounding: Array) -> bool:
-        """Tell whether an owned right-hand side is more than rounding at eliminated unknowns."""
+        """Tell whether this rank's right-hand side exceeds rounding at eliminated unknowns."""
         beyond = np.abs(rhs) > rounding
         beyond[self._kept] = False
         return bool(beyond.any())
@@ -185,9 +186,9 @@ class SchurComplement:
         return solution
 
     def reduce(self, rhs: Array) -> Array:
-        """Return a right-hand side at the kept unknowns, of all ranks. Collective.
+        """Return a right-hand side reduced to the kept unknowns, those of all ranks. Collective.
 
-        PETSc reduces it by half a solve on one rank alone.
+        In runs on one rank that is half a solve; PETSc has none on several.
         """
         if self.comm.size > 1:
             return self.condense(rhs, self.interior(rhs))
@@ -200,12 +201,12 @@ class SchurComplement:
         return reduced.array[::-1][self._kept]
 
     def condense(self, rhs: Array, interior: Array) -> Array:
-        """Return a right-hand side at the kept unknowns, of all ranks, given `interior` of it."""
+        """Reduce a right-hand side as `reduce`, given `interior` of it. Collective."""
         own = rhs[self._kept] - times(self._rows, interior)
         return np.concatenate(self.comm.allgather(own))
 
     def expand(self, rhs: Array, kept: Array) -> Array:
-        """Return the owned solution that goes with values of the kept unknowns of all ranks."""
+        """Return the owned solution, given that at the kept unknowns of all ranks. Collective."""
         own = kept[self.offset : self.offset + self._kept.size]
         solution = self.interior(rhs - times(self._rows, own, transposed=True))
         solution[self._kept] = own

@@ -114,7 +114,7 @@ class Iteration:
     best
         The iterate with the least residual.
     reserved
-        Number of steps of the limit that are kept for what follows.
+        Number of steps of the limit that are kept for later stages.
     """
 
     problem: Problem
