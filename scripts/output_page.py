@@ -20,7 +20,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "output.md"
 INTRODUCTION = """\
 # Output files
 
-<!-- Made by `python3 -m scripts.output_page`; edit contact/output/quantities.py instead. -->
+<!-- Made by `python3 -m scripts.output_page`; its entries are in contact/output. -->
 
 `contact solve CASE.toml --out DIR` writes into DIR:
 

@@ -15,8 +15,8 @@ gamma. So it runs on whole bodies and condensed ones alike, on any number of ran
    that of the pressures found (Haslinger's fixed point on the friction bound), and the next problem
    begins at 2. It has a solution where this friction balances the loads on rigid motions
    (`limit_analysis`). Where it does not, the bound is scaled once, to twice its least multiple that
-   does. The method ends where no multiple does, where a later bound does not either or is the last
-   one again, where no node presses, or after a number of bounds.
+   does. The method ends where no multiple does, where a later bound does not either, where nothing
+   presses on a body that contact has moved aside, or after a number of bounds.
 
 References
 ----------
@@ -37,7 +37,7 @@ from contact.interface.multipliers import Multipliers
 from contact.methods.cones import Cones, ConeStep
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep
 from contact.methods.report import Outcome
-from contact.methods.stagnation import PROGRESS, Stagnation
+from contact.methods.stagnation import PROGRESS
 from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
 from contact.problem.protocols import Problem
 from contact.problem.residuals import evaluate, evaluate_forces, residual_forces
@@ -125,13 +125,9 @@ def interior_point(
             state = iterate.state
         best = min(best, outcome.kkt.significant)
         nodal = interface.jump.apply(state.x)
-        last, bound = bound, interface.bound(nodal, state.forces)
-        # Pressures that are rounding bear no friction, with which the steps would come to no end.
-        bound = np.where(bound > interface.rounding(nodal), bound, 0.0)
-        # Where all nodes are open, a problem without friction has the same solution.
-        if aside is not None and interface.jump.maximum(bound) == 0:
-            break
-        if interface.jump.maximum(np.abs(bound - last)) == 0:
+        bound = interface.bound(nodal, state.forces)
+        # Where all nodes are open, the next bound is zero and has the same solution.
+        if aside is not None and interface.jump.maximum(bound) <= interface.rounding(nodal):
             break
         multiple = modes.overload(bound)
         if multiple == np.inf or (raised and multiple > 1):
@@ -202,7 +198,6 @@ class InteriorPoint:
         """Take steps until the duality gap is closed. Collective."""
         kkt, self._internal = evaluate_forces(self.problem, self.state)
         ended = "the interior point was given no step"
-        stagnation = Stagnation(iteration.options.stagnation_limit, PROGRESS, cumulative=True)
         for steps in range(1, min(LIMIT, iteration.left) + 1):
             try:
                 taken = self.step()
@@ -226,9 +221,6 @@ class InteriorPoint:
                 kkt.equilibrium <= max(FORCING, kkt.floors[0]) or gap <= CLOSED**2
             ):
                 ended = f"duality gap closed after {steps} steps"
-                break
-            if stagnation(self.cones.duality_gap()):
-                ended = f"the duality gap stalls after {steps} steps"
                 break
         return Outcome(kkt, iteration.options.allowed, ended)
 
