@@ -195,7 +195,7 @@ def linearise(
     before: ActiveSet | None,
     softening: float = np.inf,
 ) -> LinearisedContact:
-    """Linearise the contact laws at an iterate. Collective.
+    """Linearise the complementarity functions at an iterate. Collective.
 
     Parameters
     ----------

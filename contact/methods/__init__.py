@@ -1,7 +1,8 @@
 """Solution methods: each takes an initial guess of a problem to a `State` and its `Outcome`.
 
 `newton` is the semismooth Newton method (primal-dual active set) with its order of fallbacks:
-`working_set`, `continuation`, `unconstrained_modes`, `interior_point`. `newton_loop` iterates its
+all nodes open and a `working_set`, then `continuation`, `unconstrained_modes`, `interior_point`,
+and the condensed body where that was not the first. `newton_loop` iterates its
 steps: `newton_step` on the whole body, `condensed_step` on the body condensed onto its contact
 nodes, with `chord` steps. `thesis` has fixed points, Uzawa block relaxation and penalty, on which
 Newton's method does not fall back; `load_stepping` is the quasi-static load stepping around any

@@ -23,7 +23,7 @@ RADIUS = 0.05
 
 
 class Chord:
-    """Decides by the residuals whether the next step is a chord step: keeps the factorisation.
+    """Decides by the residuals whether the next step is a chord step, which needs no factorisation.
 
     All ranks decide alike.
 

@@ -1,6 +1,7 @@
 """Parameters c and gamma of the complementarity functions, and r of the Uzawa block relaxation.
 
-All are stiffnesses (stress/length) of a block that has the height of the body.
+All are stiffnesses (stress/length). c and r are those of a block that has the height of the body;
+gamma is the option `gamma`, which has no unit, times the larger one of c and a node's stiffness.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ def automatic_r(scales: Scales) -> float:
     """Return r* = 1.39 E'/sqrt(h H), the geometric mean of the Steklov spectrum's ends.
 
     E' = E/(1 - nu^2); h is the spacing of the contact nodes and H the volume of the body over
-    the area of Gamma_3. Good to a factor of a few, which acceleration makes up for.
+    the area of Gamma_3. The best r differs by a factor of a few; acceleration makes up for that.
     """
     return 1.39 * scales.plane_modulus / math.sqrt(scales.spacing * scales.height)
 
@@ -32,8 +33,9 @@ def automatic_r(scales: Scales) -> float:
 def complementarity_parameters(scales: Scales, gamma: float) -> ComplementarityParameters:
     """Return parameters that fit a body and its mesh, in any units.
 
-    A mode of Gamma_3 as long as the body is high has the stiffness E'/H, and with r* in the
-    middle, one as short as an element has r*^2 H/E'.
+    Displacements of Gamma_3 that vary over the height H of the body meet the stiffness E'/H, the
+    least one, and those that vary from node to node r*^2 H/E', the largest: r* is their geometric
+    mean.
     """
     middle = automatic_r(scales)
     nodal = middle**2 * scales.height / scales.plane_modulus

@@ -210,8 +210,9 @@ def predicted(
 ) -> tuple[State, Array | None]:
     """Return the initial guess of a step, by extrapolation of the last two. Collective.
 
-    Where loads turn the last solution is none: the material is linearised there first, with the
-    prescribed values as an increment. They would strain the elements beside them alone.
+    Where loads turn round there is nothing to extrapolate. The material is then linearised at the
+    last solution first, with the change of the prescribed values as an increment: set at once, they
+    would strain the elements beside them alone.
 
     Parameters
     ----------

@@ -141,7 +141,7 @@ class Outcome:
     allowed
         How large each of them may be.
     ended
-        Why the method ended, in words; nothing where it has converged.
+        Why the method ended, in words; empty where nothing but convergence ended it.
     signal
         Number of the signal that ended it; 0 for none.
     criterion

@@ -3,8 +3,9 @@
 A body that bends over a gap mostly touches at one node, but without contact most of its nodes
 penetrate: active sets of all these cycle. Contact is therefore stated at the node of largest
 penetration alone, and at one more in turn while others penetrate, as a dual active set method
-adds the constraint that is violated most. Each of these problems is solved by Newton's method. An
-interior point takes fewer steps where a node does not halve the number of those that penetrate.
+adds the constraint that is violated most. Each of these problems is solved by Newton's method.
+Where one more node does not halve the number of those that penetrate, the working set is given up:
+an interior point then takes fewer steps.
 
 References
 ----------

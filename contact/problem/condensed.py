@@ -1,4 +1,4 @@
-"""A contact problem with its body condensed onto the contact nodes.
+"""Static condensation: a contact problem with its body condensed onto the contact nodes.
 
 Once the material is linearised, only the unknowns at Gamma_3 are left to be found: the
 Schur complement of the body takes the place of its operator, and every method that solves a

@@ -1,8 +1,8 @@
 """Acceleration of the Uzawa block relaxation by minimising the residual over all solves so far.
 
 Every solve leaves a pair of contact forces and displacements that are in equilibrium, and so
-is every affine combination of such pairs: only the contact laws are nonlinear. The method
-therefore looks for the combination that meets the contact laws best, which costs no linear
+is every affine combination of such pairs: only complementarity is nonlinear. The method
+therefore looks for the combination that meets it best, which costs no linear
 solve, and takes the next step of the Uzawa block relaxation from there. Once the nodes in contact
 are the right ones this is GMRES with all solves as its Krylov space, also those that were
 made while the nodes were still wrong.
@@ -37,7 +37,7 @@ class ResidualMinimiser:
         Global inner products: maps two matrices (m, k) and (m, l) of local values to the
         (k, l) matrix of sums over all ranks.
     project
-        P: the contact forces that the contact laws give for z, shape (..., m).
+        P: the projections of z, the next contact forces, shape (..., m).
     derivative
         Maps z and directions, shape (m, k), to the directional derivatives of P, (m, k).
     depth

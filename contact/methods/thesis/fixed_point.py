@@ -1,4 +1,4 @@
-"""The outer loop of Algorithms 1, 4, 6 and 8: a fixed point over Uzawa block relaxation.
+"""Method `uzawa`, the outer loop of Algorithms 1, 4, 6 and 8: fixed point, Uzawa block relaxation.
 
 Elastic and piezoelectric bodies, rigid and compliant foundations differ in the terms that are
 frozen:

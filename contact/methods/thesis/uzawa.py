@@ -1,11 +1,11 @@
 """Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
 
 One step solves for u, projects the auxiliary variables phi and updates the multipliers
-lambda, (3.34)-(3.36): the alternating direction method of multipliers. Everything that it hands on
-is lambda + r u: the next multiplier is its projection, and r phi the difference to it. The step is
-therefore a fixed-point map, which `acceleration` speeds up. Its variable is
-z = lambda + r (u - u_0), with the iterate's u_0: beside slips of the whole load a lambda that is
-unloaded to 1e-12 of it would be lost in rounding.
+lambda, (3.34)-(3.36): the alternating direction method of multipliers. The next step needs only
+lambda + r u of it: the next multiplier is the projection of that sum, and r phi the rest. The step
+is therefore a fixed-point map, which `acceleration` speeds up. Its variable is
+z = lambda + r (u - u_0), with the displacement u_0 at the start: a small lambda beside a large slip
+would be lost in rounding.
 
 References
 ----------
