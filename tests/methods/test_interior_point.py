@@ -11,6 +11,7 @@ from contact.body.rigid import rigid_motions
 from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
+from contact.errors import SingularError
 from contact.interface.friction import Friction
 from contact.methods.cones import Cones
 from contact.methods.interior_point import interior_point
@@ -64,6 +65,23 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     )
     assert outcome.converged, outcome.reason
     assert found.state.near(state, rtol=1e-6, atol=1e-9)
+
+
+def test_a_singular_matrix_in_the_last_steps_leaves_another_bound():
+    """It ended the solve, though with the next friction bound there is a solution."""
+    problem = mechanics.bar(SELF, 8, -0.05, friction=COULOMB)
+    method = Newton(problem, NewtonOptions(condense=False))
+    failed = []
+
+    def finish(state):
+        if not failed:
+            failed.append(state)
+            raise SingularError("the linear system is singular", "singular")
+        return method.last_steps(state)
+
+    begin = method.whole.without_contact(problem.start())
+    _, outcome = interior_point(method.iteration, method.whole, method._modes, finish, begin)
+    assert failed and outcome.converged
 
 
 def test_what_an_interior_point_has_reached_is_kept_when_it_is_interrupted():

@@ -4,7 +4,7 @@ One step solves for u, projects the auxiliary variables phi and updates the mult
 lambda, (3.34)-(3.36): the alternating direction method of multipliers. The next step needs only
 lambda + r u of it: the next multiplier is the projection of that sum, and r phi the rest. The step
 is therefore a fixed-point map, which `acceleration` speeds up. Its variable is
-z = lambda + r (u - u_0), with the displacement u_0 at the start: a small lambda beside a large slip
+z = lambda + r (u - u_0), with u_0 of the outer iterate: a small lambda beside a large slip
 would be lost in rounding.
 
 References
