@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -13,7 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 from contact.errors import InputError
 from contact.typing import Array
 
+P = ParamSpec("P")
 T = TypeVar("T")
+
+
+class OnRanks(Protocol):
+    """An object of which each rank has a part."""
+
+    comm: MPI.Intracomm
+
+
+S = TypeVar("S", bound=OnRanks)
 
 
 @contextmanager
@@ -32,6 +43,17 @@ def on_all_ranks(comm: MPI.Intracomm) -> Iterator[None]:
     for known in (failure, *failures):
         if known is not None:
             raise known
+
+
+def together(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[S, P], T]:
+    """Let the error of a method on one rank be that of all, which makes it collective."""
+
+    @wraps(method)
+    def called(self: S, *args: P.args, **kwargs: P.kwargs) -> T:
+        with on_all_ranks(self.comm):
+            return method(self, *args, **kwargs)
+
+    return called
 
 
 def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:

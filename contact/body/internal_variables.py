@@ -27,6 +27,7 @@ from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.geometry import geometry_nodes, measures
+from contact.ranks import on_all_ranks, together
 from contact.typing import Array
 from forms.hencky import FormLaw, Graded, Law
 from forms.history import (
@@ -66,6 +67,8 @@ class QuadratureLaws:
 
     Attributes
     ----------
+    comm
+        Communicator of the mesh.
     initial
         The variables in the reference configuration; None without any.
 
@@ -85,6 +88,7 @@ class QuadratureLaws:
         pointwise: Pointwise,
         fitted: int,
     ) -> None:
+        self.comm = domain.comm
         self._domain, self._degree, self._pointwise = domain, degree, pointwise
         self._kinematics = kinematics
         self._size, self._fitted = components(domain.dim), fitted
@@ -93,7 +97,7 @@ class QuadratureLaws:
         mesh = domain.mesh
         self._owned = mesh.topology.index_map(mesh.topology.dim).size_local
         for law, _ in self._laws:
-            check_law(law, self._size, domain.comm)
+            check_law(law, self._size, self.comm)
         #: With which variables, kind and unknowns the forms' functions were evaluated last.
         self._seen: tuple[InternalVariables | None, str, Array] | None = None
         self.initial: InternalVariables | None = None
@@ -230,8 +234,9 @@ class QuadratureLaws:
             by_cell = self.by_cell(into[name])
             by_cell[cells] = found.reshape(by_cell[cells].shape)
 
+    @together
     def set(self, state: Evaluated, kind: str = "") -> None:
-        """Let the forms of the laws look at the response at a state from now on."""
+        """Let the forms of the laws look at the response at a state from now on. Collective."""
         before = self.of(state)
         if before is None:
             return
@@ -247,6 +252,7 @@ class QuadratureLaws:
                 _fill(self._stiffness, cells, response.stiffness)
         self._seen = before, kind, state.x.copy()
 
+    @together
     def commit(self, state: Evaluated) -> InternalVariables | None:
         """Return the variables at the end of the step that led to a state. Collective."""
         before = self.of(state)
@@ -268,6 +274,7 @@ class QuadratureLaws:
             changed = self._at(change.arrays, law, cells)
             yield cells, differential(law, strains, variables, way, changed)
 
+    @together
     def commit_along(
         self, state: Evaluated, along: Array, change: InternalVariables
     ) -> InternalVariables:
@@ -285,6 +292,7 @@ class QuadratureLaws:
             self._put(arrays, cells, found.variables)
         return change.replaced(arrays)
 
+    @together
     def before_along(self, state: Evaluated, change: InternalVariables) -> None:
         """Let the forms look at how the stresses change with the variables before a step.
 
@@ -298,6 +306,7 @@ class QuadratureLaws:
         for cells, found in self._differentials(state, np.zeros_like(state.x), change):
             _fill(self._stress, cells, found.stress)
 
+    @together
     def commit_transposed(self, state: Evaluated, after: InternalVariables) -> None:
         """Let the forms look at the stresses whose forces are those of the variables' derivatives.
 
@@ -318,6 +327,7 @@ class QuadratureLaws:
             volume = volumes[cells].ravel()
             _fill(self._stress, cells, by_strain / volume[:, None])
 
+    @together
     def before_transposed(
         self, state: Evaluated, along: Array, after: InternalVariables | None
     ) -> InternalVariables | None:
@@ -373,13 +383,14 @@ class QuadratureLaws:
     def energies(self, state: Evaluated) -> tuple[float, float | None]:
         """Return the energy lost in a step, and that stored at its end, if stated. Collective."""
         sums, stated, volumes = np.zeros(2), self.initial is not None, self.by_cell(self.volumes)
-        for cells, response in self._responses(state):
-            stated = stated and response.energy is not None
-            for k, values in enumerate((response.dissipation, response.energy)):
-                if values is not None:
-                    sums[k] += volumes[cells].ravel() @ values
-        lost, stored = map(float, self._domain.comm.allreduce(sums, op=MPI.SUM))
-        return lost, stored if self._domain.comm.allreduce(stated, op=MPI.LAND) else None
+        with on_all_ranks(self.comm):
+            for cells, response in self._responses(state):
+                stated = stated and response.energy is not None
+                for k, values in enumerate((response.dissipation, response.energy)):
+                    if values is not None:
+                        sums[k] += volumes[cells].ravel() @ values
+        lost, stored = map(float, self.comm.allreduce(sums, op=MPI.SUM))
+        return lost, stored if self.comm.allreduce(stated, op=MPI.LAND) else None
 
     def silence(self) -> None:
         """Let the forms see no stress of the laws."""
@@ -416,6 +427,7 @@ class QuadratureLaws:
         element = basix.ufl.element("DG", cell, self._fitted)
         return np.linalg.pinv(element.tabulate(0, self.points)[0])
 
+    @together
     def secant_shear(self, state: Evaluated) -> Array:
         """Return the means of the secant shear modulus in the owned cells, 0 without history."""
         found = np.zeros(self._owned)
@@ -424,6 +436,7 @@ class QuadratureLaws:
             found[cells] = response.stiffness[:, -1, -1].reshape(cells.size, -1).mean(axis=1) / 2
         return found
 
+    @together
     def fit(self, state: Evaluated) -> None:
         """Let `fits` be those at the end of the step that led to a state."""
         fits = self.fits

@@ -161,15 +161,15 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     friction where it slips.
     """
     problem, body = solution.problem, solution.problem.equilibrium
-    loose = [(group, null_space(group.supports)) for group in groups(problem)]
-    loose = [(group, free) for group, free in loose if free.shape[1] > 0]
-    if not (solution.converged and loose):
+    unheld = [(group, null_space(group.supports)) for group in groups(problem)]
+    unheld = [(group, free) for group, free in unheld if free.shape[1] > 0]
+    if not (solution.converged and unheld):
         return
     residual = body.unbalanced(residual_forces(problem, solution.state))
     left = float(np.linalg.norm(body.norms(residual)[0]))
     whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
     largest, kkt = solution.max_displacement, solution.outcome.kkt
-    for group, free in loose:
+    for group, free in unheld:
         shares, motions = _least_held(solution, group, free, solution.status != "open")
         share, motion = shares[0], motions[:, 0]
         # All that cost nothing, or the one that costs least.

@@ -267,6 +267,20 @@ def test_a_law_that_fails_at_larger_strains_is_named():
         next(evolve(problem, [1.0]))
 
 
+@pytest.mark.parallel(2)
+def test_the_error_of_a_law_on_one_rank_ends_the_others():
+    """They waited for it for ever."""
+    law = Other(
+        YOUNG,
+        POISSON,
+        changed=lambda r: r if np.abs(r.stress).max() < 1e-3 else 1 / 0,
+        everywhere=False,
+    )
+    problem = build_problem(case(cells=2, stages=1), MPI.COMM_WORLD, law=law)
+    with pytest.raises(InputError, match=r"^Other: respond: the function raises ZeroDivisionError"):
+        next(evolve(problem, [1.0]))
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
