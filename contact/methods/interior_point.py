@@ -201,7 +201,10 @@ class InteriorPoint:
         for steps in range(1, min(LIMIT, iteration.left) + 1):
             try:
                 taken = self.step()
-            except InputError:
+            except InputError as error:
+                # Its matrices tend to singular ones; too little memory is nothing of its own.
+                if error.identifier == "memory":
+                    raise
                 self._whole.renew()
                 taken = False
             kkt, self._internal = evaluate_forces(self.problem, self.state)

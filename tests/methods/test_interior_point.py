@@ -11,7 +11,7 @@ from contact.body.rigid import rigid_motions
 from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
-from contact.errors import SingularError
+from contact.errors import InputError, SingularError
 from contact.interface.friction import Friction
 from contact.methods.cones import Cones
 from contact.methods.interior_point import interior_point
@@ -82,6 +82,20 @@ def test_a_singular_matrix_in_the_last_steps_leaves_another_bound():
     begin = method.whole.without_contact(problem.start())
     _, outcome = interior_point(method.iteration, method.whole, method._modes, finish, begin)
     assert failed and outcome.converged
+
+
+def test_too_little_memory_in_an_interior_point_is_said(monkeypatch):
+    """It counted as the end of its digits."""
+    problem = mechanics.bar(SELF, 8, -0.05, friction=COULOMB)
+    method = Newton(problem, NewtonOptions(condense=False))
+    begin = method.whole.without_contact(problem.start())
+
+    def exhausted(self):
+        raise InputError("out of memory in the factorisation", "memory")
+
+    monkeypatch.setattr("contact.methods.interior_point.InteriorPoint.step", exhausted)
+    with pytest.raises(InputError, match="out of memory"):
+        interior_point(method.iteration, method.whole, method._modes, method.last_steps, begin)
 
 
 def test_what_an_interior_point_has_reached_is_kept_when_it_is_interrupted():

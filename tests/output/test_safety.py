@@ -184,6 +184,7 @@ def test_signals_while_writing_leave_one_of_the_runs_whole(
         end = time.monotonic() + 60
         while not (out / STAGE).exists() and process.poll() is None and time.monotonic() < end:
             time.sleep(0.002)
+        assert process.poll() is None  # else no signal meets it
         time.sleep(delay)
         process.send_signal(kind)
         process.wait(timeout=60)
