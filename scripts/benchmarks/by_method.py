@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from contact import Case, build_problem, load_case, solve
@@ -46,8 +47,10 @@ def measured(case: Case) -> dict[str, Any]:
     """Solve a case; return its costs."""
     problem = build_problem(case)
     begin = time.process_time()
-    nested = isinstance(case.solver, NewtonOptions) and case.solver.nested
-    solution = solve(problem, case.solver, start=nested_start(case, problem) if nested else None)
+    settings, start = case.solver, None
+    if isinstance(settings, NewtonOptions) and settings.nested:
+        settings, start = replace(settings, nested=None), nested_start(case, problem)
+    solution = solve(problem, settings, start=start)
     counters = solution.counters
     return {
         "converged": solution.converged,

@@ -6,8 +6,10 @@ import pytest
 
 import contact
 from scripts.benchmarks import bench
+from scripts.benchmarks.by_method import measured
 from scripts.benchmarks.pages import summary, write_memory, write_page
 from scripts.benchmarks.phases import PHASES
+from scripts.cases import bar
 from scripts.reporting import Report
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -78,3 +80,9 @@ def test_tables_that_are_not_measured_stay_on_the_page(tmp_path):
     assert once.count("Measured on ") == 3
     write_page(tmp_path / "nothing", names, page)
     assert page.read_text() == once
+
+
+def test_a_case_may_ask_for_a_nested_start():
+    """The benchmark handed a problem on with it, which `solve` refuses."""
+    row = measured(bar(8, -0.005, 1e5, "solver.nested=true"))
+    assert row["converged"]
