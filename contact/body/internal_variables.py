@@ -294,7 +294,7 @@ class QuadratureLaws:
 
     @together
     def before_along(self, state: Evaluated, change: InternalVariables) -> None:
-        """Let the forms look at how the stresses change with the variables before a step.
+        """Let the forms look at how stresses change with the variables before a step. Collective.
 
         Parameters
         ----------
@@ -309,6 +309,8 @@ class QuadratureLaws:
     @together
     def commit_transposed(self, state: Evaluated, after: InternalVariables) -> None:
         """Let the forms look at the stresses whose forces are those of the variables' derivatives.
+
+        Collective.
 
         Parameters
         ----------
@@ -429,7 +431,7 @@ class QuadratureLaws:
 
     @together
     def secant_shear(self, state: Evaluated) -> Array:
-        """Return the means of the secant shear modulus in the owned cells, 0 without history."""
+        """Return the mean secant shear moduli of owned cells, 0 without history. Collective."""
         found = np.zeros(self._owned)
         for cells, response in self._responses(state, "secant"):
             assert response.stiffness is not None
@@ -438,7 +440,7 @@ class QuadratureLaws:
 
     @together
     def fit(self, state: Evaluated) -> None:
-        """Let `fits` be those at the end of the step that led to a state."""
+        """Let `fits` be those at the end of the step that led to a state. Collective."""
         fits = self.fits
         for cells, response in self._responses(state):
             for name, values in {**response.variables, "stress": response.stress}.items():

@@ -202,7 +202,7 @@ class InteriorPoint:
             try:
                 taken = self.step()
             except InputError as error:
-                # Its matrices tend to singular ones; too little memory is nothing of its own.
+                # At its end the matrices are singular but for rounding; memory is another matter.
                 if error.identifier == "memory":
                     raise
                 self._whole.renew()

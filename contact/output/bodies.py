@@ -161,9 +161,11 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     friction where it slips.
     """
     problem, body = solution.problem, solution.problem.equilibrium
-    unheld = [(group, null_space(group.supports)) for group in groups(problem)]
-    unheld = [(group, free) for group, free in unheld if free.shape[1] > 0]
-    if not (solution.converged and unheld):
+    if not solution.converged:
+        return
+    motions_left = [(group, null_space(group.supports)) for group in groups(problem)]
+    unheld = [(group, free) for group, free in motions_left if free.shape[1] > 0]
+    if not unheld:
         return
     residual = body.unbalanced(residual_forces(problem, solution.state))
     left = float(np.linalg.norm(body.norms(residual)[0]))
