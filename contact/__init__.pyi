@@ -36,17 +36,17 @@ from contact.interface.obstacle import Punch as Punch
 from contact.interface.obstacle import Shape as Shape
 from contact.interface.obstacle import Sphere as Sphere
 from contact.interface.obstacle import Triangles as Triangles
+from contact.io.files import write_outputs as write_outputs
+from contact.io.formats import read_data as read_data
 from contact.mesh.domain import Domain as Domain
 from contact.mesh.reader import from_file as from_file
 from contact.mesh.reader import from_msh as from_msh
 from contact.methods.options import FixedPointOptions as FixedPointOptions
 from contact.methods.options import NewtonOptions as NewtonOptions
 from contact.methods.options import PenaltyOptions as PenaltyOptions
-from contact.output.files import write_outputs as write_outputs
-from contact.output.formats import read_data as read_data
-from contact.output.solution import Solution as Solution
 from contact.problem.contact import Contact as Contact
 from contact.problem.problem import ContactProblem as Problem  # noqa: F401
+from contact.results.solution import Solution as Solution
 from contact.solving import NotConvergedError as NotConvergedError
 from contact.solving import SolveInterrupted as SolveInterrupted
 from contact.solving import evolve as evolve

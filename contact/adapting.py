@@ -15,13 +15,13 @@ from contact.mesh.domain import Domain, Indices
 from contact.mesh.transfer import with_parents
 from contact.methods.report import tell
 from contact.nesting import prolong
-from contact.output.error_estimate import estimated
-from contact.output.intervals import intervals
-from contact.output.quantities import values_of
-from contact.output.quantity import ADAPT
-from contact.output.solution import Remark, Solution
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.results.error_estimate import estimated
+from contact.results.intervals import intervals
+from contact.results.quantities import values_of
+from contact.results.quantity import ADAPT
+from contact.results.solution import Remark, Solution
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 

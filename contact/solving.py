@@ -32,6 +32,7 @@ from contact.case.digest import check_restart, digest
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
+from contact.io.checkpoint import Checkpoints, read_steps
 from contact.methods.load_stepping import LoadStepping, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
@@ -39,16 +40,15 @@ from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import IterationHistory, Monitor, Outcome, tell
 from contact.methods.signals import SIGNALLED, stop_on_signal
 from contact.nesting import default_start, nested_start
-from contact.output.checkpoint import Checkpoints, read_steps
-from contact.output.fields import check_variables
-from contact.output.remarks import announce
-from contact.output.solution import Solution, StepRecord, StepRecorder
-from contact.output.uniqueness import uniqueness
 from contact.problem.checks import check_potential, check_problem, check_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.problem.state import State
 from contact.ranks import on_root
+from contact.results.fields import check_variables
+from contact.results.remarks import announce
+from contact.results.solution import Solution, StepRecord, StepRecorder
+from contact.results.uniqueness import uniqueness
 from contact.typing import Array
 
 logger = logging.getLogger("contact.steps")

@@ -27,21 +27,21 @@ from contact.case.file import Case, load_case
 from contact.case.messages import listed
 from contact.case.text import literal, to_toml
 from contact.errors import InputError, counted, nearest
+from contact.io.folder import replace_whole
+from contact.io.formats import write_csv
 from contact.mesh.domain import Domain
 from contact.methods.load_stepping import Reached, predicted, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
 from contact.methods.signals import Interrupted, stop_on_signal
-from contact.output.folder import replace_whole
-from contact.output.formats import write_csv
-from contact.output.quantities import quantities, values_of
-from contact.output.quantity import SUMMARY, SWEEP, is_of
-from contact.output.remarks import measure
-from contact.output.solution import Solution
 from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
+from contact.results.quantities import quantities, values_of
+from contact.results.quantity import SUMMARY, SWEEP, is_of
+from contact.results.remarks import measure
+from contact.results.solution import Solution
 from contact.solving import Schedule, run_schedule
 from contact.typing import Array
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from contact.cli.arguments import EXIT, offered
-from contact.output.reference import files_help
+from contact.io.reference import files_help
 
 PAGE = Path(__file__).parents[1] / "docs" / "command-line.md"
 

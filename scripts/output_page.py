@@ -9,8 +9,8 @@ from argparse import ArgumentParser
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from contact.output import quantity as q
-from contact.output.reference import described
+from contact.io.reference import described
+from contact.results import quantity as q
 
 #: Formulas in Markdown for the symbols of the command line's help.
 FORMULAS = {"σ_ν": r"$\sigma_\nu$", "σ_τ": r"$\sigma_\tau$", "u_τ": r"$u_\tau$"}
@@ -20,7 +20,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "output.md"
 INTRODUCTION = """\
 # Output files
 
-<!-- Made by `python3 -m scripts.output_page`; its entries are in contact/output. -->
+<!-- Made by `python3 -m scripts.output_page`; its entries are in contact/results. -->
 
 `contact solve CASE.toml --out DIR` writes into DIR:
 

@@ -26,8 +26,8 @@ from contact import Case, NotConvergedError, Solution, solve
 from contact.methods.method import METHODS
 from contact.methods.options import Options
 from contact.methods.report import Outcome, Record
-from contact.output.figures.run import Run
-from contact.output.figures.style import STYLE
+from contact.plot.run import Run
+from contact.plot.style import STYLE
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
@@ -154,7 +154,7 @@ def subplots(
     size: tuple[float, float] = (TWO_COLUMNS, 2.8),
     **shared: Any,
 ) -> tuple[Figure, Any]:
-    """Return a figure and its axes, in the style of `contact.output.figures`."""
+    """Return a figure and its axes, in the style of `contact.plot`."""
     figure = Figure(figsize=size)
     return figure, figure.subplots(rows, columns, **shared)
 

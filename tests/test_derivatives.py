@@ -35,8 +35,8 @@ from contact.case.text import number_at, with_number
 from contact.derivatives.by_parameters import logger
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
-from contact.output.differentiable import named_quantities
 from contact.problem.linearised import Linearised
+from contact.results.differentiable import named_quantities
 from scripts.studies.cattaneo import ball_values, cylinder_values, cylinders
 from scripts.studies.derivative_values import products
 from scripts.studies.derivatives import (

@@ -13,9 +13,9 @@ from mpi4py import MPI
 
 from contact import build_problem
 from contact.body import pointwise
-from contact.output.error_estimate import estimated
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import constrained_by_supports
+from contact.results.error_estimate import estimated
 from scripts.benchmarks.bench_one import block
 
 #: A program of its own, for the tests ask the allocator to keep memory.

@@ -4,5 +4,5 @@
 place, and `build` makes a problem of it. The keys of `[mesh]` are in `mesh`; of `[material]` in
 `material`; of `[space]`, supports, loads, rigid parts, electrodes and bolts in `body`; of
 `[contact]`, `[friction]` and `[electric]` in `interface`; of `[evolution]` in `evolution`. Those of
-`[solver]` are `contact.methods.options`, those of `[output]` `contact.output.options`.
+`[solver]` are `contact.methods.options`, those of `[output]` `contact.results.options`.
 """

@@ -16,9 +16,9 @@ from contact.case.messages import shown
 from contact.case.section import FilePath, walk
 from contact.case.text import to_toml
 from contact.errors import InputError
+from contact.io.step_files import stored_input
 from contact.library.materials import PACKAGED
 from contact.mesh.formats import files
-from contact.output.step_files import stored_input
 
 #: Key of the mesh file.
 MESH = "mesh.file"

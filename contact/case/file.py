@@ -44,7 +44,7 @@ from contact.case.section import (
 from contact.case.units import Labels, share
 from contact.errors import InputError, clipped
 from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
-from contact.output.options import OutputOptions, Units
+from contact.results.options import OutputOptions, Units
 from contact.settings import Accepted
 
 #: Key of the case -> the arguments of `build_problem` of which one replaces it.

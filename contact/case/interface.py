@@ -35,9 +35,9 @@ from contact.interface.law import Conductor
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction, Obstacle, Shape
 from contact.interface.obstacle.triangles import read_stl
+from contact.io.formats import read_data
 from contact.mesh.domain import Domain
 from contact.mesh.together import meet
-from contact.output.formats import read_data
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
 from forms import laws

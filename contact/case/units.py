@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Discriminator, Tag, WithJsonSchema, model_
 from contact.case.messages import Words, either, fault, listed, shown
 from contact.case.section import FromTable, Section, Text
 from contact.library import units as systems
-from contact.output.options import Units
+from contact.results.options import Units
 from contact.settings import Accepted
 
 #: `contact.case.file.Case`, of which the units are checked.

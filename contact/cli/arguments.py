@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from contact import __version__
 from contact.errors import InputError, nearest
-from contact.output.reference import files_help
+from contact.io.reference import files_help
 
 DESCRIPTION = """\
 Frictional contact of elasto-plastic and piezoelectric bodies. A problem is a case file;

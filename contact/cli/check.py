@@ -23,12 +23,12 @@ from contact.mesh.cells import Shape, shape_of
 from contact.mesh.geometry import determinant, geometry_nodes, jacobians
 from contact.methods.options import NewtonOptions
 from contact.nesting import coarser_cases
-from contact.output import environment
-from contact.output.bodies import passing
-from contact.output.foundations import fitting, without_heights
 from contact.problem.checks import meeting_supports
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
+from contact.results import environment
+from contact.results.bodies import passing
+from contact.results.foundations import fitting, without_heights
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 

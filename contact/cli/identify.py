@@ -15,9 +15,9 @@ from contact.cli.main import CONVERGED
 from contact.cli.progress import progress
 from contact.derivatives.identification import TIME, Identified, identify
 from contact.errors import InputError
-from contact.output.figures.style import BLUE, GREY, ORANGE, STYLE, sheet
-from contact.output.folder import on_root
-from contact.output.formats import read_data
+from contact.io.folder import on_root
+from contact.io.formats import read_data
+from contact.plot.style import BLUE, GREY, ORANGE, STYLE, sheet
 from contact.typing import Array
 
 

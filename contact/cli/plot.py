@@ -12,9 +12,9 @@ from mpi4py import MPI
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.methods.signals import signals_held
-from contact.output.figures.figures import FORMATS, animate, plot
-from contact.output.figures.style import Look
-from contact.output.figures.sweep import plot_sweep
+from contact.plot.figures import FORMATS, animate, plot
+from contact.plot.style import Look
+from contact.plot.sweep import plot_sweep
 from contact.ranks import on_root
 from contact.sweeping import TABLE
 

@@ -21,10 +21,10 @@ from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets, paths
 from contact.mesh.geometry import facet_normals
-from contact.output.figures.body import rendered
-from contact.output.figures.style import BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, YELLOW, heading
-from contact.output.options import Units
+from contact.plot.body import rendered
+from contact.plot.style import BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, YELLOW, heading
 from contact.problem.problem import ContactProblem
+from contact.results.options import Units
 from contact.typing import Array
 
 #: Colours of supports, loads, contact parts and foundations.

@@ -18,13 +18,13 @@ from contact.cli.check import amplitude_notes
 from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
 from contact.errors import InputError, counted
+from contact.io.files import write_outputs
+from contact.io.folder import SUMMARY, check_members, read_json, result_folder
+from contact.io.step_files import case_of, discard, kept_case
 from contact.methods.signals import SIGNALLED, Terminated, signals_held
-from contact.output.discretisation import locks
-from contact.output.files import write_outputs
-from contact.output.folder import SUMMARY, check_members, read_json, result_folder
-from contact.output.solution import Solution
-from contact.output.step_files import case_of, discard, kept_case
 from contact.ranks import on_root
+from contact.results.discretisation import locks
+from contact.results.solution import Solution
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep
 

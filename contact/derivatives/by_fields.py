@@ -22,8 +22,8 @@ from contact.derivatives.by_parameters import LoadPath, backwards, parameters_of
 from contact.derivatives.differences import Parameter, family_of
 from contact.errors import InputError
 from contact.history import Evaluated, InternalVariables
-from contact.output.differentiable import Differentiable, Quantity
-from contact.output.solution import Solution
+from contact.results.differentiable import Differentiable, Quantity
+from contact.results.solution import Solution
 from contact.typing import Array
 
 #: Section of a case with the constants that may be fields.

@@ -39,14 +39,6 @@ from contact.history import History
 from contact.linear.operator import Counters
 from contact.methods.complementarity_parameters import complementarity_parameters
 from contact.methods.options import NewtonOptions
-from contact.output.differentiable import (
-    Differentiable,
-    Largest,
-    Quantity,
-    Reaction,
-    named_quantities,
-)
-from contact.output.solution import Solution
 from contact.problem.linearised import (
     Equations,
     Linearised,
@@ -63,6 +55,14 @@ from contact.problem.linearised_steps import (
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import summed
+from contact.results.differentiable import (
+    Differentiable,
+    Largest,
+    Quantity,
+    Reaction,
+    named_quantities,
+)
+from contact.results.solution import Solution
 from contact.typing import Array
 
 logger = logging.getLogger("contact.sensitivity")
@@ -123,7 +123,7 @@ def sensitivity(
         ``reaction_x_PART``, ``driven_y``, ``rigid_x``, ``rigid_rotation``, ``rigid_force_x``,
         ``potential_PART``, ``charge_PART``, ``charge_foundation``; and ``energy``, ``dissipation``
         and ``driven_force_x`` by the tangent. Or functions of problem and state, by name;
-        the adjoint asks these for a `gradient` (`contact.output.differentiable`).
+        the adjoint asks these for a `gradient` (`contact.results.differentiable`).
     parameters
         Keys of the case with a number: ``material.young``, ``friction.mu``, ``contact.gap``,
         ``load.0.traction.1``. Or `Parameter` by name, for problems that were built in Python.

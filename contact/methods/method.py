@@ -8,10 +8,10 @@ from typing import Any, Protocol
 from contact.linear.operator import Counters
 from contact.methods.newton import Newton
 from contact.methods.report import IterationHistory, Monitor, Outcome
-from contact.methods.thesis.fixed_point import FixedPoint
-from contact.methods.thesis.penalty import Penalty
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.thesis.fixed_point import FixedPoint
+from contact.thesis.penalty import Penalty
 from contact.typing import Array
 
 

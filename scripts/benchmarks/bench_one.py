@@ -25,8 +25,8 @@ from contact.case.file import parse_case
 from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
 from contact.nesting import default_start
-from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
+from contact.results.solution import Solution
 from scripts.cases import CASES, bar
 
 COMM = MPI.COMM_WORLD

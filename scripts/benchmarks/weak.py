@@ -34,21 +34,21 @@ from contact._compat import destinations
 from contact.body.description import Body, Fixed
 from contact.interface import pairing
 from contact.interface.friction import Friction
+from contact.io import formats
+from contact.io.checkpoint import read_checkpoint
+from contact.io.files import write_outputs
 from contact.linear.operator import Counters
 from contact.mesh.domain import Domain, from_mesh
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Outcome
 from contact.nesting import prolong
-from contact.output import formats
-from contact.output.checkpoint import read_checkpoint
-from contact.output.files import write_outputs
-from contact.output.options import OutputOptions
-from contact.output.recovery import nodal_means
-from contact.output.solution import Solution, StepRecord
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.ranks import on_root
+from contact.results.options import OutputOptions
+from contact.results.recovery import nodal_means
+from contact.results.solution import Solution, StepRecord
 from forms.hencky import Linear
 from scripts.benchmarks.bench_one import rank_memory
 

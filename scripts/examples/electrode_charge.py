@@ -9,7 +9,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from contact import load_case, solve
-from contact.output.resultants import sensor
+from contact.results.resultants import sensor
 
 SENSOR = Path(__file__).parents[1] / "cases" / "piezo-sensor.toml"
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from contact import Case, build_problem, load_case
 from contact.case.evolution import Evolution
-from contact.output.resultants import Reading, sensor
+from contact.results.resultants import Reading, sensor
 from scripts.cases import CASES
 from scripts.reporting import Report, parser, solved, subplots
 

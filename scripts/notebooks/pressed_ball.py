@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from contact import load_case, solve
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from scripts.cases import CASES
 
 sizes = ["mesh.contact_size=0.015", "mesh.edge_size=0.015"]

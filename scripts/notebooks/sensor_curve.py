@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from contact import build_problem, load_case
-from contact.output.resultants import sensor
+from contact.results.resultants import sensor
 from scripts.cases import CASES
 from scripts.examples.sensor import opened, readings
 from scripts.reporting import solved

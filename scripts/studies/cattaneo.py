@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 
 from contact import Solution, parse_case, sensitivity
-from contact.output.differentiable import named_quantities
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.results.differentiable import named_quantities
 from scripts.reporting import Report, append, options, solved
 from scripts.studies.mindlin import MU, PRESS, RADIUS, YOUNG, write_mesh
 

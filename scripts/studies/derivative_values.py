@@ -18,8 +18,8 @@ from contact import field_gradient, gap_gradient, load_case, parse_case, sensiti
 from contact.case.file import Case
 from contact.case.text import number_at, to_toml, with_number
 from contact.derivatives.by_parameters import LoadPath
-from contact.output.differentiable import named_quantities
-from contact.output.solution import Solution
+from contact.results.differentiable import named_quantities
+from contact.results.solution import Solution
 from contact.typing import Array
 from forms.elasticity import hexagonal
 from forms.piezo import hexagonal_voigt

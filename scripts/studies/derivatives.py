@@ -27,9 +27,9 @@ from contact.derivatives.by_parameters import (
 )
 from contact.derivatives.differences import Parameter
 from contact.errors import InputError
-from contact.output.differentiable import named_quantities
-from contact.output.solution import Solution
 from contact.problem.linearised import active_set
+from contact.results.differentiable import named_quantities
+from contact.results.solution import Solution
 from contact.typing import Array
 from scripts.reporting import Report, append, parser
 

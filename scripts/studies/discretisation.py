@@ -17,10 +17,10 @@ from contact.case.build import build_problem
 from contact.case.file import Case
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.discretisation import LOCKED
-from contact.output.error_estimate import estimated
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.results.discretisation import LOCKED
+from contact.results.error_estimate import estimated
 from scripts.reporting import Report, append, options, subplots
 from tests.problems.bar import changed
 from tests.problems.membrane import cook

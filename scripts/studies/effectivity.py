@@ -20,9 +20,9 @@ from contact.body.description import Body, Fixed, Load
 from contact.body.elements import MEAN_DILATATION
 from contact.mesh.grid import box
 from contact.mesh.transfer import carry
-from contact.output.error_estimate import estimated
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.error_estimate import estimated
 from forms.hencky import Linear, Log
 from scripts.reporting import Report, append, options
 from scripts.studies.discretisation import LINEAR, LOCKING, bar, state_of

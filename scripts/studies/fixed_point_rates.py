@@ -11,7 +11,7 @@ from contact import NotConvergedError, build_problem
 from contact.case.interface import Friction
 from contact.history import BodyState
 from contact.methods.options import FixedPointOptions, Options, PenaltyOptions
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from contact.typing import Array
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, append, iterates, subplots

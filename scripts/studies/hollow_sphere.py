@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from contact import J2, Body, Contact, Fixed, Load, Problem, Solution, solve
 from contact.mesh.domain import from_mesh, revolved
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from contact.typing import Array
 from scripts.reporting import Report, append, options
 

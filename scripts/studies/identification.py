@@ -18,7 +18,7 @@ from contact import identify, load_case, sensitivity
 from contact.case.file import Case
 from contact.case.text import number_at, with_number
 from contact.cli.identify import draw
-from contact.output.solution import Solution
+from contact.results.solution import Solution
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, append, parser, solved

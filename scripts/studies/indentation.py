@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from contact import Case, Solution, load_case
 from contact.library.materials import find
-from contact.output.resultants import charge_balance
+from contact.results.resultants import charge_balance
 from contact.typing import Array
 from forms.elasticity import isotropic
 from forms.piezo import hexagonal_voigt

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contact import Case, Solution, load_case, parse_case
-from contact.output.resultants import charge_balance, movements
+from contact.results.resultants import charge_balance, movements
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, append, observed_orders, options, solved

@@ -15,7 +15,7 @@ import numpy as np
 
 from contact import Case, NotConvergedError, build_problem, load_case
 from contact.methods.options import FixedPointOptions
-from contact.methods.thesis.fixed_point import FixedPoint
+from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import TWO_COLUMNS, Report, append, iterates, options, subplots

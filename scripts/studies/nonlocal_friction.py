@@ -11,8 +11,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Solution
-from contact.output.formats import Table
-from contact.output.surface import contact_table
+from contact.io.formats import Table
+from contact.results.surface import contact_table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
 from scripts.studies.error_norms import errors

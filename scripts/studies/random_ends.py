@@ -26,11 +26,11 @@ import numpy as np
 
 from contact import Case, Solution, build_problem, solve
 from contact.case.file import parse_case
+from contact.io.files import write_outputs
 from contact.methods.options import OPTIONS, Options, with_method
 from contact.methods.signals import Terminated, ending_on_signal
-from contact.output.files import write_outputs
-from contact.output.options import OutputOptions
 from contact.problem.residuals import evaluate
+from contact.results.options import OutputOptions
 from contact.solving import SolveInterrupted
 from scripts.reporting import Report, append, parser
 from scripts.studies.raw_balance import imbalance

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contact import Solution, load_case, solve
-from contact.output.resultants import charge_balance
+from contact.results.resultants import charge_balance
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, options

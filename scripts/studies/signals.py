@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.output.folder import STAGE, SUMMARY, recover
+from contact.io.folder import STAGE, SUMMARY, recover
 from scripts.reporting import Report, append, parser
 
 COUNT, COARSE_COUNT, SEED = 120, 8, 23

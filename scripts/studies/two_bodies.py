@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from contact import load_case, parse_case
-from contact.output.formats import Table
-from contact.output.solution import Solution
-from contact.output.surface import contact_table
+from contact.io.formats import Table
+from contact.results.solution import Solution
+from contact.results.surface import contact_table
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, append, options, solved, subplots

@@ -15,12 +15,12 @@ from mpi4py import MPI
 from contact import Solution, build_problem, load_case
 from contact.interface.complementarity import project_disc
 from contact.interface.layer import NormalLaw
-from contact.output.figures.body import Picture, draw_plane, picture
-from contact.output.figures.contact import draw_line
-from contact.output.figures.style import Look
-from contact.output.formats import Table
-from contact.output.solved import tangent_of
-from contact.output.surface import contact_table
+from contact.io.formats import Table
+from contact.plot.body import Picture, draw_plane, picture
+from contact.plot.contact import draw_line
+from contact.plot.style import Look
+from contact.results.solved import tangent_of
+from contact.results.surface import contact_table
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity

@@ -12,11 +12,11 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution
-from contact.output.figures.body import draw_plane, picture
-from contact.output.figures.contact import draw_line
-from contact.output.figures.style import Look
-from contact.output.formats import Table
-from contact.output.surface import contact_table
+from contact.io.formats import Table
+from contact.plot.body import draw_plane, picture
+from contact.plot.contact import draw_line
+from contact.plot.style import Look
+from contact.results.surface import contact_table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
 

@@ -18,8 +18,8 @@ from mpi4py import MPI
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.transfer import carry
-from contact.output.figures.body import picture
-from contact.output.surface import contact_table
+from contact.plot.body import picture
+from contact.results.surface import contact_table
 from contact.typing import Array
 from forms.kinematics import strain
 from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, run_of, subplots

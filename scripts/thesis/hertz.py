@@ -12,8 +12,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution, build_problem
-from contact.output.figures.body import draw_plane, picture
-from contact.output.surface import contact_table
+from contact.plot.body import draw_plane, picture
+from contact.results.surface import contact_table
 from scripts.reporting import TWO_COLUMNS, Report, append, options, run_of, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from contact import Case, NotConvergedError, build_problem, solve
 from contact.case.interface import Friction
-from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
+from contact.results.solution import Solution
 from scripts.cases import bar
 from scripts.reporting import Report, append, observed_orders, options, solved, subplots
 from scripts.studies.dual_norm import DualNorm

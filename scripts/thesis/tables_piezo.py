@@ -12,10 +12,10 @@ import numpy as np
 from contact import Case, Solution, build_problem, load_case
 from contact.linear.operator import SparseOperator
 from contact.methods.complementarity_parameters import automatic_r
-from contact.methods.thesis.uzawa import augmentation
-from contact.output.resultants import charge_balance
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
+from contact.results.resultants import charge_balance
+from contact.thesis.uzawa import augmentation
 from scripts.cases import CASES
 from scripts.force_balance import force_balance
 from scripts.reporting import Report, options

@@ -22,8 +22,8 @@ from contact import (
     solve,
 )
 from contact.mesh.domain import from_mesh
-from contact.output.error_estimate import estimated
-from contact.output.fields import DerivedFields
+from contact.results.error_estimate import estimated
+from contact.results.fields import DerivedFields
 
 SELF, TIGHT = MPI.COMM_SELF, NewtonOptions(tolerance=1e-12)
 

@@ -17,7 +17,7 @@ from contact.mesh.domain import revolved
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from forms.elasticity import Anisotropic, isotropic
 from forms.hencky import Linear, Log
 from forms.kinematics import deviator_squared, strain

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from contact.body import pointwise
 from contact.history import BodyState
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from forms.hencky import Linear
 from tests.problems import mechanics
 

@@ -14,7 +14,7 @@ from contact.case.file import load_case, parse_case
 from contact.cli.arguments import parse
 from contact.cli.main import main
 from contact.cli.progress import HEAD
-from contact.output.environment import identify
+from contact.results.environment import identify
 
 
 def test_petsc_options_are_told_from_ours():

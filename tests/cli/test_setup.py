@@ -12,7 +12,7 @@ from matplotlib.quiver import Quiver
 from contact import build_problem, load_case, parse_case
 from contact.cli.main import main
 from contact.cli.setup import chains, draw_setup
-from contact.output.figures.style import BLUE
+from contact.plot.style import BLUE
 from scripts.cases import CASES
 
 SMALL = {

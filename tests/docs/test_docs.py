@@ -27,8 +27,8 @@ from contact.methods import (
     working_set,
 )
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.thesis import fixed_point, outer_loop, penalty, uzawa
 from contact.problem import condensed
+from contact.thesis import fixed_point, outer_loop, penalty, uzawa
 from contact.tolerances import LARGEST_VIOLATION
 from scripts import command_page
 from scripts.pictures import RUNS

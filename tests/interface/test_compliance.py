@@ -15,9 +15,9 @@ from contact.interface.layer import Layer
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
-from contact.methods.thesis.fixed_point import FixedPoint
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear
 from forms.laws import (
     Compliance,

@@ -11,9 +11,9 @@ from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane, Sphere
 from contact.interface.penalised import PenalisedLaw, Regularisation
 from contact.mesh.grid import box, rectangle
-from contact.methods.thesis.uzawa import augmentation
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.thesis.uzawa import augmentation
 from forms import foundation as forms
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import bar, flat, leaning_block

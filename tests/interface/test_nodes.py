@@ -14,9 +14,9 @@ from contact.interface.obstacle import GapFunction, Level, Plane, Sphere
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
-from contact.output.resultants import supports
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.resultants import supports
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import bar, constant, contact_data, flat, leaning_block, solve, turn

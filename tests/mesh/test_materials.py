@@ -12,7 +12,7 @@ from contact.errors import InputError
 from contact.history import BodyState
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from forms.hencky import Linear
 from forms.piezo import hexagonal
 from scripts.studies.error_norms import errors

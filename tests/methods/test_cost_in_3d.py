@@ -10,7 +10,7 @@ from contact import build_problem, nesting
 from contact.history import BodyState
 from contact.linear import multigrid
 from contact.linear.operator import SparseOperator
-from contact.output.solution import Solution
+from contact.results.solution import Solution
 from contact.solving import solve
 from scripts.benchmarks.bench_one import block
 

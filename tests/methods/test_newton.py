@@ -14,11 +14,11 @@ from contact.interface.friction import Friction
 from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.thesis.fixed_point import FixedPoint
 from contact.nesting import coarser_cases
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import solve
+from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from scripts.cases import bar

@@ -16,10 +16,10 @@ from contact.interface.obstacle import GapFunction, Plane
 from contact.interface.penalised import PenalisedLaw, Regularisation
 from contact.mesh import grid as domain
 from contact.methods.options import FixedPointOptions, PenaltyOptions
-from contact.methods.thesis.fixed_point import FixedPoint
-from contact.methods.thesis.penalty import Penalty
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.thesis.fixed_point import FixedPoint
+from contact.thesis.penalty import Penalty
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems import mechanics

@@ -7,8 +7,8 @@ import pytest
 
 from contact.interface.complementarity import disc_derivative, project_disc, project_half_line
 from contact.interface.layer import NormalLaw
-from contact.methods.thesis.acceleration import ResidualMinimiser
-from contact.methods.thesis.uzawa import _Projection
+from contact.thesis.acceleration import ResidualMinimiser
+from contact.thesis.uzawa import _Projection
 from forms.laws import Compliance
 
 

@@ -7,9 +7,9 @@ from mpi4py import MPI
 from contact.interface.friction import Friction
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.methods.stagnation import Best, Stagnation
-from contact.methods.thesis.fixed_point import FixedPoint
-from contact.methods.thesis.penalty import Penalty
 from contact.problem.residuals import evaluate
+from contact.thesis.fixed_point import FixedPoint
+from contact.thesis.penalty import Penalty
 from forms.laws import ConstantCoefficient
 from tests.problems import mechanics
 

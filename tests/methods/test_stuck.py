@@ -7,7 +7,7 @@ from mpi4py import MPI
 from contact import build_problem, parse_case
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.thesis.fixed_point import FixedPoint
+from contact.thesis.fixed_point import FixedPoint
 from tests.problems import pairs
 
 

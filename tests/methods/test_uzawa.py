@@ -11,10 +11,10 @@ from contact.body.description import Body
 from contact.interface.friction import Friction
 from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.options import FixedPointOptions
-from contact.methods.thesis.fixed_point import FixedPoint
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import Affine, attempt, bar, contact_data, flat, pressed_block, solve

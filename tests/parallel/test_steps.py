@@ -5,10 +5,10 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.output.quantities import values_of
-from contact.output.quantity import NODES
 from contact.ranks import on_root
-from tests.output.test_steps import case_of
+from contact.results.quantities import values_of
+from contact.results.quantity import NODES
+from tests.results.test_steps import case_of
 
 pytestmark = pytest.mark.parallel
 

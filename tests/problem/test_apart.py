@@ -9,10 +9,10 @@ from mpi4py import MPI
 from contact.body.description import Fixed
 from contact.body.rigid import Motion, Rigid
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.remarks import rounding, untouched
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, left_as_pressures, residual_forces
 from contact.problem.state import State
+from contact.results.remarks import rounding, untouched
 from contact.solving import solve
 from forms.hencky import Linear
 from tests.problems.apart import blocks, pressed

@@ -25,8 +25,8 @@ from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.methods.options import NewtonOptions
-from contact.output.fields import DerivedFields
 from contact.problem.checks import check_problem
+from contact.results.fields import DerivedFields
 
 COMM = MPI.COMM_WORLD
 LENGTH, YOUNG = 2.0, 10.0

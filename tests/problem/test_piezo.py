@@ -9,8 +9,8 @@ from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.thesis.fixed_point import FixedPoint
-from contact.output.resultants import charge_balance
+from contact.results.resultants import charge_balance
+from contact.thesis.fixed_point import FixedPoint
 from forms.laws import (
     RampConductivity,
 )

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import FixedPointOptions, NewtonOptions, load_case, parse_case, solve
-from contact.output.resultants import charge_balance
+from contact.results.resultants import charge_balance
 from scripts.cases import CASES
 
 #: GPa, C/m^2, GV: a stack of PZT-5A's coupling and isotropic elasticity, and a metal.

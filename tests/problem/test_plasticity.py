@@ -7,8 +7,8 @@ from mpi4py import MPI
 from contact import FixedPointOptions, NewtonOptions, evolve, parse_case, solve
 from contact.case.build import build_problem
 from contact.errors import InputError
-from contact.output.checkpoint import read_steps
-from contact.output.field_files import write_fields
+from contact.io.checkpoint import read_steps
+from contact.io.field_files import write_fields
 from tests.problems.plasticity import homogeneous, homogeneous_values
 
 YOUNG, LIMIT = 200e3, 250.0

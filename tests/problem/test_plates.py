@@ -9,8 +9,8 @@ from mpi4py import MPI
 from contact import Motion, Rigid, build_problem, solve
 from contact.case.file import parse_case
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.resultants import charge_balance, movements
 from contact.problem.problem import ContactProblem
+from contact.results.resultants import charge_balance, movements
 from tests.problems.rigid import PIEZO, column, plate, solved
 
 SELF = MPI.COMM_SELF

@@ -12,7 +12,7 @@ from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.figures.figures import plot
+from contact.plot.figures import plot
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
 from contact.solving import build_problem, solve

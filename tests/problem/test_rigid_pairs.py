@@ -9,11 +9,11 @@ from contact.body.rigid import Motion, Rigid
 from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.thesis.fixed_point import FixedPoint
-from contact.output.resultants import movements
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.resultants import movements
+from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks

@@ -12,11 +12,11 @@ from contact.interface.obstacle import GapFunction
 from contact.linear.operator import SparseOperator
 from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
-from contact.output.resultants import charge_balance
-from contact.output.surface import contact_table
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.resultants import charge_balance
+from contact.results.surface import contact_table
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks

@@ -16,9 +16,9 @@ from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
-from contact.methods.thesis.fixed_point import FixedPoint
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import FrictionCoefficient, SlipCoefficient

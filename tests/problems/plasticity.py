@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import root
 
 from contact import parse_case
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 
 FAR = 100.0
 

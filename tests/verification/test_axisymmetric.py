@@ -20,11 +20,11 @@ from contact.mesh.grid import box, rectangle
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.fields import DerivedFields
-from contact.output.resultants import charge_balance
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.fields import DerivedFields
+from contact.results.resultants import charge_balance
 from forms.hencky import Linear
 from scripts.force_balance import force_balance
 from scripts.studies import pressure_on_axis

@@ -11,8 +11,8 @@ from contact import InputError, Solution, build_problem, load_case, solve
 from contact.case.formula import Expression
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
-from contact.output.surface import contact_table
 from contact.problem.problem import ContactProblem
+from contact.results.surface import contact_table
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient
 from scripts.cases import CASES, TABLE_8_4
 from scripts.studies import limit_theorem

@@ -20,9 +20,9 @@ from contact.mesh.geometry import geometry_nodes, inverse, jacobians, sizes, vol
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.error_estimate import estimated
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.error_estimate import estimated
 from scripts.force_balance import force_balance
 from scripts.reporting import Report
 from scripts.studies import cell_orders, curved_cells, round_bodies

@@ -8,7 +8,7 @@ import pytest
 from contact.history import BodyState
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import HENCKY, Singular, exact, manufactured
 

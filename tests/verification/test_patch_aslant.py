@@ -34,8 +34,8 @@ from contact.derivatives.differences import Parameter
 from contact.interface.obstacle import GapFunction
 from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
-from contact.output.differentiable import named_quantities
-from contact.output.resultants import contact_resultant, supports
+from contact.results.differentiable import named_quantities
+from contact.results.resultants import contact_resultant, supports
 from forms.laws import ConstantCoefficient
 from scripts.force_balance import force_balance
 from tests.problems.blocks import Blocks

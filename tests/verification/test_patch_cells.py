@@ -12,9 +12,9 @@ from contact.interface.obstacle import Plane
 from contact.mesh.domain import revolved
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.fields import DerivedFields
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.fields import DerivedFields
 from forms.hencky import Linear, Log
 from forms.j2 import J2
 from forms.laws import ConstantCoefficient

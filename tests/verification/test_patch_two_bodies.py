@@ -18,9 +18,9 @@ from contact.mesh.domain import Domain, revolved
 from contact.mesh.reader import from_file
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.fields import DerivedFields
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.fields import DerivedFields
 from contact.typing import Array
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

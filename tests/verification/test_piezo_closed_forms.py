@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from contact.methods.options import FixedPointOptions
-from contact.methods.thesis.fixed_point import FixedPoint
 from contact.problem.problem import ContactProblem
+from contact.thesis.fixed_point import FixedPoint
 from tests.problems.piezo import PERMITTIVITY, SCALED, SI, Column, potential
 
 COMM = MPI.COMM_WORLD

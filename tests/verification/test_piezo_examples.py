@@ -10,10 +10,10 @@ from contact.interface.friction import Friction
 from contact.linear.operator import SparseOperator
 from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.options import FixedPointOptions
-from contact.methods.thesis.fixed_point import FixedPoint
-from contact.methods.thesis.uzawa import augmentation
-from contact.output.resultants import charge_balance
 from contact.problem.residuals import residual_forces
+from contact.results.resultants import charge_balance
+from contact.thesis.fixed_point import FixedPoint
+from contact.thesis.uzawa import augmentation
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems.piezo import SCALED, SI, Column, example, hencky, potential
 

@@ -7,7 +7,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.methods.options import FixedPointOptions
-from contact.methods.thesis.fixed_point import FixedPoint
+from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Hencky, Log
 from scripts.studies.exact_solutions import exact, manufactured
 from tests.problems.piezo import POISSON, SCALED, YOUNG, pzt

@@ -9,11 +9,11 @@ from contact.body.rigid import Electrode
 from contact.interface.law import Conductor
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.thesis.fixed_point import FixedPoint
-from contact.output.resultants import charge_balance, movements
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
+from contact.results.resultants import charge_balance, movements
+from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear
 from forms.laws import PerfectConductivity, ShiftedConductivity, Truncation
 from forms.piezo import from_voigt

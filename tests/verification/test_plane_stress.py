@@ -14,7 +14,7 @@ from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from forms.hencky import Isotropic
 from forms.history import Response, differential, isotropic_stiffness
 from forms.j2 import J2, Voce

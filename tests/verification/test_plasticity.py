@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from contact import NewtonOptions, solve
-from contact.output.fields import DerivedFields
+from contact.results.fields import DerivedFields
 from forms.j2 import J2, Tabulated, Voce
 from scripts.studies.hollow_sphere import (
     Hill,

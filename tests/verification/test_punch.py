@@ -14,9 +14,9 @@ from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.resultants import movements
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.resultants import movements
 from contact.solving import solve
 from forms.hencky import Linear
 from scripts.studies.indentation_in_space import punch, rotation

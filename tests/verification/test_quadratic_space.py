@@ -11,9 +11,9 @@ from contact.body.description import Body, Fixed
 from contact.interface.obstacle import Sphere
 from contact.mesh.grid import box
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.surface import contact_table
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.results.surface import contact_table
 from forms.hencky import Linear
 from tests.problems.mechanics import constant, leaning_block
 from tests.problems.piezo import Column, potential

@@ -1,0 +1,1 @@
+"""The files of a run: tables, fields, checkpoints, and their folder."""

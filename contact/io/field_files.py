@@ -1,0 +1,347 @@
+"""The files of fields.
+
+ADIOS2 and HDF5 throw where a disk is full, and again where a failed writer is closed by its
+destructor, which ends a process; on several ranks those that had room wait for the others. So the
+room is asked for first; and a writer that fails all the same, for others write to the disk too, is
+never destroyed.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from dolfinx import fem, has_adios2, io, la
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.errors import InputError
+from contact.io.folder import ROOM
+from contact.io.formats import Grid, Values, in_pieces, write_share
+from contact.mesh.cells import shape_of
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.ranks import on_root
+from contact.results.fields import DerivedFields, linear, unknowns
+from contact.results.solution import Solution
+from contact.results.surface import contact_surface
+
+#: A time, and the state then.
+Frame: TypeAlias = tuple[float, State]
+
+#: Fields that are written for every step, and internal variables.
+SERIES = ("displacement", "potential", "von_mises")
+
+
+def write_fields(solution: Solution, folder: Path) -> None:
+    """Write the fields in the format that is asked for. Collective.
+
+    ``fields.vtu`` holds all of them, the derived ones both averaged at the nodes and as they
+    are in the cells. So do ``fields.bp``, at the nodes, and ``cells.bp``, in the cells: one VTX
+    file has one kind of elements only. ``fields.xdmf`` has those at the nodes, of degree 1 at
+    most; of several regions the means of the cells. Averages stay in their region. Of an evolution
+    each has all steps; ``fields.vtu`` has the last one, and ``fields.pvd`` names files with the
+    main fields of all.
+
+    Raises
+    ------
+    InputError
+        If there is no room for them, or dolfinx has no ADIOS2 for VTX files.
+    OSError
+        On a rank where the library fails all the same; others may wait for it.
+    """
+    problem, frames = solution.problem, _frames(solution)
+    match solution.output.fields:
+        case "vtu":
+            share = body_share(problem, solution.state)
+            in_cells = {**share.in_cells, "region": regions_of(problem)}
+            if solution.error is not None:
+                in_cells["error"] = solution.error.cells
+            share = replace(share, in_cells=in_cells)
+            write_share(problem.comm, share, folder / "fields.vtu", _in_pieces(problem))
+            if solution.steps:
+                _write_series(solution, frames, folder)
+        case "vtx":
+            _write_vtx(problem, frames, folder)
+        case "xdmf":
+            _write_xdmf(problem, frames, folder)
+
+
+def _in_pieces(problem: ContactProblem) -> bool:
+    """Whether each rank writes its own share of the body."""
+    return in_pieces(problem.comm, problem.equilibrium.layout.index_map.size_global)
+
+
+def regions_of(problem: ContactProblem) -> NDArray[np.int32]:
+    """Return the region of each owned cell: its place among the names. Collective.
+
+    Of several that share a cell it is the one of fewest cells, which lies in the others.
+    """
+    domain = problem.domain
+    cells = [domain.regions[name] for name in sorted(domain.regions)]
+    sizes = problem.comm.allreduce(np.array([len(own) for own in cells]), op=MPI.SUM)
+    found = np.full(domain.mesh.topology.index_map(domain.dim).size_local, -1, dtype=np.int32)
+    for k in np.argsort(-sizes, kind="stable"):
+        found[cells[k]] = k
+    return found
+
+
+def _frames(solution: Solution) -> list[Frame]:
+    """Return the times and states whose fields are written: the last one always."""
+    if not solution.steps:
+        return [(0.0, solution.state)]
+    every = [(record.state.time, record.state) for record in solution.steps]
+    return every[:: -solution.output.every][::-1]
+
+
+def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> None:
+    """Write files of the main fields and of the contact part for each step, and of their names.
+
+    These are ``fields.pvd`` and ``contact.pvd``.
+    """
+    problem = solution.problem
+    derived = DerivedFields(problem.equilibrium, frames[0][1])
+    names = (*SERIES, *problem.equilibrium.laws.names)
+    lines: dict[str, list[str]] = {"fields": [], "contact": []}
+    for k, (time, state) in enumerate(frames):
+        derived.move_to(state)
+        shares = {
+            "fields": (body_share(problem, state, names, derived), _in_pieces(problem)),
+            "contact": (contact_surface(solution.at_step(state)), solution.in_pieces),
+        }
+        for kind, (share, pieces) in shares.items():
+            path = write_share(problem.comm, share, folder / f"{kind}-{k:04d}.vtu", pieces)
+            lines[kind].append(f'<DataSet timestep="{time!r}" file="{path.name}"/>')
+
+    def write_names() -> None:
+        for kind, sets in lines.items():
+            text = ['<VTKFile type="Collection">', "<Collection>", *sets, "</Collection>"]
+            path = folder / f"{kind}.pvd"
+            path.write_text("\n".join([*text, "</VTKFile>"]) + "\n", encoding="utf-8")
+
+    on_root(problem.comm, write_names)
+
+
+def body_share(
+    problem: ContactProblem,
+    state: State,
+    names: Collection[str] | None = None,
+    derived: DerivedFields | None = None,
+) -> Grid:
+    """Return a body at a state with its fields of some names: this rank's share. Collective.
+
+    `derived` are the derived fields at the state, where they are at hand.
+    """
+    body, d = problem.equilibrium, problem.dim
+    space, derived = body.space, derived or DerivedFields(body, state)
+    links, index_map = space.dofmap.list, space.dofmap.index_map
+    owned = body.domain.mesh.topology.index_map(d).size_local
+    numbers, nodes, groups = _points_of(derived)
+    cells = numbers[links[:owned], derived.groups[:, None]]
+    points = space.tabulate_dof_coordinates()[nodes, :d]
+
+    def nodal(function: fem.Function) -> Values:
+        """Return a function's values at the points."""
+        dofmap = function.function_space.dofmap
+        values = np.empty((index_map.size_local + index_map.num_ghosts, dofmap.index_map_bs))
+        values[links] = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list]
+        return _rows(values[nodes])
+
+    def mean(function: fem.Function) -> Values:
+        """Return a discontinuous function's means over the owned cells."""
+        dofmap = function.function_space.dofmap
+        values = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list[:owned]]
+        return _rows(values.mean(axis=1))
+
+    of_nodes, in_cells = unknowns(body, state.x), {}
+    at_points = {k: nodal(f) for k, f in of_nodes.items() if names is None or k in names}
+    if names is None or set(names) - set(of_nodes):
+        means, in_cells = derived.means()[groups, nodes], derived.cells()
+        at_points |= {
+            k: _rows(means[:, columns])
+            for k, columns in derived.columns.items()
+            if names is None or k in names
+        }
+    of_cells = {f"{k}_cell": mean(f) for k, f in in_cells.items() if names is None or k in names}
+    return Grid(points, cells, shape_of(body.domain.mesh), at_points, of_cells)
+
+
+def _points_of(
+    derived: DerivedFields,
+) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp]]:
+    """Return the points of a grid: a node between groups of cells has one for each. Collective.
+
+    Returns
+    -------
+    The number of the point of each local node and group over all ranks, shape (nodes, groups), -1
+    for none; the nodes and the groups of the points of this rank.
+    """
+    space, groups = derived.body.space, derived.groups
+    index_map, count = space.dofmap.index_map, derived.group_count
+    vector = la.vector(index_map, count, dtype=np.int64)
+    there = vector.array.reshape(-1, count)
+    there[space.dofmap.list[: groups.size], groups[:, None]] = 1
+    vector.scatter_reverse(la.InsertMode.add)
+    own = there[: index_map.size_local]
+    nodes, of_group = np.nonzero(own)
+    # A node's first point stands where the node does, further ones behind all nodes.
+    order = np.argsort(np.diff(nodes, prepend=-1) == 0, kind="stable")
+    nodes, of_group = nodes[order], of_group[order]
+    comm = derived.body.comm
+    begin = comm.exscan(nodes.size) or 0
+    own[:] = -1
+    own[nodes, of_group] = begin + np.arange(nodes.size)
+    vector.scatter_forward()
+    return there, nodes, of_group
+
+
+def _rows(values: Values) -> Values:
+    return values[:, 0] if values.shape[1] == 1 else values
+
+
+def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
+    if not has_adios2:
+        raise InputError(
+            'output.fields: "vtx" needs a dolfinx with ADIOS2, and this one has none; accepted: '
+            '"vtu", "xdmf" or "none"',
+            "vtx",
+        )
+    derived = DerivedFields(problem.equilibrium, frames[0][1])
+    at_nodes, in_cells = _at_nodes(problem, frames[0][1], derived), list(derived.cells().values())
+    claim_room(problem.comm, folder, len(frames) * (_bytes(at_nodes) + _bytes(in_cells)))
+    paths = folder / "fields.bp", folder / "cells.bp"
+    with (
+        library_errors(paths[0]),
+        closing(_vtx(paths[0], at_nodes)) as nodal,
+        closing(_vtx(paths[1], in_cells)) as cellwise,
+    ):
+        for time, state in frames:
+            derived.move_to(state)
+            _copy(_at_nodes(problem, state, derived), at_nodes)
+            _copy(derived.cells().values(), in_cells)
+            nodal.write(time)
+            cellwise.write(time)
+
+
+def _copy(given: Iterable[fem.Function], into: Iterable[fem.Function]) -> None:
+    for source, target in zip(given, into, strict=True):
+        target.x.array[:] = source.x.array
+
+
+def _write_xdmf(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
+    derived = DerivedFields(problem.equilibrium, frames[0][1])
+    at_corners = _at_corners(problem, frames[0][1], derived)
+    claim_room(problem.comm, folder, len(frames) * _bytes(at_corners))
+    path = folder / "fields.xdmf"
+    with library_errors(path), closing(lambda: io.XDMFFile(problem.comm, path, "w")) as file:
+        file.write_mesh(problem.domain.mesh)
+        for time, state in frames:
+            derived.move_to(state)
+            for function in _at_corners(problem, state, derived):
+                file.write_function(function, time)
+
+
+def _at_nodes(problem: ContactProblem, state: State, derived: DerivedFields) -> list[fem.Function]:
+    """Return all fields at the nodes, all discontinuous where the derived ones are."""
+    found = unknowns(problem.equilibrium, state.x, "DG" if derived.group_count > 1 else "Lagrange")
+    return list((found | derived.nodes()).values())
+
+
+def _at_corners(
+    problem: ContactProblem, state: State, derived: DerivedFields
+) -> list[fem.Function]:
+    """Return the fields for XDMF: of several regions the derived ones are the cells' means."""
+    if derived.group_count == 1:
+        return [linear(f) for f in _at_nodes(problem, state, derived)]
+    found = [linear(f) for f in unknowns(problem.equilibrium, state.x).values()]
+    for name, function in derived.cells().items():
+        space = function.function_space
+        made = fem.Function(fem.functionspace(space.mesh, ("DG", 0, derived.shapes[name])))
+        made.name = name
+        values = function.x.array.reshape(-1, space.dofmap.index_map_bs)[space.dofmap.list]
+        made.x.array[:] = values.mean(axis=1).ravel()
+        found.append(made)
+    return found
+
+
+def _vtx(path: Path, functions: Sequence[fem.Function]) -> Callable[[], Any]:
+    comm = functions[0].function_space.mesh.comm
+    return lambda: io.VTXWriter(comm, path, functions, engine="BP4")
+
+
+def _bytes(functions: Sequence[fem.Function]) -> int:
+    """Bound the bytes that this rank adds to a file of functions of one degree, with their mesh."""
+    total = OVERHEAD
+    for function in functions:
+        space = function.function_space
+        index_map, components = space.dofmap.index_map, space.dofmap.index_map_bs
+        nodes = index_map.size_local + index_map.num_ghosts
+        # Vectors and tensors are filled up to 3 and 9 components.
+        total += 8 * nodes * next(filled for filled in (1, 3, 9) if components <= filled)
+    links = space.dofmap.list
+    # Coordinates, numbers, marks of ghosts; and the corners of the cells.
+    corners = max(links.shape[1], shape_of(space.mesh).corners)
+    points = max(nodes, corners * len(links) if links.shape[1] == 1 else nodes)
+    return total + points * (24 + 8 + 1) + len(links) * (corners + 1) * 8
+
+
+#: Bytes that each rank adds to a file besides the numbers: names, offsets, extremes.
+OVERHEAD = 16384
+
+
+def claim_room(comm: MPI.Intracomm, folder: Path, own: int) -> None:
+    """Check that there is room in a folder for the bytes that each rank will write. Collective.
+
+    Raises
+    ------
+    InputError
+        If there is not.
+    """
+    needed = comm.allreduce(own, op=MPI.SUM)
+
+    def ask() -> None:
+        # Quotas do not show in the free space that a file system reports.
+        path = folder / ROOM
+        try:
+            with path.open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, needed)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(folder)) from None
+        finally:
+            path.unlink(missing_ok=True)
+
+    on_root(comm, ask)
+
+
+@contextmanager
+def library_errors(path: Path) -> Iterator[None]:
+    """Turn the errors of a library that writes a file into OSErrors."""
+    try:
+        yield
+    except RuntimeError as error:
+        number = errno.ENOSPC if "No space left" in str(error) else errno.EIO
+        raise OSError(number, os.strerror(number), str(path)) from error
+
+
+#: Writers that have failed. Some libraries abort the process where they clean up after these.
+abandoned: list[str] = []
+
+
+@contextmanager
+def closing(open_: Callable[[], Any]) -> Iterator[Any]:
+    """Yield the writer of a file, and close it; where that fails, it is left as it is."""
+    writer = open_()
+    try:
+        yield writer
+        writer.close()
+    except RuntimeError:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))  # not to be destroyed
+        abandoned.append(type(writer).__name__)
+        raise

@@ -1,0 +1,153 @@
+"""The files of a solve: summary, tables, fields, checkpoint, figures."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact.arguments import expect
+from contact.io.field_files import write_fields
+from contact.io.folder import ResultFolder, result_folder
+from contact.io.formats import gathered, write_mappings, write_rows, write_share
+from contact.ranks import on_all_ranks, on_root
+from contact.results.quantities import quantities, values_of
+from contact.results.quantity import (
+    ADAPT,
+    AGAINST,
+    HISTORY,
+    NODES,
+    OPPOSITE,
+    STEPS,
+    SUMMARY,
+    SURFACE,
+)
+from contact.results.solution import Solution
+from contact.results.surface import (
+    contact_surface,
+    opposite_surface,
+    opposite_table,
+)
+
+
+def write_outputs(
+    solution: Solution, folder: str | Path | ResultFolder, figures: bool = False
+) -> None:
+    """Write summary, tables, fields and all that is asked for. Collective.
+
+    The files replace those of an earlier run together: whatever fails, the folder has all earlier
+    results or all new ones. Other files in it are not touched.
+
+    Parameters
+    ----------
+    solution
+        The solution; the seconds that the output takes are added to it.
+    folder
+        Where to; it is made if need be. A run that takes long holds it from its beginning, by
+        `result_folder`.
+    figures
+        Whether to draw the figures too.
+
+    Raises
+    ------
+    InputError
+        If it is given something else, the folder cannot be written to, or has no room, or
+        something that is no result stands in the way.
+    OSError
+        If a library fails to write on this rank; others may wait for it.
+    """
+    expect("write_outputs", solution, "a Solution", isinstance(solution, Solution))
+    fits = isinstance(folder, str | Path | ResultFolder)
+    expect("write_outputs: folder", folder, "the name of a folder, or a ResultFolder", fits)
+    if isinstance(folder, ResultFolder):
+        _replace(solution, folder, figures)
+    else:
+        with result_folder(folder, solution.problem.comm) as held:
+            _replace(solution, held, figures)
+
+
+def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
+    begin, comm = time.perf_counter(), solution.problem.comm
+    failures: list[Exception] = []
+
+    def write(new: Path) -> Mapping[str, Any]:
+        surface, opposite = contact_surface(solution), opposite_surface(solution)
+        table, pieces = values_of(NODES, solution.listed_contact), solution.in_pieces
+        write_rows(comm, table, new / NODES, pieces)
+        write_share(comm, surface, new / SURFACE, pieces)
+        if opposite is not None:
+            whole = opposite if pieces else gathered(comm, opposite)
+            rows = None if whole is None else opposite_table(solution.problem, whole)
+            write_rows(comm, rows, new / AGAINST, pieces)
+            write_share(comm, opposite, new / OPPOSITE, pieces)
+
+        def write_tables() -> None:
+            records = [values_of(HISTORY, record) for record in solution.history.records]
+            write_mappings(
+                new / "history.csv", records, [quantity.name for quantity in quantities(HISTORY)]
+            )
+            if solution.steps:
+                write_mappings(new / STEPS, [record.row for record in solution.steps])
+            if solution.adaptation:
+                write_mappings(new / ADAPT, solution.adaptation)
+
+        on_root(comm, write_tables)
+        if solution.steps:
+            _write_contact_steps(solution, new)
+        if solution.output.fields != "none":
+            write_fields(solution, new)
+        if solution.output.checkpoint:
+            from contact.io.checkpoint import write_checkpoint
+
+            write_checkpoint(solution, new / "checkpoint.npz")
+        solution.seconds["output"] += time.perf_counter() - begin
+        summary = {key: _plain(value) for key, value in values_of(SUMMARY, solution).items()}
+        if figures:
+            try:
+                _draw(solution, new, summary)
+            except Exception as error:
+                failures.append(error)
+        return summary
+
+    folder.replace(write)
+    # A figure that fails is no reason to lose the rest.
+    with on_all_ranks(comm):
+        for failure in failures:
+            raise failure
+
+
+def _write_contact_steps(solution: Solution, folder: Path) -> None:
+    """Write ``contact-steps.csv``, of pieces one of each rank. Collective."""
+    path = folder / "contact-steps.csv"
+    for record in solution.steps:
+        step = solution.at_step(record.state)
+        table = values_of(NODES, step.listed_contact)
+        table = {"t": np.full(len(table["x"]), step.state.time), **table}
+        write_rows(solution.problem.comm, table, path, solution.in_pieces, more=True)
+
+
+def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:
+    """Draw the figures from the files. Collective."""
+    from contact.plot.figures import Look, draw, read_run  # which take a while to load
+
+    run = None
+    if solution.output.fields != "vtu":
+        run = solution.written()
+    elif solution.problem.comm.rank == 0:
+        run = read_run(folder, summary)
+    if run is not None:
+        draw(run, folder, look=Look(mirror=solution.output.mirror))
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of JSON: null in place of NaN and infinity."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | np.ndarray):
+        return [_plain(item) for item in value]
+    value = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,344 @@
+"""Pictures of deformed bodies, coloured by a field: grids of pyvista, which draws them in 3-D."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pyvista
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import Triangulation
+
+from contact.errors import InputError
+from contact.mesh.cells import LINEAR
+from contact.plot.foundation import HATCHED, magnification, profiles
+from contact.plot.run import Run
+from contact.plot.style import (
+    NARROW,
+    PAGE,
+    Look,
+    colour_range,
+    fitted,
+    named,
+    page_width,
+    sheet,
+    smooth,
+)
+from contact.typing import Array
+
+logger = logging.getLogger("contact.plots")
+
+#: The field whose values are regions.
+REGION = "region"
+#: Contact zones below this part of the body are drawn with their vicinity, of so many zones.
+SMALL, VICINITY = 0.04, 3.0
+
+
+def vicinity(run: Run) -> Array | None:
+    """Return the corners of a small contact zone's vicinity, shape (2, d); else None."""
+    zone = run.points[run.table["status"] != "open"]
+    width = float(np.ptp(zone, axis=0).max()) if len(zone) else 0.0
+    if not 0 < width < SMALL * run.diameter:
+        return None
+    return np.array([zone.min(axis=0) - VICINITY * width, zone.max(axis=0) + VICINITY * width])
+
+
+def scalar(run: Run, field: str) -> tuple[Array, bool]:
+    """Return a scalar field of the body, and whether its values are those of the cells.
+
+    Derived fields are taken as they are in cells of degree 1, and averaged at the nodes of
+    others. ``displacement``, ``stress``... are the lengths of these vectors and tensors, and
+    ``displacement_y``, ``stress_xy``... their components.
+
+    Raises
+    ------
+    InputError
+        If the body has no such field.
+    """
+    at_points, in_cells = run.body.point_data, run.body.cell_data
+    if field in in_cells:
+        return np.asarray(in_cells[field]), True
+    name, _, component = field.rpartition("_")
+    linear = run.body.celltypes[0] in LINEAR
+    for whole, part in ((field, ""), (name, component)):
+        of_cells = linear and f"{whole}_cell" in in_cells
+        fields, key = (in_cells, f"{whole}_cell") if of_cells else (at_points, whole)
+        if key not in fields or not set(part) <= set("xyz"):
+            continue
+        values = np.asarray(fields[key])
+        if not part:
+            return (np.linalg.norm(values, axis=1) if values.ndim > 1 else values), of_cells
+        if values.ndim > 1 and len(part) == (2 if values.shape[1] == 9 else 1):
+            return values[:, int("".join(str("xyz".index(i)) for i in part), 3)], of_cells
+    endings = {1: "", 3: "[_x, ...]", 9: "[_xx, ...]"}
+    accepted = [f"{name}{endings[np.size(v) // len(v)]}" for name, v in at_points.items()]
+    raise InputError(
+        f"--field {field}: no such field; accepted: {', '.join(sorted(accepted))}", "figure-option"
+    )
+
+
+@dataclass(frozen=True)
+class Picture:
+    """The deformed body of a run, coloured by a field.
+
+    Attributes
+    ----------
+    run
+        The run.
+    skin
+        The surface of the body as it is drawn, a mesh of pyvista with ``values``.
+    norm, label
+        Range and label of the colours.
+    scale, box
+        Factor of the displacements, and the corners of the part that is shown, shape (2, d).
+    look
+        The choices for the figure.
+    near
+        Corners of the vicinity that has decided on the scale, shape (2, d); None for all.
+    classes
+        Names of the values 0, 1, ..., where these are no quantity.
+    """
+
+    run: Run
+    skin: Any
+    norm: Normalize
+    label: str
+    scale: float
+    box: Array
+    look: Look = PAGE
+    near: Array | None = None
+    classes: Sequence[str] = ()
+
+    @property
+    def title(self) -> str:
+        """The title of the run, with the factor of the displacements."""
+        times = f"displacements\u00a0$\\times$\u00a0{self.scale:g}"
+        times = times if self.scale != 1 else "displacements to scale".replace(" ", "\u00a0")
+        return fitted(f"{self.run.title} ({times})" if self.run.title else times)
+
+    @property
+    def colours(self) -> Any:
+        """The colours by name, or one for each class."""
+        continuous = matplotlib.colormaps["viridis"]
+        return continuous.resampled(len(self.classes)) if self.classes else continuous
+
+
+def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE) -> Picture:
+    """Return a picture of the body, with colours for the part of it that is shown.
+
+    Parameters
+    ----------
+    run
+        The run.
+    field
+        To colour by, as `scalar` takes it.
+    scale
+        As `Picture` has it; by default that of the body, or of a small contact zone's vicinity,
+        which is then the part that is shown.
+    look
+        The choices; in 2-D that of the part that is shown.
+
+    Raises
+    ------
+    InputError
+        If there is no such field, or nothing to be seen.
+    """
+    values, in_cells = scalar(run, field)
+    near = None
+    if scale is None:
+        near = vicinity(run)
+        scale = magnification(run, box=near)
+    body = run.body.warp_by_vector("displacement", factor=scale)
+    (body.cell_data if in_cells else body.point_data)["values"] = values
+    skin = body.extract_surface(nonlinear_subdivision=1)  # triangles; at degree 2 four of each
+    whole = np.array([skin.points.min(axis=0), skin.points.max(axis=0)])[:, : len(run.axes)]
+    box = whole.copy() if near is None else np.clip(near, *whole)
+    sides = look.sides(run.axes)
+    if run.plane:
+        if len(sides) > 1:
+            whole[0, 0], box[0, 0] = -whole[1, 0], -box[1, 0]
+        for k, (low, high) in enumerate(whole.T):
+            box[:, k] = look.ends(k, low, high, "the body") or box[:, k]
+    if np.any(box[0] > whole[0]) or np.any(box[1] < whole[1]):
+        values = _inside(skin, box, sides, values)
+    label = named(field, run.units)[1]
+    if field != REGION:
+        return Picture(run, skin, *colour_range(values, label), scale, box, look, near)
+    found = np.unique(values)
+    skin["values"] = np.searchsorted(found, skin["values"])
+    names = [run.regions[k] for k in found]
+    classes = Normalize(-0.5, len(names) - 0.5)
+    return Picture(run, skin, classes, label, scale, box, look, near, names)
+
+
+def _inside(skin: Any, box: Array, sides: Sequence[int], values: Array) -> Array:
+    """Return the values of a surface, or of its mirror image, in a box; where it has none others.
+
+    Parameters
+    ----------
+    skin, box
+        As `Picture` has them.
+    sides
+        As `Look.sides` returns them.
+    values
+        Those for a box beside the surface.
+    """
+    found = []
+    for side in sides:
+        part, ends = skin, box.copy()
+        ends[:, 0] = np.sort(side * box[:, 0])
+        for above, k in np.ndindex(ends.shape):
+            if part.n_cells:
+                place = np.eye(3)[k] * ends[above, k]
+                part = part.clip("xyz"[k], origin=place, invert=above == 1)
+        found.append(np.asarray(part["values"]) if part.n_cells else np.empty(0))
+    every = np.concatenate(found)
+    return every if every.size else values
+
+
+def body_figure(picture: Picture) -> Figure | None:
+    """Draw a deformed body; None in 3-D without a display."""
+    return draw_plane(picture) if picture.run.plane else draw_space(picture)
+
+
+def draw_plane(picture: Picture) -> Figure:
+    """Draw a plane body over its outline in the reference configuration, and the foundation."""
+    run, box, head, look = picture.run, picture.box, picture.title, picture.look
+    places = np.asarray(picture.skin.points)[:, :2]
+    sides = look.sides(run.axes)
+    free = [look.xlim is None, look.ylim is None]
+    whole = np.ptp(places, axis=0) * [len(sides), 1]
+    cut = bool(np.any(np.ptp(box, axis=0)[free] < 0.99 * whole[free]))
+    width, height = box[1] - box[0]
+    tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
+    more = 0.02 * float(matplotlib.rcParams["font.size"]) * head.count("\n")
+    figure = sheet(tall + (1.4 + more) / page_width())
+    figure.set_layout_engine("compressed")  # made for axes of equal scale
+    ax = figure.subplots()
+    skin = run.body.extract_surface(nonlinear_subdivision=1)
+    edges = skin.extract_feature_edges(
+        feature_edges=False, manifold_edges=False, non_manifold_edges=False
+    )
+    outline = edges.points[edges.lines.reshape(-1, 3)[:, 1:], :2]
+    scale, near = picture.scale, picture.near
+    found = [each for side in sides for each in profiles(run, scale, places, side, near)]
+    for side in sides:
+        _colour(ax, picture, side)
+        # Dashes would be those of an edge each: none where edges are short.
+        ax.add_collection(LineCollection(list(outline * [side, 1]), colors="black", lw=0.5))
+    for profile in found:
+        profile.draw(ax, HATCHED * float(np.ptp(box, axis=0).max()))
+    _bar(figure, picture)
+    ax.set_aspect("equal")
+    shown = np.array(box)
+    if not cut:
+        every = np.concatenate([outline.reshape(-1, 2) * [side, 1] for side in sides])
+        shown = np.array([np.minimum(box[0], every.min(0)), np.maximum(box[1], every.max(0))])
+    shown = reduce(lambda part, profile: profile.reach(part), found, shown)
+    shown += 0.0 if cut else 0.02 * np.ptp(shown, axis=0) * [[-1], [1]]
+    ax.set(xlim=look.xlim or tuple(shown[:, 0]), ylim=look.ylim or tuple(shown[:, 1]))
+    ax.set_xlabel(run.units.label(f"${run.axes[0]}$", "length"))
+    ax.set_ylabel(run.units.label(f"${run.axes[1]}$", "length"))
+    ax.set_title(head, fontsize="medium")
+    return figure
+
+
+def _bar(figure: Figure, picture: Picture) -> None:
+    """Add the bar of the colours, of classes a legend."""
+    colours, axes = ScalarMappable(picture.norm, picture.colours), figure.axes
+    if picture.classes:
+        rgba = colours.to_rgba(range(len(picture.classes)))
+        handles = [Patch(color=c, label=k) for c, k in zip(rgba, picture.classes, strict=True)]
+        columns = 2 if page_width() < NARROW else 4
+        figure.legend(
+            handles=handles, title=picture.label, ncols=columns, loc="outside lower center"
+        )
+        return
+    bar = {"location": "bottom", "label": picture.label, "aspect": 40, "shrink": 0.8}
+    made = figure.colorbar(colours, ax=axes, **bar)
+    made.formatter.set_powerlimits((-2, 4))  # long numbers would meet
+    made.locator = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10])
+    text = made.ax.xaxis.get_offset_text()
+    text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the bar
+
+
+def _colour(ax: Axes, picture: Picture, side: int) -> None:
+    """Draw the coloured body, or its mirror image where the side is -1."""
+    skin = picture.skin.triangulate()
+    mesh = Triangulation(*(skin.points[:, :2] * [side, 1]).T, skin.regular_faces)
+    values, norm, colours = skin["values"], picture.norm, picture.colours
+    if "values" in skin.cell_data:
+        ax.tripcolor(mesh, facecolors=values, norm=norm, cmap=colours, rasterized=True)
+    else:
+        smooth(ax, mesh, values, norm, colours)
+
+
+def draw_space(picture: Picture) -> Figure | None:
+    """Draw the surface of a body in 3-D, from above and from below; None without a display."""
+    skin, norm = picture.skin, picture.norm
+
+    def add(plotter: Any) -> None:
+        plotter.add_mesh(
+            skin, scalars="values", cmap=picture.colours, clim=[norm.vmin, norm.vmax],
+            show_edges=skin.n_cells < 5000, line_width=0.5, edge_opacity=0.3, ambient=0.6,
+            diffuse=0.4, show_scalar_bar=False,
+        )  # fmt: skip
+
+    images = [rendered(add, (1.0, -1.6, height), picture.box) for height in (0.8, -0.8)]
+    narrow = page_width() < NARROW
+    figure = sheet(1.9 if narrow else 0.6)
+    figure.set_layout_engine("compressed")
+    axes = figure.subplots(*((2, 1) if narrow else (1, 2)))
+    for ax, name, image in zip(axes, ("from above", "from below"), images, strict=True):
+        if image is None:
+            return None
+        ax.imshow(image)
+        ax.set_title(name, fontsize="medium")
+        ax.axis("off")
+    _bar(figure, picture)
+    figure.suptitle(picture.title, fontsize="large")
+    return figure
+
+
+def rendered(
+    add: Callable[[Any], None], view: tuple[float, float, float], box: Array
+) -> Array | None:
+    """Return an image of a 3-D scene by pyvista, without a window; None without a display.
+
+    Parameters
+    ----------
+    add
+        Adds the meshes of the scene to a ``pyvista.Plotter``.
+    view
+        Direction from the scene to the eye.
+    box
+        Lower and upper corner of the scene, shape (2, 3).
+    """
+    if not os.environ.get("DISPLAY") and pyvista.vtk_version_info < (9, 4):
+        try:
+            pyvista.start_xvfb()
+        except OSError:
+            logger.warning("the body is not drawn: VTK before 9.4 needs a display or Xvfb")
+            return None
+    plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 1000))
+    plotter.set_background("white")
+    plotter.enable_parallel_projection()
+    add(plotter)
+    plotter.add_axes(viewport=(0.0, 0.0, 0.2, 0.2))
+    plotter.view_vector(view)
+    plotter.reset_camera(bounds=box.T.ravel())
+    image = plotter.screenshot(return_img=True)
+    plotter.close()
+    return np.asarray(image)

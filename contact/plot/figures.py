@@ -1,0 +1,204 @@
+"""All figures of a run, and animations, from the files that it has left."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from mpi4py import MPI
+from PIL import Image
+
+from contact.errors import InputError
+from contact.io.folder import add, begin, discard, result_folder
+from contact.plot.body import body_figure, picture
+from contact.plot.contact import contact_figure
+from contact.plot.foundation import magnification
+from contact.plot.run import Run, read_run, read_step, read_steps
+from contact.plot.steps import steps_figures
+from contact.plot.style import DEFORMED, PAGE, STYLE, Look, named
+from contact.ranks import refused
+
+#: Endings of files that figures may have.
+FORMATS = ("png", "pdf", "svg")
+
+#: Dots per inch of an animation: a file that a page can show.
+DPI = 90
+
+#: Least red, green and blue of paper, in animations.
+PAPER = 246
+
+#: Milliseconds of the whole animation, and of a frame at least and at most.
+LENGTH, SHORTEST, LONGEST = 6000, 40, 500
+
+
+class Gallery(dict[str, Figure]):
+    """Figures by name; a notebook shows them."""
+
+    def _repr_html_(self) -> str:
+        with matplotlib.rc_context(STYLE):
+            texts = {k: base64.b64encode(image(f, "png", 110)).decode() for k, f in self.items()}
+        return "".join(
+            f'<img alt="{name}" src="data:image/png;base64,{text}">' for name, text in texts.items()
+        )
+
+
+def image(figure: Figure, ending: str, dpi: int | None = None) -> bytes:
+    """Return a figure as the contents of a file."""
+    data = io.BytesIO()
+    figure.savefig(data, format=ending, dpi=dpi or "figure")
+    return data.getvalue()
+
+
+def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Gallery:
+    """Return the figures of a run by name.
+
+    In 2-D the contact figure shows the stresses along Gamma_3 with the friction bound and the zones
+    of stick and slip, as Figure 7.4 of the thesis does. In 3-D the contact nodes are seen along the
+    mean contact direction, and the deformed surface from the side.
+
+    Parameters
+    ----------
+    run, look
+        The run, and choices for all figures.
+    fields
+        Fields to colour the body by, and these figures alone; by default all figures, the body by
+        von Mises stress and potential.
+    """
+    found = Gallery()
+    with matplotlib.rc_context(look.style):
+        if not fields:
+            found["contact"] = contact_figure(run, look)
+            if run.steps is not None:
+                found |= steps_figures(run, look)
+        for field in fields or [field for field in DEFORMED if field in run.body.point_data]:
+            figure = body_figure(picture(run, field, look=look))
+            if figure is not None:
+                found[named(field, run.units)[0]] = figure
+    return found
+
+
+def draw(
+    run: Run,
+    folder: Path,
+    fields: Sequence[str] = (),
+    formats: Sequence[str] = ("png",),
+    look: Look = PAGE,
+) -> list[Path]:
+    """Draw the figures of `figures_of` into a folder; return the files. On one rank."""
+    files, step = [], "" if run.step is None else f"-step-{run.step}"
+    with matplotlib.rc_context(look.style):
+        for name, figure in figures_of(run, fields, look).items():
+            for ending in formats:
+                files.append(folder / f"figure-{name}{step}.{ending}")
+                files[-1].write_bytes(image(figure, ending))
+    return files
+
+
+def plot(
+    folder: Path,
+    fields: Sequence[str] = (),
+    formats: Sequence[str] = ("png",),
+    look: Look = PAGE,
+    step: int | None = None,
+) -> list[Path]:
+    """Draw the figures of a run into its folder, as `draw` does; return the files. On one rank.
+
+    Those of a step, numbered from 1, end with its number.
+
+    Raises
+    ------
+    InputError
+        If the folder has not all that is needed, or no such field, cannot be written to, or another
+        run works in it.
+    """
+
+    def read() -> Run:
+        return read_run(folder) if step is None else read_step(folder, step)
+
+    return _added(folder, lambda new: draw(read(), new, fields, formats, look))
+
+
+def animate(folder: Path, fields: Sequence[str] = (), look: Look = PAGE) -> list[Path]:
+    """Draw ``animation-FIELD.gif`` from the files of an evolution; return the files. On one rank.
+
+    Scale, colours and axes are the same in all frames.
+
+    Raises
+    ------
+    InputError
+        As `plot`, and if the folder has no steps.
+    """
+
+    def draw(new: Path) -> list[Path]:
+        steps = read_steps(folder)
+        return [_animation(steps, field, new, look) for field in fields or ("von_mises",)]
+
+    return _added(folder, draw)
+
+
+def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
+    """Let files be drawn, and add them to the results in a folder."""
+    if not (folder / "summary.json").is_file():
+        raise InputError(
+            f"{folder}: no results there; accepted: a folder that a run has left", "no-results"
+        )
+    with result_folder(folder, MPI.COMM_SELF, overwrite=True):  # it only adds
+        try:
+            files = draw(begin(folder))
+            add(folder, files)
+        except OSError as error:
+            raise refused(error) from None
+        finally:
+            discard(folder)
+    return [folder / path.name for path in files]
+
+
+def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
+    runs = [run for _, run in steps]
+    scale = magnification(*runs)
+    pictures = [picture(run, field, scale, look) for run in runs]
+    # Colours of all frames.
+    ends = np.array([(made.norm.vmin, made.norm.vmax) for made in pictures])
+    alike = {
+        "norm": Normalize(ends[:, 0].min(), ends[:, 1].max()),
+        "label": named(field, runs[0].units)[1],
+    }
+    box = np.array(
+        [
+            np.min([made.box[0] for made in pictures], 0),
+            np.max([made.box[1] for made in pictures], 0),
+        ]
+    )
+    with matplotlib.rc_context(look.style):
+        found = [body_figure(replace(made, box=box, **alike)) for made in pictures]
+        figures = [figure for figure in found if figure is not None]
+        if not figures:
+            raise InputError(
+                "--animate: pyvista cannot draw here; accepted: a display, or Xvfb",
+                "figure-of-steps",
+            )
+        if runs[0].plane:
+            axes = [figure.axes[0] for figure in figures]
+            shown = np.array([(ax.get_xlim(), ax.get_ylim()) for ax in axes])
+            low, high = shown[..., 0].min(axis=0), shown[..., 1].max(axis=0)
+            for ax in axes:
+                ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        files = [io.BytesIO(image(figure, "png", DPI)) for figure in figures]
+    images = [Image.open(file).convert("RGB") for file in files]
+    # One for all, so that nothing flickers; the bar has it. Paper is white, and not nearly so.
+    palette = images[-1].quantize(256, Image.Quantize.MAXCOVERAGE)
+    entries = np.array(palette.getpalette(), dtype=np.uint8).reshape(-1, 3)
+    entries[entries.min(axis=1) >= PAPER] = 255
+    palette.putpalette(entries.tobytes())
+    first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in images)
+    path = folder / f"animation-{named(field, runs[0].units)[0]}.gif"
+    duration = int(np.clip(LENGTH / len(steps), SHORTEST, LONGEST))
+    first.save(path, save_all=True, append_images=rest, duration=duration, loop=0)
+    return path

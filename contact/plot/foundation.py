@@ -1,0 +1,193 @@
+"""Rigid foundations in pictures of deformed bodies, and how far displacements are magnified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from contact.io.formats import Table
+from contact.plot.contact import ends
+from contact.plot.run import Run
+from contact.plot.style import BLUE
+from contact.typing import Array
+
+#: Overlap of bodies, over the diameter, that is not seen.
+UNSEEN = 0.002
+#: Largest height of a magnified profile, over the diameter.
+SHALLOW = 0.1
+#: Thickness of the hatching, and room for foundations beyond their least gap, over the diameter.
+HATCHED, BEYOND = 0.03, 0.15
+#: Least width of a curved part over its length.
+CURVED = 1e-6
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """The distances h + (s - 1) f at which a foundation is drawn beside displacements times s.
+
+    With a constant f it keeps its shape, and is shifted to where the body first touches it. With
+    f = h its profile is magnified as the displacements are. No magnified gap fits a plane to a
+    magnified round body: that is for straight parts alone.
+
+    Attributes
+    ----------
+    approach
+        Displacements of the body towards it, shape (n,).
+    distance, more
+        h and f, shape (n,).
+    largest
+        The scale up to which bodies do not overlap it visibly, and it is shallow.
+    """
+
+    approach: Array
+    distance: Array
+    more: Array
+    largest: float
+
+    @staticmethod
+    def of(
+        approach: Array, distance: Array, more: Array, diameter: float, seen: NDArray[np.bool_]
+    ) -> Scaling:
+        """Return it for a diameter of the part that is shown, and which nodes are seen in it."""
+        closing = seen & (approach > more)
+        room = (distance + UNSEEN * diameter - more)[closing] / (approach - more)[closing]
+        height = float(np.ptp(more[seen])) if seen.any() else 0.0
+        shallow = SHALLOW * diameter / height if height > 0 else np.inf
+        return Scaling(approach, distance, more, min(shallow, float(room.min(initial=np.inf))))
+
+
+def scalings(run: Run, table: Table, box: Array | None) -> list[Scaling]:
+    """Return how the foundation of a contact may be drawn, the best first; also the other body.
+
+    Parameters
+    ----------
+    run, table
+        The run, and the nodes of one of its contacts.
+    box
+        Corners of the part that is shown, shape (2, d); all for None.
+    """
+    points = np.column_stack([table[axis] for axis in "xyz"[: len(run.axes)]])
+    seen, diameter = np.ones(len(points), dtype=bool), run.diameter
+    if box is not None:
+        seen = np.all((points >= box[0]) & (points <= box[1]), axis=1)
+        diameter = float(np.ptp(box, axis=0).max())
+    approach, distance = table["u_n"], np.maximum(table["gap"], 0.0)
+    if not np.all(table["rigid"]):
+        return [Scaling.of(approach, distance, np.zeros_like(distance), diameter, seen)]
+    approach, distance = approach + table["moved"], table["gap"] + table["moved"]
+    touching = table["status"] != "open"
+    nearest = distance[touching if touching.any() else slice(None)].min()
+    found = [np.full_like(distance, nearest)]
+    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if run.plane and sizes[-1] <= CURVED * sizes[0]:
+        found.append(distance)
+    return [Scaling.of(approach, distance, more, diameter, seen) for more in found]
+
+
+def magnification(*runs: Run, box: Array | None = None) -> float:
+    """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of a diameter.
+
+    Displacements that are visible anyway are drawn as they are. Bodies do not overlap each other or
+    their foundation, whose gap a displacement would close many times over.
+
+    Parameters
+    ----------
+    runs
+        All that have this scale.
+    box
+        Corners of the part that is shown, shape (2, d); all by default.
+    """
+    diameter = runs[0].diameter if box is None else float(np.ptp(box, axis=0).max())
+    largest = max(float(np.linalg.norm(run.displacement, axis=1).max()) for run in runs)
+    if not 0 < largest < 0.02 * diameter:
+        return 1.0
+    wanted = 0.05 * diameter / largest
+    for run in runs:
+        for table in run.contacts:
+            if run.plane or not np.all(table["rigid"]):  # else none is drawn
+                wanted = min(wanted, max(each.largest for each in scalings(run, table, box)))
+    if wanted < 1:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(k for k in (1, 2, 5) if k * power <= wanted))
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A foundation as it is drawn beside a deformed body in 2-D.
+
+    Attributes
+    ----------
+    points, normal
+        Points that face the nodes of Gamma_3, and the directions from those to them, shape (n, 2).
+    gap
+        Their distances from the deformed body, shape (n,).
+    """
+
+    points: Array
+    normal: Array
+    gap: Array
+
+    def reach(self, box: Array) -> Array:
+        """Return a box, shape (2, 2), that shows the foundation in front of the part in it too.
+
+        Not all of one that is large.
+        """
+        size = float(np.ptp(box, axis=0).max())
+        body, room = self.points - self.gap[:, None] * self.normal, BEYOND * size
+        least, most = box[0] - room * abs(self.normal), box[1] + room * abs(self.normal)
+        seen = np.all((body >= least) & (body <= most), axis=1)
+        if not seen.any():
+            return box
+        room += max(float(self.gap[seen].min()), 0.0)
+        points, normal = self.points[seen], self.normal[seen]
+        every = np.concatenate([points, points + HATCHED * size * normal])
+        every = np.concatenate([np.clip(every, box[0] - room, box[1] + room), box])
+        return np.array([every.min(axis=0), every.max(axis=0)])
+
+    def draw(self, ax: Axes, thick: float) -> None:
+        """Draw it with its hatching of some thickness."""
+        ax.plot(*self.points.T, color="black", lw=0.5)
+        band = np.concatenate([self.points, (self.points + thick * self.normal)[::-1]])
+        ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)
+
+
+def profiles(run: Run, scale: float, places: Array, side: int, box: Array | None) -> list[Profile]:
+    """Return the foundations of a run in 2-D, as far as they face the body.
+
+    Not one that is farther from the deformed body than that is thick: that would be a dot then.
+
+    Parameters
+    ----------
+    run, scale
+        The run, and the factor of its displacements.
+    places
+        Points of the deformed body, shape (n, 2).
+    side
+        -1 for mirror images, else 1.
+    box
+        As `magnification` has had it.
+    """
+    found = []
+    for table in run.contacts:
+        if not np.all(table["rigid"]):
+            continue
+        ways = scalings(run, table, box)
+        way = next((each for each in ways if each.largest >= scale), ways[0])
+        drawn = way.distance + (scale - 1) * way.more
+        gap = drawn - scale * way.approach
+        points = np.column_stack([table["x"], table["y"]])
+        normal = np.column_stack([table["nu_x"], table["nu_y"]])
+        across = normal.mean(axis=0) / (np.linalg.norm(normal.mean(axis=0)) or 1.0)
+        if gap.min() > np.ptp(places @ across) > 0:
+            continue
+        # Held nodes beside the first and the last have their distances.
+        first, last = ends(table, run.held)
+        points = np.concatenate([first[None], points, last[None]])
+        normal, drawn, gap = (np.concatenate([v[:1], v, v[-1:]]) for v in (normal, drawn, gap))
+        mirror = np.array([side, 1])
+        found.append(Profile((points + drawn[:, None] * normal) * mirror, normal * mirror, gap))
+    return found

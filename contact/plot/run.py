@@ -1,0 +1,324 @@
+"""The files of a run, as its figures see them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+import pyvista
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from contact.errors import InputError
+from contact.io.formats import Table
+from contact.plot.style import heading
+from contact.ranks import refused
+from contact.results.options import Units
+from contact.results.quantity import OPPOSITE
+from contact.typing import Array
+
+T = TypeVar("T")
+
+#: Most frames of an animation.
+MOST = 100
+
+_SET = re.compile(r'timestep="([^"]+)" file="([\w-]+\.p?vtu)"')
+
+
+@dataclass(frozen=True)
+class Run:
+    """The results of a run, or those at the end of one of its steps.
+
+    Attributes
+    ----------
+    title
+        One line, to be shown as it is.
+    units
+        Names of the units, for labels.
+    axes
+        Names of the coordinates: xy, rz of a body of revolution, xyz.
+    table
+        The columns of ``contact.csv``, with contact direction ``nu_x``..., number of the contact
+        (``entry``), whether its foundation is rigid (``rigid``), and how far that has moved along
+        the contact direction (``moved``).
+    body, surface, opposite
+        Grids of pyvista: body, contact part, and the other sides of contacts between bodies.
+    regions
+        Names of the regions, in the order of the numbers in the field ``region``.
+    step
+        Number of the step that these are the results of, from 1; None for the last results.
+    steps, tables
+        The columns of ``steps.csv``, and the contact nodes of each step, of an evolution.
+    """
+
+    title: str
+    units: Units
+    axes: str
+    table: Table
+    body: Any
+    surface: Any
+    opposite: Any = None
+    regions: Sequence[str] = ()
+    step: int | None = None
+    steps: Table | None = None
+    tables: Sequence[Table] = ()
+
+    @property
+    def plane(self) -> bool:
+        """Whether the body is drawn in 2-D."""
+        return len(self.axes) == 2
+
+    @property
+    def points(self) -> Array:
+        """Places of the contact nodes in the reference configuration, shape (n, d)."""
+        return np.column_stack([self.table[axis] for axis in "xyz" if axis in self.table])
+
+    @property
+    def contacts(self) -> list[Table]:
+        """The rows of `table` of each contact."""
+        owner = self.table["entry"]
+        return [{k: v[owner == i] for k, v in self.table.items()} for i in np.unique(owner)]
+
+    @property
+    def held(self) -> Array:
+        """Nodes of the contact part that are no contact nodes, shape (n, d)."""
+        return np.asarray(self.surface.points[self.surface["row"] < 0, : len(self.axes)])
+
+    @property
+    def displacement(self) -> Array:
+        """Displacement of the nodes of the body, shape (n, 3)."""
+        return np.asarray(self.body.point_data["displacement"])
+
+    @property
+    def diameter(self) -> float:
+        """Largest extent of the body."""
+        return float(np.ptp(self.body.points, axis=0).max())
+
+
+def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
+    """Read the files of a run. On one rank.
+
+    Parameters
+    ----------
+    folder
+        The results of the run.
+    summary
+        The contents of ``summary.json``, where that is not written yet.
+
+    Raises
+    ------
+    InputError
+        If the folder has not all that is needed.
+    """
+    if (folder / "contact.pvtu").exists():
+        raise InputError(
+            f"{folder}: the contact part is in pieces, one a rank; accepted: results of one rank, "
+            "or of fewer contact nodes; ParaView opens contact.pvtu",
+            "contact-in-pieces",
+        )
+    about = summary or read(folder, "summary.json", _table_of)
+    bodies = "fields.pvtu" if (folder / "fields.pvtu").exists() else "fields.vtu"
+    surface, body = (read(folder, name, read_grid) for name in ("contact.vtu", bodies))
+    columns = read(folder, "contact.csv", _nodes)
+    files = about.get("files", [path.name for path in folder.iterdir()])
+
+    def run(_: Path) -> Run:
+        flat = "rz" if about["kinematics"] == "axisymmetric" else "xy"
+        row = surface["row"]
+        nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
+        along = {f"nu_{axis}": surface["normal"][nodes, i] for i, axis in enumerate("xyz")}
+        rigid = surface["rigid"][nodes] > 0
+        return Run(
+            heading(str(about["title"])),
+            Units(**about.get("units", {})),
+            "xyz" if "z" in columns else flat,
+            _moved({**columns, **along, "entry": surface["entry"][nodes], "rigid": rigid}, body),
+            body,
+            surface,
+            opposite=read(folder, OPPOSITE, read_grid) if OPPOSITE in files else None,
+            regions=about.get("regions", ()),
+            steps=read(folder, "steps.csv", _steps) if "steps.csv" in files else None,
+            tables=read(folder, "contact-steps.csv", _tables) if "steps.csv" in files else (),
+        )
+
+    return read(folder, "summary.json", run)
+
+
+def read_steps(folder: Path) -> list[tuple[float, Run]]:
+    """Read an evolution: at most `MOST` of its times and results then, the last one always."""
+    run, frames = _frames(folder)
+    chosen = frames[:: -int(np.ceil(len(frames) / MOST))][::-1]
+    return [(frame[0], _at(run, folder, *frame)) for frame in chosen]
+
+
+def read_step(folder: Path, number: int) -> Run:
+    """Read the results at the end of a step, numbered from 1.
+
+    Raises
+    ------
+    InputError
+        If the folder has no such step with its fields.
+    """
+    run, frames = _frames(folder)
+    known = {frame[1] + 1: frame for frame in frames}
+    if number not in known:
+        accepted = ", ".join(map(str, known))
+        raise InputError(
+            f"--step {number}: no fields of such a step; accepted: {accepted}", "figure-of-steps"
+        )
+    return _at(run, folder, *known[number])
+
+
+def _frames(folder: Path) -> tuple[Run, list[tuple[float, int, str, str]]]:
+    """Return an evolution and, of each step with fields, its end, row and files."""
+    if not (folder / "fields.pvd").is_file():
+        raise InputError(
+            f"{folder}: no steps there; accepted: the results of an evolution, with "
+            'output.fields = "vtu"',
+            "figure-of-steps",
+        )
+    run = read_run(folder)
+    assert run.steps is not None  # where there are fields in time, there are steps
+    fields, contact = (
+        _SET.findall(read(folder, f"{kind}.pvd", lambda path: path.read_text("utf-8")))
+        for kind in ("fields", "contact")
+    )
+    times = [float(time) for time, _ in fields]
+    rows = [int(np.argmin(abs(run.steps["t"] - time))) for time in times]
+    files = ([name for _, name in sets] for sets in (fields, contact))
+    return run, list(zip(times, rows, *files, strict=True))
+
+
+def _at(run: Run, folder: Path, time: float, row: int, fields: str, contact: str) -> Run:
+    """Return an evolution's results at a time, the end of the step of a row."""
+    body, surface = (read(folder, name, read_grid) for name in (fields, contact))
+    title = f"{run.title}, t = {time:.3g}".lstrip(", ")
+    table = _moved({**run.table, **run.tables[row]}, body)
+    own = {"table": table, "body": body, "surface": surface, "opposite": None}
+    return replace(run, title=title, step=row + 1, steps=None, tables=(), **own)
+
+
+def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
+    """Read a file of the results.
+
+    Raises
+    ------
+    InputError
+        If it is missing or damaged.
+    """
+    path = folder / name
+    try:
+        return reader(path)
+    except InputError:  # of a further file
+        raise
+    except FileNotFoundError:
+        hint = ', written with output.fields = "vtu"' if name == "fields.vtu" else ""
+        raise InputError(
+            f"{path}: no such file; accepted: a run's results{hint}", "no-results"
+        ) from None
+    except OSError as error:
+        raise refused(error) from None
+    except (KeyError, ValueError, IndexError, TypeError, AttributeError) as error:
+        why = f"no {error}" if isinstance(error, KeyError) else error
+        raise InputError(
+            f"{path}: not as a run has left it ({why}); accepted: the file that solving writes",
+            "no-results",
+        ) from None
+
+
+def _table_of(path: Path) -> dict[str, Any]:
+    found = json.loads(path.read_bytes())
+    if not isinstance(found, dict):
+        raise ValueError("no table of results")
+    return found
+
+
+def read_grid(path: Path) -> Any:
+    """Read a grid of pyvista with its fields; points of several pieces are one.
+
+    Raises
+    ------
+    ValueError
+        If the file is not one of ours.
+    """
+    path.open("rb").close()
+    errors = pyvista.VtkErrorCatcher(send_to_logging=False)
+    with errors, catch_warnings():  # VTK and pyvista would print them
+        simplefilter("ignore")
+        grid = pyvista.read(path)
+    if errors.events or not grid.n_cells:
+        raise ValueError("it has no grid")
+    return _joined(grid) if path.suffix == ".pvtu" else grid
+
+
+def _joined(pieces: Any) -> Any:
+    """Return a grid each of whose points is there once."""
+    numbers = pieces.point_data["node"]
+    _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
+    cells = {shape: place[nodes] for shape, nodes in pieces.cells_dict.items()}
+    made = pyvista.UnstructuredGrid(cells, pieces.points[first])
+    for name in pieces.point_data:
+        made.point_data[name] = pieces.point_data[name][first]
+    for name in pieces.cell_data:
+        made.cell_data[name] = pieces.cell_data[name]
+    return made
+
+
+def _columns(path: Path) -> dict[str, NDArray[Any]]:
+    """Read a table: the columns by name."""
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        header, *rows = csv.reader(file)
+    for row in rows:
+        if len(row) != len(header):
+            raise ValueError(f"a row of {len(row)} values under {len(header)} columns")
+    columns = {name: np.array(texts) for name, *texts in zip(header, *rows, strict=True)}
+    return {k: v if k in ("status", "on") else v.astype(float) for k, v in columns.items()}
+
+
+def _with(columns: dict[str, NDArray[Any]], *names: str) -> dict[str, NDArray[Any]]:
+    """Return columns, or raise a KeyError with the first that is missing of some."""
+    for name in names:
+        if name not in columns:
+            raise KeyError(name)
+    return columns
+
+
+def _nodes(path: Path) -> dict[str, NDArray[Any]]:
+    """Read ``contact.csv``, or the table of all steps, with the columns that figures ask for."""
+    columns, tangential = _columns(path), ["u_t", "tau"]
+    if "z" in columns:
+        tangential = [f"{name}{axis}" for name in ("u_t", "tau_") for axis in "xyz"]
+    names = "x", "y", "weight", "gap", "u_n", "pressure", "bound", "status"
+    return _with(columns, *names, *tangential)
+
+
+def _steps(path: Path) -> dict[str, NDArray[Any]]:
+    """Read ``steps.csv`` with the columns that figures ask for."""
+    columns = _columns(path)
+    found = [re.fullmatch(r"(driven|rigid)_(force_)?([xyz](?:_.*)?)", name) for name in columns]
+    names = [f"{m[1]}_{'' if m[2] else 'force_'}{m[3]}" for m in found if m is not None]
+    return _with(columns, "t", "work", "energy", "dissipation", *names)
+
+
+def _tables(path: Path) -> list[Table]:
+    """Read ``contact-steps.csv``: a table a step."""
+    columns = _nodes(path)
+    starts = np.flatnonzero(np.diff(columns["t"])) + 1
+    parts = {name: np.split(values, starts) for name, values in columns.items()}
+    return [{name: values[k] for name, values in parts.items()} for k in range(len(starts) + 1)]
+
+
+def _moved(table: Table, body: Any) -> Table:
+    """Return contact nodes with how far the foundation has moved."""
+    normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"])
+    places = np.column_stack([table.get(axis, np.zeros(len(normal))) for axis in "xyz"])
+    nodes = KDTree(body.points).query(places)[1]
+    along = np.einsum("ni,ni->n", body.point_data["displacement"][nodes], normal)
+    return {**table, "moved": along - table["u_n"]}

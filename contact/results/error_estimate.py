@@ -1,0 +1,361 @@
+"""An estimate of the discretisation error in the energy norm.
+
+Degree 1: eta_K^2 = int_K (G sigma - sigma) : S : (G sigma - sigma), G sigma being the nodal means
+of the stress inside each material (Zienkiewicz and Zhu, IJNME 24, 1987); also of degree 2 with the
+mean dilatation, whose constant pressures leave the stress an error of first order. Degree 2: the
+energy of the errors of `contact.results.local_problems`. Of degree 1 the loads that nodes do not see
+are added (`contact.results.oscillation`). S is the compliance of the last
+linearisation, with the secant modulus. In a piezoelectric body sigma is the pair (sigma, D), and S
+that of [F, -e^T; e, beta], whose energy is eps : F eps + E . beta E. At the contact pressures times
+gaps between the nodes are added, and friction times slip that is not dissipated (Krause, Veeser and
+Walloth, Numer. Math. 130, 2015).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import la
+from mpi4py import MPI
+
+from contact.body.description import Material
+from contact.body.elements import MEAN_DILATATION
+from contact.body.materials import factor_of
+from contact.body.pointwise import in_chunks
+from contact.body.rigid import Bolt
+from contact.mesh.cells import rule, shape_of
+from contact.mesh.domain import Domain
+from contact.mesh.entities import cells_at
+from contact.mesh.geometry import geometry_nodes, measures
+from contact.mesh.together import members, part
+from contact.results.fields import DerivedFields
+from contact.results.local_problems import LocalProblems
+from contact.results.oscillation import oscillation
+from contact.results.recovery import nodal_means
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.tolerances import NEGLIGIBLE, ROUNDING
+from contact.typing import Array
+from forms.crystal import VOIGT
+from forms.elasticity import Anisotropic, mandel, moduli
+from forms.hencky import is_linear
+from forms.history import HistoryLaw, isotropic_stiffness
+from forms.plane_stress import without_stress_across
+
+#: Factors of the components of a tensor in the basis of Mandel.
+MANDEL = np.array([1.0] * 3 + [np.sqrt(2.0)] * 3)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The estimated discretisation error of a solution.
+
+    Attributes
+    ----------
+    squares
+        eta_K^2 of the owned cells, shape (cells,) (work).
+    contact
+        The part of their sum that is from the contact.
+    energy
+        The square of the energy norm of the solution, over all ranks.
+    total
+        The sum of eta_K^2 over all ranks.
+    stiffness_ratio
+        Mean of bulk over shear modulus, weighted by the energy, the latter |s|/(2 |e|) of the
+        deviatoric stress and the whole deviatoric strain; of a crystal as of `_of_crystal`. None
+        in plane stress, where volumes are free to change.
+    """
+
+    squares: Array
+    contact: float
+    energy: float
+    total: float
+    stiffness_ratio: float | None
+
+    @property
+    def cells(self) -> Array:
+        """eta_K of the owned cells over the same norm: the sum of its squares is `relative`^2."""
+        whole = self.energy + self.total
+        return np.sqrt(self.squares / whole) if whole > 0 else np.zeros_like(self.squares)
+
+    @property
+    def relative(self) -> float:
+        """The estimated error over the norm of the exact solution, by Pythagoras."""
+        whole = self.energy + self.total
+        return float(np.sqrt(self.total / whole)) if whole > 0 else 0.0
+
+
+def estimated(
+    problem: ContactProblem, state: State, fields: DerivedFields | None = None
+) -> Estimate:
+    """Estimate the error of a state. Collective.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, and its unknowns and multipliers.
+    fields
+        The fields of the state, where they are known already.
+    """
+    body, shape = problem.equilibrium, shape_of(problem.domain.mesh)
+    if body.degree == 1 and not shape.simplex:
+        # Stresses vary in the cell, and are most exact in its middle.
+        fields = DerivedFields(body, state, shape.nodes(1))
+    fields = fields or DerivedFields(body, state)
+    flux, strain = sampled(fields)
+    secant = body.laws.secant_shear(state)
+    local = None
+    if body.degree == 2 and body.element != MEAN_DILATATION:
+        local = LocalProblems(problem, state, flux)
+    at, weights = rule(shape, 2 * body.degree)
+    linear, shapes = shape.lagrange(1, at), shape.lagrange(shape.degree_of(flux.shape[1]), at)
+    apart, modulus = _acting_inside(problem), np.ones(len(flux))
+    squares, sums, volume = np.zeros(len(flux)), np.zeros(3), 0.0
+    for material, cells in zip(body.body.materials, body.cells, strict=True):
+        law = material.law
+        if isinstance(law, Anisotropic | HistoryLaw):
+            shear = secant[cells]
+        else:
+            shear = np.asarray(law.secant_modulus(strain[cells] ** 2)).mean(axis=1)
+        factor = factor_of(body.domain, material, cells)
+        modulus[cells] = shear * factor
+        if isinstance(law, Anisotropic):
+            shears = np.diag(mandel(law.stiffness))[5 if body.dim == 2 else 3 :]
+            modulus[cells] = shears.mean() / 2 * factor
+        means, places = None, None
+        if local is not None:
+            squares[cells] = local.squares(cells, _stiffness(material, shear, factor))
+        else:
+            # Of degree 1 stresses are most exact in the middle of a cell.
+            values = flux.mean(axis=1) if body.degree == 1 else flux[:, : shape.corners]
+            means, places = nodal_means(body.domain, cells, values[cells], apart)
+            del values  # as large as the stresses
+        for some in in_chunks(np.arange(cells.size)):
+            chosen = cells[some]
+            energy = _density(material, shear[some], factor[some])
+            of, raw = geometry_nodes(body.domain, chosen), flux[chosen]
+            if len(fields.points) > 1:  # else constant in a cell
+                raw = shapes @ raw
+            volumes = measures(body.domain.revolved, shape, of, at, weights)
+            volume += float(volumes.sum())
+            if means is not None and places is not None:
+                smooth = linear @ means[places[some]]
+                squares[chosen] = np.sum(volumes * energy(smooth - raw), axis=1)
+            known = np.sum(volumes * energy(raw), axis=1)
+            sums[0] += known.sum()
+            if material.in_plane_stress:
+                continue
+            if isinstance(law, Anisotropic):
+                stiffer = _of_crystal(problem.domain, material, flux[chosen].mean(axis=1))
+            elif isinstance(law, HistoryLaw):
+                whole = _over_whole_strain(law, flux[chosen], strain[chosen])
+                energy = _density(material, whole, factor[some])
+                known = np.sum(volumes * energy(raw), axis=1)
+                stiffer = np.asarray(_bulk(material) / whole)
+            else:
+                stiffer = np.asarray(_bulk(material) / shear[some], dtype=np.float64)
+            sums[1:] += known @ stiffer, known.sum()
+    if body.degree == 1:  # the local problems of degree 2 see loads up to the third degree
+        # A surface is as stiff as E/(1 - nu^2), twice the shear modulus and more.
+        squares += oscillation(problem, state.time) / (2 * modulus)
+    at_contact = _at_contact(problem, state)
+    squares += at_contact
+    sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
+    energy_sum, locked, shearing, total, contact = sums
+    if energy_sum <= _rounding(problem, state, volume):
+        return Estimate(np.zeros_like(squares), 0.0, 0.0, 0.0, None)
+    ratio = float(locked / shearing) if shearing > 0 else None
+    return Estimate(squares, float(contact), float(energy_sum), float(total), ratio)
+
+
+def _acting_inside(problem: ContactProblem) -> list[str]:
+    """Return the parts inside of the body at which something acts, and stresses jump.
+
+    At cuts of bolts it is the displacement that jumps.
+    """
+    body = problem.equilibrium
+    unknown = [member.description for member in body.global_unknowns.members]
+    acting = [*body.body.fixed, *(one for one in unknown if not isinstance(one, Bolt))]
+    parts = dict.fromkeys(name for one in acting for name in members(one.on))
+    return [name for name in parts if name in problem.domain.inside]
+
+
+def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
+    """Return the energy of strains that a rigid motion leaves by rounding. Collective.
+
+    They are differences of displacements over the size of a cell, in all directions.
+    """
+    body, comm, topology = problem.equilibrium, problem.comm, problem.domain.mesh.topology
+    moved = float(np.abs(body.nodal(state.x)[:, : body.dim]).max(initial=0.0))
+    size = body.domain.size / topology.index_map(body.dim).size_global ** (1 / body.dim)
+    strain = ROUNDING * comm.allreduce(moved, op=MPI.MAX) / size
+    energy = body.layout.stiffness * (body.dim * strain) ** 2
+    return energy * comm.allreduce(volume, op=MPI.SUM)
+
+
+def sampled(fields: DerivedFields) -> tuple[Array, Array]:
+    """Return the fluxes and |dev eps| at the points of the owned cells.
+
+    Fluxes are the stress in the basis of Mandel, and D where there is coupling.
+    """
+    body, columns = fields.body, fields.columns
+    count = body.domain.mesh.topology.index_map(body.dim).size_local
+    flux = np.zeros((count, len(fields.points), 9 if body.piezoelectric else 6))
+    strain = np.zeros(flux.shape[:2])
+    stress = columns["stress"].start
+    for chosen, values in fields.chunks():
+        for m, (i, j) in enumerate(VOIGT):
+            flux[chosen, :, m] = MANDEL[m] * values[..., stress + 3 * i + j]
+        if body.piezoelectric:
+            charge = values[..., columns["electric_displacement"]]
+            flux[chosen, :, 6 : 6 + body.dim] = charge
+        strain[chosen] = values[..., columns["dev_strain"].start]
+    return flux, strain
+
+
+def _bulk(material: Material) -> float:
+    """Return the bulk modulus."""
+    return moduli(float(material.law.young), float(material.law.poisson))[0]
+
+
+def _over_whole_strain(law: HistoryLaw, flux: Array, strain: Array) -> Array:
+    """Return |s|/(2 |e|) of cells, at most the shear modulus, and positive.
+
+    Volumes change wrongly with the whole strain, however many steps it has been in: the pressure
+    of that is to be seen beside s. The secant of a step is nearly elastic where the step is short.
+
+    Parameters
+    ----------
+    law
+        The law.
+    flux, strain
+        Stress, shape (cells, points, components), and |e|, shape (cells, points).
+    """
+    stress = flux[..., :6].copy()
+    stress[..., :3] -= stress[..., :3].mean(axis=-1, keepdims=True)
+    modulus = moduli(float(law.young), float(law.poisson))[1]
+    elastic = 2 * modulus * strain.mean(axis=1)
+    size = np.linalg.norm(stress, axis=-1).mean(axis=1)
+    whole = np.linalg.norm(flux[..., :6], axis=-1).mean(axis=1)
+    strained = elastic > NEGLIGIBLE * whole
+    share = np.divide(size, elastic, out=np.ones_like(size), where=strained)
+    return np.asarray(modulus * np.clip(share, NEGLIGIBLE, 1.0))
+
+
+def _of_crystal(domain: Domain, material: Material, flux: Array) -> Array:
+    """Return by how much the stiffest strain is stiffer than the rest of the strain of cells.
+
+    The eigenvalue of the stiffest strain over the Rayleigh quotient of the strain without that, by
+    3/2 in 3-D, so that it is the ratio of bulk and shear modulus where the stiffness is isotropic:
+    then the stiffest strain is that of the volume, of fibres that along them.
+
+    Parameters
+    ----------
+    domain, material
+        The mesh, whose strains may all be in the plane, and the crystal.
+    flux
+        Of cells, shape (cells, 6 or 9).
+    """
+    whole = _stiffness(material, np.ones(1), np.ones(1))[0]
+    kept = list(range(6)) if domain.dim == 3 else [0, 1, 5]
+    if domain.revolved:
+        kept = [0, 1, 2, 5]
+    strain = (flux[:, : len(whole)] @ np.linalg.inv(whole).T)[:, kept]
+    stiffness = whole[np.ix_(kept, kept)]
+    values, ways = np.linalg.eigh(stiffness)
+    rest = strain - np.outer(strain @ ways[:, -1], ways[:, -1])
+    square = np.sum(rest**2, axis=1)
+    seen = square > NEGLIGIBLE**2 * np.sum(strain**2, axis=1)
+    quotient = np.full(len(flux), values[:-1].mean())
+    np.divide(np.sum((rest @ stiffness) * rest, axis=1), square, out=quotient, where=seen)
+    return np.asarray(values[-1] / quotient * 2 / sum(k < 3 for k in kept))
+
+
+def _density(material: Material, shear: Array, factor: Array) -> Callable[[Array], Array]:
+    """Return the energy density of fluxes of shape (cells, q, components) in a material."""
+    if material.piezo is None and not isinstance(material.law, Anisotropic):
+        bulk = _bulk(material)
+
+        def isotropic(flux: Array) -> Array:
+            trace = flux[..., :3].sum(axis=-1)
+            size = np.einsum("cqi,cqi->cq", flux, flux)
+            density = trace**2 / (9 * bulk) + (size - trace**2 / 3) / (2 * shear[:, None])
+            return density / factor[:, None]
+
+        return isotropic
+    compliance = np.linalg.inv(_stiffness(material, shear, factor))
+    # Without coupling a neighbour's D is zero here.
+    size = compliance.shape[1]
+    return lambda flux: np.sum((flux[..., :size] @ compliance) * flux[..., :size], axis=-1)
+
+
+def _stiffness(material: Material, shear: Array, factor: Array) -> Array:
+    """Return the stiffness of each cell, or one, shape (cells, 6, 6), with coupling (cells, 9, 9).
+
+    It maps strains to stresses in the basis of Mandel, and (eps, E) to (sigma, D); in plane stress
+    those in the plane, the strains across being those at which no stress acts.
+    """
+    law = material.law
+    if isinstance(law, Anisotropic):
+        stiffness = mandel(law.stiffness)[None]
+    else:
+        own = shear[:1] if is_linear(law) else shear
+        stiffness = isotropic_stiffness(_bulk(material), own, 6)
+        if material.in_plane_stress:
+            stiffness = without_stress_across(stiffness)
+    if material.factor is not None:
+        stiffness = factor[:, None, None] * stiffness
+    piezo = material.piezo
+    if piezo is None:
+        return stiffness
+    coupling = np.array([np.asarray(piezo.e)[:, j, k] for j, k in VOIGT]).T * MANDEL
+    whole = np.zeros((len(stiffness), 9, 9))
+    whole[:, :6, :6], whole[:, 6:, 6:] = stiffness, np.asarray(piezo.beta)
+    whole[:, :6, 6:], whole[:, 6:, :6] = -coupling.T, coupling
+    return whole
+
+
+def _at_contact(problem: ContactProblem, state: State) -> Array:
+    """Return the share of contact in eta_K^2 of the owned cells, shape (cells,). Collective.
+
+    Between its nodes, all values linear: p |u_n - g| and s |u_t| - lambda_f . u_t, where
+    complementarity holds at the nodes alone.
+    """
+    body, interface = problem.equilibrium, problem.interface
+    domain, d, nodal = body.domain, body.dim, problem.nodal(state)
+    sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
+    squares = np.zeros(domain.mesh.topology.index_map(d).size_local)
+    cells, place = cells_at(domain.mesh, domain.facets(part(sides)))
+    shape = shape_of(domain.mesh)
+    closures = shape.facet_nodes(body.degree)[place]
+    nodes = np.take_along_axis(body.space.dofmap.list[cells], closures, axis=1)
+    index_map = body.space.dofmap.index_map
+    vector = la.vector(index_map, 3 + 2 * d)
+    values = vector.array.reshape(-1, 3 + 2 * d)
+    opening = interface.opening(nodal)
+    values[interface.jump.nodes] = np.column_stack(
+        [
+            state.forces.pressure,
+            np.where(np.isfinite(opening), opening, 0.0),  # no rigid part: no pressure on it
+            interface.bound(nodal, state.forces),
+            interface.slip(nodal),
+            state.forces.friction,
+        ]
+    )
+    vector.scatter_forward()
+    at, weights = rule(shape.facet, 4)
+    found = shape.facet.lagrange(body.degree, at) @ values[nodes]
+    pressure, opening, bound = (found[..., i] for i in range(3))
+    slip, friction = found[..., 3 : 3 + d], found[..., 3 + d :]
+    # Next to a single node the quadratic function of its pressure is negative.
+    density = np.maximum(pressure, 0.0) * np.abs(opening) + np.abs(
+        bound * np.linalg.norm(slip, axis=-1) - np.sum(slip * friction, axis=-1)
+    )
+    behind = geometry_nodes(domain, cells)
+    ends = shape.facet_nodes(domain.order)[place]
+    of_facet = np.take_along_axis(behind, ends[..., None], axis=1)
+    areas = measures(domain.revolved, shape.facet, of_facet, at, weights)
+    np.add.at(squares, cells, np.sum(areas * density, axis=1))
+    return squares

@@ -1,0 +1,474 @@
+"""Fields of a solution (displacement, stress, von Mises, |dev eps|, electric), their extremes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property, partial
+from itertools import accumulate, chain
+from typing import NamedTuple
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+from dolfinx.la import InsertMode
+from mpi4py import MPI
+from numpy.typing import NDArray
+from ufl.core.expr import Expr
+
+from contact import _compat
+from contact.arguments import expect
+from contact.body.description import Material
+from contact.body.elements import kinematics_of
+from contact.body.equilibrium import BodyEquilibrium
+from contact.body.materials import form_law, piezo_with_constants
+from contact.body.stress_updates import NAME, name_of
+from contact.history import BodyState, Evaluated
+from contact.mesh.cells import shape_of
+from contact.mesh.geometry import volumes
+from contact.mesh.together import pieces
+from contact.results.quantities import quantities, values_of
+from contact.results.quantity import BODY, of_law
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+from forms.elasticity import Anisotropic
+from forms.hencky import is_linear, stress
+from forms.history import HistoryLaw, components, to_tensor
+from forms.kinematics import deviator_squared, principal_values, strain, von_mises
+from forms.ops import maximum, sqrt
+from forms.piezo import coupling_stress, electric_displacement
+from forms.plane_stress import ACROSS, PlaneStressElastic, PlaneStressHistory
+
+#: Decrease of |dev eps|, over its earlier value, that counts as unloading; and of the secant
+#: modulus, over that of small strains, that counts as yielding.
+DECREASE, SOFTENED = 1e-6, 1e-9
+
+#: The internal variable that says where a body has yielded.
+EQUIVALENT = "equivalent_plastic_strain"
+
+
+def nodal_function(
+    name: str,
+    source: fem.FunctionSpace,
+    values: Array,
+    shape: tuple[int, ...],
+    family: str = "Lagrange",
+) -> fem.Function:
+    """Return a function with a value of some shape on the nodes of a Lagrange space.
+
+    The values are those at the local nodes of `source`, shape (nodes, components). Of the family
+    "DG" it has them for each cell by itself.
+    """
+    mesh, degree = source.mesh, source.ufl_element().embedded_superdegree
+    function = fem.Function(fem.functionspace(mesh, (family, degree, shape)), name=name)
+    # Two spaces of one mesh need not number their nodes alike.
+    target = function.function_space.dofmap.list
+    function.x.array.reshape(-1, values.shape[1])[target] = values[source.dofmap.list]
+    function.x.scatter_forward()
+    return function
+
+
+def linear(function: fem.Function) -> fem.Function:
+    """Return the Lagrange interpolant of the geometry's degree of a function. Collective."""
+    space = function.function_space
+    order = _compat.geometry_degree(space.mesh)
+    if space.ufl_element().embedded_superdegree == order:
+        return function
+    shape = space.ufl_element().reference_value_shape
+    element = ("Lagrange", order, shape)
+    made = fem.Function(fem.functionspace(space.mesh, element), name=function.name)
+    made.interpolate(function)
+    return made
+
+
+def unknowns(body: BodyEquilibrium, x: Array, family: str = "Lagrange") -> dict[str, fem.Function]:
+    """Return the displacement and, for a piezoelectric body, the potential. Collective."""
+    u = body.nodal(x)[:, : body.dim]
+    given: dict[str, tuple[Array, tuple[int, ...]]] = {"displacement": (u, (body.dim,))}
+    if body.piezoelectric:
+        given["potential"] = body.phi_scale * body.nodal(x)[:, body.dim :], ()
+    return {k: nodal_function(k, body.space, *value, family) for k, value in given.items()}
+
+
+def check_variables(body: BodyEquilibrium) -> None:
+    """Refuse internal variables whose names are those of other fields.
+
+    Raises
+    ------
+    InputError
+        On all ranks, with the law and the name.
+    """
+    taken = [*(each.name for each in quantities(BODY) if each.value is not of_law), ACROSS]
+    words = f"{NAME} that is the name of no other field ({', '.join(taken)})"
+    for law in (material.law for material in body.body.materials):
+        within = law.base if isinstance(law, PlaneStressHistory) else law
+        for name in body.laws.variables(within):
+            place = f"{name_of(within)}: variables: the name"
+            expect(place, name, words, name not in taken, "law-variables")
+
+
+class Extremes(NamedTuple):
+    """The largest values in a material.
+
+    Attributes
+    ----------
+    strain, von_mises
+        The largest |dev eps| and von Mises stress.
+    yielded, volume
+        Volume in the plastic range, |dev eps| above first yield or with plastic strain (None for a
+        law without), and that of all of it.
+    plastic
+        The largest equivalent plastic strain; None for a law without.
+    """
+
+    strain: float
+    von_mises: float
+    yielded: float | None
+    volume: float
+    plastic: float | None
+
+
+class Point:
+    """A point of a body of some material at some unknowns as the quantities see it, in UFL."""
+
+    def __init__(self, body: BodyEquilibrium, material: Material, at: fem.Function) -> None:
+        mesh = body.domain.mesh
+        u, self._phi = body.split(at)
+        u = u if body.cuts is None else u + body.cuts.jump
+        # The nodes may lie on the axis.
+        kinematics = kinematics_of(body.domain, body.element, on_axis=True)
+        self._dim, plane = body.dim, strain(u, kinematics)
+        self._piezo = material.piezo and piezo_with_constants(material.piezo, mesh)
+        law = body.laws.fitted_law(form_law(material, mesh))
+        self.stress = stress(law, plane)
+        if self._piezo is not None:
+            self.stress += coupling_stress(self._piezo, self._phi)
+        #: That of the body: in plane stress with the strain across, which no form sees.
+        self.strain = plane
+        across: Expr | None = None
+        if isinstance(material.law, PlaneStressElastic):
+            gradient = None if self._piezo is None else ufl.grad(self._phi)
+            across = material.law.strain_across(plane, gradient)
+        elif isinstance(material.law, PlaneStressHistory):
+            across = body.laws.fits[ACROSS]
+        if across is not None:
+            self.strain = plane + across * ufl.as_tensor(np.diag([0.0, 0.0, 1.0]).tolist())
+
+    @property
+    def principal_stress(self) -> Expr:
+        """The principal stresses, the largest first."""
+        return principal_values(self.stress)
+
+    @property
+    def von_mises(self) -> Expr:
+        """The von Mises stress."""
+        return von_mises(self.stress)
+
+    @property
+    def dev_strain(self) -> Expr:
+        """The norm of the strain deviator: rounding can make its square slightly negative."""
+        return sqrt(maximum(deviator_squared(self.strain), 0.0))
+
+    @property
+    def electric_displacement(self) -> Expr | None:
+        """D; None for a body without a potential."""
+        if self._piezo is None:
+            return self._nothing
+        found = electric_displacement(self._piezo, self.strain, self._phi)
+        return ufl.as_vector([found[i] for i in range(self._dim)])
+
+    @property
+    def electric_field(self) -> Expr | None:
+        """E = -grad phi, likewise."""
+        if self._piezo is None:
+            return self._nothing
+        return ufl.as_vector([-ufl.grad(self._phi)[i] for i in range(self._dim)])
+
+    @property
+    def _nothing(self) -> Expr | None:
+        """Zeros in a material without coupling."""
+        return None if self._phi is None else ufl.as_vector([0.0] * self._dim)
+
+
+def _usual_points(body: BodyEquilibrium) -> Array:
+    """Return the nodes of a cell, of degree 1 its middle.
+
+    There strains of simplices are constant, and those of other cells most exact (Barlow, IJNME 10,
+    1976).
+    """
+    shape = shape_of(body.domain.mesh)
+    return shape.middle if body.degree == 1 else shape.nodes(body.degree)
+
+
+class DerivedFields:
+    """Fields derived from the unknowns of a body at a state. The methods are collective.
+
+    The points are those of `_usual_points`, or others, at which `chunks` alone has a meaning.
+
+    Attributes
+    ----------
+    shapes
+        Name -> shape of the value, for instance (3, 3) of the stress, whose third axis is that of
+        theta in a body of revolution; then the internal variables of the materials.
+    """
+
+    def __init__(
+        self, body: BodyEquilibrium, state: Evaluated, points: Array | None = None
+    ) -> None:
+        self.body = body
+        #: Reference points of a cell at which the fields are evaluated.
+        self.points = _usual_points(body) if points is None else points
+        self.move_to(state)
+        at = Point(body, body.body.materials[0], fem.Function(body.space))
+        self.shapes: dict[str, tuple[int, ...]] = {
+            name: expression.ufl_shape for name, expression in values_of(BODY, at).items()
+        }
+        self.shapes |= {name: value.ufl_shape for name, value in self._variables.items()}
+
+    @property
+    def columns(self) -> Mapping[str, slice]:
+        """Where the components of each field are in the rows of values."""
+        sizes = [math.prod(shape) for shape in self.shapes.values()]
+        ends = accumulate(sizes)
+        return {
+            name: slice(end - size, end)
+            for name, size, end in zip(self.shapes, sizes, ends, strict=True)
+        }
+
+    def _expression(self, material: Material, at: fem.Function) -> Expr:
+        """Return all components of a material's fields, one after the other."""
+        point = Point(self.body, material, at)
+        fields = values_of(BODY, point).values()
+        every = [*fields, *self._variables.values()]
+        return ufl.as_vector([f[i] for f in every for i in np.ndindex(f.ufl_shape)])
+
+    @property
+    def _variables(self) -> dict[str, Expr]:
+        """The internal variables by name, tensors of strain or stress as such."""
+        fits = self.body.laws.fits
+        tensor = (components(self.body.dim),)
+        return {
+            name: to_tensor(fits[name]) if fits[name].ufl_shape == tensor else fits[name]
+            for name in self.body.laws.names
+        }
+
+    def of_material(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Yield owned cells of a material, by its number, and the values as `chunks`."""
+        body, cells = self.body, self.body.cells[material]
+        expression = partial(self._expression, body.body.materials[material])
+        name = "fields", material, self.points.tobytes()
+        body.laws.fit(self._state)
+        if body.cuts is not None:
+            body.cuts.set(body.cuts.jump, self._q)
+        yield from body.pointwise.values(name, expression, self.points, self._x, cells)
+
+    def chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Yield owned cells and the values there, shape (cells, points, components)."""
+        return chain.from_iterable(map(self.of_material, range(len(self.body.cells))))
+
+    def move_to(self, state: Evaluated) -> None:
+        """Look at the fields of another state of the same body from now on."""
+        self._state, self._x = state, self.body.nodal(state.x).flatten()
+        self._q = self.body.motion(state.x)
+
+    def strains(self) -> list[Array]:
+        """Return |dev eps| in the owned cells of each material, shape (cells, points)."""
+        column = self.columns["dev_strain"]
+        return [
+            np.concatenate([values[..., column][..., 0] for _, values in self.of_material(k)])
+            for k in range(len(self.body.cells))
+        ]
+
+    def extremes(self) -> list[Extremes]:
+        """Return the largest values over the cells (their nodes, for degree 2), a material."""
+        volume, found = volumes(self.body.domain), []
+        strain, mises = self.columns["dev_strain"], self.columns["von_mises"]
+        laws, comm = self.body.laws, self.body.comm
+        after = laws.commit(self._state)
+        for index, material in enumerate(self.body.body.materials):
+            limit = getattr(material.law, "first_yield", np.inf)
+            flows = EQUIVALENT in laws.variables(material.law)
+            largest, sums = np.zeros(3), np.zeros(2)
+            for chosen, values in self.of_material(index):
+                largest[0] = max(largest[0], values[..., strain].max(initial=0.0))
+                largest[1] = max(largest[1], values[..., mises].max(initial=0.0))
+                beyond = (values[..., strain] > limit).mean(axis=(1, 2))
+                sums += volume[chosen] @ np.column_stack([beyond, np.ones(chosen.size)])
+            if flows and after is not None:
+                cells = self.body.cells[index]
+                plastic = laws.by_cell(after.arrays[EQUIVALENT])[cells]
+                largest[2] = plastic.max(initial=0.0)
+                sums[0] = laws.by_cell(laws.volumes)[cells][plastic > 0].sum()
+            comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
+            comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+            yielded = float(sums[0]) if np.isfinite(limit) or flows else None
+            plastic_strain = float(largest[2]) if flows else None
+            here = float(largest[0]), float(largest[1]), yielded, float(sums[1]), plastic_strain
+            found.append(Extremes(*here))
+        return found
+
+    def cells(self) -> dict[str, fem.Function]:
+        """Return the fields as they are: discontinuous, of degree 0 for P1 and 1 for P2."""
+        mesh, degree = self.body.domain.mesh, self.body.degree - 1
+        made = {
+            name: fem.Function(fem.functionspace(mesh, ("DG", degree, shape)), name=name)
+            for name, shape in self.shapes.items()
+        }
+        corners = 1 if degree == 0 else shape_of(mesh).corners
+        for chosen, values in self.chunks():
+            for name, columns in self.columns.items():
+                dofs = made[name].function_space.dofmap.list[chosen]
+                array = made[name].x.array.reshape(-1, columns.stop - columns.start)
+                array[dofs] = values[:, :corners, columns]
+        for function in made.values():
+            function.x.scatter_forward()
+        return made
+
+    @cached_property
+    def groups(self) -> NDArray[np.int32]:
+        """The group of each owned cell: one for all cells that are in the same regions. Collective.
+
+        The same groups, counted in the same order, on all ranks.
+        """
+        domain = self.body.domain
+        count = domain.mesh.topology.index_map(domain.dim).size_local
+        found = pieces(domain.comm, count, domain.regions.values())
+        groups = np.full(count, len(found), dtype=np.int32)
+        for k, (_, cells) in enumerate(found):
+            groups[cells] = k
+        return groups
+
+    @cached_property
+    def group_count(self) -> int:
+        """The number of groups. Collective."""
+        return 1 + int(self.body.comm.allreduce(int(self.groups.max(initial=0)), op=MPI.MAX))
+
+    def means(self) -> Array:
+        """Return the cells' values around nodes, averaged by volume in each group. Collective.
+
+        Principal stresses are those of the averaged stress.
+
+        Returns
+        -------
+        Shape (groups, local nodes, components); NaN at nodes of no cell of a group.
+        """
+        space, volume, groups = self.body.space, volumes(self.body.domain), self.groups
+        index_map, links = space.dofmap.index_map, space.dofmap.list
+        nodes = index_map.size_local + index_map.num_ghosts
+        count = sum(math.prod(shape) for shape in self.shapes.values())
+        sums = np.zeros((self.group_count, nodes, count + 1))
+        for chosen, values in self.chunks():
+            dofs = links[chosen]
+            weight = np.broadcast_to(volume[chosen, None, None], (*dofs.shape, 1))
+            at_nodes = np.broadcast_to(values, (*dofs.shape, count)) * weight
+            every = np.concatenate([at_nodes, weight], axis=2)
+            np.add.at(sums, (groups[chosen, None], dofs), every)
+        vector = la.vector(index_map, count + 1)
+        for group in sums:
+            vector.array[:] = group.ravel()
+            vector.scatter_reverse(InsertMode.add)
+            vector.scatter_forward()
+            group[:] = vector.array.reshape(group.shape)
+        with np.errstate(invalid="ignore"):
+            means = np.asarray(sums[..., :-1] / sums[..., -1:])
+        known = np.isfinite(means[..., 0])
+        stress, principal = self.columns["stress"], self.columns["principal_stress"]
+        tensors = means[known, stress].reshape(-1, 3, 3)
+        means[known, principal] = np.linalg.eigvalsh(tensors)[:, ::-1]
+        return means
+
+    def nodes(self) -> dict[str, fem.Function]:
+        """Return the fields at the nodes: the cells' values, averaged by volume. Collective.
+
+        In a mesh of several regions averages stay within each: the functions are discontinuous
+        between them, of the same degree.
+        """
+        means, space, groups = self.means(), self.body.space, self.groups
+        if self.group_count == 1:
+            return {
+                name: nodal_function(name, space, means[0][:, columns], self.shapes[name])
+                for name, columns in self.columns.items()
+            }
+        made = {}
+        links, degree = space.dofmap.list[: groups.size], self.body.degree
+        for name, columns in self.columns.items():
+            apart = fem.functionspace(space.mesh, ("DG", degree, self.shapes[name]))
+            made[name] = fem.Function(apart, name=name)
+            dofs = made[name].function_space.dofmap.list[: groups.size]
+            array = made[name].x.array.reshape(-1, columns.stop - columns.start)
+            array[dofs] = means[groups[:, None], links, columns]
+            made[name].x.scatter_forward()
+        return made
+
+
+class Deformation(NamedTuple):
+    """Extremes over the middles of the cells.
+
+    Attributes
+    ----------
+    largest_strain
+        |eps|, the Frobenius norm.
+    least_volume, largest_volume
+        det(I + grad u), a deformed volume over the undeformed one.
+    """
+
+    largest_strain: float
+    least_volume: float
+    largest_volume: float
+
+
+def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
+    """Return how large the deformation is at local unknowns of a body. Collective."""
+    mesh, kinematics = body.domain.mesh, body.domain.kinematics
+    nodal, middle = body.nodal(x).ravel(), shape_of(mesh).middle
+    if body.cuts is not None:
+        body.cuts.set(body.cuts.jump, body.motion(x))
+
+    def measures(at: fem.Function) -> Expr:
+        u, _ = body.split(at)
+        u = u if body.cuts is None else u + body.cuts.jump
+        eps, stretch = strain(u, kinematics), ufl.Identity(3) + kinematics.gradient(u)
+        return ufl.as_vector([ufl.sqrt(ufl.inner(eps, eps)), ufl.det(stretch)])
+
+    cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+    extremes = np.array([0.0, -np.inf, -np.inf])
+    for _, found in body.pointwise.values("deformation", measures, middle, nodal, cells):
+        size, volume = found[:, 0].T
+        here = [size.max(initial=0.0), (-volume).max(initial=-np.inf), volume.max(initial=-np.inf)]
+        extremes = np.maximum(extremes, here)
+    body.comm.Allreduce(MPI.IN_PLACE, extremes, op=MPI.MAX)
+    return Deformation(float(extremes[0]), float(-extremes[1]), float(extremes[2]))
+
+
+def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
+    """Return the largest share of a body that has unloaded from the plastic range in a step.
+
+    Hencky's law is nonlinear elasticity: it unloads along its loading path, as no metal does. Where
+    |dev eps| decreases in the plastic range, its results are no longer those of plasticity.
+    Collective.
+
+    Parameters
+    ----------
+    problem, states
+        The problem, and the states at the ends of all of its steps.
+    """
+    body = problem.equilibrium
+    laws = [material.law for material in body.body.materials]
+    if not states or all(is_linear(law) or isinstance(law, HistoryLaw) for law in laws):
+        return 0.0
+    fields = DerivedFields(body, BodyState(body.rest()))
+    of_cells = volumes(body.domain)
+    sizes = [of_cells[cells] for cells in body.cells]
+    sums, after = np.zeros(len(states) + 1), fields.strains()
+    sums[-1] = sum(float(own.sum()) for own in sizes)
+    for k, state in enumerate(states):
+        fields.move_to(state)
+        before, after = after, fields.strains()
+        for law, own, old, new in zip(laws, sizes, before, after, strict=True):
+            if not isinstance(law, Anisotropic | HistoryLaw):
+                modulus = np.asarray(law.secant_modulus(old**2), dtype=float)
+                yielded = modulus < (1 - SOFTENED) * float(law.shear)
+                sums[k] += own @ (yielded & (new < (1 - DECREASE) * old)).mean(axis=1)
+    body.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+    return float(sums[:-1].max() / sums[-1])

@@ -1,0 +1,343 @@
+"""Local Neumann problems for the error of quadratic elements, cell by cell.
+
+Bank and Weiser, Math. Comp. 44, 1985. In each cell the error is sought among the cubics that vanish
+at the nodes: M strain(e) : strain(v) = work of the loads - flux : strain(v) + work of the flux
+through the facets, the mean of both sides, at a contact of the multipliers (Weiss and Wohlmuth,
+Math. Comp. 78, 2009), brought into balance with the cells (`balance`). The flux is sigma, with D
+where there is coupling, and the strain eps, with E = -grad phi. Recovery of the stress, which
+serves degree 1, follows that of degree 2 into its singularities, and sees half of the error there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import combinations
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+from dolfinx import la
+from numpy.typing import NDArray
+
+from contact.body.equilibrium import BodyEquilibrium
+from contact.mesh.cells import INTERVAL, Shape, barycentric, rule, shape_of
+from contact.mesh.domain import Indices
+from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures
+from contact.results.balance import Sides, balancing
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.tolerances import ROUNDING
+from contact.typing import Array
+from forms.crystal import VOIGT
+
+#: Cells that are solved at once.
+CHUNK = 10_000
+
+
+def cubics(shape: Shape, at: Array) -> Array:
+    """Return the cubics without values at nodes, shape (q, n), at points of the reference cell.
+
+    Of simplices, one an edge, L_i L_j (L_i - L_j), and one a triangle, L_i L_j L_k, in barycentric
+    coordinates. Of others that of an interval along each axis, times quadratics along the others.
+    """
+    if not shape.simplex:
+        return np.concatenate([one for one, _ in _products(shape, at)], axis=1)
+    at = barycentric(at)
+    size = range(at.shape[1])
+    edges = [at[:, i] * at[:, j] * (at[:, i] - at[:, j]) for i, j in combinations(size, 2)]
+    faces = [at[:, i] * at[:, j] * at[:, k] for i, j, k in combinations(size, 3)]
+    return np.stack(edges + faces, axis=1)
+
+
+def _derivatives(shape: Shape, at: Array) -> Array:
+    """Return the derivatives of `cubics` by the coordinates of the reference cell."""
+    if not shape.simplex:
+        return np.concatenate([by for _, by in _products(shape, at)], axis=1)
+    at = barycentric(at)
+    size = at.shape[1]
+    by = np.zeros((len(at), size * (size - 1) // 2 + comb(size, 3), size))
+    for n, (i, j) in enumerate(combinations(range(size), 2)):
+        by[:, n, i] = at[:, j] * (2 * at[:, i] - at[:, j])
+        by[:, n, j] = at[:, i] * (at[:, i] - 2 * at[:, j])
+    first = size * (size - 1) // 2
+    for n, face in enumerate(combinations(range(size), 3), first):
+        for i in face:
+            by[:, n, i] = np.prod(at[:, [k for k in face if k != i]], axis=1)
+    return by[..., 1:] - by[..., :1]
+
+
+def _products(shape: Shape, at: Array) -> Iterator[tuple[Array, Array]]:
+    """Yield the functions along each axis, (q, n), and their derivatives, (q, n, dim)."""
+    x, dim = at[:, :, None], shape.dim
+    cubic = (x * (1 - x) * (1 - 2 * x), 1 - 6 * x + 6 * x**2)
+    quadratic = (INTERVAL.lagrange(2, at.reshape(-1, 1)), INTERVAL.gradients(2, at.reshape(-1, 1)))
+    smooth = [np.asarray(values).reshape(len(at), dim, 3) for values in quadratic]
+    for axis in range(dim):
+        order = [list(part) for part in (cubic, smooth)]
+        yield (
+            _product(order, axis),
+            np.stack([_product(order, axis, along) for along in range(dim)], axis=-1),
+        )
+
+
+def _product(factors: list[list[Array]], axis: int, along: int = -1) -> Array:
+    """Return products of a cubic along one axis and quadratics along others, shape (q, n).
+
+    Of the factor that belongs to the axis `along` the derivative is taken.
+    """
+    found = np.ones((len(factors[0][0]), 1))
+    for k in range(factors[0][0].shape[1]):
+        one = factors[k != axis][k == along][:, k]
+        found = (found[:, :, None] * one[:, None, :]).reshape(len(found), -1)
+    return found
+
+
+class Basis(NamedTuple):
+    """Functions on the reference cell, (q, n), and their derivatives, (q, n, dim)."""
+
+    values: Callable[[Shape, Array], Array]
+    derivatives: Callable[[Shape, Array], Array]
+
+
+class Work(NamedTuple):
+    """Points of a rule, strains of functions there, (cells, q, k, n b), and these by weights."""
+
+    at: Array
+    strains: Array
+    weighted: Array
+
+
+CUBICS = Basis(cubics, _derivatives)
+HATS = Basis(lambda shape, at: shape.lagrange(1, at), lambda shape, at: shape.gradients(1, at))
+
+
+class LocalProblems:
+    """The local problems of a body at a state. Collective to make.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, of degree 2, and its state.
+    flux
+        Stress in the basis of Mandel, with D where there is coupling, at the nodes of the owned
+        cells, shape (cells, nodes, 6 or 9).
+    """
+
+    def __init__(self, problem: ContactProblem, state: State, flux: Array) -> None:
+        body = self._body = problem.equilibrium
+        self._flux, self._nodes = flux, geometry_nodes(body.domain)
+        shape = self._shape = shape_of(body.domain.mesh)
+        #: The nodes of each facet, as nodes of its cell.
+        self._closures = shape.facet_nodes(2)
+        self._loads, self._load_points = _loads(body, state.time)
+        self._through, self._held, unknown = self._facets(problem, state)
+        self._through += balancing(body, self._out_of_balance(), unknown)
+
+    def _out_of_balance(self) -> Array:
+        """Return the residuals of the linear functions of the owned cells, (cells, corners, b)."""
+        found = np.zeros((len(self._flux), self._shape.corners, self._body.block_size))
+        for cells in self._pieces(np.arange(len(found), dtype=np.int32)):
+            found[cells] = self._residual(cells, HATS, self._work(cells, HATS))[0]
+        return found
+
+    def _pieces(self, cells: Indices) -> Iterator[Indices]:
+        """Yield some of the cells after the other: none where there are none."""
+        size = CHUNK if self._shape.simplex else CHUNK // 10
+        for first in range(0, len(cells), size):
+            yield cells[first : first + size]
+
+    def _normal_flux(self) -> Array:
+        """Return the flux out of each cell at the nodes of its facets, (cells, facets, m, b).
+
+        That of the charge is -D . n, as it works on the potential.
+        """
+        d, shape, flux = self._body.dim, self._shape, self._flux[:, self._closures]
+        jacobian = jacobians(shape, self._nodes, shape.nodes(2))
+        every = np.broadcast_to(jacobian, (*self._flux.shape[:2], d, d))[:, self._closures]
+        # Along the gradient of the coordinate that grows out of the facet.
+        normal = np.einsum("fr,cfmrd->cfmd", shape.facet_normals, inverse(every))
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        found = np.zeros((*flux.shape[:3], self._body.block_size))
+        for m, (i, j) in enumerate(VOIGT):
+            if i < d and j < d:
+                value = flux[..., m] if i == j else flux[..., m] / np.sqrt(2)
+                found[..., i] += value * normal[..., j]
+                if i != j:
+                    found[..., j] += value * normal[..., i]
+        if self._body.piezoelectric:
+            found[..., d] = -np.sum(flux[..., 6 : 6 + d] * normal, axis=-1)
+        return found
+
+    def _facets(
+        self, problem: ContactProblem, state: State
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the flux into each cell through its facets, and two flags of its components.
+
+        Inside it is the mean of both sides. On the boundary it is among the loads, where these are
+        known; at a contact that touches, that of the multipliers, and the flux itself where there
+        are none: of charge, on the other side. Which components are held, without any error, and
+        of which the flux is unknown.
+        """
+        body, d = self._body, self._body.dim
+        sides, out = Sides(body, self._closures), self._normal_flux()
+        facets, nodes, inside = sides.facets, sides.nodes, sides.inside
+        forces = np.zeros(body.owned + body.global_unknowns.size)
+        problem.interface.add_forces(forces, state.x, state.forces)
+        touch = np.any(body.nodal(body.local(forces)) != 0, axis=1)[nodes].any(axis=2)
+        slave, master = (
+            np.isin(facets, np.concatenate([[], *map(body.domain.facets, names)]))
+            for names in (
+                [c.on for c in problem.contacts],
+                [c.against for c in problem.contacts if c.against],
+            )
+        )
+        touch &= slave | master
+        # The traction of an elastic support is none of the loads either, nor is that of a roller.
+        rollers = [fixed.on for fixed in body.body.fixed if fixed.normal is not None]
+        for part in [*(support.on for support in body.body.elastic), *rollers]:
+            touch |= np.isin(facets, body.domain.facets(part))
+        own = np.zeros(body.owned + body.global_unknowns.size)
+        own[: body.owned] = body.free.ravel()
+        free = body.nodal(body.local(own))[nodes].any(axis=2)
+        loads = [body.domain.facets(load.on) for load in body.body.loads if load.on]
+        loaded = np.isin(facets, np.concatenate([[], *loads]))
+        # Facets inside that are fixed, or an electrode, have a jump, of charges for instance.
+        names = [
+            *(fixed.on for fixed in body.body.fixed),
+            *(member.description.on for member in body.global_unknowns.members),
+        ]
+        parts = [body.domain.facets_anywhere(name) for name in names]
+        boundary = ~inside[..., None]
+        split = boundary | np.isin(facets, np.concatenate([[], *parts]))[..., None]
+        held = split & (free == 0)
+        unknown = held | (boundary & touch[..., None])
+        one_sided = (unknown | boundary)[:, :, None]
+        mean = np.where(one_sided, out, out - sides.sums(out) / 2)
+        through = np.where((unknown | ~boundary)[:, :, None], mean, 0.0)
+        traction = _contact_traction(problem, state)[nodes]
+        pressed = (touch & slave)[..., None, None] & np.isfinite(traction)
+        through[..., :d] = np.where(pressed, traction, through[..., :d])
+        held = held | (boundary & (touch & loaded & ~slave)[..., None])
+        return through, held, unknown
+
+    def squares(self, cells: Indices, moduli: Array) -> Array:
+        """Return the square of the energy norm of the errors in some of the owned cells.
+
+        Parameters
+        ----------
+        cells
+            The cells.
+        moduli
+            From strains to fluxes, shape (cells, 6 or 9, 6 or 9), or one for all.
+        """
+        # Of a material without a field those of a field are zero.
+        whole = np.zeros((len(cells), *2 * (9 if self._body.piezoelectric else 6,)))
+        whole[:, : moduli.shape[1], : moduli.shape[2]] = moduli
+        pieces = self._pieces(np.arange(len(cells), dtype=np.int32))
+        found = [self._solved(cells[piece], whole[piece]) for piece in pieces]
+        return np.concatenate([np.zeros(0), *found])
+
+    def _solved(self, cells: Indices, moduli: Array) -> Array:
+        body, count = self._body, len(cells)
+        work = self._work(cells, CUBICS)
+        moduli = moduli[..., self._kept, :][..., self._kept]
+        fluxes = (moduli[:, None] @ work.strains).reshape(work.weighted.shape)
+        matrix = work.weighted.swapaxes(1, 2) @ fluxes
+        right, held = self._residual(cells, CUBICS, work)
+        if body.piezoelectric:
+            held[..., body.dim] |= (moduli[:, -1, -1] == 0)[:, None]
+        held, right = held.reshape(count, -1), right.reshape(count, -1)
+        right[held] = 0.0
+        matrix[held[:, :, None] | held[:, None, :]] = 0.0
+        places = np.arange(held.shape[1])
+        matrix[:, places, places] += held
+        errors = np.linalg.solve(matrix, right[..., None])[..., 0]
+        return np.asarray(np.sum(errors * right, axis=1))
+
+    @property
+    def _kept(self) -> list[int]:
+        """The components that strains of the test functions have."""
+        d = self._body.dim
+        kept = [0, 1, 2, 5] if d == 2 else list(range(6))
+        return kept + [6, 7, 8][:d] * self._body.piezoelectric
+
+    def _work(self, cells: Indices, basis: Basis) -> Work:
+        """Return the strains of functions in cells."""
+        body, d, shape, of, kept = (
+            self._body, self._body.dim, self._shape, self._nodes[cells], self._kept
+        )  # fmt: skip
+        order = body.domain.order
+        degree = (4 if shape.simplex else 6) + 2 * (order - 1) + body.domain.revolved
+        at, weights = rule(shape, degree)
+        values, derivatives = basis.values(shape, at), basis.derivatives(shape, at)
+        volumes = measures(body.domain.revolved, shape, of, at, weights)
+        back = np.broadcast_to(inverse(jacobians(shape, of, at)), (len(of), len(at), d, d))
+        gradients = derivatives @ back
+        strains = np.zeros((*gradients.shape[:3], body.block_size, len(kept)))
+        for m, component in enumerate(kept):
+            if component >= 6:
+                strains[..., d, m] = -gradients[..., component - 6]
+                continue
+            i, j = VOIGT[component]
+            if i == j and i < d:
+                strains[..., i, m] = gradients[..., i]
+            elif j < d:
+                strains[..., i, m] = gradients[..., j] / np.sqrt(2)
+                strains[..., j, m] = gradients[..., i] / np.sqrt(2)
+            elif body.domain.revolved and i == j:
+                strains[..., 0, m] = values / (of[..., 0] @ shape.lagrange(order, at).T)[..., None]
+        count = len(cells)
+        strains = strains.reshape(count, len(weights), -1, len(kept)).swapaxes(2, 3)
+        weighted = (volumes[:, :, None, None] * strains).reshape(count, -1, strains.shape[3])
+        return Work(at, strains, weighted)
+
+    def _residual(
+        self, cells: Indices, basis: Basis, work: Work
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the residuals of functions in cells, (cells, n, b), and which are held."""
+        body, shape, of, count = self._body, self._shape, self._nodes[cells], len(cells)
+        flux = shape.lagrange(2, work.at) @ self._flux[cells]
+        known = flux[..., self._kept].reshape(count, -1, 1)
+        inner = (work.weighted.swapaxes(1, 2) @ known)[..., 0]
+        right = basis.values(shape, self._load_points).T @ self._loads[cells]
+        right = right - inner.reshape(right.shape)
+        held = np.zeros(right.shape, dtype=bool)
+        at, weights = rule(shape.facet, 5)
+        for facet, ends in enumerate(shape.facet_nodes(body.domain.order)):
+            values = basis.values(shape, shape.on_facet(facet, at))
+            areas = measures(body.domain.revolved, shape.facet, of[:, ends], at, weights)
+            flux = shape.facet.lagrange(2, at) @ self._through[cells, facet]
+            right += values.T @ (areas[..., None] * flux)
+            acts = np.abs(values).max(axis=0) > ROUNDING
+            held |= acts[None, :, None] & self._held[cells, facet][:, None]
+        return right, held
+
+
+def _contact_traction(problem: ContactProblem, state: State) -> Array:
+    """Return the traction of the multipliers and layers at the nodes, shape (n, d). Collective.
+
+    Weiss and Wohlmuth, Math. Comp. 78, 2009. No numbers at nodes without a multiplier.
+    """
+    body, interface = problem.equilibrium, problem.interface
+    pressure = interface.pressure(problem.nodal(state), state.forces)
+    found = la.vector(body.space.dofmap.index_map, body.dim)
+    found.array[:] = np.nan
+    at_nodes = found.array.reshape(-1, body.dim)
+    at_nodes[interface.jump.nodes] = (
+        -pressure[:, None] * interface.jump.normal - state.forces.friction
+    )
+    found.scatter_forward()
+    return at_nodes
+
+
+def _loads(body: BodyEquilibrium, time: float) -> tuple[Array, Array]:
+    """Return the loads on the cubics of Lagrange in the owned cells, (cells, n, b); their nodes."""
+    space, loads = body.loads_by_cell
+    values = loads.at(time).reshape(-1, body.block_size)
+    points = space.sub(0).element.basix_element.points
+    nodes = space.dofmap.list[: body.domain.mesh.topology.index_map(body.dim).size_local]
+    found = values[nodes]
+    if body.piezoelectric:
+        # The potential is scaled there, and its test function negated.
+        found[..., body.dim] /= -body.phi_scale
+    return np.asarray(found), np.asarray(points)

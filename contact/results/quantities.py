@@ -1,0 +1,359 @@
+"""The quantities of the output files: an entry each is name, unit, description and value.
+
+``summary.json``, the csv tables, the fields, ``docs/output.md`` and the command line's help are
+made from these entries. Nothing is imported here that loads dolfinx: the help is shown before
+PETSc's options are read.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contact.results.environment import versions
+from contact.results.field_quantities import AT_NODES, AT_OPPOSITE_NODES, FIELDS
+from contact.results.quantity import (
+    ADAPT,
+    BODY,
+    ENDS,
+    HISTORY,
+    ROWS,
+    STEPS,
+    SUMMARY,
+    SWEEP,
+    VECTOR,
+    Quantity,
+    elsewhere,
+)
+
+
+def quantities(file: str) -> list[Quantity]:
+    """Return the quantities of a file, in their order there."""
+    return [quantity for quantity in QUANTITIES if file in quantity.files]
+
+
+def values_of(file: str, given: Any, only: str = "") -> dict[str, Any]:
+    """Return the keys, columns or fields of a file for some object, or those of one name alone."""
+    found: dict[str, Any] = {}
+    for quantity in quantities(file):
+        if only in ("", quantity.name):
+            found |= quantity.in_file(file, given)
+    return found
+
+
+def _error(given: Any) -> float:
+    """Return the estimated error; no number where the equations are not solved."""
+    return float("nan") if given.error is None else float(given.error.relative)
+
+
+def _item(values: Any, index: int) -> Any:
+    return None if values is None else values[index]
+
+
+def _node_counts(record: Any) -> str:
+    """Return the numbers of open, stick and slip nodes after an iteration; empty if unknown."""
+    return "/".join(map(str, record.sizes or ()))
+
+
+_ALL = (SUMMARY, STEPS, SWEEP)
+_MESHES = (*_ALL, ADAPT)
+
+_RUN = (
+    Quantity("KEY", "", "A swept key, a column each: its value in this row.", elsewhere, (SWEEP,)),
+    Quantity("title", "", "Title of the case."),
+    Quantity("units", "", "Names of the units, those of `[case] units`.", lambda r: r.units.given),
+    Quantity("t", "time", "End of the step.", lambda r: r.state.time, (STEPS,)),
+    Quantity(
+        "converged", "", "Whether all residuals are within the tolerance or their rounding floors.",
+        files=(SUMMARY, SWEEP),
+    ),
+    Quantity("reason", "", "Why the run ended, in words.", lambda r: r.outcome.reason),
+    Quantity("method", "", "The method, as in `[solver]`."),
+    Quantity(
+        "kinematics", "", "`plane_strain`, `plane_stress`, `axisymmetric` or `solid`.",
+        lambda r: r.problem.kinematics,
+    ),
+    Quantity("dofs", "", "Number of unknowns.", lambda r: r.problem.equilibrium.layout.unknowns),
+    Quantity(
+        "cells", "", "Number of cells of the mesh.",
+        lambda r: r.problem.domain.mesh.topology.index_map(r.problem.dim).size_global,
+    ),
+    Quantity(
+        "ranks", "", "Number of MPI processes. The results do not depend on it.",
+        lambda r: r.problem.comm.size,
+    ),
+    Quantity(
+        "unknowns", "", "Number of unknowns of a mesh of `[mesh.adapt]`, a row each.",
+        lambda r: r.problem.equilibrium.layout.unknowns, (ADAPT,),
+    ),
+    Quantity("error", "", "`energy` of `error`.", _error, (ADAPT,)),
+    Quantity(
+        "contact_force", "force", "Force that the body exerts on the foundation, a vector; in 2-D "
+        "per unit of depth. Between bodies the one that the body with `on` exerts on the other. "
+        "With several contacts their sum; `traction`, `weight` and `entry` of `contact.vtu` have "
+        "the force of each.", files=_MESHES, component=VECTOR,
+    ),
+    Quantity(
+        "contact_moment", "force · length", "Moment of the contact forces about the origin of "
+        "coordinates, at points of the reference configuration: in 2-D a list of one number, about "
+        "z and counter-clockwise, in 3-D a vector.", component=VECTOR,
+    ),
+    Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
+    Quantity(
+        "reactions", "force", "Force of the support of each part on the body, a vector per part. "
+        "A node of two parts counts for the first of them in the case. Their sum plus the loads "
+        "minus `contact_force` is zero, if forces between bodies are left out of the latter.",
+        lambda r: {part: held.force for part, held in r.supports.items()}, component=VECTOR,
+    ),
+    Quantity(
+        "reaction_AXIS_PART", "force", "Force of each support: `reaction_x_left`, ...",
+        lambda r: r.reaction_columns, (STEPS,),
+    ),
+    Quantity(
+        "reaction_moments", "force · length", "Moments of the reactions, as `contact_moment`.",
+        lambda r: {part: held.moment for part, held in r.supports.items()}, component=VECTOR,
+    ),
+    Quantity(
+        "region", "", "Place of the cell's region among `regions` of the summary, from 0; of "
+        "several regions that of the fewest cells. In `fields.vtu` alone, cell by cell.",
+        elsewhere, (BODY,),
+    ),
+    Quantity(
+        "error", "",
+        "Estimated discretisation error. `energy`: relative, in the energy norm; displacements "
+        "under given loads are off by about its square. `effectivity`: `null`, for it is the "
+        "estimate over the error, which a run does not know. `intervals`: bounds of forces, of the "
+        "largest displacement and of the largest pressure, by the last three meshes of "
+        "`[mesh.adapt]` with `fraction = 1`; `null` for one that does not converge, such as a "
+        "pressure at a corner. All are `null` where the equations are not solved.",
+        lambda r: {
+            "energy": _error(r), "effectivity": None, "intervals": r.intervals,
+        }, component=VECTOR, entries=ENDS,
+    ),
+    Quantity(
+        "max_pressure", "stress", "Largest contact pressure, -σ_ν >= 0.",
+        lambda r: r.problem.nodes.maximum(r.pressure), _MESHES,
+    ),
+    Quantity(
+        "contact_nodes", "", "Number of contact nodes that touch: sticking and sliding ones.",
+        lambda r: r.counts["stick"] + r.counts["slip"], _ALL,
+    ),
+    Quantity("stick_nodes", "", "Number of nodes that stick.", lambda r: r.counts["stick"], _ALL),
+    Quantity(
+        "slip_nodes", "", "Number of nodes that slide; without friction all that touch.",
+        lambda r: r.counts["slip"], _ALL,
+    ),
+    Quantity(
+        "max_displacement", "length", "Largest Euclidean norm of the displacement at a node.",
+        files=_MESHES,
+    ),
+    Quantity(
+        "contact_area", "area",
+        "Sum of the tributary areas of the nodes that touch; in 2-D a length.",
+        files=(SUMMARY, SWEEP),
+    ),
+    Quantity("max_dev_strain", "", "Largest |dev ε| over the cells (at degree 2 their nodes)."),
+    Quantity(
+        "max_strain", "",
+        "Largest Frobenius norm of ε in the middle of a cell; linear kinematics is for small ones.",
+        lambda r: _item(r.deformation, 0),
+    ),
+    Quantity(
+        "volume_ratio", "", "Least and largest deformed volume of a cell over its own.",
+        lambda r: r.deformation and [*r.deformation[1:]], component=VECTOR, entries=ENDS,
+    ),
+    Quantity(
+        "max_von_mises", "stress",
+        "Largest von Mises stress over the cells (at degree 2 their nodes). At sharp corners it "
+        "grows with each refinement.",
+        files=(SUMMARY, SWEEP),
+    ),
+    Quantity(
+        "plastic_share", "", "Share of the volume in the plastic range, 0 to 1: where |dev ε| is "
+        "above the yield strain, with `j2` where there is plastic strain. `null` where no material "
+        "yields.",
+        lambda r: np.nan if r.plastic_share is None else r.plastic_share,
+    ),
+    Quantity("plastic_volume", "volume", "Volume with plastic strain, of bodies with `j2`."),
+    Quantity(
+        "equivalent_plastic_strain", "", "Largest equivalent plastic strain, of bodies with `j2`."
+    ),
+    Quantity(
+        "contact_direction", "", "`[contact]` `direction`: whose normal ν is.",
+        lambda r: ", ".join(dict.fromkeys(c.foundation.direction for c in r.problem.contacts)),
+    ),
+    Quantity(
+        "work", "work", "Of loads, supports, electrodes, layer and charge in the step.",
+        lambda r: r.energies.work, (STEPS,),
+    ),
+    Quantity(
+        "energy", "work", "Stored in the body at the end of the step.",
+        lambda r: r.energies.energy, (STEPS,),
+    ),
+    Quantity(
+        "dissipation", "work", "By friction in the step; over a cycle the area of the loop.",
+        lambda r: r.energies.dissipation, (STEPS,),
+    ),
+    Quantity("dissipation", "work", "By friction in all steps.", files=(SWEEP,)),
+    Quantity(
+        "plastic_dissipation", "work", "By plastic flow in the step; in the summary in all steps.",
+        files=(SUMMARY, STEPS),
+    ),
+    Quantity(
+        "outer_iterations", "", "Outer iterations: rows of `history.csv`.",
+        lambda r: len(r.history.records), (SUMMARY, SWEEP),
+    ),
+    Quantity(
+        "inner_iterations", "", "Linear solves in each of them, a list.",
+        lambda r: [r.inner for r in r.history.records],
+    ),
+    Quantity(
+        "linear_solves", "", "Solves with the matrix of the whole body.",
+        lambda r: r.counters.linear_solves, _ALL,
+    ),
+    Quantity(
+        "linear_iterations", "", "Iterations of the linear solver in all of these; 1 each by LU.",
+        lambda r: r.counters.linear_iterations,
+    ),
+    Quantity(
+        "factorizations", "", "Factorisations of this matrix, or set-ups of multigrid.",
+        lambda r: r.counters.factorizations, _ALL,
+    ),
+    Quantity(
+        "contact_solves", "", "Linear solves of the problem condensed onto the contact nodes.",
+        lambda r: r.counters.contact_solves,
+    ),
+    Quantity(
+        "kkt", "", "Residuals of the equations, each relative to its own size: `equilibrium` "
+        "(forces; of piezoelectric bodies charges, where these are farther from balance), "
+        "`contact` (no penetration, no tension, one of them zero), `friction` (stick or slip).",
+        lambda r: {key: getattr(r.outcome.kkt, key) for key in r.floors},
+    ),
+    Quantity("kkt", "", "The largest residual.", lambda r: r.outcome.kkt.largest, ROWS),
+    Quantity(
+        "rounding", "", "Rounding floors of the residuals in `kkt`, up to which they are accepted; "
+        "of `equilibrium` in an evolution the largest of all steps. Larger than the tolerance in "
+        "slender bodies alone, with a warning.", lambda r: r.floors,
+    ),
+    Quantity(
+        "rigid", "", "The foundation that moves: its `displacement` and `rotation` (degrees), and "
+        "the `force` and `moment` on it from outside, given or reactions. With several such "
+        "foundations one entry per part.",
+        lambda r: r.movements.get("rigid"), component=VECTOR,
+    ),
+    Quantity(
+        "rigid_parts", "", "As `rigid`, of each part that moves as a rigid body.",
+        lambda r: r.movements.get("rigid_parts"), component=VECTOR,
+    ),
+    Quantity(
+        "electrodes", "",
+        "`potential` and `charge` of each electrode whose potential was unknown, by part.",
+        lambda r: r.movements.get("electrodes"),
+    ),
+    Quantity(
+        "bolts", "", "`shortening` and section `force` of each `[[bolt]]`, by part.",
+        lambda r: r.movements.get("bolts"),
+    ),
+    Quantity(
+        "rigid_AXIS", "length",
+        "Displacement of a moving foundation, or of a rigid part, `rigid_x`...; `rigid_rotation` "
+        "in degrees. Names end with the part, `rigid_x_top`, of several foundations, and of rigid "
+        "parts unless there is one part alone.",
+        lambda r: r.rigid["moved"], ROWS,
+    ),
+    Quantity(
+        "rigid_force_AXIS", "force",
+        "Force on it, and `rigid_moment`..., with names like the displacement.",
+        lambda r: r.rigid["acting"], ROWS,
+    ),
+    Quantity(
+        "potential_PART", "potential", "Potential of an electrode.",
+        lambda r: r.rigid["potentials"], ROWS,
+    ),
+    Quantity(
+        "bolt_KEY_PART", "length, force",
+        "Of a bolt: `bolt_shortening_shank`, `bolt_force_shank`.", lambda r: r.rigid["bolts"], ROWS
+    ),
+    Quantity(
+        "charge_PART", "charge", "Of an electrode; `charge_foundation` through the contact part.",
+        lambda r: r.charge_columns, ROWS,
+    ),
+    Quantity(
+        "driven", "length", "Mean displacement of the part that is moved or loaded in time.",
+        lambda r: _item(r.driven, 0), (STEPS,), VECTOR,
+    ),
+    Quantity(
+        "driven_force", "force",
+        "Force of its own supports and loads on it: with `driven_x` it makes the loop.",
+        lambda r: _item(r.driven, 1), (STEPS,), VECTOR,
+    ),
+    Quantity("notes", "", "Assumptions that are met, or have not been checked, in words."),
+    Quantity("warnings", "", "Reasons for care, in words."),
+    Quantity(
+        "phi_min", "potential", "Least potential at a node.", lambda r: _item(r.potential_range, 0),
+    ),
+    Quantity(
+        "phi_max", "potential", "Largest potential at a node.",
+        lambda r: _item(r.potential_range, 1),
+    ),
+    Quantity(
+        "total_charge", "charge", "Sum of all charges: 0 up to the tolerance, by Gauss's law.",
+        lambda r: r.charges and r.charges.total,
+    ),
+    Quantity(
+        "charges", "charge", "Charges D·ν integrated, ν out of the body: `electrodes` and "
+        "`given` part by part, `foundation` (through the contact part), `body` (in the volume), "
+        "`magnitude` (of all nodal ones, without sign).", lambda r: r.charges and vars(r.charges),
+    ),
+    Quantity(
+        "conduction_ramp", "length",
+        "1/delta: how far in front of the closed gap the foundation conducts, if it does.",
+        lambda r: (r.conduction_ramp or np.nan) if r.problem.piezoelectric else None,
+    ),
+    Quantity(
+        "case", "", "The case as it was solved, all defaults written out: a case file to run "
+        "again. Empty where the problem was built or changed in Python.",
+    ),
+    Quantity("seconds", "s", "For `setup`, `solve` and `output`."),
+    Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: versions()),
+    Quantity("files", "", "Files of this run: a later run replaces them.", elsewhere),
+    Quantity("seconds", "s", "Time for this row.", elsewhere, (SWEEP,)),
+    Quantity("input", "", "Digests of the case's files, and of the row.", elsewhere, (SWEEP,)),
+)  # fmt: skip
+
+_HISTORY = (
+    Quantity(
+        "iteration", "", "Number of the outer iteration; 0 is a frictionless start.",
+        files=(HISTORY,),
+    ),
+    Quantity("inner", "", "Linear solves of the iteration.", files=(HISTORY,)),
+    Quantity(
+        "equilibrium", "", "Residual after the iteration, as in `kkt`.",
+        lambda r: r.kkt.equilibrium, (HISTORY,),
+    ),
+    Quantity("contact", "", "Likewise.", lambda r: r.kkt.contact, (HISTORY,)),
+    Quantity("friction", "", "Likewise.", lambda r: r.kkt.friction, (HISTORY,)),
+    Quantity(
+        "change", "", "Relative change of the friction bound; `nan` where there is none.",
+        files=(HISTORY,),
+    ),
+    Quantity("seconds", "s", "Since the solve began.", files=(HISTORY,)),
+    Quantity("note", "", "Kind of the iteration, for instance `tangent`.", files=(HISTORY,)),
+    Quantity(
+        "contact_solves", "", "Linear solves of the condensed problem in the iteration.",
+        lambda r: r.contact_solves, (HISTORY,),
+    ),
+    Quantity(
+        "active_set", "", "Numbers of open, stick and slip nodes at its end, for instance `3/5/1`; "
+        "empty where the active set is not known.", _node_counts, (HISTORY,),
+    ),
+    Quantity(
+        "steps", "", "The active sets after each Newton iteration on the condensed problem, "
+        "separated by blanks; `-` where one is not known.",
+        lambda r: " ".join(_node_counts(step) or "-" for step in r.steps), (HISTORY,),
+    ),
+)  # fmt: skip
+
+
+QUANTITIES = (*_RUN, *AT_NODES, *_HISTORY, *AT_OPPOSITE_NODES, *FIELDS)

@@ -1,0 +1,457 @@
+"""The solution of a case, and its results as a whole."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from contact.errors import InputError
+from contact.linear.operator import Counters
+from contact.methods.load_stepping import LoadStep
+from contact.methods.report import IterationHistory, Outcome
+from contact.results.error_estimate import Estimate
+from contact.results.fields import Deformation, DerivedFields, unknowns
+from contact.results.intervals import Intervals
+from contact.results.options import OutputOptions, Source, Units
+from contact.results.quantities import values_of
+from contact.results.quantity import STEPS
+from contact.results.resultants import (
+    ChargeBalance,
+    DrivenPart,
+    Movements,
+    Resultant,
+    charge_balance,
+    contact_resultant,
+    movements,
+    rigid_columns,
+    supports,
+)
+from contact.results.solved import ContactResult, Solved, contact_result
+from contact.problem.energy import Balance, StepEnd, balance, step_end
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+if TYPE_CHECKING:
+    from contact.plot.figures import Gallery
+    from contact.plot.run import Run
+
+
+#: Columns of ``steps.csv`` that a look at a step shows.
+SHOWN = ("t", "max_pressure", "contact_nodes", "max_displacement", "kkt")
+
+#: A text on a solution: a warning, or a `Note`.
+Remark: TypeAlias = str
+
+
+class Note(str):
+    """A remark that is no reason for care."""
+
+
+@dataclass(frozen=True, repr=False)
+class StepRecord:
+    """The end of a step of an evolution, and its row in the table of steps.
+
+    Attributes
+    ----------
+    row
+        The columns of ``steps.csv``.
+    enthalpy
+        Where the energy balance of the next step begins, see `problem.energy.Moment`.
+    rounding
+        Largest `rounding` of the residuals of a step so far, see `problem.kkt.Residuals`.
+    """
+
+    state: State
+    row: Mapping[str, float]
+    enthalpy: float
+    rounding: float = 0.0
+
+    def __repr__(self) -> str:
+        """Return the main columns; `row` has all."""
+        shown = {name: self.row[name] for name in SHOWN if name in self.row}
+        return f"<StepRecord: {', '.join(f'{name} = {v:.4g}' for name, v in shown.items())}>"
+
+
+class StepRecorder:
+    """Makes the records of one step after the other.
+
+    Parameters
+    ----------
+    problem
+        The problem of the evolution.
+    last
+        The record to go on from; from the reference configuration by default. Collective.
+    """
+
+    def __init__(self, problem: ContactProblem, last: StepRecord | None = None) -> None:
+        self._before = StepEnd.rest(problem)
+        if last is not None:
+            here = problem.at(last.state.time, last.state.history)
+            self._before = step_end(here, last.state, self._before)
+            self._before = replace(self._before, enthalpy=last.enthalpy)
+        self._rounding = 0.0 if last is None else last.rounding
+        self._driven = DrivenPart.of(problem)
+
+    def record(self, step: LoadStep) -> StepRecord:
+        """Return the record of a step that follows the last one. Collective."""
+        problem, state = step.problem, step.state
+        now = step_end(problem, state, self._before)
+        energies = balance(problem, state, self._before, now)
+        self._before = now
+        solution = Solution(problem, state, step.outcome, step.history, step.counters, "", {})
+        solution.energies = energies
+        if self._driven is not None:
+            way, force = (find(problem, state) for find in (self._driven.way, self._driven.force))
+            solution.driven = way, force
+        row = values_of(STEPS, solution)
+        self._rounding = max(self._rounding, step.outcome.kkt.rounding)
+        return StepRecord(state, row, now.enthalpy, self._rounding)
+
+
+@dataclass(repr=False)
+class Solution(Solved):
+    """The solution of a problem, or the state at which its method has ended.
+
+    Attributes
+    ----------
+    problem, state
+        The problem, and its state: unknowns, contact forces, time and history.
+    outcome
+        Whether it has converged, why it ended, and the residuals.
+    history, counters
+        The outer iterations; factorisations and linear solves.
+    method
+        Name of the method.
+    seconds
+        Spent on setup, solve and output.
+    notes, warnings
+        Remarks in words that are no reason for care, and those that are, each with its identifier.
+    max_dev_strain, max_von_mises
+        The largest |dev eps| and von Mises stress over the cells (their nodes, for degree 2).
+    plastic_share
+        Share of the body's volume in the plastic range, |dev eps| above the material's first
+        yield; None where no material has such a limit.
+    plastic_volume, equivalent_plastic_strain
+        Volume with plastic strain, and the largest equivalent one; None without a law that has it.
+    deformation
+        How large strains and changes of volume are; None before the solution is reviewed.
+    error
+        The estimated discretisation error; None before the solution is reviewed.
+    adaptation
+        The rows of ``adapt.csv``, one a mesh; none without `[mesh.adapt]`.
+    intervals
+        Intervals of its quantities; None unless there are three nested uniform meshes.
+    start
+        The initial guess, in words.
+    critical_factor
+        The factor of mu from which on there may be several solutions, as far as that is known;
+        infinity for none, NaN where it is not looked for (`contact.results.uniqueness`).
+    jammed
+        Whether friction alone keeps bodies in contact: without contact forces there is a solution.
+    case
+        The case as `contact check` prints it, empty where there is none.
+    source
+        The case itself, a `Case`; None of a problem that was built in Python, or with objects in
+        its places.
+    energies, driven
+        Of a step: its energies, and displacement and force of the part that is moved or loaded.
+    title, units
+        Title of the case, and the names of its units.
+    output
+        The files that are written besides the summary and the tables.
+    steps
+        The steps of an evolution, the last of which this is.
+    extra_steps
+        How many more they are than were asked for: steps that failed were halved.
+    """
+
+    outcome: Outcome
+    history: IterationHistory
+    counters: Counters
+    method: str
+    seconds: dict[str, float]
+    notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    max_dev_strain: float = np.nan
+    max_von_mises: float = np.nan
+    plastic_share: float | None = None
+    plastic_volume: float | None = None
+    equivalent_plastic_strain: float | None = None
+    deformation: Deformation | None = None
+    error: Estimate | None = None
+    adaptation: list[dict[str, float]] = field(default_factory=list)
+    intervals: Intervals | None = None
+    start: str = "zero slip"
+    critical_factor: float = np.inf
+    jammed: bool = False
+    case: str = ""
+    source: Source | None = None
+    energies: Balance | None = None
+    driven: tuple[Array, Array] | None = None
+    title: str = ""
+    units: Units = field(default_factory=Units)
+    output: OutputOptions = field(default_factory=OutputOptions)
+    steps: list[StepRecord] = field(default_factory=list)
+    extra_steps: int = 0
+
+    def __repr__(self) -> str:
+        """Return the main results; `summary.json` has all."""
+        name = f" {self.title!r}" if self.title else ""
+        state = "converged" if self.converged else "not converged"
+        return (
+            f"<Solution{name}: {state}, {self.outcome.reason}; method {self.method}, "
+            f"von Mises stress up to {self.max_von_mises:.4g}; {len(self.warnings)} warning(s)>"
+        )
+
+    @property
+    def converged(self) -> bool:
+        """Whether all residuals are below the tolerance."""
+        return self.outcome.converged
+
+    @property
+    def rounding(self) -> float:
+        """Forces out of balance that count as rounding; of an evolution the most in a step."""
+        return max([self.outcome.kkt.rounding, *(step.rounding for step in self.steps[-1:])])
+
+    @property
+    def floors(self) -> dict[str, float]:
+        """Rounding floors of the residuals."""
+        balance, contact, friction = self.outcome.kkt.floors
+        balance = max(balance, self.rounding)
+        return {"equilibrium": balance, "contact": contact, "friction": friction}
+
+    @cached_property
+    def contact(self) -> ContactResult:
+        """The contact nodes of all ranks as arrays, and as functions. Collective."""
+        return contact_result(self)
+
+    @cached_property
+    def listed_contact(self) -> ContactResult:
+        """The contact nodes that this rank lists in files: all, or its own. Collective."""
+        return contact_result(self, whole=False) if self.in_pieces else self.contact
+
+    @cached_property
+    def _derived(self) -> dict[str, fem.Function]:
+        return DerivedFields(self.problem.equilibrium, self.state).cells()
+
+    @property
+    def stress(self) -> fem.Function:
+        """The stress, 3 x 3, cell by cell: of a degree less than the displacement. Collective."""
+        return self._derived["stress"]
+
+    @property
+    def von_mises(self) -> fem.Function:
+        """The von Mises stress, likewise. Collective."""
+        return self._derived["von_mises"]
+
+    def plot(self, *fields: str, width: float | None = None) -> Gallery | None:
+        """Return the figures on rank 0, which a notebook shows; None elsewhere. Collective.
+
+        Parameters
+        ----------
+        fields
+            Fields to colour the body by, as ``contact plot --field`` takes them. By default
+            contact part, von Mises stress and potential are drawn.
+        width
+            Of the figures (inches).
+
+        Returns
+        -------
+        The figures.
+
+        Raises
+        ------
+        InputError
+            If there is no such field.
+        """
+        from contact.plot.figures import Look, figures_of  # which take a while to load
+
+        run = self.written()
+        return None if run is None else figures_of(run, fields, Look(width, self.output.mirror))
+
+    def written(self) -> Run | None:
+        """Return the results in the files as figures read them; None but on rank 0. Collective."""
+        from contact import write_outputs
+        from contact.plot.run import read_run
+
+        comm = self.problem.comm
+        with ExitStack() as stack:
+            folder = stack.enter_context(TemporaryDirectory()) if comm.rank == 0 else ""
+            whole = replace(self, output=OutputOptions(), seconds={**self.seconds})
+            write_outputs(whole, comm.bcast(folder))
+            return read_run(Path(folder)) if comm.rank == 0 else None
+
+    @cached_property
+    def _unknowns(self) -> dict[str, fem.Function]:
+        return unknowns(self.problem.equilibrium, self.state.x)
+
+    @property
+    def displacement(self) -> fem.Function:
+        """The displacement. The first use is collective."""
+        return self._unknowns["displacement"]
+
+    @property
+    def potential(self) -> fem.Function | None:
+        """The electric potential; None for a body without. The first use is collective."""
+        return self._unknowns.get("potential")
+
+    @property
+    def plastic_dissipation(self) -> float | None:
+        """The energy that plastic flow took, in a step or in all of them. Collective."""
+        body = self.problem.equilibrium
+        if self.energies is not None or body.laws.initial is None:
+            return None if self.energies is None else self.energies.plastic
+        if not self.steps:
+            return body.laws.energies(self.state)[0]
+        return sum(float(step.row["plastic_dissipation"]) for step in self.steps)
+
+    @property
+    def contact_force(self) -> Array:
+        """The force that the body exerts on the foundation, shape (d,). Collective."""
+        return contact_resultant(self.problem, self.state).force
+
+    @property
+    def contact_moment(self) -> Array:
+        """The moment of the contact forces about the origin, shape (1,) or (3,). Collective."""
+        return contact_resultant(self.problem, self.state).moment
+
+    @property
+    def contact_area(self) -> float:
+        """The contact area: the sum of the weights of nodes in contact. Collective."""
+        return self.problem.nodes.sum(np.where(self.status == "open", 0.0, 1.0))
+
+    @property
+    def max_displacement(self) -> float:
+        """The largest Euclidean norm of the displacement over the nodes. Collective."""
+        body, comm = self.problem.equilibrium, self.problem.comm
+        u = self.state.x[: body.owned].reshape(-1, body.block_size)[:, : self.problem.dim]
+        return float(comm.allreduce(np.linalg.norm(u, axis=1).max(initial=0.0), op=MPI.MAX))
+
+    @cached_property
+    def supports(self) -> Mapping[str, Resultant]:
+        """Resultant of each part with prescribed displacements on the body. Collective."""
+        return supports(self.problem, self.state)
+
+    def reaction(self, part: str) -> Array:
+        """Return the force that a support exerts on the body, shape (d,). Collective.
+
+        Parameters
+        ----------
+        part
+            Name of the part with prescribed displacements.
+
+        Returns
+        -------
+        The force, of a plane body per unit of depth, of one of revolution over the full turn.
+
+        Raises
+        ------
+        InputError
+            If no displacement is prescribed on the part.
+        """
+        if part not in self.supports:
+            raise InputError(
+                f"reaction({part!r}): no displacement is prescribed there; accepted: "
+                f"{', '.join(self.supports) or 'none, for nothing is held'}",
+                "no-such-name",
+            )
+        return self.supports[part].force
+
+    @cached_property
+    def movements(self) -> Movements:
+        """Rigid bodies, and electrodes of unknown potential, as in summary.json. Collective.
+
+        Its keys are `rigid`, `rigid_parts`, `electrodes` and `bolts`, as far as there are any.
+        """
+        return movements(self.problem, self.state)
+
+    @cached_property
+    def charges(self) -> ChargeBalance | None:
+        """The free charges; None for a body without a potential. Collective."""
+        if not self.problem.piezoelectric:
+            return None
+        return charge_balance(self.problem, self.state)
+
+    @property
+    def charge_columns(self) -> Mapping[str, float] | None:
+        """Charges of the electrodes and of the contact part, by the names of their columns."""
+        if self.charges is None:
+            return None
+        columns = {f"charge_{part}": charge for part, charge in self.charges.electrodes.items()}
+        return columns | {"charge_foundation": self.charges.foundation}
+
+    @property
+    def rigid(self) -> Mapping[str, Mapping[str, float]]:
+        """The columns of rigid bodies, and of electrodes: see `rigid_columns`."""
+        return rigid_columns(self.movements)
+
+    def at_step(self, state: State) -> Solution:
+        """Return the solution at the end of a step, without the records of the whole.
+
+        Parameters
+        ----------
+        state
+            The state at its end.
+
+        Returns
+        -------
+        Problem and state of the step.
+        """
+        problem = self.problem.at(state.time, state.history)
+        return Solution(problem, state, self.outcome, self.history, self.counters, self.method, {})
+
+    @property
+    def reaction_columns(self) -> dict[str, float]:
+        """The reactions of supports as columns, ``reaction_x_left``. Collective."""
+        axes = "xyz"[: self.problem.dim]
+        return {
+            f"reaction_{axis}_{part}": float(value)
+            for part, held in self.supports.items()
+            for axis, value in zip(axes, held.force, strict=True)
+        }
+
+    @property
+    def dissipation(self) -> float:
+        """The energy that friction has dissipated, in all steps of an evolution. Collective."""
+        if self.steps:
+            return sum(float(step.row["dissipation"]) for step in self.steps)
+        slip = self.problem.interface.slip(self.nodal)
+        return self.problem.nodes.sum(np.einsum("ni,ni->n", self.friction, slip))
+
+    @property
+    def conduction_ramp(self) -> float | None:
+        """How far in front of the closed gap the foundation conducts, 1/delta (length)."""
+        conductor = self.problem.interface.law.conductor
+        return 1 / conductor.psi.delta if conductor and conductor.psi.follows_gap else None
+
+    @cached_property
+    def counts(self) -> dict[str, int]:
+        """Numbers of contact nodes that are open, stick and slip. Collective."""
+        names, status = ("open", "stick", "slip"), self.status
+        own = np.array([np.count_nonzero(status == name) for name in names])
+        counts = self.problem.comm.allreduce(own, op=MPI.SUM)
+        return dict(zip(names, counts.tolist(), strict=True))
+
+    @cached_property
+    def potential_range(self) -> tuple[float, float] | None:
+        """The least and the largest potential at a node. Collective."""
+        if not self.problem.piezoelectric:
+            return None
+        comm, body = self.problem.comm, self.problem.equilibrium
+        scaled = self.state.x[: body.owned].reshape(-1, body.block_size)[:, -1]
+        phi = body.phi_scale * scaled
+        return (
+            comm.allreduce(float(phi.min(initial=math.inf)), op=MPI.MIN),
+            comm.allreduce(float(phi.max(initial=-math.inf)), op=MPI.MAX),
+        )

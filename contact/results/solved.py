@@ -1,0 +1,277 @@
+"""The contact nodes of a solved problem: those of this rank, and those of all ranks in order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from contact.errors import InputError, counted
+from contact.interface.mortar.surface import surface_of
+from contact.interface.multipliers import Multipliers
+from contact.mesh.entities import paths
+from contact.io.formats import in_pieces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+
+@dataclass(repr=False)
+class Solved:
+    """A solved problem.
+
+    Nodal quantities are those of the contact nodes that this rank owns, in the order of
+    `problem.nodes`.
+
+    Attributes
+    ----------
+    problem
+        The problem, of a load step that of its time and history.
+    state
+        Unknowns, contact forces, time and history: a value, which nothing that is done with the
+        problem changes.
+    """
+
+    problem: ContactProblem
+    state: State
+
+    @property
+    def in_pieces(self) -> bool:
+        """Whether each rank writes its own contact nodes. Collective."""
+        return in_pieces(self.problem.comm, self.problem.nodes.size)
+
+    @property
+    def nodal(self) -> Array:
+        """Displacement (and scaled potential) at the contact nodes, shape (n, block size)."""
+        return self.problem.nodal(self.state)
+
+    @property
+    def forces(self) -> Multipliers:
+        """Multipliers of the unilateral constraint and of friction."""
+        return self.state.forces
+
+    @property
+    def pressure(self) -> Array:
+        """Contact pressure -sigma_nu, shape (n,): multiplier and layer."""
+        return self.problem.interface.pressure(self.nodal, self.forces)
+
+    @property
+    def friction(self) -> Array:
+        """Friction stress -sigma_tau = lambda_f, shape (n, d)."""
+        return self.forces.friction
+
+    @property
+    def friction_bound(self) -> Array:
+        """Friction bound s, shape (n,). Collective."""
+        return self.problem.interface.bound(self.nodal, self.forces)
+
+    @property
+    def normal_displacement(self) -> Array:
+        """u_nu along the contact direction, shape (n,)."""
+        return self.problem.nodes.normal_component(self.nodal)
+
+    @property
+    def slip(self) -> Array:
+        """Tangential displacement u_tau, shape (n, d)."""
+        return self.problem.nodes.tangential_component(self.nodal)
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """The active set by names: "open", "stick" or "slip", shape (n,). Collective.
+
+        A node is in contact where p - c (gap - u_nu) > 0 for the multiplier p, or where the
+        layer presses; c = E / size. There it slips if |lambda_f + c u_tau|
+        exceeds the friction bound (always where that is 0), and sticks else. Pressures
+        below 1e-9 of the largest count as rounding, and those that rounding of displacements makes.
+        """
+        interface, nodal = self.problem.interface, self.nodal
+        rounding = interface.negligible(nodal, self.pressure)
+        active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
+        layer = interface.law.layer_pressure(nodal) > rounding
+        touches = active.closed | layer
+        sticks = active.sticks & (self.friction_bound > 0)
+        return np.where(touches, np.where(sticks, "stick", "slip"), "open")
+
+
+def tangent_of(normal: Array) -> Array:
+    """Return the unit tangents t of contact directions nu in the plane, shape (n, 2).
+
+    t is nu turned counter-clockwise by 90 degrees: on the bottom of a body, where
+    nu = (0, -1), t points along x.
+    """
+    return np.column_stack([-normal[:, 1], normal[:, 0]])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactResult:
+    """The contact nodes of all ranks, on each of them, in the order of ``contact.csv``.
+
+    In 2-D that is along Gamma_3 from node to node, each connected component from its end with the
+    smaller x (then y); in 3-D by x, then y, then z. Nodes of one contact follow those of another.
+
+    Attributes
+    ----------
+    points, weight
+        Places in the reference configuration, shape (n, d), and the areas they stand for, (n,).
+    normal
+        Contact direction, out of the body, shape (n, d).
+    gap, opening
+        Initial and present distance to the foundation along it, shape (n,) (length).
+    normal_displacement, slip
+        Displacement along it, shape (n,), and tangential one, shape (n, d) (length).
+    pressure, friction, traction
+        Contact pressure -sigma_nu, (n,), friction stress -sigma_tau, and both together: the stress
+        of the body on the foundation, (n, d).
+    friction_bound
+        Shape (n,) (stress).
+    status
+        "open", "stick" or "slip", shape (n,).
+    potential, charge
+        Of a piezoelectric body: potential, and charge that leaves through the foundation, shape
+        (n,); else None.
+    entry, node
+        Number of the contact, and of the node over all ranks, shape (n,).
+    """
+
+    points: Array
+    weight: Array
+    normal: Array
+    gap: Array
+    opening: Array
+    normal_displacement: Array
+    slip: Array
+    pressure: Array
+    friction: Array
+    traction: Array
+    friction_bound: Array
+    status: NDArray[np.str_]
+    entry: NDArray[np.intp]
+    node: NDArray[np.int64]
+    _problem: ContactProblem
+    potential: Array | None = None
+    charge: Array | None = None
+
+    def __repr__(self) -> str:
+        """Return how many nodes there are, and how many of them touch."""
+        closed = np.count_nonzero(self.status != "open")
+        words = f"{counted(self.status.size, 'node')}, {closed} in contact"
+        return f"<ContactResult: {words}, pressure up to {self.pressure.max(initial=0.0):.4g}>"
+
+    @property
+    def part(self) -> NDArray[Any] | None:
+        """Part of each node; None for a single contact."""
+        names = np.array([entry.on for entry in self._problem.entries])
+        return names[self.entry] if names.size > 1 else None
+
+    def tangential(self, vectors: Array) -> Array:
+        """Return the component along `tangent_of` the contact direction; in 3-D the vectors."""
+        if self._problem.dim == 3:
+            return vectors
+        return np.asarray(np.einsum("ni,ni->n", vectors, tangent_of(self.normal)))
+
+    def function(self, name: str) -> fem.Function:
+        """Return one of the arrays as a function on a mesh of the contact surface. Collective.
+
+        It is NaN at nodes that are held, and hence no contact nodes.
+
+        Raises
+        ------
+        InputError
+            If there is no such array of numbers.
+        """
+        known = {k: v for k, v in vars(self).items() if getattr(v, "dtype", None) == np.float64}
+        if name not in known:
+            raise InputError(
+                f"contact.function({name!r}): accepted: {', '.join(known)}", "no-such-name"
+            )
+        values, domain = known[name], self._problem.domain
+        facets = np.concatenate([domain.facets(contact.on) for contact in self._problem.contacts])
+        surface = dmesh.create_submesh(domain.mesh, domain.dim - 1, np.unique(facets))[0]
+        element = ("Lagrange", self._problem.equilibrium.degree, values.shape[1:])
+        made = fem.Function(fem.functionspace(surface, element), name=name)
+        places = made.function_space.tabulate_dof_coordinates()[:, : domain.dim]
+        distance, nearest = KDTree(self.points).query(places)
+        rows = values[nearest]
+        rows[distance > 1e-9 * domain.size] = np.nan
+        made.x.array[:] = rows.ravel()
+        return made
+
+
+def contact_result(solved: Solved, whole: bool = True) -> ContactResult:
+    """Return the contact nodes of a solved problem. Collective.
+
+    Parameters
+    ----------
+    solved
+        The solved problem.
+    whole
+        Whether those of all ranks; else those of this one, in the order of their places.
+    """
+    problem, nodes, forces = solved.problem, solved.problem.nodes, solved.forces
+    gap, normal_displacement = problem.interface.law.jump.gap, solved.normal_displacement
+    own: dict[str, NDArray[Any]] = {
+        # Mesh generators leave coordinates such as -3e-19.
+        "points": np.where(np.abs(nodes.points) < 1e-15 * problem.domain.size, 0.0, nodes.points),
+        "weight": nodes.weight,
+        "normal": nodes.normal,
+        "gap": gap,
+        "opening": gap - normal_displacement,
+        "normal_displacement": normal_displacement,
+        "slip": solved.slip,
+        "pressure": solved.pressure,
+        "friction": forces.friction,
+        "traction": solved.pressure[:, None] * nodes.normal + forces.friction,
+        "friction_bound": solved.friction_bound,
+        "status": solved.status,
+        "entry": np.repeat(
+            np.arange(len(problem.entries)), [entry.nodes.nodes.size for entry in problem.entries]
+        ),
+        "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
+    }
+    if problem.piezoelectric:
+        own["potential"] = problem.equilibrium.phi_scale * solved.nodal[:, -1]
+        own["charge"] = problem.interface.law.charge(solved.nodal, solved.pressure)
+    if whole:
+        own = {name: nodes.gather(values) for name, values in own.items()}
+        order = _by_position(problem, nodes.gather(nodes.points))
+        if problem.dim == 2:
+            order = _along_chain(own["node"], order, nodes.gather(_links(problem)))
+    else:
+        order = _by_position(problem, nodes.points)
+    order = order[np.argsort(own["entry"][order], kind="stable")]
+    arrays: dict[str, Any] = {name: values[order] for name, values in own.items()}
+    return ContactResult(**arrays, _problem=problem)
+
+
+def _by_position(problem: ContactProblem, points: Array) -> NDArray[np.intp]:
+    """Return the order of points by x, then y, then z."""
+    # Coordinates that differ by rounding alone must not change the order.
+    return np.lexsort(np.round(points / (1e-9 * problem.domain.size)).T[::-1])
+
+
+def _links(problem: ContactProblem) -> NDArray[np.int64]:
+    """Return the global numbers of neighbours on the owned facets of Gamma_3, shape (m, 2)."""
+    space = problem.equilibrium.space
+    parts = [surface_of(problem.domain, space, contact.on).nodes for contact in problem.contacts]
+    nodes = np.concatenate(parts)
+    # Both ends, then the middle node if there is one.
+    chain = nodes if nodes.shape[1] == 2 else nodes[:, [0, 2, 1]]
+    return np.concatenate([chain[:, k : k + 2] for k in range(chain.shape[1] - 1)])
+
+
+def _along_chain(
+    names: NDArray[np.int64], by_position: NDArray[np.intp], links: NDArray[np.int64]
+) -> NDArray[np.intp]:
+    """Follow the links from node to node; pieces come in the order of their first ends."""
+    both = np.isin(links, names).all(axis=1)
+    # Number the nodes by position, so that every choice is one of position.
+    rank = np.empty_like(by_position)
+    rank[by_position] = np.arange(by_position.size)
+    sorter = np.argsort(names)
+    edges = rank[sorter[np.searchsorted(names, links[both], sorter=sorter)]]
+    return np.asarray(by_position[np.concatenate(paths(edges, names.size))])

@@ -1,0 +1,181 @@
+"""Method `uzawa`, the outer loop of Algorithms 1, 4, 6 and 8: fixed point, Uzawa block relaxation.
+
+Elastic and piezoelectric bodies, rigid and compliant foundations differ in the terms that are
+frozen:
+
+- Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
+- Algorithm 4, Problem (P~V): also psi, or all of the charge l where it is lagged.
+- Algorithm 6, Problem (PV2): also h_nu, or all of the layer's force j_1 where it is lagged.
+- Algorithm 8, Problem (PV1): as Algorithm 6 without friction and current.
+
+Their inner Algorithms 2, 5, 7 and 9 are `uzawa.uzawa_block_relaxation`, with another
+`Interface.law` each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from contact.linear.operator import Operator
+from contact.methods.complementarity_parameters import automatic_r
+from contact.methods.conductivity_derivative import ConductivityDerivative
+from contact.methods.options import FixedPointOptions
+from contact.methods.report import Outcome
+from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.problem.residuals import Residuals
+from contact.problem.state import State
+from contact.thesis.outer_loop import NEAR, OuterLoop
+from contact.thesis.uzawa import augmentation, split, uzawa_block_relaxation
+from contact.typing import Array
+
+#: Outer iterations without progress after which the loop is given up where the Uzawa block
+#: relaxation gets no further either.
+STALLED = 3
+
+#: Why the loop stalls far from a solution though its Uzawa block relaxations converge.
+FROZEN = (
+    " though each frozen problem is solved: the frozen terms (friction bound, conducting nodes, "
+    "material) cycle"
+)
+
+
+@dataclass
+class FixedPoint(OuterLoop):
+    """Algorithms 1, 4, 6 and 8; see `OuterLoop`."""
+
+    options: FixedPointOptions
+    stagnation: ClassVar[tuple[int, float]] = (25, 0.9)
+
+    def __post_init__(self) -> None:
+        """Choose r and set up the operator."""
+        super().__post_init__()
+        given = self.options.r
+        self.r = automatic_r(self.problem.scales) if given == "auto" else given
+        self.operator = self._new_operator(symmetric=True)
+
+    def _new_operator(self, symmetric: bool) -> Operator:
+        kind = "many" if self.options.linear == "auto" else self.options.linear
+        return self.problem.operator(symmetric=symmetric, counters=self.counters, kind=kind)
+
+    def solve(
+        self, start: State | None = None, linearised_at: Array | None = None
+    ) -> tuple[State, Outcome]:
+        """Iterate until convergence, stagnation or the limit. Collective.
+
+        Parameters
+        ----------
+        start, linearised_at
+            Initial guess, zero by default; and unknowns at which the first secant is taken.
+        """
+        self._stalled, self._residual = False, np.inf
+        self._gap_derivative = ConductivityDerivative(NEAR)
+        if not self.operator.symmetric:  # a solve does not depend on an earlier one
+            self.operator = self._new_operator(symmetric=True)
+        problem, interface = self.problem, self.problem.interface
+        frictional = interface.friction.acts
+        if start is None:
+            self.state, self._secant_at = problem.start(), problem.equilibrium.rest()
+            stuck = UnconstrainedModes(problem).stuck_bound()
+            # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
+            # updated in the Uzawa block relaxation needs none, and a body that friction alone holds
+            # has no such problem.
+            first = 0 if frictional and not self.options.single_loop and stuck is None else 1
+            # At zero strain: prescribed values strain the elements beside them alone.
+            self._z = self._about(0.0, frictional and first > 0)
+            self.bound = np.zeros(interface.jump.gap.size) if stuck is None else stuck
+        else:
+            self.state, self._secant_at, first = (
+                start,
+                start.x if linearised_at is None else linearised_at,
+                1,
+            )
+            nodal, pressure = interface.jump.apply(start.x), start.forces.pressure
+            if interface.law.normal_law(nodal) is not None:
+                pressure = interface.pressure(nodal, start.forces)
+            self._z = np.column_stack([pressure, start.forces.friction])
+            self.bound = interface.bound(nodal, start.forces)
+        self._first, self._tangent = first, False
+        outcome = self._iterate(first)
+        return self.state, outcome
+
+    def _about(self, z: Array | float, friction: bool) -> Array:
+        """Return a state of the relaxation lambda + r u as it is about the iterate: less r u_0."""
+        nodal = self.problem.interface.jump.apply(self.state.x)
+        return z - self.r * split(self.problem.interface, nodal, friction)
+
+    def _step(self, iteration: int) -> tuple[int, str]:
+        """Freeze, solve the frozen problem, and move the state."""
+        problem, interface = self.problem, self.problem.interface
+        friction, body = interface.friction.acts and iteration > 0, problem.equilibrium
+        if friction and self._first == 0 and iteration == 1:
+            # The slip without friction is a bad guess, and so is the contact that goes with it.
+            self._z = self._about(0.0, friction)
+        state, nodal = self.state, interface.jump.apply(self.state.x)
+        blocks = augmentation(interface.jump, self.r, friction)
+        if interface.law.active:
+            blocks = blocks + self._current_block(nodal, interface.pressure(nodal, state.forces))
+        # Newton's tangent of a zero strain is the secant, and cheaper.
+        kind = "tangent" if self._tangent and iteration > self._first else "secant"
+        linearised_at = self._secant_at if kind == "secant" else state.x
+        weighted = interface.weighted(blocks, state.x)
+        self.operator.update(kind, replace(state, x=linearised_at), weighted, constant=body.linear)
+        result = uzawa_block_relaxation(
+            problem,
+            state,
+            self.operator,
+            self.bound,
+            friction,
+            self._secant_at,
+            self._z,
+            self.r,
+            self.options,
+            self._norm,
+            self.history.poll,
+        )
+        # With frozen terms that is left then: their derivatives change the inner problem.
+        self._stalled = result.stalled and not self._gap_derivative.included
+        x = body.moved(state.x, result.increment)
+        self.state, self._z = replace(state, x=x, forces=result.forces), result.z
+        self._secant_at = x
+        return result.iterations, "tangent" if kind == "tangent" else ""
+
+    def _current_block(self, nodal: Array, pressure: Array) -> Array:
+        """Linearise the charge: near the solution with psi, which depends on the gap.
+
+        Frozen, a steep ramp costs many iterations there; its derivative overshoots from afar.
+        """
+        law = self.problem.interface.law
+        if not law.follows_gap or not self._gap_derivative(self._residual):
+            return law.current_block(nodal, pressure)
+        if self.operator.symmetric:
+            self.operator = self._new_operator(symmetric=False)
+        return law.current_block(nodal, pressure, full=True)
+
+    def _measure(self, residuals: Residuals) -> float:
+        self._residual = residuals.significant
+        return self._residual
+
+    def _adapt(self, residual: float, best: float) -> None:
+        """Take the material's tangent near the solution: far away it is too soft."""
+        choice = self.options.material_step
+        if choice == "auto" and not self.problem.equilibrium.linear:
+            self._tangent = residual < (2 * best if self._tangent else NEAR)
+        else:
+            self._tangent = choice == "tangent"
+
+    def _limit(self) -> int:
+        return STALLED if self._stalled else self.stagnation[0]
+
+    def _thesis_criterion(self, change: float, previous: State) -> bool:
+        """Tell whether (3.46) is met, or (6.40) without friction."""
+        if self.problem.interface.friction.acts:
+            return change < self.options.eps_fp
+        return super()._thesis_criterion(change, previous)
+
+    def _advice(self, residual: float | None = None) -> str:
+        if self._stalled:
+            return f": the Uzawa block relaxation with r = {self.r:.3g} stalls"
+        return FROZEN if residual is not None and residual > NEAR else ""

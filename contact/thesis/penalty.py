@@ -1,0 +1,370 @@
+"""Algorithm 3: the penalty method, through PETSc's SNES.
+
+The Signorini and Coulomb conditions are replaced by the laws of `contact.interface.penalised`,
+so that the penalised problem (PV_eps) is one nonlinear equation in the displacement. An outer
+iteration freezes the secant modulus of the material and the friction modulus of (4.33); the rest
+of (4.32), the unilateral [u_nu - rho]^+ of the *new* iterate, is solved by SNES as a
+semismooth equation, with a compliant layer where there is one. An outer count is that of
+Algorithm 3; the inner one counts SNES's iterations. SNES takes full steps while friction is lagged,
+and has a backtracking line search with implicit friction and with a layer that is not lagged.
+
+Convergence. A penalty run solves the penalised problem: it has converged when the equilibrium
+residual with the forces of the regularised laws at the final displacement is below the
+tolerance (those laws then hold by construction). The residuals `contact` and `friction` of the
+reported KKT are those of the Signorini-Coulomb laws themselves; they measure how far the
+penalised solution is from the limit, and fall like eps. Where they are above
+`LARGEST_VIOLATION`, the solution says nothing of contact, and the run has not converged.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from petsc4py import PETSc
+
+from contact.errors import InputError, SingularError
+from contact.interface.penalised import PenalisedLaw, Regularisation, outer
+from contact.linear.faults import petsc_options
+from contact.linear.krylov import Packing, shell
+from contact.linear.operator import Counters
+from contact.methods.options import PenaltyOptions
+from contact.methods.report import Outcome
+from contact.methods.signals import Interrupted
+from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.problem.checks import expected_displacements
+from contact.problem.problem import ContactProblem
+from contact.problem.residuals import Residuals, residual_forces
+from contact.problem.state import State
+from contact.thesis.outer_loop import LOST, NEAR, OuterLoop
+from contact.tolerances import LARGEST_VIOLATION
+from contact.typing import Array
+
+logger = logging.getLogger("contact.inner")
+
+
+class PenalisedProblem:
+    """The nonlinear problem of an outer iteration, in the owned unknowns.
+
+    SNES asks `SparseOperator` for its linear solves, through a shell preconditioner. Its residual
+    are forces, and charges, over the norms of those that act. Its options have the prefix
+    ``penalty_``, for instance ``-penalty_snes_monitor``.
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        options: PenaltyOptions,
+        eps: Regularisation,
+        counters: Counters,
+        symmetric: bool,
+    ) -> None:
+        self._options, self._eps = options, eps
+        self._error: InputError | Interrupted | None = None
+        self._problem = problem
+        self._body, self._interface = problem.equilibrium, problem.interface
+        self.operator = problem.operator(
+            symmetric=symmetric, counters=counters, kind=options.linear
+        )
+        self._packing = Packing(problem.comm, self._body.global_unknowns.size)
+        matrix = shell(self, problem.comm, self._body.owned, self._body.global_unknowns.size)
+        self._iterate, self._residual = matrix.createVecs()
+        self.snes = PETSc.SNES().create(problem.comm)
+        self.snes.setOptionsPrefix("penalty_")
+        self.snes.setFunction(self._function, self._residual)
+        self.snes.setJacobian(self._jacobian, matrix)
+        self.snes.setMonitor(self._tell)
+        self.snes.getKSP().setType("preonly")
+        pc = self.snes.getKSP().getPC()
+        pc.setType("python")
+        pc.setPythonContext(self)
+        # A wrong active set raises the residual by 1/eps, for a step.
+        self.snes.setDivergenceTolerance(1e300)
+        # Full steps: the active set of the pressure settles in a few of them, while a line
+        # search on the residual, which has kinks of the size 1/eps, takes tiny ones. A layer that
+        # saturates needs the search: full steps cycle between its open and its saturated state.
+        # So do implicit friction and material: full steps jump between sticking and sliding.
+        given = PETSc.Options()
+        name = "penalty_snes_linesearch_type"
+        default = not given.hasName(name)
+        if default:
+            layer = problem.interface.law.layer
+            given[name] = "basic" if symmetric and (layer is None or layer.lagged) else "bt"
+        try:
+            with petsc_options("penalty_"):
+                self.snes.setFromOptions()
+        finally:
+            if default:
+                given.delValue(name)
+
+    def set_load_step(self, problem: ContactProblem, eps: Regularisation) -> None:
+        """Go on with another step of the same problem."""
+        self._problem, self._interface, self._eps = problem, problem.interface, eps
+
+    def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """Solve with the operator: the preconditioner of SNES's KSP."""
+        try:
+            self._poll()
+            found = self.operator.solve(self._units * self._packing.unpacked(rhs.array_r))
+            solution.array[:] = self._packing.packed(found)
+        except (InputError, Interrupted) as error:
+            # Not through PETSc, which would wrap it; SNES stops at a solution without numbers.
+            self._error = error
+            solution.array[:] = np.nan
+
+    def multiply(self, values: Array) -> Array:
+        """Return the derivative of the residual times owned values. Collective."""
+        return self.operator.multiply(values) / self._units
+
+    def solve(
+        self, law: PenalisedLaw, state: State, implicit: bool, poll: Callable[[], None]
+    ) -> tuple[Array, int, str]:
+        """Solve from a state; return the unknowns, the iterations and the fault, if any.
+
+        Before each of them `poll` is called, on all ranks.
+
+        Raises
+        ------
+        Interrupted
+            If `poll` raises it.
+        SingularError
+            If nothing holds the body at an iterate.
+        InputError
+            If numbers overflow, where the laws are not implicit.
+        """
+        body, interface = self._body, self._interface
+        nodal = interface.jump.apply(state.x)
+        self._law, self._implicit, self._nodal = law, implicit, nodal
+        self._state = state
+        self._assembled = body.linear
+        pressure = interface.pressure(nodal, state.forces)
+        self._response = interface.law.force(nodal, pressure)
+        self._current_block = interface.law.current_block(nodal, pressure)
+        self._layer = interface.law.normal_law(nodal)
+        if self._layer is not None:
+            # Like the unilateral [.]^+ it is that of the new iterate, but for h_nu.
+            self._response[:, : body.dim] = 0.0
+        residual = residual_forces(self._problem, state)
+        on_contact = np.zeros_like(residual)
+        interface.add_forces(on_contact, state.x, state.forces)
+        norms = body.load_norms(state.time) + body.norms(residual)
+        norms = norms + body.norms(on_contact) + body.exchanged(state)
+        self._units = body.component_norms.spread(np.where(norms > 0, norms, 1.0))
+        self.snes.setTolerances(
+            rtol=1e-14,
+            # Rounding is magnified by 1/eps: the residual may stay above any tolerance.
+            stol=1e-14,
+            atol=self._options.tolerance / 10,
+            max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
+        )
+        self._error, self._poll = None, poll
+        self._iterate.array[:] = self._packing.packed(body.owned_part(state.x) + self._touch())
+        self.snes.solve(None, self._iterate)
+        lasting = isinstance(self._error, SingularError | Interrupted)
+        if self._error is not None and (lasting or not implicit):
+            raise self._error
+        reason = self.snes.getConvergedReason()
+        note = "" if reason > 0 else f"SNES stopped with reason {reason}"
+        return self._unknowns(self._iterate), self.snes.getIterationNumber(), note
+
+    def _touch(self) -> Array:
+        """Return a first guess: zero, or where nothing touches yet, the closest nodes in touch.
+
+        A body that only the foundation holds would otherwise give a singular first system.
+        """
+        body, interface, nodal = self._body, self._interface, self._nodal
+        jump, state = interface.jump, self._state
+        # Of the rigid part, or without one of the layer.
+        opening = jump.normal_component(nodal) - interface.law.jump.gap
+        closest = jump.maximum(opening, -np.inf)
+        if closest >= 0:
+            return np.zeros_like(body.owned_part(state.x))
+        stiffness = (opening >= closest - 1e-9 * interface.diameter) / self._eps.contact
+        n, d = jump.normal.shape
+        blocks = np.zeros((n, jump.block_size, jump.block_size))
+        blocks[:, :d, :d] = stiffness[:, None, None] * outer(jump.normal, jump.normal)
+        blocks[:, :d, :d] += self._law.block(nodal)
+        self.operator.update("secant", state, interface.weighted(blocks, state.x))
+        rhs = body.external(state.time) - body.internal_forces(state)
+        jump.transpose(-(jump.weight * stiffness * opening)[:, None] * jump.normal, rhs)
+        return self.operator.solve(rhs)
+
+    def _unknowns(self, iterate: PETSc.Vec) -> Array:
+        """Return the local unknowns of an iterate of SNES. Collective."""
+        return self._body.local(self._packing.unpacked(iterate.array_r))
+
+    def _tell(self, _: PETSc.SNES, iteration: int, norm: float) -> None:
+        logger.debug("inner iteration %d: residual %.2e", iteration, norm)
+
+    def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
+        body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
+        nodal = jump.apply(x)
+        secant_at = None if self._implicit else self._state.x
+        values = body.internal_forces(replace(self._state, x=x), secant_at)
+        values = values - body.external(self._state.time)
+        jump.transpose(jump.weight[:, None] * self._law.forces(nodal).vectors(jump), values)
+        change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
+        if self._layer is not None:
+            u_n = np.minimum(jump.normal_component(nodal), jump.gap)
+            change[:, : jump.dim] += self._layer.layer(u_n)[:, None] * jump.normal
+        jump.transpose(jump.weight[:, None] * (self._response + change), values)
+        residual.array[:] = self._packing.packed(body.unbalanced(values) / self._units)
+
+    def _jacobian(
+        self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
+    ) -> None:
+        body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
+        nodal, d = jump.apply(x), body.dim
+        blocks = self._current_block.copy()
+        blocks[:, :d, :d] += self._law.block(nodal)
+        if self._layer is not None:
+            u_n = jump.normal_component(nodal)
+            slope = np.where(u_n < jump.gap, self._layer.layer_slope(u_n), 0.0)
+            blocks[:, :d, :d] += slope[:, None, None] * outer(jump.normal, jump.normal)
+        kind, linearised_at = ("tangent", x) if self._implicit else ("secant", self._state.x)
+        unchanged = body.linear or (self._assembled and not self._implicit)
+        blocks = self._interface.weighted(blocks, x)
+        at = replace(self._state, x=linearised_at)
+        self.operator.update(kind, at, blocks, constant=unchanged)
+        self._assembled = True
+
+
+#: Advice at an end without convergence.
+HARDER = "; the larger eps_contact and eps_slip, the easier the problem"
+
+#: Least part of the displacement that a step is taken to add to it.
+LEAST_ADDED = 1e-2
+
+
+def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regularisation:
+    """Return the parameters of the penalised laws. Collective.
+
+    Those that are not given fit the body, its mesh and its loads, in any units. The foundation is a
+    hundred times stiffer than a layer of elements, E/h. The slip length is a hundredth of the
+    displacement that the loads, as a stress on Gamma_3, give a block of the body's size; in a step
+    of an evolution, their increment there.
+    """
+    body, scales = problem.equilibrium, problem.scales
+    loads, prescribed = body.external(problem.time), problem.start().x
+    displacement = max(expected_displacements(problem, loads, prescribed))
+    if problem.since is not None:
+        before = problem.start(problem.since).x
+        added = loads - body.external(problem.since), prescribed - before
+        displacement = max(*expected_displacements(problem, *added), LEAST_ADDED * displacement)
+    slip = 1e-2 * displacement or 1e-6 * scales.size
+    # Of the part in contact: slips of a stiff one are its own, however soft its support is.
+    young = problem.interface.stiffness * scales.size
+    contact, slip = 1e-2 * scales.spacing / young, slip * min(1.0, scales.young / young)
+    if options.eps_contact is not None:
+        contact = slip = options.eps_contact
+    return Regularisation(contact, slip if options.eps_slip is None else options.eps_slip)
+
+
+@dataclass
+class Penalty(OuterLoop):
+    """Algorithm 3; see `OuterLoop`."""
+
+    options: PenaltyOptions
+    #: The lagged friction modulus can creep: only the last hundred iterations count.
+    stagnation: ClassVar[tuple[int, float]] = (100, 0.99)
+
+    def __post_init__(self) -> None:
+        """Start from zero, without a solver."""
+        self._solvers: dict[bool, PenalisedProblem] = {}
+        super().__post_init__()
+
+    def set_load_step(self, problem: ContactProblem) -> None:
+        """Go on with another step of the same problem; factorisations remain."""
+        super().set_load_step(problem)
+        self._eps = regularisation(problem, self.options)
+        for solver in self._solvers.values():
+            solver.set_load_step(problem, self._eps)
+
+    def solve(
+        self, start: State | None = None, linearised_at: Array | None = None
+    ) -> tuple[State, Outcome]:
+        """Iterate until convergence, stagnation or the limit. Collective.
+
+        Parameters
+        ----------
+        start
+            Initial guess; zero by default. From the solution of a somewhat larger eps, small
+            ones are reached that are too hard from there.
+        linearised_at
+            Of no effect.
+        """
+        self.state = self.problem.start() if start is None else start
+        self.bound = np.zeros_like(self.bound)
+        self._implicit = start is not None and self.options.material_step != "secant"
+        self._failed = False
+        # The residual below which material and friction become implicit.
+        self._switch = {"secant": 0.0, "auto": NEAR, "tangent": np.inf}[self.options.material_step]
+        outcome = self._iterate()
+        return self.state, outcome
+
+    def _step(self, iteration: int) -> tuple[int, str]:
+        """Solve (4.32), or the penalised problem itself, by SNES from the state."""
+        interface, implicit = self.problem.interface, self._implicit
+        x, inner, fault = self._solve(implicit)
+        self._failed = implicit and bool(fault)
+        if self._failed:  # Algorithm 3 goes on a while
+            x, fault = self.state.x, f"implicit: {fault}"
+        forces = PenalisedLaw(interface, self._eps).forces(interface.jump.apply(x))
+        self.state = replace(self.state, x=x, forces=forces)
+        return inner, fault or ("implicit" if implicit else "")
+
+    def _solve(self, implicit: bool) -> tuple[Array, int, str]:
+        """Return the unknowns that SNES finds, its iterations and the fault, if any."""
+        interface = self.problem.interface
+        nodal = interface.jump.apply(self.state.x)
+        law = PenalisedLaw(interface, self._eps) if implicit else self._lagged(nodal)
+        symmetric = not (implicit and interface.friction.acts)
+        if symmetric not in self._solvers:
+            self._solvers[symmetric] = PenalisedProblem(
+                self.problem, self.options, self._eps, self.counters, symmetric
+            )
+        solver = self._solvers[symmetric]
+        try:
+            return solver.solve(law, self.state, implicit, self.history.poll)
+        except SingularError:
+            taken = solver.snes.getIterationNumber()
+            if taken == 0 and not self.history.records:
+                raise
+            del self._solvers[symmetric]  # MUMPS does not begin anew after that
+            return self.state.x, taken, LOST
+
+    def _lagged(self, nodal: Array) -> PenalisedLaw:
+        """Return the laws with the friction of an iterate; of stuck nodes where that has none.
+
+        At zero displacement there is no pressure, so no friction: a body that friction alone
+        constrains would fly away.
+        """
+        law = PenalisedLaw(self.problem.interface, self._eps, nodal)
+        if not law.acts() and UnconstrainedModes(self.problem).friction_alone:
+            law.stick()
+        return law
+
+    def _measure(self, residuals: Residuals) -> float:
+        return residuals.equilibrium
+
+    def _adapt(self, residual: float, best: float) -> None:
+        """Go on implicitly near the solution; nearer where that has failed."""
+        self._switch = best / 10 if self._failed else self._switch
+        self._implicit = residual < self._switch
+
+    def _advice(self, residual: float | None = None) -> str:
+        return HARDER
+
+    def _outcome(self, residuals: Residuals, ended: str = "", criterion: str = "") -> Outcome:
+        options, limit, laws = self.options, max(residuals.contact, residuals.friction), ""
+        criterion = criterion or (
+            f"the residual of the penalised problem is <= {options.tolerance:g}"
+        )
+        if residuals.equilibrium <= options.tolerance:
+            laws += f"; the complementarity conditions are met to {limit:.1e}"
+        if limit > LARGEST_VIOLATION:
+            laws += "; a smaller eps_contact or eps_slip brings them nearer"
+        return super()._outcome(residuals, ended and ended + laws, criterion + laws)

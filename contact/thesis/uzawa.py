@@ -1,0 +1,283 @@
+"""Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
+
+One step solves for u, projects the auxiliary variables phi and updates the multipliers
+lambda, (3.34)-(3.36): the alternating direction method of multipliers. The next step needs only
+lambda + r u of it: the next multiplier is the projection of that sum, and r phi the rest. The step
+is therefore a fixed-point map, which `acceleration` speeds up. Its variable is
+z = lambda + r (u - u_0), with u_0 of the outer iterate: a small lambda beside a large slip
+would be lost in rounding.
+
+References
+----------
+Glowinski and Le Tallec, Augmented Lagrangian and Operator-Splitting Methods in Nonlinear Mechanics,
+SIAM (1989), their ALG2; also known as ADMM.
+Koko, Uzawa block relaxation domain decomposition method for a two-body frictionless contact
+problem, Appl. Math. Lett. 22 (2009) 1534.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.interface.complementarity import disc_derivative, interface_residuals, project_disc
+from contact.interface.interface import Interface
+from contact.interface.layer import NormalLaw
+from contact.interface.multipliers import Multipliers
+from contact.interface.nodes import ContactNodes
+from contact.linear.multigrid import TOLERANCE
+from contact.linear.operator import Operator
+from contact.methods.options import FixedPointOptions
+from contact.methods.stagnation import Stagnation
+from contact.problem.protocols import Problem
+from contact.problem.residuals import residual_forces
+from contact.problem.state import State
+from contact.ranks import summed
+from contact.thesis.acceleration import ResidualMinimiser
+from contact.tolerances import ROUNDING
+from contact.typing import Array
+from forms.foundation import contact_multiplier
+
+logger = logging.getLogger("contact.inner")
+
+#: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
+#: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
+STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
+
+#: Tolerance of an iterative solver over that of the relaxation: with one as large it returns its
+#: initial guess, and rounding decides when it does.
+SHARE = 0.1
+
+
+def augmentation(jump: ContactNodes, r: float, friction: bool) -> Array:
+    """Return the nodal blocks of r u_nu v_nu [+ r u_tau v_tau], without weights, (n, bs, bs)."""
+    n, d = jump.normal.shape
+    blocks = np.zeros((n, jump.block_size, jump.block_size))
+    blocks[:, :d, :d] = jump.normal[:, :, None] * jump.normal[:, None, :]
+    if friction:
+        blocks[:, :d, :d] += jump.tangent
+    return r * blocks
+
+
+def split(interface: Interface, nodal: Array, friction: bool) -> Array:
+    """Return normal displacements and slips side by side, shape (n, 1 + d).
+
+    Without friction the slips are no unknowns of the relaxation, and 0 here.
+    """
+    parts = components(interface.jump, nodal, friction)
+    parts[:, 1:] -= friction * interface.friction.history.jump
+    return parts
+
+
+def components(jump: ContactNodes, nodal: Array, friction: bool) -> Array:
+    """Return normal and tangential displacements side by side, shape (n, 1 + d); as `split`."""
+    tangential = friction * jump.tangential_component(nodal)
+    return np.column_stack([jump.normal_component(nodal), tangential])
+
+
+@dataclass
+class Relaxed:
+    """Outcome of a Uzawa block relaxation.
+
+    Attributes
+    ----------
+    increment
+        dx on the owned unknowns.
+    forces
+        Multipliers in equilibrium with the iterate.
+    z
+        State to start the next relaxation from, relative to the new iterate, shape (n, 1 + d).
+    iterations
+        Number of linear solves.
+    stalled
+        Whether it was given up because nothing got better: rounding, as a rule.
+    """
+
+    increment: Array
+    forces: Multipliers
+    z: Array
+    iterations: int
+    stalled: bool = False
+
+
+@dataclass
+class _Projection:
+    """Steps 2 and 3, from z of shape (..., n, 1 + d) to the new multipliers: (3.43) and the disc.
+
+    All that is given is about `origin`.
+
+    Attributes
+    ----------
+    jump, r
+        The contact nodes, and the augmentation parameter.
+    bound
+        Friction bound, shape (n,).
+    law
+        The compliant layer in front of the rigid part, which is solved with the constraint; None
+        without one. The multipliers are then those of the total pressure -sigma_nu.
+    origin
+        r u_0 of the iterate, shape (n, 1 + d).
+    """
+
+    jump: ContactNodes
+    r: float
+    bound: Array
+    law: NormalLaw | None
+    origin: Array
+
+    def __call__(self, z: Array) -> Array:
+        """Return the new multipliers."""
+        z = z + self.origin
+        if self.law is None:
+            pressure = np.asarray(contact_multiplier(z[..., 0], self.r, 0.0, self.jump.gap))
+        else:
+            # Laws of users take one value a node.
+            rows = z[..., 0].reshape(math.prod(z.shape[:-2]), z.shape[-2])
+            pressure = np.reshape([self.law.pressure(row, self.r) for row in rows], z.shape[:-1])
+        friction = project_disc(z[..., 1:], self.bound)
+        return np.concatenate([pressure[..., None], friction], axis=-1)
+
+    def derivative(self, z: Array, directions: Array) -> Array:
+        """Return their derivatives along directions of shape (n, 1 + d, k)."""
+        z = z + self.origin
+        if self.law is None:
+            slope = np.where(z[:, 0] > self.r * self.jump.gap, 1.0, 0.0)
+        else:
+            slope = self.law.pressure_slope(z[:, 0], self.r)
+        normal = slope[:, None, None] * directions[:, :1]
+        tangential = disc_derivative(z[:, 1:], self.bound, directions[:, 1:])
+        return np.concatenate([normal, tangential], axis=1)
+
+    def accelerator(self, depth: int, size: Array) -> ResidualMinimiser:
+        """Return the acceleration of z as a flat array; `size`: unit of forces, (n,)."""
+        jump, shape = self.jump, (self.jump.weight.size, 1 + self.jump.normal.shape[1])
+        weights = np.repeat(jump.weight / size**2, shape[1])
+
+        def inner(a: Array, b: Array) -> Array:
+            return summed(jump.comm, a.T @ (weights[:, None] * b))
+
+        def project(flat: Array) -> Array:
+            return self(flat.reshape(*flat.shape[:-1], *shape)).reshape(flat.shape)
+
+        def derivative(flat: Array, directions: Array) -> Array:
+            columns = directions.reshape(*shape, directions.shape[1])
+            return self.derivative(flat.reshape(shape), columns).reshape(directions.shape)
+
+        return ResidualMinimiser(inner, project, derivative, depth)
+
+
+def _residual(problem: Problem, state: State, secant_at: Array, layer: bool) -> Array:
+    """Return the owned residual without the multipliers, the unknowns of the relaxation.
+
+    Neither is the layer's pressure a part of it, unless it is lagged. The contact flag of the
+    perfect conductor still looks at the last pressure. Collective.
+    """
+    interface, jump = problem.interface, problem.interface.jump
+    residual, unknown = residual_forces(problem, state, secant_at), state.forces.vectors(jump)
+    if layer:
+        pressure = interface.law.layer_pressure(jump.apply(state.x))
+        unknown += pressure[:, None] * jump.normal
+    jump.transpose(-jump.weight[:, None] * unknown, residual)
+    return residual
+
+
+def uzawa_block_relaxation(
+    problem: Problem,
+    state: State,
+    operator: Operator,
+    bound: Array,
+    friction: bool,
+    secant_at: Array,
+    z: Array,
+    r: float,
+    options: FixedPointOptions,
+    domain_norm: Callable[[Array], float] | None,
+    poll: Callable[[], None],
+) -> Relaxed:
+    """Iterate Steps 1 to 3 of Algorithm 2 (5, 7, 9) on one frozen problem. Collective.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, and the iterate at which it is frozen.
+    operator
+        Factorised operator, with `augmentation(jump, r, friction)`.
+    bound
+        Friction bound s_n, shape (n,).
+    friction
+        Whether tangential forces act.
+    secant_at
+        Unknowns at which the secant modulus of the material is taken.
+    z
+        lambda + r (u - u_0) to start from, shape (n, 1 + d); u_0 is that of the iterate.
+    r, options
+        Augmentation parameter (stress/length), and the options.
+    domain_norm
+        L2(Omega) norm of owned unknowns: ends the relaxation by the thesis's criterion (3.45).
+    poll
+        Called before every iteration, on all ranks; an exception ends the relaxation.
+    """
+    interface, jump = problem.interface, problem.interface.jump
+    at, own = jump.apply(state.x), problem.equilibrium.owned_part(state.x)
+    law = interface.law.normal_law(at)
+    constant = -_residual(problem, state, secant_at, law is not None)
+    origin = r * split(interface, at, friction)
+    project = _Projection(jump, r, bound, law, origin)
+    accelerated, over = options.acceleration == "anderson", options.relaxation
+    accelerator: ResidualMinimiser | None = None
+    beside: Array = np.ones_like(jump.weight)
+    last: tuple[Array, Array] | None = None
+    rtol = max(SHARE * options.inner, ROUNDING)
+    increment: Array = np.zeros(own.size)
+    stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
+    for iteration in range(1, options.max_inner + 1):
+        poll()
+        # Neither projections nor solves change the part of z along the normal beside its first
+        # column: of rounding, the acceleration makes a pressure that no law sees.
+        z[:, 1:] = jump.tangential_component(z[:, 1:])
+        multiplier = project(z)
+        q = 2 * multiplier - z
+        rhs = constant.copy()
+        vectors = q[:, :1] * jump.normal + q[:, 1:]
+        jump.transpose(-jump.weight[:, None] * vectors, rhs)
+        increment = operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
+        moved = jump.apply(increment)
+        nodal = at + moved
+        way = r * components(jump, moved, friction)
+        # q + r (u - u_0) is the force that the foundation exerted in this very solve.
+        total = q + way
+        if iteration == 1:
+            beside = interface.component_norms(total)
+        layer = 0.0 if law is None else law.layer(jump.normal_component(nodal))
+        forces = Multipliers.of(jump, total[:, 0] - layer, total[:, 1:])
+        if options.single_loop and friction:
+            project.bound = interface.bound(nodal, forces)
+        residual = float(interface_residuals(interface, nodal, forces, project.bound)[0].max())
+        logger.debug("inner iteration %d: residual %.2e", iteration, residual)
+        image = multiplier + (1 - over) * (z - multiplier) + over * way
+        done = residual <= options.inner or not np.isfinite(residual)
+        # Not the residual: where nothing touches yet it is small, beside the stress of closing.
+        measured = jump.norm((total - project(total + way)) / beside[:, None])
+        if domain_norm is not None:
+            phi: Array = (image + origin - project(image)) * (1 / r)
+            before, done = last, False
+            last = increment, phi
+            if before is not None:
+                change = domain_norm(increment - before[0]) ** 2 + jump.norm(phi - before[1]) ** 2
+                size = domain_norm(own + increment) ** 2 + jump.norm(phi) ** 2
+                done = change < options.eps**2 * size
+                measured = float(np.sqrt(change / size)) if size > 0 else 0.0
+        stalled = not done and stagnation(measured)
+        if done or stalled:
+            return Relaxed(increment, forces, image - way, iteration, stalled)
+        z = image
+        if accelerated:
+            if accelerator is None:
+                accelerator = project.accelerator(options.depth, beside)
+            newest = (total + way).ravel()
+            z = accelerator.next(total.ravel(), newest, image.ravel()).reshape(z.shape)
+    return Relaxed(increment, forces, z - way, options.max_inner)

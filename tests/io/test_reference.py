@@ -1,0 +1,143 @@
+"""docs/output.md: every key, column and field that is written is described, and no other."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from contact.io.files import write_outputs
+from contact.io.reference import files_help
+from contact.plot.run import read_grid
+from contact.results import quantities as registry
+from contact.results.quantities import QUANTITIES, quantities
+from contact.results.quantity import BODY, HISTORY, NODES, STEPS, SUMMARY, SURFACE, SWEEP, Quantity
+from contact.solving import solve
+from scripts.output_page import PAGE, page
+from tests.problems.rigid import column, indented, plate
+from tests.problems.written import block, electric
+from tests.results.test_steps import case_of as steps_case
+
+
+def two_contacts():
+    parts = {"piece": {"side": "bottom", "from": 0.5, "to": 1.5}}
+    return block(
+        2,
+        mesh={"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4], "parts": parts},
+        contact=[{"on": "piece"}, {"on": "right"}],
+        friction={},
+    )
+
+
+def bolted():
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4]}
+    mesh["inside"] = {"cut": "abs(y - 0.5) < 1e-6"}
+    return block(2, mesh=mesh, bolt=[{"on": "cut", "shortening": 0.001}])
+
+
+def rigid():
+    return indented(n=4), plate(), column()
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Return folders with the results of all kinds of problems."""
+    folders = []
+    metal = {"law": "j2", "young": 10.0, "poisson": 0.3, "yield_stress": 0.05}
+    plastic = block(2, 2, material=metal)
+    for case in (
+        block(2),
+        block(3),
+        plastic,
+        electric(2),
+        electric(3),
+        two_contacts(),
+        bolted(),
+        *rigid(),
+    ):
+        folders.append(tmp_path_factory.mktemp("out"))
+        write_outputs(solve(case), folders[-1])
+    return folders
+
+
+def fits(quantity: Quantity, name: str) -> bool:
+    """Whether a key, column or field is the quantity's."""
+    parts = (quantity.component.format(name=quantity.name, axis=axis) for axis in "xyz")
+    known = [re.sub("PART|KEY|AXIS", ".+", each) for each in (quantity.name, *parts)]
+    return any(re.fullmatch(each, name) for each in known)
+
+
+def agree(found: list[list[str]], file: str) -> None:
+    """All that is found is described, in its order, and all that is described is found."""
+    described = quantities(file)
+    for names in found:
+        places = [next(i for i, q in enumerate(described) if fits(q, name)) for name in names]
+        assert file == SUMMARY or places == sorted(places)
+    for quantity in described:
+        assert any(fits(quantity, name) for names in found for name in names), quantity.name
+
+
+def header(path: Path) -> list[str]:
+    return next(csv.reader(path.open()))
+
+
+def test_summary(written: list[Path]) -> None:
+    agree([list(json.loads((f / SUMMARY).read_text())) for f in written], SUMMARY)
+
+
+@pytest.mark.parametrize("name", [NODES, HISTORY])
+def test_tables(name: str, written: list[Path]) -> None:
+    agree([header(folder / name) for folder in written], name)
+
+
+def test_fields(written: list[Path]) -> None:
+    for name in (BODY, SURFACE):
+        fields = [read_grid(folder / name) for folder in written]
+        for quantity in quantities(name):
+            assert any(
+                quantity.name in found.point_data or quantity.name in found.cell_data
+                for found in fields
+            )
+        for found in fields:
+            known = {quantity.name for quantity in quantities(name)}
+            assert set(found.point_data) <= known
+            derived = set(found.point_data) - {"displacement", "potential"}
+            assert name == SURFACE or set(found.cell_data) == {
+                "error",
+                "region",
+                *(f"{k}_cell" for k in derived),
+            }
+
+
+def test_one_entry_is_a_key_and_a_column(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A further quantity stands in the summary, the steps, a sweep, the page and the help."""
+    mean = Quantity(
+        "mean_pressure", "stress", "Mean contact pressure.",
+        lambda r: r.problem.nodes.sum(r.pressure) / r.contact_area,
+        (SUMMARY, STEPS, SWEEP),
+    )  # fmt: skip
+    monkeypatch.setattr(registry, "QUANTITIES", (*QUANTITIES, mean))
+    solution = solve(steps_case())
+    write_outputs(solution, tmp_path)
+    rows = list(csv.DictReader((tmp_path / STEPS).open()))
+    assert (
+        float(rows[-1]["mean_pressure"])
+        == json.loads((tmp_path / SUMMARY).read_text())["mean_pressure"]
+    )
+    assert "| `mean_pressure` | stress | Mean contact pressure. |" in page()
+    for name in (SUMMARY, STEPS, SWEEP):
+        assert "mean_pressure" in files_help(name)
+
+
+def test_the_page_is_made_from_this() -> None:
+    assert PAGE.read_text() == page(), "python3 -m scripts.output_page"
+
+
+def test_help_names_every_key() -> None:
+    for name in (SUMMARY, NODES, HISTORY, STEPS, SWEEP):
+        lines = files_help(name).splitlines()
+        assert all(len(line) <= 100 for line in lines)
+        shown = [line.split()[0] for line in lines if re.match(r"  \S", line)]
+        assert len(shown) == len(quantities(name))
+        assert all(fits(q, key) for q, key in zip(quantities(name), shown, strict=True))

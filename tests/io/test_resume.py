@@ -1,0 +1,323 @@
+"""An evolution that is ended at any step goes on from its checkpoints to the same numbers."""
+
+import csv
+import json
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+from contact import solve
+from contact.case.text import to_toml
+from contact.cli.main import main
+from contact.errors import InputError
+from contact.io.checkpoint import Checkpoints, read_steps
+from contact.io.step_files import case_of, discard
+from contact.methods.newton import Newton
+from contact.methods.report import IterationHistory
+from tests.problem.test_plasticity import block
+from tests.results.test_steps import case_of as steps_case
+
+SELF = MPI.COMM_SELF
+MESHES = Path(__file__).parents[2] / "meshes" / "fixtures"
+
+#: A case with a mesh file.
+SQUARE = """
+[mesh]
+file = "{mesh}"
+[material]
+young = 1.0
+poisson = 0.3
+[[fixed]]
+on = "top"
+displacement = ["0", "-0.001*t"]
+[contact]
+on = "bottom"
+[evolution]
+times = [0.0, 1.0]
+steps = [3]
+"""
+
+
+class Killed(BaseException):
+    """What ends a run here."""
+
+
+@pytest.fixture
+def ended(monkeypatch):
+    """Return a function that lets a run end after some of its steps."""
+
+    def after(count):
+        keep = Checkpoints.keep
+
+        def last(self, record):
+            keep(self, record)
+            if self._count == count:
+                raise Killed
+
+        monkeypatch.setattr(Checkpoints, "keep", last)
+        return lambda: monkeypatch.setattr(Checkpoints, "keep", keep)
+
+    return after
+
+
+def hencky(**changes):
+    law = {"material__law": "log", "material__yield_strain": 0.002}
+    return steps_case(load__0__traction=[0.0, -0.01], **law, **changes)
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+@pytest.mark.parametrize("count", [1, 3])
+def test_going_on(tmp_path, ended, count, elsewhere):
+    case = hencky()
+    whole = solve(case, comm=SELF)
+    heal = ended(count)
+    with pytest.raises(Killed):
+        solve(case, comm=SELF, folder=tmp_path)
+    heal()
+    out = tmp_path
+    if elsewhere:
+        out = tmp_path / "elsewhere"
+        out.mkdir()
+    solution = solve(case, comm=SELF, folder=out, restart=tmp_path)
+    assert solution.converged
+    assert len(solution.steps) == len(whole.steps)
+    for one, two in zip(whole.steps, solution.steps, strict=True):
+        assert one.state.near(two.state, atol=1e-12)
+        for name, value in one.row.items():
+            if name not in ("linear_solves", "factorizations", "kkt"):
+                assert two.row[name] == pytest.approx(value, rel=1e-9, abs=1e-12)
+    assert len(list((out / "checkpoints").glob("0*.npz"))) == 5
+    assert whole.warnings == solution.warnings
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
+    """Of press, shear and unload with friction: bit for bit on the same ranks."""
+    case = block("chaboche", cells=3)
+    whole = solve(case, comm=SELF)
+    heal = ended(count)
+    with pytest.raises(Killed):
+        solve(case, comm=SELF, folder=tmp_path)
+    heal()
+    solution = solve(case, comm=SELF, folder=tmp_path, restart=tmp_path)
+    assert solution.converged and len(solution.steps) == len(whole.steps)
+    assert whole.plastic_dissipation > 0
+    for one, two in zip(whole.steps, solution.steps, strict=True):
+        assert one.state.near(two.state, rtol=1e-12, atol=0.0)
+        assert one.state.history.near(two.state.history, rtol=1e-12, atol=0.0)
+
+
+@pytest.mark.parallel
+def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
+    """All ranks, one of them alone, and all again in one folder: each reads pieces of others."""
+    world, place = MPI.COMM_WORLD, shared_tmp_path / "checkpoints"
+    case = block("chaboche", cells=3)
+    whole = solve(case, comm=world)
+    for count, comm in ((2, world), (4, SELF), (None, world)):
+        restart = None if count == 2 else shared_tmp_path
+        if comm is world or world.rank == 0:
+            if count is None:
+                solution = solve(case, comm=comm, folder=shared_tmp_path, restart=restart)
+            else:
+                heal = ended(count)
+                with pytest.raises(Killed):
+                    solve(case, comm=comm, folder=shared_tmp_path, restart=restart)
+                heal()
+        world.barrier()
+    assert solution.converged and len(solution.steps) == len(whole.steps) == 6
+    for one, two in zip(whole.steps, solution.steps, strict=True):
+        assert one.state.near(two.state, rtol=1e-9, atol=1e-9)
+    listed = json.loads((place / "manifest.json").read_text())["files"]
+    assert {path.name for path in place.iterdir()} == {*listed, "manifest.json"}
+    ranks = [world.size] * 2 + [1] * 2 + [world.size] * 2
+    for k, size in enumerate(ranks, 1):
+        assert len([*place.glob(f"{k:05d}*.npz")]) == size
+    again = read_steps(shared_tmp_path, whole.problem)
+    assert [step.state.time for step in again] == [step.state.time for step in whole.steps]
+    world.barrier()
+    if world.size > 1 and world.rank == 0:
+        (place / f"00005.{world.size - 1:04d}.npz").write_bytes(b"damaged")
+    world.barrier()
+    if world.size > 1:
+        assert len(read_steps(shared_tmp_path, whole.problem)) == 4
+
+
+def test_a_new_run_leaves_the_earlier_checkpoints_until_its_first_step(tmp_path, monkeypatch):
+    solve(steps_case(), comm=SELF, folder=tmp_path)
+    written = [path.name for path in sorted((tmp_path / "checkpoints").iterdir())]
+
+    def fail(self, record):
+        raise Killed
+
+    with monkeypatch.context() as context:
+        context.setattr(Checkpoints, "keep", fail)
+        with pytest.raises(Killed):
+            solve(steps_case(), comm=SELF, folder=tmp_path)
+    assert [path.name for path in sorted((tmp_path / "checkpoints").iterdir())] == written
+    assert case_of(tmp_path).read_text() == to_toml(steps_case())
+    discard(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_steps_were_there(tmp_path):
+    """A run that is ended while it writes its results has nothing left to solve."""
+    whole = solve(steps_case(), comm=SELF, folder=tmp_path)
+    again = solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path)
+    assert again.converged
+    assert again.state.near(whole.state)
+    assert again.history.records == []
+
+
+@pytest.mark.parametrize("rest", [False, True])
+def test_a_run_that_was_ended_while_it_replaced_checkpoints_goes_on(tmp_path, ended, rest):
+    """Between the removal of the earlier ones, or a part of them, and the renaming."""
+    heal = ended(2)
+    with pytest.raises(Killed):
+        solve(steps_case(), comm=SELF, folder=tmp_path)
+    heal()
+    place = tmp_path / "checkpoints"
+    place.rename(tmp_path / "checkpoints.new")
+    if rest:
+        place.mkdir()
+        (place / ".contact-draft").touch()
+    solution = solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path)
+    assert solution.converged and len(solution.steps) == 5
+    assert len(list(place.glob("0*.npz"))) == 5
+    assert not (tmp_path / "checkpoints.new").exists()
+
+
+def test_another_mesh(tmp_path):
+    solve(steps_case(), comm=SELF, folder=tmp_path)
+    for cells in ([8, 4], [16, 2]):
+        domain = steps_case(mesh__cells=cells).mesh.build(SELF)
+        with pytest.raises(InputError, match=r"--restart .*: given checkpoints of another mesh"):
+            solve(steps_case(), comm=SELF, restart=tmp_path, domain=domain)
+        with pytest.raises(InputError, match=r"of another case: there mesh\.cells\.\d is"):
+            solve(steps_case(mesh__cells=cells), comm=SELF, restart=tmp_path)
+
+
+@pytest.mark.parametrize("edited", ["the mesh file", "the stored case", "the digests"])
+def test_other_input_is_not_continued(tmp_path, ended, capfd, edited):
+    """Another mesh file of the same nodes, and a stored case with another modulus."""
+    out, case, mesh = tmp_path / "out", tmp_path / "case.toml", tmp_path / "square.msh"
+    shutil.copy(MESHES / "square.msh", mesh)
+    case.write_text(SQUARE.format(mesh=mesh))
+    heal = ended(1)
+    with pytest.raises(Killed):
+        on_the_line("solve", case, "--out", out)
+    heal()
+    if edited == "the mesh file":
+        mesh.write_text(mesh.read_text() + "\n")
+        words = "the file mesh.file has changed since the checkpoints were written"
+    elif edited == "the stored case":
+        stored = out / "checkpoints" / "case.toml"
+        stored.write_text(stored.read_text().replace("young = 1.0", "young = 2.0"))
+        words = "case.toml: no checkpoint, or a damaged one"
+    else:
+        manifest = out / "checkpoints" / "manifest.json"
+        manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"digest": None}))
+        words = "the file mesh.file has changed since the checkpoints were written"
+    assert on_the_line("solve", "--restart", out) == 2
+    assert words in capfd.readouterr().err
+
+
+def on_the_line(*arguments):
+    return main([str(argument) for argument in (*arguments, "--quiet")])
+
+
+def test_the_command_line(tmp_path, ended, capfd):
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(to_toml(steps_case()))
+    assert on_the_line("solve", "--restart", out) == 2
+    assert f"--restart {out}: no checkpoints there" in capfd.readouterr().err
+    heal = ended(2)
+    with pytest.raises(Killed):
+        on_the_line("solve", case, "--out", out)
+    heal()
+    other = ("--set", "friction.mu.rho=1.0")
+    assert on_the_line("solve", case, "--restart", out, *other) == 2
+    words = "given checkpoints of another case: there friction.mu.rho is 10000.0, here 1.0"
+    assert words in capfd.readouterr().err
+    assert on_the_line("solve", case, "--out", out, *other) == 2
+    words = f"--out {out}: given a folder with checkpoints of another case: there friction.mu.rho"
+    assert words in capfd.readouterr().err
+    assert len(list((out / "checkpoints").glob("0*.npz"))) == 2
+    assert on_the_line("solve", "--restart", out, "--set", "output.fields=none") == 0
+    assert not (out / "checkpoints").exists()
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["converged"]
+    assert len((out / "steps.csv").read_text().splitlines()) == 6
+
+
+def test_missing_arguments(capfd, tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text(to_toml(steps_case()))
+    assert on_the_line("solve", case) == 2
+    assert "--out: missing; accepted: a folder to write to" in capfd.readouterr().err
+    assert on_the_line("solve", "--out", tmp_path) == 2
+    assert "CASE.toml: missing; accepted: a case file, or --restart DIR" in capfd.readouterr().err
+
+
+def rows_of(out):
+    with (out / "steps.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number, status):
+    """They are written, and checkpoints remain to go on from, to the numbers of a whole run."""
+    keep, out, case = Checkpoints.keep, tmp_path / "out", tmp_path / "case.toml"
+    case.write_text(to_toml(hencky()))
+    assert on_the_line("solve", case, "--out", tmp_path / "whole") == 0
+
+    def interrupted(self, record):
+        keep(self, record)
+        if self._count == 2:
+            signal.raise_signal(number)
+
+    with monkeypatch.context() as context:
+        context.setattr(Checkpoints, "keep", interrupted)
+        assert on_the_line("solve", case, "--out", out) == status
+    assert f"results in {out}; contact solve --restart {out} goes on" in capfd.readouterr().err
+    assert len(rows_of(out)) == 2
+    summary = json.loads((out / "summary.json").read_text())
+    assert not summary["converged"]
+    assert f"interrupted ({number.name})" in summary["reason"]
+    assert len(list((out / "checkpoints").glob("0*.npz"))) == 2
+    assert on_the_line("solve", "--restart", out) == 0
+    for one, two in zip(rows_of(tmp_path / "whole"), rows_of(out), strict=True):
+        for name in one.keys() - {"linear_solves", "factorizations", "kkt"}:
+            assert float(two[name]) == pytest.approx(float(one[name]), rel=1e-9, abs=1e-12)
+
+
+def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monkeypatch):
+    out, case = tmp_path / "out", tmp_path / "case.toml"
+    case.write_text(to_toml(steps_case()))
+    assert on_the_line("solve", case, "--out", out) == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    turn = Newton.set_load_step
+
+    def signalled(self, problem):
+        signal.raise_signal(signal.SIGINT)
+        turn(self, problem)
+
+    record = IterationHistory.record
+
+    def nothing(self, *arguments, **named):
+        self.poll()
+        record(self, *arguments, **named)
+
+    monkeypatch.setattr(Newton, "set_load_step", signalled)
+    monkeypatch.setattr(IterationHistory, "record", nothing)
+    assert on_the_line("solve", case, "--out", out) == 130
+    after = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
+    assert after == before
+
+
+def test_read_steps_gives_the_states(tmp_path):
+    solution = solve(steps_case(), comm=SELF, folder=tmp_path)
+    for one, two in zip(solution.steps, read_steps(tmp_path, solution.problem), strict=True):
+        assert one.state.near(two.state)

@@ -1,0 +1,201 @@
+"""Runs that fail, are killed, or meet a full disk: whole processes."""
+
+import ctypes
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from contact.io.folder import LOCK, STAGE, recover
+from tests.problems.processes import (
+    BAR,
+    RANKS,
+    SMALL,
+    command,
+    environment,
+    processes,
+    served,
+)
+
+
+def solving(out: Path, *options: str, ranks: int = 1, before: str = "") -> list[str]:
+    """Return a command that solves a small case, after some Python."""
+    arguments = ["solve", str(BAR), "--out", str(out), *SMALL, *options]
+    return command(*arguments, ranks=ranks, before=before)
+
+
+def run(*args: object, **options: object) -> tuple[int, str]:
+    """Run a command as above; return its status and what it said."""
+    done = subprocess.run(
+        solving(*args, **options), env=environment(), capture_output=True, text=True, timeout=120
+    )
+    return done.returncode, done.stderr
+
+
+def messages(text: str) -> list[str]:
+    """Return our lines, without the launcher's and without warnings of the case."""
+    return [line for line in text.splitlines() if line.startswith("contact: ")]
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a run, with figures and a checkpoint."""
+    if shutil.which("mpirun") is None:
+        pytest.skip("there is no mpirun")
+    out = tmp_path_factory.mktemp("good") / "out"
+    status, text = run(out, "--plot", "--set", "output.checkpoint=true")
+    assert status == 0, text
+    return out
+
+
+def same(folder: Path, other: Path) -> bool:
+    """Whether two folders hold the same files."""
+
+    def content(root: Path) -> dict[str, bytes]:
+        files = (path for path in root.rglob("*") if path.is_file() and path.name != LOCK)
+        return {str(path.relative_to(root)): path.read_bytes() for path in files}
+
+    return content(folder) == content(other)
+
+
+def whole(folder: Path) -> bool:
+    """Whether a folder holds what its summary names, and nothing half done."""
+    summary = json.loads((folder / "summary.json").read_text())
+    return sorted(p.name for p in folder.iterdir() if p.name != LOCK) == summary["files"]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Return a file system of 700 kB."""
+    libc, disk = ctypes.CDLL(None, use_errno=True), tmp_path / "disk"
+    disk.mkdir()
+    if libc.mount(b"tmpfs", bytes(disk), b"tmpfs", 0, b"size=700k"):
+        pytest.skip(f"no tmpfs can be mounted: {os.strerror(ctypes.get_errno())}")
+    yield disk
+    libc.umount2(bytes(disk), 2)
+
+
+@RANKS
+def test_a_full_disk_keeps_the_earlier_results(ranks: int, good: Path, small_disk: Path) -> None:
+    """However little is left, there is one message, and no abort of a library."""
+    out, ballast = small_disk / "out", small_disk / "ballast"
+    with served(ranks) as run:
+        for format_ in ("vtu", "vtx", "xdmf"):
+            shutil.rmtree(out, ignore_errors=True)
+            shutil.copytree(good, out)
+            arguments = ["solve", str(BAR), "--out", str(out), *SMALL]
+            arguments += ["--set", f"output.fields={format_}"]
+            for left in (0, 40_000):
+                ballast.unlink(missing_ok=True)
+                room = os.statvfs(small_disk)
+                with ballast.open("wb") as file:
+                    os.posix_fallocate(file.fileno(), 0, room.f_bavail * room.f_bsize - left)
+                status, text = run(*arguments)
+                assert status == 2, text
+                (message,) = messages(text)
+                assert "No space left on device" in message
+                assert same(out, good)
+            ballast.unlink()
+            status, text = run(*arguments)
+            assert status == 0, text
+            assert whole(out) and not (out / "checkpoint.npz").exists()
+
+
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_library_that_fails_to_write_does_not_end_in_an_abort(
+    ranks: int, good: Path, tmp_path: Path
+) -> None:
+    """What is left on the disk may go to others after it was asked for."""
+    out = tmp_path / "out"
+    before = (
+        "import resource, contact.io.field_files as disk; disk.claim_room = lambda *_: None\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))"
+    )
+    fields = [[f"output.fields={format_}"] for format_ in ("vtu", "vtx", "xdmf")]
+    with served(ranks, before=before) as run:
+        for settings in (*fields, ["output.checkpoint=true", "output.fields=none"]):
+            shutil.rmtree(out, ignore_errors=True)
+            shutil.copytree(good, out)
+            options = [word for setting in settings for word in ("--set", setting)]
+            status, text = run("solve", str(BAR), "--out", str(out), *SMALL, *options)
+            assert status == 2, text
+            assert len(messages(text)) == 1 and "earlier results are kept" in messages(text)[0]
+            recover(out)
+            assert same(out, good)
+
+
+@RANKS
+def test_what_the_system_refuses_is_said_in_words(ranks: int, tmp_path: Path) -> None:
+    """A path that is too long, a folder of the system's, and a home that is none."""
+    with served(ranks) as run:
+        outs = tmp_path / ("long" * 75), Path("/proc/self/out")
+        ends = [run("solve", str(BAR), "--out", str(out), *SMALL) for out in outs]
+    # HOME is that of a process: caches are there.
+    environ = environment() | {"HOME": "/proc/self/nobody"}
+    environ.pop("XDG_CACHE_HOME", None)
+    started = solving(tmp_path / "out", ranks=ranks)
+    done = subprocess.run(started, env=environ, capture_output=True, text=True, timeout=120)
+    for status, text in (*ends, (done.returncode, done.stderr)):
+        assert status == 2
+        (message,) = messages(text)
+        assert "accepted: " in message
+        assert ranks > 1 or text.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@RANKS
+def test_a_mesh_from_elsewhere_executes_nothing(ranks: int, tmp_path: Path) -> None:
+    """Gmsh would take it for a script, where a case is but looked at."""
+    mark, mesh = tmp_path / "executed", tmp_path / "body.msh"
+    mesh.write_text(f'// $MeshFormat 2.2\nSystemCall "touch {mark}";\n')
+    lines = BAR.read_text().splitlines()
+    start, end = lines.index("[mesh]"), lines.index("[material]")
+    lines[start:end] = ["[mesh]", f'file = "{mesh}"']
+    (tmp_path / "case.toml").write_text("\n".join(lines))
+    started = command("check", str(tmp_path / "case.toml"), ranks=ranks)
+    done = subprocess.run(started, env=environment(), capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    (message,) = messages(done.stderr)
+    assert "no Gmsh .msh file" in message
+    assert not mark.exists()
+
+
+@RANKS
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_signals_while_writing_leave_one_of_the_runs_whole(
+    ranks: int, kind: signal.Signals, good: Path, tmp_path: Path
+) -> None:
+    """They are sent from when the first new file is there; every process ends."""
+    out = tmp_path / "out"
+    for delay in (0.0, 0.05)[ranks - 1 :]:
+        shutil.rmtree(out, ignore_errors=True)
+        shutil.copytree(good, out)
+        process = subprocess.Popen(
+            solving(out, "--plot", ranks=ranks), env=environment(), start_new_session=True,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        end = time.monotonic() + 60
+        while not (out / STAGE).exists() and process.poll() is None and time.monotonic() < end:
+            time.sleep(0.002)
+        assert process.poll() is None  # else no signal meets it
+        time.sleep(delay)
+        process.send_signal(kind)
+        process.wait(timeout=60)
+        end = time.monotonic() + 60
+        while left_of(process.pid) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert not left_of(process.pid)
+        recover(out)
+        assert same(out, good) or whole(out)
+
+
+def left_of(session: int) -> list[str]:
+    """Return the names of the processes of a session."""
+    return [process.name for process in processes() if process.session == session]

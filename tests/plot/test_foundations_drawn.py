@@ -1,0 +1,149 @@
+"""Rigid foundations beside magnified bodies: true shapes, or shallow profiles that touch."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contact.plot.body import draw_plane, picture
+from contact.plot.foundation import (
+    BEYOND,
+    SHALLOW,
+    UNSEEN,
+    magnification,
+    profiles,
+)
+from contact.plot.run import Run
+from contact.solving import solve
+from tests.problems.written import block
+
+SHAPES: dict[str, dict[str, Any]] = {
+    "plane": {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]},
+    "tilted plane": {"shape": "plane", "point": [0.0, 0.0], "normal": [1e-3, 1.0]},
+    "small ball": {"shape": "sphere", "centre": [1.0, -0.3], "radius": 0.3},
+    "ball": {"shape": "sphere", "centre": [1.0, -3.0], "radius": 3.0},
+    "large ball": {"shape": "sphere", "centre": [1.0, -30.0], "radius": 30.0},
+    "wedge": {"shape": "cone", "apex": [1.0, 0.0], "axis": [0, -1], "half_angle": 45.0},
+    "blunt wedge": {"shape": "cone", "apex": [1.0, 0.0], "axis": [0, -1], "half_angle": 89.0},
+    "punch": {"shape": "punch", "centre": [1.0, 0.0], "axis": [0, -1], "radius": 0.3},
+    "heights": {"shape": "heights"},
+}
+
+
+def pressed(contact: dict[str, Any], by: float = 1e-3, **more: Any) -> Run:
+    """Return the run of a block that is pressed down on a foundation by a small displacement."""
+    sections: dict[str, Any] = {
+        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [40, 10]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": [0.0, -by]}],
+        "contact": {"on": "bottom", **contact},
+        "friction": {"law": "none"},
+    }
+    run = solve(block(2, **(sections | more))).written()
+    assert run is not None
+    return run
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_foundations_are_no_spikes_and_bodies_touch_them(name: str, tmp_path: Path) -> None:
+    """In front of a straight part, whatever the scale: nothing overlaps, what touches is closed."""
+    shape = dict(SHAPES[name])
+    if name == "heights":
+        x = np.linspace(0.0, 2.0, 201)
+        heights = np.column_stack([x, 2e-4 * (np.cos(9 * x) - 1)])
+        np.savetxt(tmp_path / "rough.csv", heights, delimiter=",", header="x,y", comments="")
+        shape["file"] = str(tmp_path / "rough.csv")
+    run = pressed({"foundation": shape})
+    made = picture(run, "von_mises")
+    assert made.scale > 1 and np.ptp(run.points[run.table["status"] != "open", 0]) >= 0
+    (profile,) = profiles(run, made.scale, made.skin.points[:, :2], 1, made.near)
+    size = run.diameter if made.near is None else np.ptp(made.near, axis=0).max()
+    seen = np.ones(len(run.points), dtype=bool)
+    if made.near is not None:
+        seen = np.all((run.points >= made.near[0]) & (run.points <= made.near[1]), axis=1)
+    gap, touching = profile.gap[1:-1], run.table["status"] != "open"
+    assert gap[seen].min() >= -1.001 * UNSEEN * size
+    assert gap[seen & touching].max() <= 1e-6 * size
+    # Its own shape, or one that rises by little.
+    true = run.points + run.table["gap"][:, None] * np.column_stack(
+        [run.table[f"nu_{axis}"] for axis in "xy"]
+    )
+    drawn = profile.points[1:-1]
+    shallow = np.ptp((drawn - run.points)[seen, 1]) <= 1.001 * SHALLOW * size
+    assert shallow or np.ptp((drawn - true)[:, 1]) < 1e-9
+    ax = draw_plane(made).axes[0]
+    (low, high), extent = ax.get_ylim(), np.ptp(made.box[:, 1])
+    assert high - low <= 1.1 * extent + (2 * BEYOND + 0.1) * np.ptp(made.box, axis=0).max()
+    assert low < drawn[seen][touching[seen], 1].min()
+
+
+def test_a_plane_in_front_of_a_round_body_stays_plane() -> None:
+    """Magnified gaps would bend it; the round body that is magnified would overlap it."""
+    mesh = {
+        "generator": "quarter_disc", "radius": 8.0, "size": 0.8, "contact_size": 0.2,
+        "contact_width": 2.0, "growth": 0.2,
+    }  # fmt: skip
+    run = pressed(
+        {"on": "contact", "foundation": SHAPES["plane"], "direction": "foundation"},
+        mesh=mesh,
+        fixed=[{"on": "symmetry", "displacement": [0.0, "free"]}],
+        load=[{"on": "top", "traction": [0.0, -2e-3]}],
+    )
+    for scale in (magnification(run), 50.0):
+        (profile,) = profiles(run, scale, run.body.points[:, :2], 1, None)
+        assert np.ptp(profile.points[:, 1]) < 1e-9
+    (profile,) = profiles(run, magnification(run), run.body.points[:, :2], 1, None)
+    assert profile.gap.min() >= -1.001 * UNSEEN * run.diameter
+
+
+def test_a_moving_foundation_is_drawn_where_the_body_meets_it() -> None:
+    """A ball comes from afar, by 30 times the deformation of the body."""
+    run = pressed(
+        {
+            "foundation": {"shape": "sphere", "centre": [1.0, -1.03], "radius": 1.0},
+            "rigid": {"displacement": [0.0, 0.031]},
+        },
+        by=0.0,
+    )
+    made = picture(run, "von_mises")
+    (profile,) = profiles(run, made.scale, made.skin.points[:, :2], 1, made.near)
+    touching = run.table["status"] != "open"
+    assert abs(profile.gap[1:-1][touching]).max() <= UNSEEN * run.diameter
+    # Round about the place of the ball, a little larger so that it is in the magnified dent; gaps
+    # along the contact direction are right up to the square of the motion.
+    radii = np.linalg.norm(profile.points - [1.0, -0.999], axis=1)
+    assert made.scale > 1
+    np.testing.assert_allclose(radii, 1.0 + (made.scale - 1) * 1e-3, atol=0.5 * 0.031**2)
+
+
+def test_the_foundation_of_a_small_zone_is_in_the_picture() -> None:
+    """The picture ends at the body without it."""
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [200, 10]}
+    ball = {"shape": "sphere", "centre": [1.0, -3.01], "radius": 3.0}
+    run = pressed({"foundation": ball}, by=0.0105, mesh=mesh)
+    made = picture(run, "von_mises")
+    assert made.near is not None
+    ax = draw_plane(made).axes[0]
+    assert ax.get_xlim() == pytest.approx(tuple(made.box[:, 0]))
+    (profile,) = profiles(run, made.scale, made.skin.points[:, :2], 1, made.near)
+    inside = abs(profile.points[:, 0] - 1.0) < np.ptp(made.box[:, 0]) / 2
+    assert ax.get_ylim()[0] < profile.points[inside, 1].min()
+
+
+def test_magnified_bodies_do_not_overlap() -> None:
+    """A gap that small displacements close: bodies would overlap by 49 times of it."""
+    run = pressed({"foundation": SHAPES["plane"]})
+    large = run.displacement * 1e-3 * run.diameter / np.abs(run.displacement).max()
+    run.body.point_data["displacement"] = large
+    count = len(run.table["x"])
+    table = run.table | {"u_n": np.full(count, 1e-3), "gap": np.full(count, 1e-3)}
+    rigid, bodies = (
+        replace(run, table=table | {"rigid": np.full(count, flag)}) for flag in (True, False)
+    )
+    assert magnification(rigid) == 50.0
+    scale = magnification(bodies)
+    assert scale == 5.0 and scale * 1e-3 - 1e-3 <= 0.002 * run.diameter
+    table["gap"][:] = 1.0
+    assert magnification(bodies) == 50.0

@@ -1,0 +1,95 @@
+"""The quantities with derivatives are the columns of steps.csv, value by value."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import load_case, parse_case, sensitivity, solve
+from contact.case.text import number_at, with_number
+from contact.results.differentiable import Differentiable, named_quantities
+from scripts.studies.derivatives import FAMILIES, problem
+
+SELF = MPI.COMM_SELF
+
+
+def plate():
+    """Return a block under a turning plate that sinks, with a foundation that moves too."""
+    return parse_case({
+        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [6, 3]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "rigid": [{"on": "top", "displacement": [0.001, "free"], "force": [0.0, -0.02],
+                   "rotation": "free", "moment": 0.0007, "centre": [1.1, 1.2]}],
+        "contact": {"on": "bottom",
+                    "foundation": {"shape": "sphere", "centre": [1.0, -4.0], "radius": 4.0},
+                    "rigid": {"displacement": [0.0, "0.002*t"], "rotation": 0.1,
+                              "centre": [0.5, 0.0]}},
+        "friction": {"law": "coulomb", "mu": 0.4},
+        "evolution": {"times": [0.0, 1.0], "steps": [3]},
+        "solver": {"tolerance": 1e-13},
+    })  # fmt: skip
+
+
+def family(name):
+    return parse_case(problem(FAMILIES.index(name))[1])
+
+
+def energy(run):
+    """Return the stored energy, of Hencky's law by a finer quadrature than that of the column."""
+    here = run.problem.at(run.state.time, run.state.history)
+    return named_quantities(run.problem)["energy"](here, run.state)
+
+
+CASES = {
+    "plate": plate,
+    "slip": lambda: family("evolution, slip"),
+    "log": lambda: family("evolution, log"),
+    "j2": lambda: family("evolution, j2"),
+    "electrode": lambda: family("evolution, electrode"),
+    "ring": lambda: load_case(
+        "scripts/cases/ring-on-mandrel.toml", ["mesh.cells=[4,3]", "evolution.steps=[3,3]"]
+    ),
+}
+
+
+#: Columns with derivatives, at least: all but times, counts, residuals and work, which asks for
+#: two ends. A new column may be without one.
+COUNTS = {"plate": 18, "slip": 12, "log": 12, "j2": 13, "electrode": 15, "ring": 15}
+
+
+@pytest.mark.parametrize(("name", "count"), COUNTS.items())
+def test_columns(name, count):
+    run = solve(CASES[name](), comm=SELF)
+    known = named_quantities(run.problem)
+    assert len(known) >= count
+    for record in run.steps:
+        here = run.problem.at(record.state.time, record.state.history)
+        for key, quantity in known.items():
+            # Of Hencky's law the energy is a quadrature of the way, in one step or in several.
+            close = 1e-5 if key == "energy" and name == "log" else 1e-9
+            value = quantity(here, record.state)
+            assert value == pytest.approx(record.row[key], rel=close, abs=1e-12), key
+
+
+@pytest.mark.parametrize("name", ["plate", "slip", "log", "j2", "electrode"])
+def test_derivatives_of_all_columns(name):
+    case = CASES[name]()
+    key, second = ("rigid.0.centre.0" if name == "plate" else "friction.mu"), "material.young"
+    key = "friction.mu.a" if name == "slip" else key
+    run, keys = solve(case, comm=SELF), [key, second]
+    known = named_quantities(run.problem)
+    tangent = sensitivity(run, [*known], keys, "tangent")
+    smooth = [name for name, it in known.items() if isinstance(it, Differentiable)]
+    adjoint = sensitivity(run, smooth, keys, "adjoint")
+    for one in keys:
+        at = number_at(case, one)
+        step = 1e-5 * at
+        ends = [solve(with_number(case, one, at + by), comm=SELF) for by in (step, -step)]
+        rows = [{**end.steps[-1].row, "energy": energy(end)} for end in ends]
+        for column in known:
+            apart = (rows[0][column] - rows[1][column]) / (2 * step)
+            size = max(abs(apart), 1e-2 * abs(run.steps[-1].row[column] / at), 1e-9)
+            assert tangent[column][one] == pytest.approx(apart, abs=2e-6 * size), (column, one)
+            if column in smooth:
+                size = max(size, abs(run.steps[-1].row[column] / at))
+                assert adjoint[column][one] == pytest.approx(tangent[column][one], abs=1e-9 * size)
+    assert np.isfinite([*tangent["energy"].values()]).all()

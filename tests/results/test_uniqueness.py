@@ -1,0 +1,267 @@
+"""Friction from which on there may be several solutions, by the solution's own Jacobian."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import build_problem, solve
+from contact.case.file import parse_case
+from contact.results.uniqueness import uniqueness
+from contact.problem.residuals import evaluate
+from scripts.studies.fresh_check import Mesh, write_msh
+from scripts.studies.fresh_families import Bodies
+from scripts.studies.sweep import problems
+from tests.problems.rings import between_plates, squeezed
+
+SAID = "several solutions may exist"
+
+
+def triangle(folder, mu, load, method="newton", height=0.5345, poisson=0.3):
+    """Return one triangle on a plane, clamped along its slope: one contact node, at the origin."""
+    mesh = Mesh(
+        np.array([[0.0, 0.0], [1.0, 0.0], [0.0, height]]), np.array([[0, 1, 2]]), np.array([0]),
+        ["body"], {"bottom": np.array([[0, 1]]), "slope": np.array([[1, 2]]),
+                   "side": np.array([[0, 2]])},
+    )  # fmt: skip
+    write_msh(mesh, folder / "triangle.msh")
+    return parse_case({
+        "mesh": {"file": str(folder / "triangle.msh")},
+        "material": {"young": 1.0, "poisson": poisson},
+        "fixed": [{"on": "slope", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "side", "traction": load}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": mu},
+        "solver": {"method": method},
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize(("height", "poisson"), [(0.5345, 0.3), (1.0, 0.3), (0.3, 0.45)])
+def test_critical_friction_of_a_triangle_in_closed_form(height, poisson, tmp_path):
+    """K = lambda g g + mu (g g + |g|^2 I), g = (1, 1/h): K_tt/|K_nt| is the critical mu."""
+    case = triangle(tmp_path, 0.5, [0.01, -0.01], height=height, poisson=poisson)
+    solution = solve(case, comm=MPI.COMM_SELF)
+    ratio = 2 * poisson / (1 - 2 * poisson)
+    critical = (ratio + 2 + 1 / height**2) * height / (ratio + 1)
+    assert 0.5 * solution.critical_factor == pytest.approx(critical, rel=1e-10)
+
+
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+@pytest.mark.parametrize(("mu", "warned"), [(0.5, False), (1.49, False), (1.5, True), (3.0, True)])
+@pytest.mark.parametrize("load", [[0.01, -0.01], [-0.01, -0.01], [-0.01, 0.005]])
+def test_several_solutions_of_a_triangle_are_warned_of(mu, warned, load, method, tmp_path):
+    """The node slips, sticks or has lifted off: one sticks where another method lets it go."""
+    solution = solve(triangle(tmp_path, mu, load, method), comm=MPI.COMM_SELF)
+    assert solution.converged
+    said = [text for text in solution.warnings if SAID in text]
+    assert bool(said) is warned
+    assert not warned or "mu up to 1.497" in said[0]
+
+
+def test_a_body_on_supports_that_friction_alone_keeps_in_contact(tmp_path):
+    """It sticks, and without contact forces lifts off: nothing is jammed, nor lacks a support."""
+    solution = solve(triangle(tmp_path, 3.0, [-0.02, -0.01]), comm=MPI.COMM_SELF)
+    assert solution.converged and solution.pressure.max() > 0 and solution.jammed
+    (said,) = [text for text in solution.warnings if "[strong-friction]" in text]
+    assert "friction alone keeps the bodies in contact, which on their supports" in said
+    assert "jams" not in said and "support against" not in said
+
+
+def under_a_cylinder(method):
+    """Return a block on a plane, pressed by a rigid cylinder up whose flanks it slides."""
+    return parse_case({
+        "mesh": {"generator": "rectangle", "size": [2.0, 0.8], "cells": [20, 8]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "contact": [
+            {"on": "bottom"},
+            {"on": "top", "foundation": {"shape": "sphere", "centre": [1.07, 2.4], "radius": 1.6},
+             "rigid": {"displacement": [0.0, "free"], "force": [0.0, -0.01]}},
+        ],
+        "friction": {"law": "coulomb", "mu": 0.2},
+        "solver": {"method": method},
+    })  # fmt: skip
+
+
+def test_bodies_that_slide_like_rigid_ones_are_not_warned_of():
+    """The pencil was singular from mu = 0.19 on, and other methods found the same pressures."""
+    newton, uzawa = (
+        solve(under_a_cylinder(method), comm=MPI.COMM_SELF) for method in ("newton", "uzawa")
+    )
+    assert newton.converged and uzawa.converged
+    largest = newton.pressure.max()
+    np.testing.assert_allclose(newton.pressure, uzawa.pressure, rtol=0, atol=1e-5 * largest)
+    for solution in (newton, uzawa):
+        assert 5 < solution.critical_factor < np.inf
+        assert not [text for text in solution.warnings if SAID in text]
+
+
+def test_critical_friction_beside_a_body_that_slides(tmp_path):
+    """The triangle's, beside a free block: nothing was known, since the block slides like rigid."""
+    case = triangle(tmp_path, 3.0, [0.01, -0.01])
+    points = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.5345], [3.0, 0.0], [4.0, 0.0], [4.0, 1.0], [3.0, 1.0]]
+    parts = {"bottom": [[0, 1], [3, 4]], "slope": [[1, 2]], "side": [[0, 2]], "top": [[5, 6]]}
+    mesh = Mesh(
+        np.array(points), np.array([[0, 1, 2], [3, 4, 5], [3, 5, 6]]), np.zeros(3, dtype=int),
+        ["body"], {name: np.array(rows) for name, rows in parts.items()},
+    )  # fmt: skip
+    write_msh(mesh, tmp_path / "triangle.msh")
+    loads = [{"on": part, "traction": [0.01 * (part == "side"), -0.01]} for part in ("side", "top")]
+    tables = case.model_dump(mode="json", exclude_unset=True) | {"load": loads}
+    solution = solve(parse_case(tables), comm=MPI.COMM_SELF)
+    assert solution.converged
+    assert 3 * solution.critical_factor == pytest.approx(1.4966629560336764, rel=1e-10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hard", [False, True])
+def test_single_solutions_are_not_warned_of(hard):
+    """Problems of the sweeps at mu up to 0.5."""
+    seen = 0
+    for _, case in problems(True, None, hard):
+        problem = build_problem(case, MPI.COMM_SELF)
+        law = problem.interface.friction.law
+        if law is None or np.max(law.maximum) > 0.5 or problem.piezoelectric:
+            continue
+        solution = solve(problem)
+        assert not solution.critical_factor <= 1, case.source  # NaN beyond 300 nodes
+        assert not solution.jammed, case.source
+        seen += 1
+    assert seen >= 2
+
+
+@pytest.mark.parallel
+def test_any_number_of_ranks():
+    """The factor of a beam's contact nodes, which are on all ranks."""
+    tables = {
+        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [32, 8]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "top", "traction": [0.002, -0.01]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.6},
+    }
+    alone, shared = (solve(parse_case(tables), comm=c) for c in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    assert np.isfinite(alone.critical_factor)
+    assert shared.critical_factor == pytest.approx(alone.critical_factor, rel=1e-8)
+    # Another method has no condensed body: it is made for this.
+    again, jams = uniqueness(shared.problem, shared.state)
+    assert not jams
+    assert again == pytest.approx(alone.critical_factor, rel=1e-8)
+
+
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+@pytest.mark.parametrize("yaw", [0.0, 0.7, np.pi / 2])
+def test_critical_friction_does_not_depend_on_the_axes(yaw, method, tmp_path):
+    """A tetrahedron on a plane, clamped along its slope: one node, and K as of the triangle.
+
+    It sticks, or slides with friction across the slope: of that direction nothing was critical.
+    """
+    turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    height, poisson = 0.5345, 0.3
+    points = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, height]])
+    points[:, :2] @= turn
+    facets = {"bottom": [0, 1, 2], "slope": [1, 2, 3], "side": [0, 1, 3]}
+    names = [f'2 {k} "{name}"' for k, name in enumerate(facets, 1)]
+    cells = [
+        f"{k} 2 2 {k} {k} {' '.join(str(n + 1) for n in nodes)}"
+        for k, nodes in enumerate(facets.values(), 1)
+    ]
+    lines = [
+        "$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", "4", *names, '3 4 "body"',
+        "$EndPhysicalNames", "$Nodes", "4",
+        *(f"{k} {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(points, 1)),
+        "$EndNodes", "$Elements", "4", *cells, "4 4 2 4 4 1 2 3 4", "$EndElements", "",
+    ]  # fmt: skip
+    (tmp_path / "tet.msh").write_text("\n".join(lines))
+    load = np.array([-0.015, 0.018]) @ turn
+    case = parse_case({
+        "mesh": {"file": str(tmp_path / "tet.msh")},
+        "material": {"young": 1.0, "poisson": poisson},
+        "fixed": [{"on": "slope", "displacement": [0.0, 0.0, 0.0]}],
+        "load": [{"on": "side", "traction": [*load.tolist(), -0.01]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 3.0},
+        "solver": {"method": method},
+    })  # fmt: skip
+    solution = solve(case, comm=MPI.COMM_SELF)
+    assert solution.converged
+    ratio = 2 * poisson / (1 - 2 * poisson)
+    critical = (ratio + 2 + 1 / height**2) * height / (ratio + 1)
+    assert 3.0 * solution.critical_factor == pytest.approx(critical, rel=1e-5)
+    assert [text for text in solution.warnings if "several solutions" in text]
+
+
+def test_no_critical_friction_where_supports_let_no_node_slide():
+    """A single node of 15 touches, at the corner of a clamped side."""
+    ((_, case),) = problems(False, "few-5", True)
+    solution = solve(case, comm=MPI.COMM_SELF)
+    assert solution.converged and solution.critical_factor == np.inf
+
+
+def test_a_critical_friction_that_is_not_looked_for_is_told(monkeypatch):
+    ((_, case),) = problems(False, "few-5", True)
+    for module in ("uniqueness", "remarks"):
+        monkeypatch.setattr(f"contact.results.{module}.MOST", 3)
+    solution = solve(case, comm=MPI.COMM_SELF)
+    assert np.isnan(solution.critical_factor)
+    (said,) = [note for note in solution.notes if "critical" in note]
+    assert said.startswith("with more than 3 contact nodes") and said.endswith("[strong-friction]")
+
+
+def rhombus(folder, mu):
+    """Return a body between two jaws that touch its corners a tenth above and below its middle."""
+    bodies = Bodies(np.random.default_rng(0))
+    bodies.block("left", [[-2.0, -0.6], [-0.5, -0.6], [-0.5, 0.6], [-2.0, 0.6]], 0.125)
+    bodies.block("body", [[0.0, -0.5], [0.5, 0.1], [0.0, 0.5], [-0.5, -0.1]], 0.125)
+    bodies.block("right", [[0.5, -0.6], [2.0, -0.6], [2.0, 0.6], [0.5, 0.6]], 0.125)
+    write_msh(bodies.mesh(), folder / "rhombus.msh")
+    return parse_case({
+        "mesh": {"file": str(folder / "rhombus.msh")},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [
+            {"on": "left_left", "displacement": [0.0015, 0.0]},
+            {"on": "right_right", "displacement": [-0.0015, 0.0]},
+        ],
+        "contact": [
+            {"on": "left_right", "against": "body_left"},
+            {"on": "right_left", "against": "body_right"},
+        ],
+        "friction": {"law": "coulomb", "mu": mu},
+    })  # fmt: skip
+
+
+def test_a_body_that_friction_alone_jams(tmp_path):
+    """With less friction it turns out of the way, and nothing presses: a solution with more too."""
+    free, jammed = (solve(rhombus(tmp_path, mu), comm=MPI.COMM_SELF) for mu in (0.05, 0.5))
+    assert free.converged and jammed.converged
+    assert free.pressure.max() == 0 < jammed.pressure.max()
+    assert evaluate(jammed.problem, free.state).largest < 1e-8
+    assert jammed.jammed and not free.jammed
+    said = "friction alone jams the bodies"
+    assert [said in "".join(each.warnings) for each in (free, jammed)] == [False, True]
+    # Flat facets deviated by 1e-17 from a curve, and gaps are nothing.
+    assert "curved" not in "".join(free.warnings)
+
+
+def test_a_body_that_is_turned_aside_by_fixed_points(tmp_path):
+    """Its pressures are rounding at last: the end was a friction residual of 5e-6, and no more."""
+    tables = rhombus(tmp_path, 0.05).model_dump(mode="json", exclude_unset=True)
+    free = solve(parse_case(tables | {"solver": {"method": "uzawa"}}), comm=MPI.COMM_SELF)
+    assert free.converged and free.pressure.max() == 0
+    assert np.abs(free.state.x).max() == pytest.approx(0.2031, rel=1e-3)
+    assert "nothing holds body against rigid motions" in "".join(free.warnings)
+
+
+def test_a_weight_needs_contact_however_hard_jaws_clamp(tmp_path):
+    """It was compared with the clamping forces, and "in balance without any contact force"."""
+    tables = rhombus(tmp_path, 0.5).model_dump(mode="json", exclude_unset=True)
+    tables["load"] = [{"on": "body_top", "traction": [0.0, -1e-8]}]
+    solution = solve(parse_case(tables), comm=MPI.COMM_SELF)
+    assert solution.converged and solution.pressure.max() > 1e-4
+    assert not solution.jammed
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("seed", range(3))
+def test_a_ring_that_is_squeezed_without_friction_too(seed):
+    held = solve(squeezed("newton"), domain=between_plates(MPI.COMM_WORLD, seed))
+    assert held.converged and held.problem.frictional and not held.jammed
