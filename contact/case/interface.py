@@ -37,6 +37,7 @@ from contact.interface.obstacle import GapFunction, Obstacle, Shape
 from contact.interface.obstacle.triangles import read_stl
 from contact.io.formats import read_data
 from contact.mesh.domain import Domain
+from contact.mesh.geometry import area, volume
 from contact.mesh.together import meet
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
@@ -410,5 +411,5 @@ def conduction_ramp(domain: Domain, part: str) -> float:
     refined meshes resolve it and solutions have a limit. A fixed small number of the thesis's
     delta means a wide ramp too.
     """
-    height = domain.volume(domain.dx) / domain.volume(domain.ds(part))
+    height = volume(domain) / area(domain, part)
     return RAMP * min(height, domain.size)

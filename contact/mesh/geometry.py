@@ -1,10 +1,11 @@
-"""The sizes of cells and facets: maps from the reference cell, volumes, integrals over the body."""
+"""The sizes of cells and facets: maps from the reference cell, volumes, areas, integrals."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
@@ -14,7 +15,8 @@ from contact.mesh.entities import cells_at
 from contact.typing import Array
 
 #: Places of the corners of cells, over their distance from the middle, that no edge of a region
-#: beside them reaches; and the degree of the rule by which cells on both sides are shared.
+#: beside them reaches; and the degree of the rule for integrands that are no polynomials: cells on
+#: both sides of such an edge, areas of curved facets.
 INWARD, FINE = 0.99, 20
 
 
@@ -153,6 +155,37 @@ def measures(revolved: bool, shape: Shape, of: Array, at: Array, weights: Array)
     if not revolved:
         return found
     return found * 2 * np.pi * (of[..., 0] @ shape.lagrange(shape.degree_of(of.shape[1]), at).T)
+
+
+def volume(domain: Domain, region: str | None = None) -> float:
+    """Return the volume of the body, or of a region of it. Collective.
+
+    Raises
+    ------
+    InputError
+        If there is no such region.
+    """
+    of_cells = volumes(domain)
+    own = of_cells if region is None else of_cells[domain.cells(region)]
+    return float(domain.comm.allreduce(float(own.sum()), op=MPI.SUM))
+
+
+def area(domain: Domain, part: str) -> float:
+    """Return the area of a part of the boundary; in the plane its length. Collective.
+
+    Raises
+    ------
+    InputError
+        If there is no such part.
+    """
+    cells, place = cells_at(domain.mesh, domain.facets(part))
+    shape = shape_of(domain.mesh)
+    ends = shape.facet_nodes(domain.order)[place]
+    nodes = np.take_along_axis(geometry_nodes(domain, cells), ends[:, :, None], axis=1)
+    straight = shape.facet.simplex and domain.order == 1
+    points, weights = rule(shape.facet, 1 if straight else FINE)
+    own = measures(domain.revolved, shape.facet, nodes, points, weights)
+    return float(domain.comm.allreduce(float(own.sum()), op=MPI.SUM))
 
 
 def volumes(domain: Domain) -> Array:

@@ -37,6 +37,7 @@ from contact.linear.constraint import ConstrainedOperator, Constraint
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
+from contact.mesh.geometry import area, volume
 from contact.problem.contact import Contact, check_laws
 from contact.problem.protocols import Scales
 from contact.problem.state import State
@@ -309,21 +310,21 @@ class ContactProblem:
 
     def _area(self, domain: Domain) -> float:
         """Return the area of Gamma_3. Collective."""
-        return sum(domain.volume(domain.ds(contact.on)) for contact in self.contacts)
+        return sum(area(domain, contact.on) for contact in self.contacts)
 
     def _scales(self) -> Scales:
         domain, law, d = self.domain, self.body.law, self.dim
-        area = self._area(domain)
+        own = self._area(domain)
         # Of the mesh itself, which may be but the half plane of the body.
-        mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else area
+        mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else own
         return Scales(
             young=float(law.young),
             poisson=float(law.poisson),
             bulk=float(law.bulk),
             shear=float(law.shear),
             size=domain.size,
-            height=domain.volume(domain.dx) / area,
-            area=area,
+            height=volume(domain) / own,
+            area=own,
             spacing=(mesh_area / self.nodes.size) ** (1 / (d - 1)),
         )
 

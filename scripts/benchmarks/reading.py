@@ -18,6 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.mesh.cells import TETRAHEDRON
+from contact.mesh.geometry import area, volume
 from contact.mesh.reader import from_file
 from contact.mesh.shared import write
 from contact.mesh.validity import Cells, Groups
@@ -66,8 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "seconds": seconds,
         "memory": memory(),
         "before": before,
-        "volume": domain.volume(domain.dx),
-        "areas": [domain.volume(domain.ds(part)) for part in ("bottom", "top")],
+        "volume": volume(domain),
+        "areas": [area(domain, part) for part in ("bottom", "top")],
     }
     if comm.rank == 0:
         print(json.dumps(found))

@@ -12,6 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution, build_problem
+from contact.mesh.geometry import area
 from contact.plot.body import draw_plane, picture
 from contact.results.surface import contact_table
 from scripts.reporting import TWO_COLUMNS, Report, append, options, run_of, solved, subplots
@@ -87,10 +88,9 @@ def run(case: Case, load: float) -> tuple[Solution, Found]:
         Vertical force on the meshed part of the body.
     """
     domain = case.mesh.build(MPI.COMM_WORLD)
-    area = domain.volume(domain.ds("top"))
     first = case.load[0]
     assert first.traction is not None
-    scaled = [0.0] * (domain.dim - 1) + [-load / area]
+    scaled = [0.0] * (domain.dim - 1) + [-load / area(domain, "top")]
     traction = tuple(type(first.traction[0])(value) for value in scaled)
     loads = (first.model_copy(update={"traction": traction}), *case.load[1:])
     case = case.model_copy(update={"load": loads})

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import ufl
 from dolfinx import io
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
@@ -181,14 +180,13 @@ def test_nodes_between_corners_are_where_the_manual_says(program, order, dim, tm
     write(path, program, order, dim)
     domain = from_file(MPI.COMM_SELF, path)
     assert domain.order == 2
-    x = ufl.SpatialCoordinate(domain.mesh)
-    assert integral(domain, domain.dx) == pytest.approx(1.0, rel=1e-12)
+    assert integral(domain) == pytest.approx(1.0, rel=1e-12)
     height = 0.5 + (0.3 + 0.2 * (dim == 3)) / 6
-    assert integral(domain, domain.dx, x[dim - 1]) == pytest.approx(height, rel=1e-12)
+    assert integral(domain, lambda x: x[dim - 1]) == pytest.approx(height, rel=1e-12)
     # int (z + b)^2 for b = 0.3 x (1 - x) + 0.2 y (1 - y)
     square = 1 / 3 + (height - 0.5) + (0.3**2 + 0.2**2 * (dim == 3)) / 30
     square += 2 * 0.3 * 0.2 / 36 * (dim == 3)
-    assert integral(domain, domain.dx, x[dim - 1] ** 2) == pytest.approx(square, rel=1e-12)
+    assert integral(domain, lambda x: x[dim - 1] ** 2) == pytest.approx(square, rel=1e-12)
     assert len(domain.parts) == 1
 
 
@@ -223,7 +221,7 @@ def test_prisms_and_pyramids_of_second_order_are_cut(program, names, tmp_path, m
         path = tmp_path / f"{kind}{ENDINGS[program]}"
         write(path, program, order, 3)
         domain = from_file(MPI.COMM_SELF, path)
-        assert integral(domain, domain.dx) == pytest.approx(volume, rel=1e-12)
+        assert integral(domain) == pytest.approx(volume, rel=1e-12)
         assert len(domain.parts) == 1 and domain.order == 1 and domain.space["degree"] == 2
         assert f"its cells, '{kind}', become tetrahedra with straight edges" in domain.notes[0]
 
@@ -255,7 +253,7 @@ def test_tags_of_dolfinx_are_parts_and_regions(cell, shared_tmp_path):
     domain = from_file(COMM, path)
     assert measures(domain) == pytest.approx({"sides 3": 1.0, "sides 5": 1.0})
     assert COMM.allreduce(len(domain.regions["half 7"])) == expected[1]
-    assert integral(domain, domain.dx) == pytest.approx(1.0)
+    assert integral(domain) == pytest.approx(1.0)
     assert domain.notes == ()
 
 
@@ -278,7 +276,7 @@ def test_mixed_topologies_of_second_order(tmp_path):
     meshio.write(tmp_path / "piece.xdmf", meshio.Mesh(bent(points), blocks, cell_data=data))
     domain = from_file(MPI.COMM_SELF, tmp_path / "piece.xdmf")
     assert [*domain.parts] == ["tags 6"] and [*domain.regions] == ["tags 4"]
-    assert domain.order == 2 and integral(domain, domain.dx) == pytest.approx(1.0)
+    assert domain.order == 2 and integral(domain) == pytest.approx(1.0)
     for name, accepted in (("Hexahedron", "several meshes"), ("Mixed", "number 99")):
         text = "<Geometry><DataItem Dimensions='1 3'>0 0 {}</DataItem></Geometry><Topology "
         text += f"TopologyType='{name}'><DataItem Dimensions='1 2'>99 0</DataItem></Topology>"
@@ -298,7 +296,7 @@ def test_prisms_of_second_order_in_xdmf(tmp_path):
     numbers = (" ".join(map(str, v)) for v in (points.ravel().tolist(), range(15), mark))
     (tmp_path / "prism.xdmf").write_text(text.format(*numbers))
     domain = from_file(MPI.COMM_SELF, tmp_path / "prism.xdmf")
-    assert integral(domain, domain.dx) == pytest.approx(0.5)
+    assert integral(domain) == pytest.approx(0.5)
     assert measures(domain) == pytest.approx({"low 1": 0.5})
 
 

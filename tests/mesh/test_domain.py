@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
@@ -17,9 +16,8 @@ COMM = MPI.COMM_WORLD
 
 
 def mean_normal(domain, name):
-    nu = ufl.FacetNormal(domain.mesh)
-    length = integral(domain, domain.ds(name))
-    return [integral(domain, domain.ds(name), nu[i]) / length for i in range(domain.dim)]
+    length = integral(domain, part=name)
+    return [integral(domain, lambda _, nu, i=i: nu[i], name) / length for i in range(domain.dim)]
 
 
 def all_midpoints(domain, name):
@@ -43,7 +41,7 @@ def test_rectangle_has_its_sides_and_pieces(diagonal, rotation):
     domain = rectangle(COMM, (0, 0), (4, 1), (8, 4), parts, diagonal, rotation)
     expected = {**BAR, "loaded": 2.0, "ends": 1.0, "clamped": 1.0}
     assert measures(domain) == pytest.approx(expected, abs=1e-13)
-    assert integral(domain, domain.dx) == pytest.approx(4.0)
+    assert integral(domain) == pytest.approx(4.0)
     assert (domain.dim, domain.size) == (2, 4.0)
 
 
@@ -109,7 +107,7 @@ def test_there_may_be_any_number_of_parts():
 def test_a_mesh_without_regions_is_one():
     domain = rectangle(COMM, (0, 0), (4, 1), (8, 4))
     assert list(domain.regions) == ["body"]
-    assert integral(domain, domain.dx_in("body")) == pytest.approx(4.0)
+    assert integral(domain, region="body") == pytest.approx(4.0)
 
 
 @pytest.mark.parallel

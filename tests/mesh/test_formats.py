@@ -193,7 +193,7 @@ FILES = {
 
 
 def regions(domain) -> dict[str, float]:
-    return {name: integral(domain, domain.dx_in(name)) for name in domain.regions}
+    return {name: integral(domain, region=name) for name in domain.regions}
 
 
 @pytest.mark.parallel
@@ -268,7 +268,7 @@ def test_groups_of_salome(count, shared_tmp_path):
     bent = 1.0 if count == 8 else measures(domain)["high"]
     expected = {"low": 2 * bent, "Group_of_faces": 2 * bent, "high": bent, "left": 1.0}
     assert measures(domain) == pytest.approx(expected, rel=1e-6)
-    assert integral(domain, domain.dx) == pytest.approx(2.0)
+    assert integral(domain) == pytest.approx(2.0)
     assert domain.order == (1 if count == 8 else 2)
 
 

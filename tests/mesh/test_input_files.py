@@ -46,7 +46,7 @@ def test_a_cell_that_stands_twice_counts_once(order, tmp_path):
     again += "*SURFACE, NAME=skin\nall,\n"
     domain = read(tmp_path, block() + again)
     assert measures(domain) == pytest.approx({"low": 1.0, "skin": 6.0})
-    assert integral(domain, domain.dx) == pytest.approx(1.0)
+    assert integral(domain) == pytest.approx(1.0)
     assert {name: len(cells) for name, cells in domain.regions.items()} == {
         **{"Eall": 8, "again": 1, "more": 1, "all": 8}
     }
@@ -153,7 +153,7 @@ def test_continuum_shells_are_solids(tmp_path):
     text = block() + "*NODE\n28, 0, 0, 2\n29, 1, 0, 2\n30, 1, 1, 2\n31, 0, 1, 2\n"
     text += "*ELEMENT, TYPE=SC8R\n9, 19, 21, 27, 25, 28, 29, 30, 31\n"
     domain = read(tmp_path, text + "*NSET, NSET=low, GENERATE\n1, 9\n")
-    assert integral(domain, domain.dx) == pytest.approx(2.0)
+    assert integral(domain) == pytest.approx(2.0)
 
 
 def test_elements_between_nodes_are_left_out(tmp_path):

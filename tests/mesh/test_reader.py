@@ -133,7 +133,7 @@ def test_one_part_at_least_is_needed(tmp_path):
 @pytest.mark.parallel
 def test_groups_of_cells_are_regions():
     domain = from_msh(COMM, FIXTURES / "regions.msh")
-    areas = {name: integral(domain, domain.dx_in(name)) for name in domain.regions}
+    areas = {name: integral(domain, region=name) for name in domain.regions}
     assert areas == pytest.approx({"right": 0.5, "left": 0.5, "all": 1.0})
     x = np.vstack(COMM.allgather(midpoints(domain, domain.cells("right"))))
     assert x == pytest.approx(np.array([[2 / 3, 1 / 3, 0.0]]))
@@ -157,7 +157,7 @@ def test_check_lists_regions_and_notes():
 @pytest.mark.parallel
 def test_cells_in_no_group_are_no_part_of_the_body():
     domain = from_msh(COMM, FIXTURES / "ungrouped.msh")
-    assert integral(domain, domain.dx) == pytest.approx(0.5)
+    assert integral(domain) == pytest.approx(0.5)
     assert "1 cell(s) in no physical group are no part of the body" in domain.notes
 
 

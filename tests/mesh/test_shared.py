@@ -96,12 +96,10 @@ def test_a_shared_mesh_is_its_source(name, shared_tmp_path, capsys):
 
 def moments(domain):
     """Return the first moments of parts and regions: no other facet or cell is taken for one."""
-    import ufl
-
-    x = ufl.SpatialCoordinate(domain.mesh)
-    measures = [domain.ds(name) for name in domain.parts]
-    measures += [domain.dx_in(name) for name in domain.regions]
-    return [integral(domain, dx, x[i]) for dx in measures for i in range(domain.dim)]
+    places = [{"part": name} for name in domain.parts]
+    places += [{"region": name} for name in domain.regions]
+    axes = [lambda x, *_, i=i: x[i] for i in range(domain.dim)]
+    return [integral(domain, of, **place) for place in places for of in axes]
 
 
 def test_names_with_blanks_and_many_groups(tmp_path, capsys):

@@ -156,14 +156,14 @@ def test_files_of_unlike_cells_keep_their_sets(name, shared_tmp_path):
         write(path, stack())
     COMM.barrier()
     domain = from_file(COMM, path)
-    found = {region: integral(domain, domain.dx_in(region)) for region in VOLUMES}
+    found = {region: integral(domain, region=region) for region in VOLUMES}
     assert found == pytest.approx(VOLUMES)
     areas = measures(domain)
     expected = {"start": 1.0, "end": 1.0}
     if name == "stack.inp":
         # A surface of a square and a triangle, and all that bounds one cell alone.
         expected |= {"side": 3.0, "below": 1.5, "skin": SKIN}
-        assert integral(domain, domain.dx_in("all")) == pytest.approx(sum(VOLUMES.values()))
+        assert integral(domain, region="all") == pytest.approx(sum(VOLUMES.values()))
     assert {part: areas[part] for part in expected} == pytest.approx(expected)
     assert any("become tetrahedra: a mesh has cells of one kind" in note for note in domain.notes)
 
@@ -173,7 +173,7 @@ def test_quadrilaterals_beside_triangles():
     """From Gmsh: a square and a triangle under one name."""
     domain = from_file(COMM, FIXTURES / "two-kinds.msh")
     assert measures(domain) == pytest.approx({"bottom": 1.0, "top": 1.0})
-    assert integral(domain, domain.dx_in("body")) == pytest.approx(1.5)
+    assert integral(domain, region="body") == pytest.approx(1.5)
     note = "its cells, 'Triangle 3' beside 'Quadrilateral 4', become triangles: a mesh has cells "
     assert domain.notes == (note + "of one kind",)
 
@@ -188,7 +188,7 @@ def test_cells_of_second_order_become_straight(tmp_path):
     (tmp_path / "plate.inp").write_text("\n".join(lines) + "\n")
     domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
     assert domain.order == 1 and measures(domain) == pytest.approx({"ground": 2.0})
-    assert integral(domain, domain.dx_in("corner")) == pytest.approx(0.5)
+    assert integral(domain, region="corner") == pytest.approx(0.5)
     assert domain.notes == (
         "its cells, 'Quadrilateral 4' beside 'Triangle 6', become triangles with straight edges: a "
         "mesh has cells of one kind, and curved edges in files of one kind alone",
@@ -255,7 +255,7 @@ def test_quadrilaterals_that_are_triangles_and_free_faces_of_prisms(tmp_path):
     plate += "1,1,2,3,4\n2,1,4,5,5\n*SURFACE,NAME=rim\nplate,\n*SURFACE,NAME=end\n1,S3\n2,S2\n"
     (tmp_path / "plate.inp").write_text(plate)
     domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
-    assert integral(domain, domain.dx) == pytest.approx(1.5)
+    assert integral(domain) == pytest.approx(1.5)
     assert measures(domain) == pytest.approx({"rim": 4 + 2**0.5, "end": 2.0})
     # Two prisms that share a square, each as a hexahedron, collapsed at corners of other numbers.
     prisms = "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n"
@@ -263,7 +263,7 @@ def test_quadrilaterals_that_are_triangles_and_free_faces_of_prisms(tmp_path):
     prisms += "*SURFACE,NAME=skin\nall,\n*SURFACE,NAME=low\nall,S1\n*SURFACE,NAME=end\n1,S4\n2,S3\n"
     (tmp_path / "prisms.inp").write_text(prisms)
     domain = from_file(MPI.COMM_SELF, tmp_path / "prisms.inp")
-    assert integral(domain, domain.dx) == pytest.approx(1.0)
+    assert integral(domain) == pytest.approx(1.0)
     assert measures(domain) == pytest.approx({"skin": 6.0, "low": 1.0, "end": 2.0})
 
 

@@ -5,7 +5,6 @@ import re
 import gmsh
 import numpy as np
 import pytest
-import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
@@ -175,7 +174,7 @@ def test_generators_make_their_parts(name):
     domain = from_generator(COMM, name)
     # Straight sides miss a little of a round body.
     assert measures(domain) == pytest.approx(expected, rel=1e-2)
-    assert integral(domain, domain.dx) == pytest.approx(volume, rel=2e-2)
+    assert integral(domain) == pytest.approx(volume, rel=2e-2)
 
 
 #: Generators with curved sides.
@@ -201,7 +200,7 @@ def test_generators_make_other_cells(name, order):
     # Sides of second order miss next to nothing of a round body.
     least = {1: 3e-2, 2: 5e-4}[order]
     assert measures(domain) == pytest.approx(expected, rel=least)
-    assert integral(domain, domain.dx) == pytest.approx(volume, rel=least)
+    assert integral(domain) == pytest.approx(volume, rel=least)
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])
@@ -225,10 +224,9 @@ PLANES = {
 
 def test_faces_of_a_block_have_the_right_names():
     domain = from_generator(COMM, "block", width=2.0, depth=3.0, size=0.6)
-    nu = ufl.FacetNormal(domain.mesh)
     for name, normal in PLANES.items():
-        area = integral(domain, domain.ds(name))
-        found = [integral(domain, domain.ds(name), nu[i]) / area for i in range(3)]
+        area = integral(domain, part=name)
+        found = [integral(domain, lambda _, nu, i=i: nu[i], name) / area for i in range(3)]
         assert found == pytest.approx(normal, abs=1e-12)
 
 
