@@ -5,15 +5,17 @@ SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py) scripts/examples/explore_fo
 NAMES := $(notdir $(basename $(SCRIPTS)))
 # a test that hangs on some ranks is ended, and fails
 MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
-	python3 -m mpi4py -m pytest tests $(SHORT) -m parallel -q --color=no -p no:cacheprovider
+	python3 -m mpi4py -m pytest $(TESTS) $(SHORT) -m 'parallel and $(MARKS)' -q --color=no -p no:cacheprovider
 
-.PHONY: help demo test test-all test-serial lint format docs release clean $(NAMES)
+.PHONY: help demo test test-rest test-all test-serial messages lint format docs release clean $(NAMES)
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo     solve Example 7.2 into results/bar, with figures"
-	@echo "make test     the short tests: the serial ones, then on 2 and 3 ranks"
-	@echo "make test-all  the slow ones too, and all combinations of parameters"
+	@echo "make test     the core suite: the serial tests, then those of 2 and 3 ranks"
+	@echo "make test-rest  the other short tests"
+	@echo "make test-all  all of them, the slow ones too, and all combinations of parameters"
+	@echo "make messages  renew the texts of messages in tests/snapshots"
 	@echo "make lint     ruff and mypy"
 	@echo "make format   let ruff format the sources"
 	@echo "make NAME     run a script: $(sort $(NAMES))"
@@ -26,18 +28,24 @@ demo:
 	$(FX) python3 -m contact solve scripts/cases/bar.toml --out results/bar --plot
 
 # A release has passed test-all. What is left out by --short: tests/conftest.py.
-test: SHORT := --short
+test test-rest: SHORT := --short
+test: MARKS := core
+test-rest: MARKS := not core and not release
+test-all: MARKS := not release
+# Other files need not be imported.
+test: TESTS = $(shell grep -rl --include='test_*.py' 'mark\.core' tests)
+test-rest test-all: TESTS := tests
 # The serial tests first: their workers compile most forms at the same time, for which ranks wait.
 # One BLAS thread each: the workers and ranks fill the cores.
-test test-all: export OMP_NUM_THREADS := 1
+test test-rest test-all: export OMP_NUM_THREADS := 1
 # Ranks that wait give way: there are fewer cores than ranks, or others use them too.
-test test-all: export OMPI_MCA_mpi_yield_when_idle := 1
+test test-rest test-all: export OMPI_MCA_mpi_yield_when_idle := 1
 # Each of some fifty processes would compile the sources, and assertions, again.
-test test-all test-serial: export PYTHONDONTWRITEBYTECODE :=
-test test-all: SHELL := bash
-test test-all:
+test test-rest test-all test-serial: export PYTHONDONTWRITEBYTECODE :=
+test test-rest test-all: SHELL := bash
+test test-rest test-all:
 	@set -o pipefail; status=0; last=$$(mktemp); trap 'rm -f $$last' EXIT; \
-	echo "== serial"; $(FX) python3 -m pytest tests $(SHORT) -n auto --dist worksteal | tee $$last || status=1; \
+	echo "== serial"; $(FX) python3 -m pytest $(TESTS) $(SHORT) -m '$(MARKS)' -n auto --dist worksteal | tee $$last || status=1; \
 	echo "== 2 ranks"; $(call MPI_TESTS,2) || status=1; \
 	echo "== 3 ranks"; $(call MPI_TESTS,3) || status=1; \
 	echo "== serial, as above"; tail -n 1 $$last; \
@@ -46,6 +54,9 @@ test test-all:
 test-serial: export OMP_NUM_THREADS := 1
 test-serial:
 	$(FX) python3 -m pytest tests -n auto --dist worksteal
+
+messages:
+	$(FX) python3 -m pytest tests -m wording --renew -n 0 -q
 
 lint:
 	scripts/ruff check .

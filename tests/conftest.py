@@ -3,8 +3,9 @@
 import importlib.metadata
 import io
 import os
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import module_from_spec, spec_from_file_location
@@ -80,6 +81,31 @@ def _small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr("scripts.reporting.DPI", 60)
 
 
+#: Parts of messages that memory, rounding and Python's parser of TOML decide.
+OTHERS_WORDS = {
+    r"[\d.e+]+ GB": "… GB",
+    r"-?\d[\d.]*e-1\d": "0",
+    r"not a TOML file: .* ": "not a TOML file: … ",
+    r"is broken \(.*\); ": "is broken (…); ",
+}
+
+
+@pytest.fixture
+def snapshot(request: pytest.FixtureRequest) -> Callable[[str, dict[str, str]], None]:
+    """Return the comparison of texts, by their names, with a file of tests/snapshots."""
+
+    def compare(file: str, texts: dict[str, str]) -> None:
+        path = Path(__file__).parent / "snapshots" / f"{file}.txt"
+        text = "".join(f"{name}\n  {said}\n" for name, said in texts.items())
+        for pattern, replaced in OTHERS_WORDS.items():
+            text = re.sub(pattern, replaced, text)
+        if request.config.getoption("--renew"):
+            path.write_text(text, encoding="utf-8")
+        assert text.splitlines() == path.read_text(encoding="utf-8").splitlines()
+
+    return compare
+
+
 @pytest.fixture
 def bar(tmp_path: Path) -> Path:
     """Return the path of the bar's case file."""
@@ -89,11 +115,12 @@ def bar(tmp_path: Path) -> Path:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Let `make test` run the short tests alone."""
+    """Let `make test` run short tests alone, and `make messages` write texts."""
     words = (
         "no slow tests; each value of each parameter, not all combinations; one a test on 3 ranks"
     )
     parser.addoption("--short", action="store_true", help=words)
+    parser.addoption("--renew", action="store_true", help="write the files of tests/snapshots anew")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -27,133 +27,89 @@ D400, D5000, X5000 = "1" + "0" * 400, "9" * 5000, "0x" + "f" * 5000
 LONG = "k" * 5000
 GEOMETRY = (TABLES["mesh.parts.loaded"], 'side = "top"')
 
-#: Name -> (replacements of text in the tables, words of the message).
+#: Name -> replacements of text in the tables.
 FILES = {
-    "400 digits as traction": (("-0.005", D400), "load.0.traction.1: 1000"),
+    "400 digits as traction": ("-0.005", D400),
     "400 digits as body force": (
-        ('on = "loaded"\ntraction', "everywhere = true\nbody_force", "-0.005", D400),
-        "load.0.body_force.1: 1000",
+        'on = "loaded"\ntraction',
+        "everywhere = true\nbody_force",
+        "-0.005",
+        D400,
     ),
-    "400 digits as displacement": (("[0.0, 0.0]", f"[0, {D400}]"), "fixed.0.displacement.1: 1"),
-    "5000 digits": (
-        ("young = 1.0", f"young = {D5000}"),
-        "not a TOML file: Exceeds the limit (4300 digits)",
-    ),
-    "5000 digits, hexadecimal": (
-        ("young = 1.0", f"young = {X5000}"),
-        "material.young: given a whole number of thousands of digits; accepted: a number > 0",
-    ),
-    "5000 digits of a load": (("-0.005", X5000), "load.0.traction.1: a whole number of thousands"),
-    "an edge of 1e-20": (("[4.0, 1.0]", "[1e-20, 1e-20]"), "mesh.size.0: given 1e-20; accepted: s"),
-    "an edge of 1e-150": (
-        ("[4.0, 1.0]", "[4.0, 1e-150]", *GEOMETRY),
-        "mesh.size.1: given 1e-150; accepted: sizes above 2.2e-16",
-    ),
-    "an edge of 5e-324": (("[4.0, 1.0]", "[4.0, 5e-324]", *GEOMETRY), "mesh.size.1: given 5e-324"),
-    "an edge lost beside the origin": (
-        ("cells", "origin = [1e30, 0.0]\ncells", *GEOMETRY),
-        "mesh.size.0: given 4.0; accepted: sizes above 2.2e-16, also beside the origin",
-    ),
-    "an edge of 1e150": (("[4.0, 1.0]", "[1e150, 1.0]"), "mesh.size.0: given 1e+150; accepted: ce"),
-    "a yield strain of 1e-308": (("0.05", "1e-308"), "material.yield_strain: given 1e-308"),
-    "a permittivity of 1e308": (("8.1", "1e308"), "material.piezo.beta11: given 1e+308; accepted"),
-    "ten refinements": (
-        ("cells = [8, 2]", "cells = [800, 200]\nrefine = 10"),
-        "mesh.refine: 10 refinements of 3.2e+05 cells, 3.36e+11 cells take more memory",
-    ),
+    "400 digits as displacement": ("[0.0, 0.0]", f"[0, {D400}]"),
+    "5000 digits": ("young = 1.0", f"young = {D5000}"),
+    "5000 digits, hexadecimal": ("young = 1.0", f"young = {X5000}"),
+    "5000 digits of a load": ("-0.005", X5000),
+    "an edge of 1e-20": ("[4.0, 1.0]", "[1e-20, 1e-20]"),
+    "an edge of 1e-150": ("[4.0, 1.0]", "[4.0, 1e-150]", *GEOMETRY),
+    "an edge of 5e-324": ("[4.0, 1.0]", "[4.0, 5e-324]", *GEOMETRY),
+    "an edge lost beside the origin": ("cells", "origin = [1e30, 0.0]\ncells", *GEOMETRY),
+    "an edge of 1e150": ("[4.0, 1.0]", "[1e150, 1.0]"),
+    "a yield strain of 1e-308": ("0.05", "1e-308"),
+    "a permittivity of 1e308": ("8.1", "1e308"),
+    "ten refinements": ("cells = [8, 2]", "cells = [800, 200]\nrefine = 10"),
     "nine refinements of a generator": (
-        (
-            *(TABLES["mesh"], 'generator = "half_disc"\ncontact_size = 0.05\nrefine = 9'),
-            *(f"[mesh.parts.loaded]\n{TABLES['mesh.parts.loaded']}", ""),
-            *('on = "left"', 'on = "top"', 'on = "bottom"', 'on = "contact"'),
-            *('on = "loaded"\ntraction', "everywhere = true\nbody_force"),
-        ),
-        "mesh.refine: 9 refinements",
+        *(TABLES["mesh"], 'generator = "half_disc"\ncontact_size = 0.05\nrefine = 9'),
+        *(f"[mesh.parts.loaded]\n{TABLES['mesh.parts.loaded']}", ""),
+        *('on = "left"', 'on = "top"', 'on = "bottom"', 'on = "contact"'),
+        *('on = "loaded"\ntraction', "everywhere = true\nbody_force"),
     ),
-    "a line break in a key": (("young", '"a\\nb" = 1\nyoung'), r"material.a\nb: unknown key"),
+    "a line break in a key": ("young", '"a\\nb" = 1\nyoung'),
     "a line break in a part": (
-        ("[mesh.parts.loaded]", '[mesh.parts."a\\nb"]\nside = "base"\n[mesh.parts.loaded]'),
-        r"mesh.parts.a\nb.side: given",
+        "[mesh.parts.loaded]",
+        '[mesh.parts."a\\nb"]\nside = "base"\n[mesh.parts.loaded]',
     ),
-    "a long key": (("young", f"{LONG} = 1\nyoung"), "kkk...: unknown key; accepted: on, name"),
+    "a long key": ("young", f"{LONG} = 1\nyoung"),
     "a long part": (
-        ("[mesh.parts.loaded]", f'[mesh.parts.{LONG}]\nside = "base"\n[mesh.parts.loaded]'),
-        'side: given "base"',
+        "[mesh.parts.loaded]",
+        f'[mesh.parts.{LONG}]\nside = "base"\n[mesh.parts.loaded]',
     ),
-    "a long list": (("[0.0, -0.005]", f"[{'0.0, ' * 20000}]"), "load.0.traction: given [0.0, 0.0,"),
+    "a long list": ("[0.0, -0.005]", f"[{'0.0, ' * 20000}]"),
     "many parts": (
-        (
-            "[mesh.parts.loaded]",
-            "".join(f'[mesh.parts.p{i}]\nside = "top"\n' for i in range(5000))
-            + "[mesh.parts.loaded]",
-            'on = "bottom"',
-            'on = "bottm"',
-        ),
-        "more (did you mean bottom?)",
+        "[mesh.parts.loaded]",
+        "".join(f'[mesh.parts.p{i}]\nside = "top"\n' for i in range(5000)) + "[mesh.parts.loaded]",
+        'on = "bottom"',
+        'on = "bottm"',
     ),
-    "a traction that is not finite": (
-        ("-0.005", '"log(x-3)"'),
-        "load.0.traction.1: a formula is not finite everywhere on its part",
-    ),
-    "a charge that is not finite": (
-        ("-0.005]", '0.0]\ncharge = "log(x-3)"'),
-        "load.0.charge: a formula is not finite",
-    ),
+    "a traction that is not finite": ("-0.005", '"log(x-3)"'),
+    "a charge that is not finite": ("-0.005]", '0.0]\ncharge = "log(x-3)"'),
     "a part inside that is not finite": (
-        ("[mesh.parts.loaded]", '[mesh.inside]\ncut = "sqrt(x-1)"\n[mesh.parts.loaded]'),
-        'mesh.inside.cut: "sqrt(x-1)" is not finite at (',
+        "[mesh.parts.loaded]",
+        '[mesh.inside]\ncut = "sqrt(x-1)"\n[mesh.parts.loaded]',
     ),
     "a region that is not finite": (
-        ("[mesh.parts.loaded]", '[mesh.regions]\nrest = "log(x-1)"\n[mesh.parts.loaded]'),
-        'mesh.regions.rest: "log(x-1)" is not finite at (',
+        "[mesh.parts.loaded]",
+        '[mesh.regions]\nrest = "log(x-1)"\n[mesh.parts.loaded]',
     ),
     "a key of another shape": (
-        ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "sphere", point = [0, 0]}'),
-        'point: given [0, 0]; accepted: point with shape = "plane" or "cylinder"',
+        'on = "bottom"',
+        'on = "bottom"\nfoundation = {shape = "sphere", point = [0, 0]}',
     ),
     "a wrong key of a shape": (
-        ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "sphere", raduis = 1}'),
-        'contact.foundation.raduis: unknown key with shape = "sphere", did you mean radius?',
+        'on = "bottom"',
+        'on = "bottom"\nfoundation = {shape = "sphere", raduis = 1}',
     ),
     "an unknown shape": (
-        ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "cube", centre = [0, 0]}'),
-        'contact.foundation.shape: given "cube"; accepted: "plane", "sphere", "cylinder", "cone"',
+        'on = "bottom"',
+        'on = "bottom"\nfoundation = {shape = "cube", centre = [0, 0]}',
     ),
-    "no shape": (
-        ('on = "bottom"', 'on = "bottom"\nfoundation = {centre = [0, 0]}'),
-        'contact.foundation.shape: missing; accepted: "plane", "sphere", "cylinder"',
-    ),
-    "a coefficient of the contact": (
-        ('on = "bottom"', 'on = "bottom"\nmu = 0.3'),
-        "contact.mu: unknown key here: it belongs to [friction]; accepted: on,",
-    ),
-    "friction of the contact as a number": (
-        ('on = "bottom"', 'on = "bottom"\nfriction = 0.3'),
-        "contact.friction: given 0.3; accepted: a table; [friction] at the top level is for all",
-    ),
-    "material of the contact": (
-        ('on = "bottom"', 'on = "bottom"\nmaterial = {young = 0.3}'),
-        "contact.material: unknown key here: [material] is a table of its own, at the top level",
-    ),
-    "friction of the contact": (
-        ('on = "bottom"', 'on = "bottom"\nfriction = {mu = 0.3}'),
-        'contact.friction.mu: given 0.3; accepted: mu with law = "coulomb"',
-    ),
-    "friction twice": (
-        ('on = "bottom"', 'on = "bottom"\nfriction = {law = "coulomb", mu = 0.3}'),
-        "friction: beside friction of every contact; accepted: one of them",
-    ),
+    "no shape": ('on = "bottom"', 'on = "bottom"\nfoundation = {centre = [0, 0]}'),
+    "a coefficient of the contact": ('on = "bottom"', 'on = "bottom"\nmu = 0.3'),
+    "friction of the contact as a number": ('on = "bottom"', 'on = "bottom"\nfriction = 0.3'),
+    "material of the contact": ('on = "bottom"', 'on = "bottom"\nmaterial = {young = 0.3}'),
+    "friction of the contact": ('on = "bottom"', 'on = "bottom"\nfriction = {mu = 0.3}'),
+    "friction twice": ('on = "bottom"', 'on = "bottom"\nfriction = {law = "coulomb", mu = 0.3}'),
 }
 
 OVERRIDES = {
-    "deep": ("a" + ".a" * 20000 + "=1", "20001 keys deep; accepted: at most 16"),
-    "long": (f"{LONG}=1", "kkk...: unknown key"),
-    "long index": (f"load.{D5000}.on=1", "load has no entry 999"),
-    "no assignment": (LONG, "kkk...: no assignment"),
-    "line break": ("a\nb=1", r"a\nb: unknown key"),
-    "5000 digits": (f"material.young={D5000}", "is broken (Exceeds the limit (4300 digits)"),
-    "hexadecimal": (f"material.young={X5000}", "material.young: given a whole number of thousands"),
-    "an edge": ("mesh.size.0=1e150", "mesh.size.0: given 1e+150"),
+    "deep": "a" + ".a" * 20000 + "=1",
+    "long": f"{LONG}=1",
+    "long index": f"load.{D5000}.on=1",
+    "no assignment": LONG,
+    "line break": "a\nb=1",
+    "5000 digits": f"material.young={D5000}",
+    "hexadecimal": f"material.young={X5000}",
+    "an edge": "mesh.size.0=1e150",
 }
 
 
@@ -175,23 +131,19 @@ def refused(path, capsys, *arguments):
     assert message.startswith("contact: ") and message.count("\n") == 1
     check_identifier(message.rstrip("\n"))
     assert len(message) < 300 + LIST
-    return message
+    return message.rstrip("\n").replace(str(path.parent), "")
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_absurd_files(name, tmp_path, capsys):
-    changes, words = FILES[name]
-    path = tmp_path / "case.toml"
-    path.write_text(case(*changes))
-    assert words in refused(path, capsys)
-
-
-@pytest.mark.parametrize("name", OVERRIDES)
-def test_absurd_overrides(name, tmp_path, capsys):
-    override, words = OVERRIDES[name]
-    path = tmp_path / "case.toml"
+@pytest.mark.wording
+def test_messages_of_absurd_input(snapshot, tmp_path, capsys):
+    path, said = tmp_path / "case.toml", {}
+    for name, changes in FILES.items():
+        path.write_text(case(*changes))
+        said[name] = refused(path, capsys)
     path.write_text(case())
-    assert words in refused(path, capsys, "--set", override)
+    for name, override in OVERRIDES.items():
+        said[f"override: {name}"] = refused(path, capsys, "--set", override)
+    snapshot("absurd-input", said)
 
 
 def test_a_large_mesh_is_announced(monkeypatch, caplog):
