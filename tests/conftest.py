@@ -137,6 +137,13 @@ def pytest_report_header() -> str:
     return f"contact: {len(files)} files, {lines} lines"
 
 
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Let `core` with identifiers of parameters stand for those alone."""
+    mark = item.get_closest_marker("core")
+    if mark is not None and mark.args and item.callspec.id not in mark.args:
+        item.own_markers.remove(mark)
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out tests that are for another number of ranks, or compare one rank with itself.

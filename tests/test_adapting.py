@@ -34,6 +34,7 @@ def bar(comm=MPI.COMM_SELF, cells=(8, 2), degree=1, **adapt):
     return solution
 
 
+@pytest.mark.core
 def test_the_error_of_the_bar_falls_like_one_over_the_root_of_unknowns():
     rows = bar(error=0.008).adaptation
     unknowns, error = (np.array([row[name] for row in rows]) for name in ("unknowns", "error"))
@@ -57,6 +58,7 @@ def test_meshes_grow_so_that_the_last_one_costs_the_most(degree, asked):
     assert unknowns.sum() < 1.75 * unknowns[-1]  # 1 + (1 + 1/4 + ...)/2 and a little
 
 
+@pytest.mark.core
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize(
     ("degree", "error"),
@@ -95,6 +97,7 @@ def test_marks_have_the_share_of_the_sum_with_ties():
     assert every.tolist() == [0, 1, 2]
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("fraction", [0.1, 0.5, 0.97, 1.0])
 def test_marks_are_the_fewest_with_the_share(fraction):
@@ -110,6 +113,7 @@ def test_marks_are_the_fewest_with_the_share(fraction):
     np.testing.assert_array_equal(np.concatenate(comm.allgather(found)), expected)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_names_are_inherited_where_some_cells_are_refined(dim):
@@ -199,6 +203,7 @@ def test_what_does_not_go_with_it_is_refused():
         solve(parse_case(data))
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("generator", "off"), [("quarter_disc", 1e-12), ("sphere", 3e-5)])
 def test_new_nodes_of_curved_boundaries_follow_the_curve(generator, off):

@@ -104,11 +104,13 @@ def agrees(found: set, known: set) -> None:
     assert not known - found, "mended: take it off the list"
 
 
+@pytest.mark.core
 def test_imports_go_up():
     edges = graph()
     agrees({(a, b) for a in edges for b in edges[a] if layer(b) > layer(a)}, DOWNWARDS)
 
 
+@pytest.mark.core
 def test_no_module_imports_itself_through_others():
     edges = graph()
 
@@ -122,23 +124,27 @@ def test_no_module_imports_itself_through_others():
     agrees({name for name in edges if name in reached(name)}, CYCLIC)
 
 
+@pytest.mark.core
 def test_no_python_objects_are_sent_by_the_communicator_of_a_mesh():
     """With mpi4py from 4.0 on a program may not end then, see `contact._compat.lasting`."""
     sent = re.compile(r"mesh\.comm\.(all)?(reduce|gather|bcast|scatter|toall|send|recv)\b")
     assert [name for name, path in CONTACT.items() if sent.search(path.read_text())] == []
 
 
+@pytest.mark.core
 def test_files_are_short():
     lengths = {name: len(path.read_text().splitlines()) for name, path in CONTACT.items()}
     agrees({name for name, length in lengths.items() if length > LONGEST}, LONG)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", modules("forms"))
 def test_forms_need_no_mesh_and_no_solver(name):
     allowed = {"forms", "ufl", "numpy", "scipy", *sys.stdlib_module_names}
     assert {used.split(".")[0] for used in imports(modules("forms")[name])} <= allowed
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", modules("meshes"))
 def test_generators_need_the_solver_for_its_errors_alone(name):
     used = {i for i in imports(modules("meshes")[name]) if i.split(".")[0] in ("contact", "forms")}

@@ -7,6 +7,7 @@ from contact.arguments import naming, real
 from contact.errors import InputError
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     "values",
     [
@@ -26,6 +27,7 @@ def test_what_is_returned_becomes_a_plain_array_of_its_own(values):
     assert not np.shares_memory(found, values)
 
 
+@pytest.mark.core
 def test_what_is_no_number_for_each_is_named():
     with (
         pytest.raises(InputError, match=r"^mu: .* shape \(3,\); accepted: one number"),

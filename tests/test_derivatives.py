@@ -62,6 +62,7 @@ def solution(seed):
     return solve(parse_case(problem(seed)[1]), comm=SELF)
 
 
+@pytest.mark.core
 def test_bar_by_its_friction_coefficient():
     # computed independently, by central differences
     given = ["mesh.cells=[64,16]", "material.law=linear", "friction.mu=0.3"]
@@ -116,6 +117,7 @@ def test_numbers_without_a_derivative(key, words):
         sensitivity(given, ["max_pressure"], [key])
 
 
+@pytest.mark.core("0", "2", "10", "12")
 @pytest.mark.parametrize("seed", [*range(len(FAMILIES)), *range(COUNT, COUNT + len(FURTHER))])
 def test_differences_and_adjoint(seed):
     found = compared(seed, SELF, each=False)
@@ -166,6 +168,7 @@ def test_a_law_without_a_differential_of_its_own(kinematic):
     assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
+@pytest.mark.core
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("family", ["two bodies", "ball under a force", "evolution", *FURTHER])
 def test_ranks(family):
@@ -188,6 +191,7 @@ def test_ranks(family):
                 assert one[name][key] == pytest.approx(alone[name][key], rel=1e-7, abs=close)
 
 
+@pytest.mark.core
 def test_steps_and_their_adjoint():
     run = solution(FAMILIES.index("evolution, slip"))
     keys = ["friction.mu.a", "material.young", "fixed.1.displacement.0"]
@@ -208,6 +212,7 @@ def test_steps_and_their_adjoint():
         )
 
 
+@pytest.mark.core
 def test_the_closed_form_of_cattaneo_and_mindlin():
     known = ball_values(2 / 3)  # beside numbers that were computed by themselves
     assert known.way == pytest.approx(0.0292078206, rel=1e-8)
@@ -247,6 +252,7 @@ def test_a_problem_in_python_and_a_function():
         sensitivity(run, ["rigid_y"], ["material.young"])
 
 
+@pytest.mark.core
 def test_hertz_exponents():
     # P = (4/3) E* R^(1/2) d^(3/2): of a half space, which the block is not, E alone is exact
     case = indented(displacement=[0.0, -0.02])
@@ -258,6 +264,7 @@ def test_hertz_exponents():
         assert found[name]["material.young"] == pytest.approx(value, rel=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("family", ["number", "evolution", "two bodies", "3-D"])
 def test_gradient_by_the_gap(family):
     data = problem(FAMILIES.index(family))[1]
@@ -292,6 +299,7 @@ def pushed(mu, press=-0.01):
     }
 
 
+@pytest.mark.core
 def test_nodes_that_touch_without_pressure_are_named(monkeypatch):
     data = pushed(0.3) | {"contact": {"on": "bottom", "gap": 0.01}}
     data["fixed"] = [{"on": "top", "displacement": [0.0, -0.01]}]
@@ -303,6 +311,7 @@ def test_nodes_that_touch_without_pressure_are_named(monkeypatch):
     assert "between two states" in said[0]
 
 
+@pytest.mark.core
 def test_a_node_at_its_bound_is_named_and_the_derivative_is_one_sided():
     # all stick at mu = 3; with mu the largest ratio of friction to pressure one node is at its
     # bound, and the solution is the same
@@ -442,6 +451,7 @@ def test_gradients_cost_no_more_than_one_parameter(monkeypatch):
     assert counts[0] == counts[1] == counts[2] > 0
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     "family", ["slip", "smoothed", "evolution, electrode", "ball under a force"]
 )

@@ -19,6 +19,7 @@ def fails():
     raise MemoryError("no room")
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_what_the_first_rank_raises():
     with pytest.raises(MemoryError, match="no room"):
@@ -26,6 +27,7 @@ def test_what_the_first_rank_raises():
     assert np.array_equal(on_root(COMM, lambda: np.arange(3.0)), np.arange(3.0))
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_what_the_last_rank_raises():
     last = COMM.rank == COMM.size - 1
@@ -37,6 +39,7 @@ def test_what_the_last_rank_raises():
         pass
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_a_dense_factorisation_without_room(monkeypatch):
     """The others went on to the next solve, and waited there."""
@@ -48,6 +51,7 @@ def test_a_dense_factorisation_without_room(monkeypatch):
         operator.update("tangent", BodyState(np.zeros(2)), np.ones((1, 2, 2)))
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_sums_over_all_ranks():
     """Of numbers and arrays, in any order in memory, with none at all."""
@@ -61,6 +65,7 @@ def test_sums_over_all_ranks():
     assert given[0, 1] == own, "the given values are changed"
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_the_largest_over_all_ranks():
     """NaN on one rank is NaN on all: a comparison with it would be false on that rank alone."""
@@ -84,6 +89,7 @@ class Collected:
         yield from (SimpleNamespace(args=(given,)) for given in self.callspec.params)
 
 
+@pytest.mark.core
 def test_on_several_ranks_each_value_of_each_parameter_stays():
     """Not each combination; of a test without parameters itself."""
     found = [Collected("both", a=a, b=b) for a in range(3) for b in range(2)]
@@ -94,6 +100,7 @@ def test_on_several_ranks_each_value_of_each_parameter_stays():
     assert _covering([single := Collected("single")]) == [single]
 
 
+@pytest.mark.core
 def test_rows_of_a_list_of_parameters_stay_whole():
     """Each row of values for several names is one: two with the same second value both stay."""
     found = [Collected("rows", a=a, b=b) for a, b in ((1, 2), (1, 3), (2, 2))]
@@ -102,6 +109,7 @@ def test_rows_of_a_list_of_parameters_stay_whole():
     assert _covering(found) == found
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("short", [False, True])
 def test_short_runs_leave_out_slow_tests_and_combinations(short):
     items = [Collected(f"both[{a}-{b}]", a=a, b=b) for a in range(2) for b in range(2)]

@@ -83,6 +83,7 @@ def offences(path: Path) -> Iterator[tuple[str, str]]:
             yield word, " ".join(around.split())
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("package", packages())
 def test_words_of_the_field(package: str) -> None:
     found = [(path.name, *place) for path in packages()[package] for place in offences(path)]
@@ -91,6 +92,7 @@ def test_words_of_the_field(package: str) -> None:
     assert len(found) <= allowed, "\n".join(said)
 
 
+@pytest.mark.core
 def test_words_are_found_in_names_comments_and_over_line_ends(tmp_path: Path) -> None:
     path = tmp_path / "some.py"
     path.write_text(

@@ -56,6 +56,7 @@ def operator_at(problem, kind, x):
     return operator
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("case", NAMES)
 def test_internal_forces_are_the_derivative_of_the_assembled_energy(cases, case):
     """B(u; u, v) = d/dt M(u + t v), with shear strains and all."""
@@ -75,6 +76,7 @@ def test_internal_forces_are_the_derivative_of_the_assembled_energy(cases, case)
     assert work == pytest.approx(slope, rel=1e-5, abs=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("case", NAMES)
 def test_tangent_is_the_derivative_of_the_internal_forces(cases, case):
     problem, body = cases[case], cases[case].equilibrium

@@ -50,6 +50,7 @@ def extremes(solution):
     return np.max(COMM.allgather(here), axis=0)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize(
@@ -79,6 +80,7 @@ def test_a_bed_of_springs_of_a_body_of_revolution_has_the_area_of_the_full_turn(
     assert solution.reaction("bottom")[1] == pytest.approx(PRESSURE * np.pi, rel=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("angle", [30.0, -75.0])
 def test_a_normal_stiffness_on_an_inclined_face_is_that_of_the_turned_problem(angle):
@@ -120,6 +122,7 @@ def test_a_stiff_bed_is_a_support():
     assert off[1] == pytest.approx(off[0] / 10, rel=0.01)
 
 
+@pytest.mark.core
 def test_forces_are_in_balance_beside_supports_and_contact():
     data = {
         "fixed": [{"on": "left", "displacement": [0.0, "free"]}],
@@ -177,6 +180,7 @@ def test_results_have_derivatives_by_a_stiffness():
     assert abs(slope) > 1e-4
 
 
+@pytest.mark.core
 def test_energy_is_stored_and_comes_back():
     steps = {"times": [0.0, 1.0, 2.0], "steps": [2, 2]}
     pulse = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}

@@ -95,6 +95,7 @@ def test_a_factor_by_cell_is_a_region_by_itself():
     assert one.state.x == pytest.approx(other.state.x, abs=1e-12)
 
 
+@pytest.mark.core
 def test_a_column_whose_modulus_grows_with_the_height():
     """u(1) = s int_0^1 dy/(1 + y) under a traction s."""
     body = Body(

@@ -41,6 +41,7 @@ def resultant(*force, **more):
         return Load("top", force=force, **more)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_force_is_the_resultant_and_a_traction_is_per_area(dim):
     force, area = [0.01, *[0.0] * (dim - 2), DOWN], {2: 2.0, 3: 2.0}[dim]
@@ -92,6 +93,7 @@ def test_a_resultant_in_the_whole_body_is_refused():
         parse_case(changed(load=[{"everywhere": True, "force": [0.0, 1.0]}]))
 
 
+@pytest.mark.core
 def test_of_a_body_of_revolution_it_is_that_of_the_full_turn():
     domain = revolved(rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2)))
 
@@ -104,11 +106,13 @@ def test_of_a_body_of_revolution_it_is_that_of_the_full_turn():
         made(0.1, DOWN)
 
 
+@pytest.mark.core
 def test_a_ramp_grows_over_its_stage_and_stays():
     assert [Ramp()(t) for t in (0.0, 0.25, 1.0, 3.0)] == [0.0, 0.25, 1.0, 1.0]
     assert [Ramp(2.0, 4.0)(t) for t in (2.0, 3.0, 5.0)] == [0.0, 0.5, 1.0]
 
 
+@pytest.mark.core
 def test_loads_without_an_amplitude_follow_one_rule_in_python_and_in_a_case():
     """Those of a case acted from the first step on, those of Python grew on after time 1."""
     steps = {"times": [0.0, 1.0, 2.0], "steps": [2, 1]}

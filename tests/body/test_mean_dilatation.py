@@ -90,6 +90,7 @@ def test_q1_p0_on_cells_no_two_of_which_are_alike(cell):
     assert fem.assemble_scalar(change) == pytest.approx(0.0, abs=1e-13)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", ["plane", "solid", "revolved"])
 def test_it_is_p2_p0_with_the_pressure_condensed(kind):
     """Energy: of the deviator in full, and of a pressure that is constant in each cell."""
@@ -155,6 +156,7 @@ def test_the_tangent_is_symmetric_and_that_of_the_forces(kind, material):
     assert np.linalg.norm(slope - change.array) < 1e-6 * np.linalg.norm(slope)
 
 
+@pytest.mark.core
 def test_cooks_membrane_does_not_lock():
     """Both elements of degree 2 close in on one limit, P2 from below."""
     below, above = cook(64, 2), cook(64, 2, MEAN)

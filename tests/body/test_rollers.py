@@ -57,6 +57,7 @@ def lengths(solution):
     return np.sort(np.linalg.norm(found[:, body.dim :], axis=1))
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 @pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1)])
@@ -91,6 +92,7 @@ def test_rollers_along_an_axis_are_a_fixed_component(linear):
     assert found.reaction("left") == pytest.approx(known.reaction("left"), abs=1e-11)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("order", [["left", "bottom"], ["bottom", "left"]])
@@ -140,6 +142,7 @@ def shrunk(domain, degree, amount):
     return solve(Problem(domain, body, Contact("left", 10.0), degree=degree))
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("degree", "bound", "order"), [(1, 2e-3, 1.6), (2, 2e-3, 1.8)])
 def test_a_circle_pressed_in_is_the_closed_form_of_a_ring(degree, bound, order):
@@ -164,6 +167,7 @@ def test_a_circle_pressed_in_is_the_closed_form_of_a_ring(degree, bound, order):
     assert solution.reaction("right") == pytest.approx(-2 * pressure * along, rel=5e-3)
 
 
+@pytest.mark.core
 def test_rollers_move_in_time_and_results_have_derivatives_by_them():
     steps = {"evolution": {"times": [0.0, 1.0], "steps": [2]}}
     clamped = {"on": "right", "displacement": [0.0, 0.0]}

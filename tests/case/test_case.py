@@ -17,6 +17,7 @@ from tests.problems.bar import BAR, changed
 PIEZO = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
 
 
+@pytest.mark.core
 def test_the_bar(bar):
     case = load_case(bar)
     assert case.source == str(bar)
@@ -29,6 +30,7 @@ def test_the_bar(bar):
     assert pickle.loads(pickle.dumps(case)) == case
 
 
+@pytest.mark.core
 def test_the_rest_of_the_keys():
     case = parse_case(
         changed(
@@ -122,6 +124,7 @@ def test_missing_files_name_the_file(tmp_path):
         load_case(tmp_path)
 
 
+@pytest.mark.core
 def test_overrides(bar):
     case = load_case(
         bar,

@@ -14,11 +14,13 @@ def evolution(**changes):
     return {**STEPS, "amplitudes": {"press": PRESS}, **changes}
 
 
+@pytest.mark.core
 def test_ends_of_the_steps():
     case = parse_case(changed(evolution=STEPS))
     assert case.evolution.ends == [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
 
 
+@pytest.mark.core
 def test_an_amplitude_is_linear_between_its_values():
     case = parse_case(changed(evolution=evolution(), load__0__amplitude="press"))
     function = case.evolution.amplitudes["press"]

@@ -49,6 +49,7 @@ formulas = st.recursive(st.one_of(numbers, st.sampled_from(["x", "y", "z", "pi"]
 points = st.tuples(*[st.floats(-3, 3).map(lambda v: round(v, 3))] * 3)
 
 
+@pytest.mark.core
 @pytest.mark.filterwarnings("ignore:Value error in evaluation:UserWarning")
 @settings(max_examples=300, deadline=None)
 @given(formulas, points)
@@ -80,6 +81,7 @@ def test_numpy_and_ufl_agree_with_numpy_itself(formula, point):
     assert symbolic == pytest.approx(reference, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("formula", "value"),
     [

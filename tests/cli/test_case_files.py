@@ -183,12 +183,14 @@ MESHES = {
 }
 
 
+@pytest.mark.core
 def test_the_base_case_is_right(shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """What the wrong cases differ from converges."""
     status, _ = run(write(shared_tmp_path, BAR), capfd=capfd)
     assert status == CONVERGED
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", WRONG)
 def test_wrong_case_file(
     name: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
@@ -227,6 +229,7 @@ def test_missing_files(shared_tmp_path: Path, capfd: pytest.CaptureFixture[str])
     refuse(write(shared_tmp_path, MESH.format(file="absent.msh")), ["absent.msh"], capfd)
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 @pytest.mark.parametrize(
     "name",

@@ -59,6 +59,7 @@ def test_bad_command_lines_leave_with_status_2(bar, capsys, monkeypatch, line, f
     assert sorted(path.name for path in bar.parent.iterdir()) == ["bar.toml"]
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("limit", "status"), [(100, 0), (1, 1)])
 def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, status):
     written = []
@@ -134,6 +135,7 @@ def test_too_little_memory_is_said_in_words(bar, capsys, monkeypatch):
     assert shown.count("\n") == 1
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_in_a_solve_keeps_what_there_is(bar, capsys, monkeypatch, number, status):
     from contact.methods.report import IterationHistory
@@ -153,6 +155,7 @@ def test_a_signal_in_a_solve_keeps_what_there_is(bar, capsys, monkeypatch, numbe
     assert f"contact: stopped: interrupted ({number.name}); results in {out}" in shown.err
 
 
+@pytest.mark.core
 def test_check_prints_the_case_the_parts_and_the_unknowns(bar, capsys):
     assert main(["check", str(bar), "--set", "solver.method=uzawa"]) == 0
     text = capsys.readouterr().out

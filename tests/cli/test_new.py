@@ -121,6 +121,7 @@ def test_parts_inside_of_a_body_are_listed(tmp_path: Path) -> None:
     assert main(["check", str(tmp_path / "bar.toml"), *more]) == CONVERGED
 
 
+@pytest.mark.core
 def test_two_bodies(tmp_path: Path) -> None:
     """The case presses them onto each other; it passes check as it is, and solves."""
     mesh = tmp_path / "blocks.msh"

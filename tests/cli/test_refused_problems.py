@@ -9,6 +9,7 @@ from contact.cli.main import CONVERGED, NOT_CONVERGED
 from tests.cli.running import BAR, PIEZO, refuse, run, write
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", ["pulled off", "potential of an open contact", "overflow"])
 @pytest.mark.parametrize("method", ["uzawa", "newton"])
 def test_problem_without_solution(
@@ -29,6 +30,7 @@ def test_problem_without_solution(
     refuse(write(shared_tmp_path, text), words, capfd)
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 @pytest.mark.parametrize("method", ["uzawa", "newton"])
 def test_held_nodes_that_conduct_determine_the_potential(
@@ -90,6 +92,7 @@ def test_each_body_of_a_pair_needs_a_potential(
         )
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 def test_not_converged_writes_outputs(
     shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]

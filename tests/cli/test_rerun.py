@@ -31,6 +31,7 @@ def run(case: Path, *options: str) -> int:
     return main(["solve", str(case), "--out", str(case.parent / "out"), "--quiet", *options])
 
 
+@pytest.mark.core
 def test_the_same_problem_again(case: Path) -> None:
     """By another method, to another tolerance, with other outputs: it is the same."""
     assert run(case) == CONVERGED

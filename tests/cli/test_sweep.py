@@ -55,6 +55,7 @@ def physics(row):
     return {key: value for key, value in row.items() if key not in RUNS}
 
 
+@pytest.mark.core
 def test_two_keys_and_rows_that_are_there(sweep):
     over = ("--over", "load.0.traction=[0.0, -0.005],[0.0, -0.01]", "--over", "friction.mu=0.2,0.4")
     linear = ("--set", "material.law=linear")
@@ -95,6 +96,7 @@ def test_rows_that_come_later_remain_where_the_sweep_is_ended(sweep, monkeypatch
     assert more == rows
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_warm_and_cold_agree(sweep, tmp_path, law):
     over = ("--over", "load.0.traction.1=-0.005,-0.01,-0.02", "--set", f"material.law={law}")

@@ -25,6 +25,7 @@ def numbers(expression, shape):
     return np.array([float(expression[index]) for index in np.ndindex(shape)]).reshape(shape)
 
 
+@pytest.mark.core
 def test_isotropic_constants_give_the_isotropic_law():
     law, other = Linear(7.0, 0.3), Anisotropic(isotropic(7.0, 0.3))
     for name in ("young", "poisson", "bulk", "shear"):
@@ -41,6 +42,7 @@ def test_isotropic_constants_give_the_isotropic_law():
     )
 
 
+@pytest.mark.core
 def test_rotated_material_and_strain_give_the_rotated_stress():
     q = to_axis([1.0, -2.0, 0.7]) @ about_z(33.0)
     eps = np.random.default_rng(1).normal(size=(3, 3))
@@ -52,6 +54,7 @@ def test_rotated_material_and_strain_give_the_rotated_stress():
     assert np.allclose(eigenvalues, Anisotropic(PZT).eigenvalues, rtol=1e-12)
 
 
+@pytest.mark.core
 def test_class_6mm_in_the_plane():
     """Along x and y are X2 and X3: c11 along x, c33 along y."""
     c = Anisotropic(PZT).rotated(in_plane()).stiffness
@@ -62,6 +65,7 @@ def test_class_6mm_in_the_plane():
     Anisotropic(c).check_plane()
 
 
+@pytest.mark.core
 def test_voigt_and_tensor():
     matrix = np.arange(36.0).reshape(6, 6)
     matrix = matrix + matrix.T

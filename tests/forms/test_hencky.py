@@ -75,6 +75,7 @@ def strains(draw, dim):
 both_strains = st.one_of(strains(2), strains(3))
 
 
+@pytest.mark.core
 @every_law
 @given(eps=both_strains)
 @settings(max_examples=40, deadline=None)
@@ -85,6 +86,7 @@ def test_energy(name, eps):
     )
 
 
+@pytest.mark.core
 @every_law
 @given(eps=both_strains)
 @settings(max_examples=40, deadline=None)
@@ -102,6 +104,7 @@ def test_stress_is_the_derivative_of_the_energy(name, eps):
             assert sigma[i, j] == pytest.approx(expected, rel=2e-5, abs=1e-8)
 
 
+@pytest.mark.core
 @given(eps=strains(2))
 @settings(max_examples=40, deadline=None)
 def test_the_stress_out_of_the_plane(eps):
@@ -123,6 +126,7 @@ def test_the_stress_out_of_the_plane(eps):
     assert number(von_mises(flat)) == pytest.approx(np.sqrt(1.5 * np.sum(dev**2)), abs=1e-15)
 
 
+@pytest.mark.core
 @given(eps=both_strains)
 @settings(max_examples=30, deadline=None)
 def test_deviator(eps):
@@ -132,6 +136,7 @@ def test_deviator(eps):
     assert number(deviator_squared(tensor(eps))) == pytest.approx(np.sum(dev**2), rel=1e-13)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("argument", ["norm", "square"])
 def test_the_law_of_the_thesis(argument):
     law = Log(1.0, 0.3, yield_strain=XI, argument=argument)
@@ -155,6 +160,7 @@ def test_a_law_that_makes_no_sense_is_refused(bad):
         Log(1.0, 0.3, yield_strain=XI, **bad)
 
 
+@pytest.mark.core
 def test_the_secant_stress_takes_the_modulus_from_the_frozen_strain():
     law = LAWS["norm"]
     frozen, eps = np.diag([4 * XI, -4 * XI]), np.diag([XI / 10, 0.0])

@@ -46,6 +46,7 @@ def steps(law, size, count=200, number=5):
         variables = response.variables
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("size", [4, 6])
 @pytest.mark.parametrize("name", list(LAWS))
 def test_a_step_meets_all_equations_of_the_law(name, size):
@@ -72,6 +73,7 @@ def test_a_step_meets_all_equations_of_the_law(name, size):
         assert response.dissipation.min() >= 0
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("size", [4, 6])
 @pytest.mark.parametrize("name", list(LAWS))
 def test_the_tangent_is_the_derivative_of_the_step(name, size):
@@ -87,6 +89,7 @@ def test_the_tangent_is_the_derivative_of_the_step(name, size):
     assert (asymmetric < 1e-14) == law.symmetric == (name != "chaboche")
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("size", [4, 6])
 @pytest.mark.parametrize("name", list(LAWS))
 def test_the_differential_is_the_derivative_of_the_step(name, size):
@@ -128,6 +131,7 @@ def test_the_differential_of_a_law_that_has_none_is_that_of_differences(name):
             assert np.sort(error)[-4] < 1e-5
 
 
+@pytest.mark.core
 def test_the_secant_is_hencky_s_about_a_moved_origin():
     law = J2(1.0, 0.3, yield_stress=0.004, hardening=0.03, kinematic=0.02)
     for strain, before, _ in steps(law, 6):
@@ -176,6 +180,7 @@ def test_numbers_that_are_none_of_a_material_are_refused():
             Tabulated(*points)
 
 
+@pytest.mark.core
 def test_laws_follow_the_protocol():
     assert all(isinstance(law, HistoryLaw) for law in LAWS.values())
     nothing = LAWS["chaboche"].respond(np.zeros((0, 4)), rest(LAWS["chaboche"], 0, 4), "tangent")

@@ -43,6 +43,7 @@ OTHERS = [
 name = str
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("mu", FRICTION, ids=name)
 @given(a=st.floats(0, 10), b=st.floats(0, 10), scale=st.sampled_from([1e-8, 1e-3, 1.0, 1e3]))
 def test_friction_coefficients_keep_their_bounds(mu, a, b, scale):
@@ -54,6 +55,7 @@ def test_friction_coefficients_keep_their_bounds(mu, a, b, scale):
     assert abs(values[0] - values[1]) <= mu.lipschitz * abs(s[0] - s[1]) * (1 + 1e-9) + tolerance
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("mu", FRICTION, ids=name)
 def test_the_bounds_of_friction_coefficients_are_sharp(mu):
     s = np.concatenate([[0.0], np.geomspace(1e-12, 1e12, 200)])
@@ -61,6 +63,7 @@ def test_the_bounds_of_friction_coefficients_are_sharp(mu):
     assert np.abs(mu.derivative(s)).max() == pytest.approx(mu.lipschitz, rel=1e-12)
 
 
+@pytest.mark.core
 def test_the_coefficient_of_the_thesis():
     mu = SlipCoefficient(0.5, 0.2, 100.0)
     assert mu(0.0) == pytest.approx(0.6)
@@ -68,6 +71,7 @@ def test_the_coefficient_of_the_thesis():
     assert (mu.maximum, mu.lipschitz) == pytest.approx((0.6, 0.05 * 100))
 
 
+@pytest.mark.core
 def test_a_coefficient_may_differ_from_node_to_node():
     mu = ConstantCoefficient(np.array([0.1, 0.4, 0.2]))
     assert mu.maximum == 0.4
@@ -75,6 +79,7 @@ def test_a_coefficient_may_differ_from_node_to_node():
     assert ConstantCoefficient(np.array([])).maximum == 0.0  # a rank without contact nodes
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("law", LAWS, ids=name)
 def test_friction_laws_know_their_derivatives(law):
     slip, pressure, h = np.array([0.02, 0.3]), np.array([0.5, 2.0]), 1e-6
@@ -89,6 +94,7 @@ def slopes(law, s, h=1e-6):
     return (law(s + h) - law(s - h)) / (2 * h)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("mu", FRICTION, ids=name)
 def test_derivatives_of_friction_coefficients(mu):
     scale = 1 / max(getattr(mu, "rho", 1.0), 1.0)
@@ -97,6 +103,7 @@ def test_derivatives_of_friction_coefficients(mu):
     assert mu.derivative(s) == pytest.approx(expected, rel=1e-6, abs=1e-9 / scale)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("law", "kinks"), OTHERS, ids=name)
 def test_derivatives_away_from_kinks(law, kinks):
     s = np.linspace(-2, 2, 401) + 1e-3
@@ -110,6 +117,7 @@ def test_derivatives_away_from_kinks(law, kinks):
         assert min(left, right) - 1e-12 <= at <= max(left, right) + 1e-12
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("law", "kinks"), OTHERS, ids=name)
 def test_laws_are_monotone_where_the_theory_needs_it(law, kinks):
     s = np.linspace(-2, 2, 401)
@@ -118,6 +126,7 @@ def test_laws_are_monotone_where_the_theory_needs_it(law, kinks):
     assert np.all(np.isfinite(law(s)))
 
 
+@pytest.mark.core
 def test_values_of_the_printed_laws():
     assert Truncation(0.5)(np.array([-2.0, 0.1, 2.0])).tolist() == [-0.5, 0.1, 0.5]
     ramp, shifted = RampConductivity(2.0, 4.0), ShiftedConductivity(2.0, 4.0)
@@ -147,6 +156,7 @@ def nodal():
     return evaluate
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("law", [*FRICTION, *(law for law, _ in OTHERS)], ids=name)
 def test_ufl_and_numpy_agree(law, nodal):
     s = np.linspace(0 if law in FRICTION else -2, 2, 61)
@@ -155,6 +165,7 @@ def test_ufl_and_numpy_agree(law, nodal):
     assert slope == pytest.approx(law.derivative(s) + 0 * s, rel=1e-13, abs=1e-15)
 
 
+@pytest.mark.core
 def test_the_flag_of_the_perfect_conductor_in_ufl(nodal):
     law, s = PerfectConductivity(3.0), np.linspace(-1, 1, 61)
     flagged = nodal(lambda x: law.at(x, None, ufl.gt(x, 0.05)), s)

@@ -8,6 +8,7 @@ from forms.monotonicity import check_monotonicity
 from tests.problems.materials import XI
 
 
+@pytest.mark.core
 def test_monotonicity_is_reported():
     law, t_max = Log(1.0, 0.3, yield_strain=XI), 0.4
     report = check_monotonicity(law, t_max)
@@ -30,6 +31,7 @@ def test_monotonicity_is_reported():
     assert check_monotonicity(Linear(1.0, 0.3), 0.0).holds
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("poisson", "dim", "holds"), [
     (-0.5, 2, False), (0.12, 2, False), (0.13, 2, True), (-0.01, 3, False), (0.01, 3, True),
 ])  # fmt: skip

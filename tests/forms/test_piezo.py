@@ -33,6 +33,7 @@ def voigt(crystal: Piezo):
     return e, crystal.beta
 
 
+@pytest.mark.core
 def test_short_form_is_the_full_matrix():
     e = [
         [0, 0, 0, 0, COUPLING["e15"], 0],
@@ -46,6 +47,7 @@ def test_short_form_is_the_full_matrix():
     assert np.array_equal(voigt(full)[0], e)
 
 
+@pytest.mark.core
 def test_plane_reduction_is_the_printed_law():
     """Equation (8.2) with (x, y) = (X2, X3)."""
     a, b, c, p, q = 0.3, -0.7, 0.2, 1.1, -0.4  # eps_xx, eps_yy, eps_xy, phi_x, phi_y
@@ -66,6 +68,7 @@ def value(expression, domain) -> float:
     return float(fem.assemble_scalar(fem.form(expression * ufl.dx(domain))))
 
 
+@pytest.mark.core
 def test_quarter_turns_and_poling_axis():
     turned = CRYSTAL.poled_along([0.0, 1.0, 0.0])
     assert np.allclose(turned.e[1, 1, 1], COUPLING["e33"])
@@ -116,6 +119,7 @@ def test_bad_tensors_are_refused():
         CRYSTAL.poled_along([1.0, 1.0, 1.0]).check_plane()
 
 
+@pytest.mark.core
 def test_coupling_number():
     """The coupling of a strain e: (e:eps)^2/(beta C) is maximal over all strains."""
     number = coupling_number(SCALED.law(), CRYSTAL)
@@ -126,6 +130,7 @@ def test_coupling_number():
     assert coupling_number(SCALED.law(), turned) == pytest.approx(number, rel=1e-12)
 
 
+@pytest.mark.core
 def test_stored_energy_is_positive():
     """B(x; y, y) = 2 W(eps, grad phi) > 0: the coupling cancels, however large."""
     square = mesh.create_unit_square(MPI.COMM_SELF, 2, 2)
@@ -165,6 +170,7 @@ def both_forms(dim: int, degree: int, law):
     return space, matrices
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("law", [SCALED.law(), hencky(0.1)], ids=["linear", "log"])
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("dim", [2, 3])

@@ -16,6 +16,7 @@ from tests.problems import mechanics
 SELF = MPI.COMM_SELF
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     """Compare with finite differences at a sliding and sticking iterate, away from kinks."""
@@ -48,6 +49,7 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     assert np.allclose(normal, nodes.normal_component(predicted), rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("softening", [0.25, np.inf])
 def test_falling_friction_is_followed_as_far_as_allowed(softening):
     """With no limit, the block is the derivative of mu(|u_tau|) p along the slip."""
@@ -72,6 +74,7 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     assert np.allclose(base.blocks[:, 0, 0], expected, rtol=1e-4)
 
 
+@pytest.mark.core
 def test_sliding_nodes_are_at_their_bound():
     """Those that slid in the step before and do so against their friction; no others."""
     yes = np.ones(4, dtype=bool)

@@ -47,29 +47,34 @@ def check_solution(column: LayerColumn, loop: FixedPoint | Newton) -> None:
         assert np.abs(problem.equilibrium.phi_scale * nodal[:, -1] - potential).max() < 1e-10
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("regime", REGIMES)
 @pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1)])
 def test_elastic_column(regime, dim, degree):
     assert check_column(REGIMES[regime], dim, degree) == regime
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("regime", PIEZO_REGIMES)
 @pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1)])
 def test_piezoelectric_column_with_potential_dependent_stiffness(regime, dim, degree):
     assert check_column(PIEZO_REGIMES[regime], dim, degree) == regime
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("regime", PIEZO_REGIMES)
 def test_insulated_piezoelectric_column_without_dependence(regime):
     column = replace(PIEZO_REGIMES[regime], k_e=0.0, h_nu=PotentialFactor(60.0))
     assert check_column(column) == regime
 
 
+@pytest.mark.core
 def test_current_through_a_gap_that_closes():
     column = replace(PIEZO_REGIMES["linear"], delta=4.0)
     assert check_column(column) == "linear"
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("push", [0.3, 0.8, 2.0])
 def test_no_rigid_part(push):
     column = LayerColumn(push, gap=np.inf, p_nu=Compliance(np.inf))
@@ -113,6 +118,7 @@ def test_a_stiff_column_does_not_cycle_between_open_and_saturated():
     assert check_column(STIFF) == "linear"
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     "column",
     [*REGIMES.values(), *PIEZO_REGIMES.values(), STIFF, replace(STIFF, gap=np.inf)],
@@ -152,6 +158,7 @@ def test_lagged_layer_reaches_the_same_solution(regime):
         assert check_column(replace(column, lagged=True)) == regime
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize(("c_nu", "rigid"), [(0.4, False), (0.2, True)])
 def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, rigid):
@@ -190,6 +197,7 @@ def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, r
     assert np.abs(nodal[:, 0] - slip).max() < 1e-10
 
 
+@pytest.mark.core
 @pytest.mark.parallel(alone=False)
 def test_ranks_agree_on_a_layer_in_space(comm):
     # Held at the left, pressed and pushed on top, on a layer with a rigid part behind.

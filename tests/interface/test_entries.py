@@ -44,6 +44,7 @@ def coulomb(mu):
 LAYER = {"law": "compliance", "layer": 0.01, "stiffness": 5.0, "potential_factor": 1.0}
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("common", [{}, LAYER], ids=["rigid", "layer"])
 def test_one_law_for_two_feet_is_the_law_of_their_union(common) -> None:
@@ -64,6 +65,7 @@ def test_one_law_for_two_feet_is_the_law_of_their_union(common) -> None:
     np.testing.assert_allclose(tables[1]["pressure"], tables[0]["pressure"], atol=1e-10)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("method", ["newton", "uzawa"])
 def test_each_foot_has_its_own_law(method: str) -> None:

@@ -72,6 +72,7 @@ def lumped(problem, vectors):
     return total
 
 
+@pytest.mark.core
 def test_augmentation_is_the_form_of_the_augmented_lagrangian(problem, x):
     body, nodes = problem.equilibrium, problem.nodes
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
@@ -86,6 +87,7 @@ def normal_of(problem):
     return ufl.FacetNormal(problem.domain.mesh)
 
 
+@pytest.mark.core
 def test_auxiliary_load(problem):
     random = np.random.default_rng(6)
     nodes, v = problem.nodes, ufl.TestFunction(problem.equilibrium.space)
@@ -103,6 +105,7 @@ def test_auxiliary_load(problem):
     )
 
 
+@pytest.mark.core
 def test_penalty_forms(problem, x):
     body, nodes = problem.equilibrium, problem.nodes
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
@@ -120,11 +123,13 @@ def test_penalty_forms(problem, x):
     assert assembled(friction) == pytest.approx(lumped(problem, forces.friction), abs=1e-14)
 
 
+@pytest.mark.core
 def test_contact_multiplier():
     pressure = forms.contact_multiplier(np.array([1.0, 0.0, 0.0]), 2.0, np.array([0.5, -1, 1]), 0.5)
     assert pressure.tolist() == [1.0, 0.0, 1.0]
 
 
+@pytest.mark.core
 def test_plane():
     plane = Plane((0.0, -1.0), (0.0, 2.0))
     points = np.array([[0.3, 0.5], [2.0, -1.0]])
@@ -140,6 +145,7 @@ def test_plane():
     assert np.all(np.isinf(away))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("inside", [False, True])
 def test_sphere_along_its_radius_and_along_the_body_s_normal(inside):
     sphere = Sphere((1.0, 0.0, 0.0), 2.0, inside)
@@ -163,6 +169,7 @@ def test_sphere_along_its_radius_and_along_the_body_s_normal(inside):
     assert inside or np.all(np.isinf(away)), "a ray that leads away never touches"
 
 
+@pytest.mark.core
 def test_gap_function_and_directions_of_the_body():
     direction, gap = flat(0.3).measure(np.zeros((4, 2)), np.tile([0.0, -1.0], (4, 1)))
     assert gap.tolist() == [0.3] * 4

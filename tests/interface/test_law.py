@@ -45,6 +45,7 @@ def random_nodes(n: int, dim: int, block_size: int, rng: np.random.Generator) ->
     )
 
 
+@pytest.mark.core
 def test_a_part_of_the_conductivity_is_that_of_a_smaller_k_e():
     rng = np.random.default_rng(5)
     nodes, x = random_nodes(50, 2, 3, rng), rng.standard_normal((50, 3))
@@ -60,6 +61,7 @@ def test_a_part_of_the_conductivity_is_that_of_a_smaller_k_e():
     assert less.block(x, pressure, full=True) == pytest.approx(small.block(x, pressure, full=True))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("psi", [ShiftedConductivity(0.7, 2.0), RampConductivity(0.7, 2.0)])
 def test_jacobian_is_the_derivative_of_the_force(dim, psi):
@@ -80,6 +82,7 @@ def test_jacobian_is_the_derivative_of_the_force(dim, psi):
         assert np.abs(jacobian[:, :, k] - slope).max() < 1e-6
 
 
+@pytest.mark.core
 def test_block_is_the_symmetric_part_without_the_frozen_factors():
     rng = np.random.default_rng(4)
     nodes = random_nodes(50, 2, 3, rng)
@@ -93,6 +96,7 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
     assert np.allclose(block, law.block(x, np.zeros(50), full=True), rtol=1e-14)
 
 
+@pytest.mark.core
 def test_what_rounding_leaves_of_a_multiplier_conducts_nothing():
     """A body that hung free was said to have a known potential, after 1e-19 of a pressure."""
     nodes = random_nodes(3, 2, 3, np.random.default_rng(5))
@@ -107,6 +111,7 @@ def test_what_rounding_leaves_of_a_multiplier_conducts_nothing():
     assert layered.charge(x, layered.layer_pressure(x)) == pytest.approx([-0.7 * 1.5] * 3)
 
 
+@pytest.mark.core
 def test_the_forms_j_1_and_l_are_the_nodal_force_and_charge():
     column = replace(PIEZO_REGIMES["linear"], delta=4.0)
     problem = column.problem()

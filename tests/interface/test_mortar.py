@@ -55,6 +55,7 @@ def rotation(dim):
     return turn
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("turned", [False, True], ids=["straight", "turned"])
 @pytest.mark.parametrize(("on", "against"), PAIRS, ids=PAIR_NAMES)
 def test_constant_pressure_and_linear_fields_pass(on, against, turned) -> None:
@@ -101,6 +102,7 @@ def check_tied(slave, master) -> None:
     np.testing.assert_allclose((found.own - found.other).toarray(), 0, atol=1e-12)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_matching_meshes_are_tied_node_by_node(kind) -> None:
     slave, _ = flat(kind, 5, 0.0, 1.0, 4)
@@ -116,6 +118,7 @@ def test_matching_curved_edges_are_those_of_both_sides(kind) -> None:
     check_tied(slave, master)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_what_is_partly_covered_still_reproduces_linear_fields(kind) -> None:
     """The master is smaller: nodes far from it drop out, the others extrapolate exactly."""
@@ -135,6 +138,7 @@ def test_what_is_partly_covered_still_reproduces_linear_fields(kind) -> None:
     np.testing.assert_allclose(found.gap, 0.05, atol=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_nodes_without_a_multiplier_hand_their_functions_over(kind) -> None:
     """At the rim none has one: constant pressures and constant fields still pass."""
@@ -154,6 +158,7 @@ def test_nodes_without_a_multiplier_hand_their_functions_over(kind) -> None:
     np.testing.assert_allclose(forces, loads(master, found.masters), rtol=0, atol=close)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("corners", "others"), [(3, 3), (4, 3), (4, 4)])
 def test_clipped_polygons_have_the_area_in_common(corners, others) -> None:
     """Against the share of random points that lie in both."""
@@ -207,6 +212,7 @@ def test_a_corner_that_both_triangles_have_loses_no_other() -> None:
         assert abs(area) == pytest.approx(0.0960959, rel=1e-6)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_concentric_arcs(degree) -> None:
     """Chords of two circles: normals are radial, gaps right to their order; of degree 2 beyond."""
@@ -261,6 +267,7 @@ def test_a_bowl_that_touches_within_facets_does_not_cut_them() -> None:
     assert cut.apart[deepest] > cut.gap[deepest] + 0.1 * depth
 
 
+@pytest.mark.core
 def test_deviations() -> None:
     """They are those of a sphere, at the rim too; edges of a body are none of a smooth surface."""
     turns = [np.linspace(0, 2 * np.pi, 6 * k, endpoint=False) for k in range(1, 5)]
@@ -303,6 +310,7 @@ def test_surfaces_that_do_not_face_each_other_have_nothing_in_common() -> None:
         assert couple(slave, master, 1.0).nodes.size == 0
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_surfaces_of_meshes(kind) -> None:
     """The nodes of facets are where the basis says, and normals point out of the body."""
@@ -325,6 +333,7 @@ def test_surfaces_of_meshes(kind) -> None:
         np.testing.assert_allclose(side.normal, normals, atol=1e-15)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_the_changed_basis_has_positive_integrals(kind) -> None:
     (shape, degree), change = kind, dual_basis_transformation(*kind)

@@ -40,6 +40,7 @@ def on_arch(foundation, degree=1, fixed=("top", (ZERO, ZERO))):
     return ContactProblem(arch(), body, Contact("arc", foundation), degree=degree).nodes
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_normals_of_a_curved_part_are_averaged(degree):
     nodes = on_arch(flat(), degree)
@@ -54,6 +55,7 @@ def test_normals_of_a_curved_part_are_averaged(degree):
     assert nodes.sum(np.ones(nodes.size)) == pytest.approx(length, rel=1e-13)
 
 
+@pytest.mark.core
 def test_directions_and_gaps_of_a_curved_part_over_a_plane():
     plane = Plane((0.0, -0.1), (0.0, 1.0))
     theirs = on_arch(plane)
@@ -65,6 +67,7 @@ def test_directions_and_gaps_of_a_curved_part_over_a_plane():
     assert np.all(own.gap >= theirs.gap - 1e-15)
 
 
+@pytest.mark.core
 def test_a_concentric_arc_has_a_constant_gap():
     nodes = on_arch(Sphere((0.0, 2.0), 2.25, inside=True))
     assert nodes.gap == pytest.approx(0.25)
@@ -72,6 +75,7 @@ def test_a_concentric_arc_has_a_constant_gap():
     assert own.gap == pytest.approx(0.25, rel=2e-3)
 
 
+@pytest.mark.core
 def test_tangents_project_onto_the_free_tangential_directions():
     for nodes in (on_arch(flat()), leaning_block(MPI.COMM_SELF, 2, 2).nodes):
         t = nodes.tangent
@@ -80,6 +84,7 @@ def test_tangents_project_onto_the_free_tangential_directions():
         assert np.einsum("nii->n", t) == pytest.approx(nodes.dim - 1)
 
 
+@pytest.mark.core
 def test_apply_and_transpose_are_each_other_s_transpose():
     problem = leaning_block(MPI.COMM_SELF, 2)
     nodes, owned = problem.nodes, problem.equilibrium.owned
@@ -105,6 +110,7 @@ def inclined(prescribed, degree):
     return problem, normal
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("prescribed", [0.0, 0.05, -0.1])
 def test_a_direction_that_is_partly_fixed(prescribed, degree):
@@ -127,6 +133,7 @@ def test_a_direction_that_is_partly_fixed(prescribed, degree):
     assert reaction == pytest.approx([-pressed * normal[0], 0.0], rel=1e-9)
 
 
+@pytest.mark.core
 def test_nodes_that_cannot_reach_the_foundation_are_left_out():
     away = GapFunction(lambda p: np.where(p[:, 0] > 2, np.inf, 0.0))
     example = bar(MPI.COMM_SELF, 4)
@@ -200,6 +207,7 @@ def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"
     return ContactProblem(domain, body, Contact("top", rigid), degree=degree).nodes
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("shape", [Sphere, circle])
 @pytest.mark.parametrize("direction", ["foundation", "body"])
 @pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1)])

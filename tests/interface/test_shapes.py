@@ -49,6 +49,7 @@ def coordinates(points):
     return h, np.linalg.norm(offset - h[:, None] * UP, axis=1)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", SHAPES)
 def test_distances_and_normals(name):
     """The nearest point is on the surface, nothing is nearer, and the normal leads to it."""
@@ -71,6 +72,7 @@ def test_distances_and_normals(name):
         assert np.array_equal(distance < 0, inside(*coordinates(POINTS)))
 
 
+@pytest.mark.core
 def test_the_paraboloid_by_minimisation():
     shape, _ = SHAPES["paraboloid"]
     distance, _ = shape.distance(POINTS)
@@ -86,6 +88,7 @@ def test_the_paraboloid_by_minimisation():
         assert abs(found) == pytest.approx(best, abs=1e-8)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("direction", ["body", "axis"])
 def test_gaps_along_rays(name, direction):
@@ -113,6 +116,7 @@ def test_gaps_along_rays(name, direction):
         assert np.all(shape.distance(away)[0] > -1e-9)
 
 
+@pytest.mark.core
 def test_closed_forms_along_the_axis():
     """The gaps of Hertz's paraboloid, of Sneddon's cone and of a flat punch, in half planes."""
     r = np.linspace(0, 1.5, 301)
@@ -206,6 +210,7 @@ def test_normals_that_are_not_the_slope_of_the_distance_are_refused(shape, fits,
         shape.check_normals(POINTS[:, :dim])
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", SHAPES)
 def test_normals_are_the_slope_of_the_distance(name):
     """Also beside edges and tips, where there are several slopes."""

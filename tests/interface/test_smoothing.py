@@ -37,6 +37,7 @@ def nodes(request):
     return PROBLEMS[request.param]().nodes
 
 
+@pytest.mark.core
 @given(radius=st.floats(1e-6, 50.0))
 @settings(max_examples=25, deadline=None)
 def test_a_constant_is_reproduced_to_rounding_at_any_radius(nodes, radius):
@@ -44,6 +45,7 @@ def test_a_constant_is_reproduced_to_rounding_at_any_radius(nodes, radius):
     assert np.abs(smooth - 3.7).max() < 1e-13
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("degree", "accuracy"), [(1, 1e-12), (2, 2e-3)])
 def test_a_linear_pressure_is_kept_in_the_interior(degree, accuracy):
     """Exact where nodes and weights are symmetric about the node; Simpson's weights alternate."""
@@ -57,6 +59,7 @@ def test_a_linear_pressure_is_kept_in_the_interior(degree, accuracy):
     assert np.abs(smooth - 1 - 2 * x)[x > 4 - radius / 2].max() > 0.01
 
 
+@pytest.mark.core
 def test_the_weighted_kernel_is_symmetric_before_its_normalisation(nodes):
     """R moves no more from one node to another than back, up to the division at each."""
     smoothing = Smoothing(nodes, 0.6)
@@ -84,6 +87,7 @@ def test_a_symmetric_pressure_stays_symmetric(degree):
     assert smooth[0] > 0
 
 
+@pytest.mark.core
 def test_it_is_the_identity_at_small_radii(nodes):
     pressure = 1 + np.sin(3 * nodes.points[:, 0])
     errors = [np.abs(Smoothing(nodes, r)(pressure) - pressure).max() for r in (0.8, 0.4, 0.2)]

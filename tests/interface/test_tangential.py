@@ -47,6 +47,7 @@ def check(solution) -> None:
     assert plate[1] == pytest.approx(-lid[1], rel=1e-7)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(
     ("method", "seed"), [("newton", 0), ("newton", 1), ("uzawa", 3), ("penalty", 2)]
@@ -82,6 +83,7 @@ def test_pressures_balance_the_reaction(method):
             assert pressed == pytest.approx(2.3788e-5, rel=2e-4)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("share", [1e-3, -1e-3])
 def test_residual_sees_friction_along_the_normal(share):
     """On sticking, slipping and open nodes, and where forces stay balanced."""
@@ -98,6 +100,7 @@ def test_residual_sees_friction_along_the_normal(share):
             assert evaluate(problem, wrong).friction > 1e-5
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [2, 3])
 def test_tangential_part_of_a_displacement_nearly_along_the_normal(dim):
     """Beside a large normal displacement the small tangential one has no part along the normal."""

@@ -37,6 +37,7 @@ def ball(n):
     return made[area > 1e-12]
 
 
+@pytest.mark.core
 def test_a_surface_of_triangles_is_second_order():
     points = POINTS[np.linalg.norm(POINTS, axis=1) > 0.3]
     radius = np.linalg.norm(points, axis=1)
@@ -50,6 +51,7 @@ def test_a_surface_of_triangles_is_second_order():
     assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2, abs=0.15)
 
 
+@pytest.mark.core
 def test_signs_at_edges_and_corners():
     """In front of the edges and corners of a cube faces alone do not tell the side."""
     corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
@@ -144,6 +146,7 @@ def test_a_hundred_thousand_triangles_in_a_second():
     assert min(seconds) < 1
 
 
+@pytest.mark.core
 def test_stl_files(tmp_path):
     made = ball(4)
     binary = np.zeros(len(made), [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")])

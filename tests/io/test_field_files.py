@@ -20,6 +20,7 @@ from contact.solving import solve
 from tests.problems.written import block, electric, written
 
 
+@pytest.mark.core
 def test_fields_can_be_read_back(shared_tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """fields.bp holds all fields at the nodes, with the values of the solution."""
     # Debian's adios2 takes its serial library in a run without mpirun, which will not do.
@@ -37,6 +38,7 @@ def test_fields_can_be_read_back(shared_tmp_path: Path, monkeypatch: pytest.Monk
     assert largest == pytest.approx(np.linalg.norm(x, axis=1).max(), rel=1e-12)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_xdmf(shared_tmp_path: Path) -> None:
     """Without VTX the fields go to XDMF, for P2 interpolated to P1."""
@@ -77,6 +79,7 @@ def test_a_failed_write_leaves_the_earlier_results(
     assert json.loads((shared_tmp_path / "summary.json").read_text()) == before
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
 def test_derived_fields_of_a_known_strain(degree: int) -> None:
@@ -97,6 +100,7 @@ def test_derived_fields_of_a_known_strain(degree: int) -> None:
     assert max(e.strain for e in fields.extremes()) == pytest.approx(t, rel=1e-12)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     "kind", [pytest.param("P1", marks=pytest.mark.parallel), "P2", "piezoelectric"]
 )

@@ -28,6 +28,7 @@ COLUMNS = {
 }
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
 def test_fixed_formats(dim: int, degree: int, shared_tmp_path: Path) -> None:
@@ -57,6 +58,7 @@ def test_fixed_formats(dim: int, degree: int, shared_tmp_path: Path) -> None:
     assert not list(shared_tmp_path.glob(".*")), "nothing half written is left"
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_electric_outputs(dim: int, shared_tmp_path: Path) -> None:
@@ -91,6 +93,7 @@ def test_iterations_of_the_linear_solver_are_written(tmp_path: Path) -> None:
     assert counts[0] == 1 < 5 < counts[1]
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_same_on_any_number_of_ranks(dim: int, shared_tmp_path: Path) -> None:
@@ -109,6 +112,7 @@ def test_same_on_any_number_of_ranks(dim: int, shared_tmp_path: Path) -> None:
             np.testing.assert_allclose(together[name], values, rtol=0, atol=1e-8 * scale)
 
 
+@pytest.mark.core
 def test_rows_follow_the_contact_part(shared_tmp_path: Path) -> None:
     """In the plane neighbours are neighbours, also on an arc and in several pieces."""
     disc = block(
@@ -140,11 +144,13 @@ def test_rows_follow_the_contact_part(shared_tmp_path: Path) -> None:
     np.testing.assert_allclose(table["x"], [*np.arange(5) / 8, *(1.5 + np.arange(5) / 8)])
 
 
+@pytest.mark.core
 def test_tangent() -> None:
     """On the bottom the tangent points along x."""
     np.testing.assert_allclose(tangent_of(np.array([[0.0, -1.0]])), [[1.0, 0.0]])
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_contact_force_balances_the_supports(shared_tmp_path: Path) -> None:
     """The force on the foundation is that of the load, in size and direction."""

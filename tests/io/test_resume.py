@@ -68,6 +68,7 @@ def hencky(**changes):
     return steps_case(load__0__traction=[0.0, -0.01], **law, **changes)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("elsewhere", [False, True])
 @pytest.mark.parametrize("count", [1, 3])
 def test_going_on(tmp_path, ended, count, elsewhere):
@@ -93,6 +94,7 @@ def test_going_on(tmp_path, ended, count, elsewhere):
     assert whole.warnings == solution.warnings
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("count", [1, 4])
 def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
     """Of press, shear and unload with friction: bit for bit on the same ranks."""
@@ -110,6 +112,7 @@ def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
         assert one.state.history.near(two.state.history, rtol=1e-12, atol=0.0)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
     """All ranks, one of them alone, and all again in one folder: each reads pieces of others."""
@@ -228,6 +231,7 @@ def on_the_line(*arguments):
     return main([str(argument) for argument in (*arguments, "--quiet")])
 
 
+@pytest.mark.core
 def test_the_command_line(tmp_path, ended, capfd):
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(to_toml(steps_case()))

@@ -97,6 +97,7 @@ def test_members_are_replaced_and_others_left_alone(tmp_path: Path) -> None:
     assert sorted(json.loads(later["summary.json"])["files"]) == sorted([*LATER, "summary.json"])
 
 
+@pytest.mark.core
 def test_killed_at_any_step_one_of_the_runs_is_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

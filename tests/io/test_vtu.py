@@ -19,6 +19,7 @@ from tests.problems.written import block, electric
 ROOT = MPI.COMM_WORLD.rank == 0
 
 
+@pytest.mark.core("2-1-triangle line", "3-2-tetra10 triangle6", "2-2-quad9 line3")
 @pytest.mark.parallel
 @pytest.mark.parametrize(
     ("dim", "degree", "kinds"),

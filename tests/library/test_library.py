@@ -51,6 +51,7 @@ def case(**material):
     return parse_case({**CASE, "material": material})
 
 
+@pytest.mark.core
 def test_the_packaged_library():
     known = library()
     wanted = "PZT-4 PZT-5A PZT-5H PZT-6B BaTiO3 PVDF ZnO AlN quartz LiNbO3 steel aluminium tungsten"
@@ -131,6 +132,7 @@ def test_a_wrong_entry_is_refused_with_its_name(tmp_path, old, new, words):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.core
 def test_a_material_by_name_is_the_one_by_its_constants():
     entry = find("PZT-4")
     constants = {"c11": 139.0, "c12": 77.8, "c13": 74.3, "c33": 113.0, "c44": 25.6}

@@ -43,6 +43,7 @@ def aggregates(matrix: PETSc.Mat, threshold: str = "0.01") -> PETSc.Mat:
     return found
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("n", [1, 8])
 def test_the_coarse_operator_is_that_of_petsc(n: int) -> None:
@@ -178,6 +179,7 @@ def test_rounding_on_one_side_of_a_symmetric_matrix() -> None:
     assert (found * ones).norm() > 0
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_multigrid_knows_rigid_motions_with_inclined_supports() -> None:
     """Their matrix is copied, and lost them on the way: the program broke off."""

@@ -36,6 +36,7 @@ class Bulk:
         return DenseOperator(MPI.COMM_SELF, self.free, DenseStiffness(self.stiffness), Counters())
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", ["definite", "indefinite", "asymmetric"])
 def test_solves_are_those_of_the_whole_matrix(kind):
     """By Cholesky or LU, with stiff blocks that come and go."""
@@ -82,6 +83,7 @@ def test_the_same_sum_is_factorised_once():
         assert operator.solve(rhs) == pytest.approx(expected, abs=1e-10)
 
 
+@pytest.mark.core
 def test_blocks_that_alone_hold_a_node_are_taken_away():
     """The whole matrix is singular then: a solution without numbers, not an error."""
     bulk = Bulk()

@@ -140,6 +140,7 @@ def test_an_operator_is_freed_at_once() -> None:
         gc.enable()
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_forces_that_contact_carries_do_not_blur_the_solution() -> None:
     """The tolerance is one on the solution, however large the contact forces on the right are."""
@@ -200,6 +201,7 @@ def test_one_level_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.allclose(*solutions, rtol=0, atol=1e-9 * np.abs(solutions[0]).max())
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_contact_alone_may_hold_the_body(dim: int) -> None:
@@ -211,6 +213,7 @@ def test_contact_alone_may_hold_the_body(dim: int) -> None:
     assert np.allclose(state.forces.pressure, 0.02, rtol=1e-6)
 
 
+@pytest.mark.core
 def test_fixed_unknowns_stay_exactly_where_they_are():
     """An iterative solver leaves them to its tolerance: a body that flew first kept 2e-5 of it."""
     problem = mechanics.leaning_block(MPI.COMM_SELF, 4)

@@ -47,6 +47,7 @@ def test_nothing_else_asks_for_a_shape_by_its_name() -> None:
     assert asked == set()
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
 @pytest.mark.parametrize("degree", [1, 2])
 def test_facets_have_the_nodes_of_dolfinx(shape, degree):
@@ -62,6 +63,7 @@ def test_facets_have_the_nodes_of_dolfinx(shape, degree):
         np.testing.assert_allclose(np.delete(whole, nodes, axis=1), 0, atol=1e-14)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("name", "degree", "known"),
     [
@@ -86,6 +88,7 @@ def test_numbers_and_order_are_those_of_vtk(name, degree, known):
     np.testing.assert_allclose(shape.nodes(degree)[list(order)], places[:, : shape.dim], atol=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", NAMES)
 def test_volumes_are_those_of_dolfinx(name):
@@ -102,6 +105,7 @@ def test_volumes_are_those_of_dolfinx(name):
         assert COMM.allreduce(found.sum()) == pytest.approx(np.pi, rel=1e-13)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
 def test_sizes_of_facets_and_their_normals_close_the_cell(shape):
     """The integral of n over the boundary is 0, and that of x.n is dim times the volume."""

@@ -29,6 +29,7 @@ BAR = {"left": 1.0, "right": 1.0, "bottom": 4.0, "top": 4.0}
 BRICK = {"left": 2.0, "right": 2.0, "front": 8.0, "back": 8.0, "bottom": 4.0, "top": 4.0}
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("rotation", [0.0, 30.0])
 @pytest.mark.parametrize("diagonal", ["right", "left", "crossed", "left_right", "right_left"])
@@ -45,6 +46,7 @@ def test_rectangle_has_its_sides_and_pieces(diagonal, rotation):
     assert (domain.dim, domain.size) == (2, 4.0)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_box_has_its_sides_and_pieces():
     parts = {"loaded": Piece("top", (2.0, 0.0), (4.0, 0.5)), "low": Piece("right", None, (1, 0))}
@@ -110,6 +112,7 @@ def test_a_mesh_without_regions_is_one():
     assert integral(domain, region="body") == pytest.approx(4.0)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_rotation_turns_the_normals_and_keeps_the_size():
     plane = rectangle(COMM, (1, 2), (4, 1), (4, 1), rotation=30.0)
@@ -206,6 +209,7 @@ def test_wrong_parts_of_a_dolfinx_mesh_are_refused():
         from_mesh(prisms, {})
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_ranks_without_cells():
     domain = rectangle(COMM, (0, 0), (1, 1), (1, 1))

@@ -196,6 +196,7 @@ def regions(domain) -> dict[str, float]:
     return {name: integral(domain, region=name) for name in domain.regions}
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_sets_of_abaqus_are_parts_and_regions(shared_tmp_path):
     path = shared_tmp_path / "plate.inp"
@@ -244,6 +245,7 @@ def test_bent_edges_are_kept(tmp_path):
         from_file(MPI.COMM_SELF, tmp_path / "folded.inp")
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", FILES)
 def test_other_formats(name, shared_tmp_path):
@@ -256,6 +258,7 @@ def test_other_formats(name, shared_tmp_path):
     assert regions(domain) == pytest.approx(cells)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("count", [8, 20, 27])
 def test_groups_of_salome(count, shared_tmp_path):
@@ -299,6 +302,7 @@ def test_input_files_that_gmsh_writes(cell, order, shared_tmp_path):
     assert regions(other)["body"] == pytest.approx(regions(own)["body"])
 
 
+@pytest.mark.core
 def test_side_sets_of_exodus(tmp_path):
     netcdf, meshio = pytest.importorskip("netCDF4"), pytest.importorskip("meshio")
     points = np.array(

@@ -55,6 +55,7 @@ def materials(first=None, second=None):
     ]
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("law", ["linear", "log"])
 @pytest.mark.parametrize("degree", [1, 2])

@@ -58,6 +58,7 @@ BAD = {
 }
 
 
+@pytest.mark.core("bar.msh", "bar-2.2.msh", "block.msh")
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", GOOD)
 def test_mesh_files_are_read_with_their_parts(name):
@@ -67,6 +68,7 @@ def test_mesh_files_are_read_with_their_parts(name):
     assert measures(domain) == pytest.approx(expected)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_cells_of_second_order_keep_their_nodes():
     domain = from_msh(COMM, FIXTURES / "curved.msh")
@@ -130,6 +132,7 @@ def test_one_part_at_least_is_needed(tmp_path):
         from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_groups_of_cells_are_regions():
     domain = from_msh(COMM, FIXTURES / "regions.msh")

@@ -22,6 +22,7 @@ def two_regions():
     return from_mesh(mesh, {"bottom": lambda x: x[1] < 0.01}, regions=regions)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("refine", [False, True])
 def test_regions(refine):
@@ -49,6 +50,7 @@ def refinable():
     }
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("kind", ["rectangle", "box", "ghosted", "two cells"])
 def test_refinement_keeps_the_parts(kind):

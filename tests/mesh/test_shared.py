@@ -122,6 +122,7 @@ def test_dolfinx_reads_it_too(shared_tmp_path, capsys):
     assert mesh.geometry.x[:, 0].max(initial=0.0) <= 2.0
 
 
+@pytest.mark.core
 def test_a_case_is_solved_on_it_as_on_its_source(tmp_path, capsys):
     source, made = written(tmp_path, "plate.inp")
     found = []

@@ -74,6 +74,7 @@ def sizes(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.sqrt(np.linalg.det(edges @ edges.transpose(0, 2, 1))) / (count * (count - 1))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("seed", range(8))
 def test_neighbours_cut_their_faces_alike_whatever_the_numbers(seed):
     contents = stack()

@@ -167,6 +167,7 @@ GENERATORS = {
 }
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 @pytest.mark.parametrize("name", meshes.GENERATORS)
 def test_generators_make_their_parts(name):
@@ -230,6 +231,7 @@ def test_faces_of_a_block_have_the_right_names():
         assert found == pytest.approx(normal, abs=1e-12)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", ["half_cylinder", "half_space", "sphere"])
 def test_cells_have_positive_volumes(name):
     """As other programs ask for, which read the files that are written."""
@@ -239,6 +241,7 @@ def test_cells_have_positive_volumes(name):
     assert np.linalg.det(corners[:, 1:] - corners[:, :1]).min() > 0
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", ["quarter_disc", "half_disc", "disc", "sphere"])
 def test_nodes_of_round_parts_lie_on_the_circle(name):
     radius = 5.0

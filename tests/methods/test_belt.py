@@ -24,6 +24,7 @@ def strap(cells: int, thickness: float) -> Domain:
     return domain
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("cells", "ratio", "mu", "degree", "thickness"),
     [(37, 1.2, 0.4, 1, 0.08), (53, 1.5, 0.3, 1, 0.2), (50, 1.1, 0.4, 2, 0.08)],

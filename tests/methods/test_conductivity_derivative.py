@@ -1,6 +1,7 @@
 """When the ramp of the conductivity is followed, and what that is good for."""
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
@@ -12,6 +13,7 @@ from forms.laws import SlipCoefficient
 from tests.problems.piezo import example, potential
 
 
+@pytest.mark.core
 def test_followed_as_long_as_the_residual_falls():
     follow = ConductivityDerivative(1e-2)
     assert [follow(r) for r in (1.0, 1e-1, 9e-3, 1e-4, 1e-9)] == [False, False, True, True, True]
@@ -27,6 +29,7 @@ def test_a_step_that_made_it_worse_is_not_repeated_at_once():
     assert follow(1e-4)
 
 
+@pytest.mark.core
 def test_steps_in_between_that_must_not_follow():
     follow = ConductivityDerivative()
     assert follow(1e-3)

@@ -20,6 +20,7 @@ from tests.problems.rings import between_plates, squeezed
 COMM = MPI.COMM_WORLD
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_the_least_of_all_places():
     """The lid is lifted: the ring may go anywhere in between. It does not depend on the ranks."""
@@ -89,6 +90,7 @@ def test_a_loaded_ring_that_lies_on_a_plate(seed):
     assert abs(pressed) == pytest.approx(1e-3 * np.pi, rel=0.02)  # a polygon in a circle
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("seed", range(5))
 def test_least_distance_by_another_method(seed):
     rng = np.random.default_rng(seed)

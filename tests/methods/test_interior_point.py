@@ -38,6 +38,7 @@ def bar_case(n: int, *changes: str) -> Case:
 COULOMB = Friction(ConstantCoefficient(0.5))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("friction", [COULOMB, Friction()])
 def test_an_interior_point_takes_over_where_newton_gives_up(friction):
     problem = mechanics.bar(SELF, 8, -0.05, friction=friction)
@@ -46,6 +47,7 @@ def test_an_interior_point_takes_over_where_newton_gives_up(friction):
     assert method.history.records[-1].kkt.largest <= 1e-8
 
 
+@pytest.mark.core
 def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     """Without friction it would slide away: its nodes are first taken for stuck."""
     case = {
@@ -250,6 +252,7 @@ def test_the_best_iterate_is_what_is_left_of_a_failure():
     assert outcome.kkt.largest == min(record.kkt.largest for record in method.history.records)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("slack", "length", "inside"),
     [(1, 2, True), (0, 2, False), (1, 1, False), (np.nan, 2, False), (1e200, 2, False)],

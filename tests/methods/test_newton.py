@@ -43,6 +43,7 @@ def compare(one: ContactProblem, other: ContactProblem, tolerance: float) -> Non
         assert np.allclose(found.forces.friction, slow.forces.friction, rtol=0, atol=atol)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("f2", [-0.005, -0.05])
 def test_newton_and_block_relaxation_agree_on_the_bar(degree, f2):
@@ -51,16 +52,19 @@ def test_newton_and_block_relaxation_agree_on_the_bar(degree, f2):
     compare(*pair, 1e-7)
 
 
+@pytest.mark.core
 def test_they_agree_in_space_where_sliding_nodes_turn():
     compare(mechanics.leaning_block(SELF), mechanics.leaning_block(SELF), 1e-7)
 
 
+@pytest.mark.core
 def test_they_agree_with_a_smoothed_pressure():
     friction = Friction(ConstantCoefficient(0.5), radius=0.3)
     pair = [mechanics.bar(SELF, 8, friction=friction) for _ in range(2)]
     compare(*pair, 1e-7)
 
 
+@pytest.mark.core
 def test_they_agree_with_tresca_friction():
     friction = Friction(tresca=mechanics.constant(0.002, 2))
     pair = [mechanics.bar(SELF, 8, friction=friction) for _ in range(2)]
@@ -89,6 +93,7 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
     assert np.allclose(state.x, x, rtol=0, atol=1e-8 * np.abs(x).max())
 
 
+@pytest.mark.core
 def test_the_last_steps_square_the_residual():
     law = Log(1.0, 0.3, yield_strain=0.01)
     problem = mechanics.bar(SELF, 16, -0.02, law=law, friction=Friction(ConstantCoefficient(0.4)))
@@ -99,6 +104,7 @@ def test_the_last_steps_square_the_residual():
     assert after < max(2e-4 * before, 1e-13)
 
 
+@pytest.mark.core
 def test_a_body_that_only_contact_holds_is_solved():
     problem = mechanics.pressed_block(SELF, 3, gap=0.01)
     method = newton(problem)
@@ -128,6 +134,7 @@ class Fading:
         return self.mu / (1 + pressure / self.p_0) ** 2
 
 
+@pytest.mark.core
 def test_friction_whose_coefficient_depends_on_the_pressure():
     law = Fading(0.6, 0.01)
     pair = [mechanics.bar(SELF, 8, -0.05, friction=Friction(law=law)) for _ in range(2)]
@@ -139,6 +146,7 @@ def test_friction_whose_coefficient_depends_on_the_pressure():
     assert np.allclose(size[slides], law(0.0, pressure[slides]), rtol=1e-6)
 
 
+@pytest.mark.core
 def test_the_iterative_solver_finds_the_same_solution():
     direct, iterative = mechanics.leaning_block(SELF, 4), mechanics.leaning_block(SELF, 4)
     exact = newton(direct, linear="lu")
@@ -152,6 +160,7 @@ def bar_case(n: int, *changes: str) -> Case:
     return bar(n, -0.05, 1.0, "friction.mu=0.5", "solver.tolerance=1e-10", *changes)
 
 
+@pytest.mark.core
 def test_nested_meshes_save_steps_and_change_nothing():
     plain = solve(bar_case(32), comm=SELF)
     nested = solve(bar_case(32, "solver.nested=true"), comm=SELF)
@@ -169,6 +178,7 @@ def test_nested_levels_halve_the_cells():
     assert coarser_cases(case, 5)[0].mesh.cells == (16, 4)
 
 
+@pytest.mark.core
 def test_a_linear_material_is_assembled_once_and_solved_exactly():
     problem = mechanics.bar(
         SELF, 8, law=Linear(1.0, 0.3), friction=Friction(ConstantCoefficient(0.5))
@@ -193,17 +203,20 @@ def pushed_block(push: float) -> dict:
     }
 
 
+@pytest.mark.core
 def test_friction_alone_may_hold_a_body():
     solution = solve(parse_case(pushed_block(0.004)), comm=SELF)
     assert solution.outcome.converged
     assert np.allclose(solution.contact_force[1:], [0.004, -0.05], rtol=1e-7)
 
 
+@pytest.mark.core
 def test_more_than_friction_can_hold_is_refused():
     with pytest.raises(InputError, match="pull the body off"):
         build_problem(parse_case(pushed_block(0.04)), SELF)
 
 
+@pytest.mark.core
 @pytest.mark.parallel(alone=False)
 def test_ranks_agree():
     world = MPI.COMM_WORLD

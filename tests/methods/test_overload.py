@@ -32,6 +32,7 @@ def wall(dim, part, angle=0.0):
     })  # fmt: skip
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("dim", "angle"), [(2, 0.0), (3, 0.0), (3, 0.3)])
 def test_the_multiple_of_friction_that_holds_a_block(dim, angle):

@@ -38,6 +38,7 @@ def relative(problem: ContactProblem, a, b) -> float:
     return float(np.sqrt(difference / problem.comm.allreduce(float(np.sum(b**2)), op=MPI.SUM)))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("load", [-0.005, -0.05])
 def test_error_and_pressure_fall_like_eps(load):
     problem = bar(load=load, coefficient=ConstantCoefficient(0.5))
@@ -59,6 +60,7 @@ def test_error_and_pressure_fall_like_eps(load):
     assert errors[2] < 1e-5
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_without_friction_the_penetration_is_eps_times_the_pressure():
     problem = bar()
@@ -73,6 +75,7 @@ def test_without_friction_the_penetration_is_eps_times_the_pressure():
     assert outcome.kkt.contact == pytest.approx(0.25e-5, rel=1e-6)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("material_step", ["secant", "tangent", "auto"])
 def test_all_ways_lead_to_the_same_solution(material_step):
     problem = bar(load=-0.05, coefficient=SlipCoefficient(0.5, 0.2, 1e5))
@@ -155,6 +158,7 @@ def test_smoothed_pressure(radius):
     assert relative(problem, state.x[:owned], reference.x[:owned]) < 1e-4
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("law", ["lagged", "implicit"])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_blocks_are_the_derivative_of_the_forces(law, dim):

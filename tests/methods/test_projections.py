@@ -12,6 +12,7 @@ from contact.thesis.uzawa import _Projection
 from forms.laws import Compliance
 
 
+@pytest.mark.core
 def test_projections():
     z = np.array([[3.0, 4.0], [0.3, 0.4], [0.0, 0.0], [-6.0, 8.0]])
     assert project_disc(z, np.array([1.0, 1.0, 0.0, 0.0])) == pytest.approx(
@@ -20,6 +21,7 @@ def test_projections():
     assert project_half_line(np.array([-1.0, 2.0])).tolist() == [0.0, 2.0]
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [1, 2, 3])
 def test_the_derivative_of_the_projection_onto_a_disc(dim):
     random = np.random.default_rng(dim)
@@ -32,6 +34,7 @@ def test_the_derivative_of_the_projection_onto_a_disc(dim):
         assert np.abs(exact[:, :, k] - slope).max() < 1e-6
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("seed", range(5))
 def test_the_acceleration_solves_random_complementarity_problems(seed):
     """Find p >= 0 with u = u_0 - C p <= 0, p u = 0, for a random positive definite C."""
@@ -69,6 +72,7 @@ def test_the_acceleration_solves_random_complementarity_problems(seed):
     assert fast <= 60
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("nodes", [0, 3])
 @pytest.mark.parametrize("layer", [False, True])
 def test_several_points_are_projected_as_one_after_the_other(nodes, layer):

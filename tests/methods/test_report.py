@@ -10,6 +10,7 @@ MET = Residuals(1e-9, 0.0, 1e-10)
 FLOORS = (5e-8, 0.0, 0.0)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("ended", ["", "not converged in 200 steps", "the residual stalled"])
 def test_what_has_converged_is_said_to_have_met_its_residuals(ended):
     """The reason of a ring in a clearance was "not converged in 200 steps", with exit 0."""
@@ -18,6 +19,7 @@ def test_what_has_converged_is_said_to_have_met_its_residuals(ended):
     assert outcome.reason == "all residuals <= 1e-08"
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("ended", "reason"),
     [
@@ -32,6 +34,7 @@ def test_a_residual_explains_a_failure(ended, reason):
     assert outcome.reason.startswith(reason)
 
 
+@pytest.mark.core
 def test_a_residual_below_its_floor_alone_is_met_to_rounding():
     outcome = Outcome(Residuals(3e-8, 0.0, 0.0, FLOORS), ALLOWED, "stalled")
     assert outcome.converged
@@ -41,6 +44,7 @@ def test_a_residual_below_its_floor_alone_is_met_to_rounding():
     assert not beyond.converged and "to rounding" not in beyond.reason
 
 
+@pytest.mark.core
 def test_a_criterion_of_its_own_is_named():
     """Where the residuals are met, and where they are not."""
     words = "the thesis's criterion is met"

@@ -35,6 +35,7 @@ FRICTION = [-2.9026178e-05, -9.9516588e-05]
 UNIFORM = {"on": "top", "traction": [0.0, -1e-5]}
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("case", "force", "nodes", "fallback"),
     [
@@ -131,6 +132,7 @@ def test_a_plate_over_a_gap_is_solved_without_its_dense_matrix(mu):
     assert np.allclose(sparse.contact_force, dense.contact_force, rtol=0, atol=1e-7 * size)
 
 
+@pytest.mark.core
 def test_the_force_of_the_stop_is_that_of_a_beam():
     """Euler and Bernoulli: F - 3 E' I gap/L^3, but for shear, (h/L)^2 of the difference."""
     case = beam(100.0, [200, 2], TIP, 0.5, space={"degree": 2})
@@ -262,6 +264,7 @@ def test_half_of_the_steps_remain_for_the_condensed_body(most):
     assert len(solution.history.records) <= most
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_ranks_agree_on_the_working_set():
     case = beam(100.0, [100, 1], TIP, 0.5, 0.3)

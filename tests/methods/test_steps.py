@@ -34,6 +34,7 @@ BLOCKS = {
 }
 
 
+@pytest.mark.core
 def test_the_block_slides_by_the_closed_form():
     """s_n = clip(s_(n-1), U - H tau_c/G, U + H tau_c/G)."""
     stepped, slip = BLOCKS["coulomb"], 0.0
@@ -42,6 +43,7 @@ def test_the_block_slides_by_the_closed_form():
         assert step.slip == pytest.approx(slip, abs=1e-14)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("dim", "degree", "method"),
     [(2, 1, "newton"), (2, 2, "newton"), (3, 1, "newton"), (2, 1, "uzawa")],
@@ -61,6 +63,7 @@ def test_stepped_block(name, dim, degree, method):
     assert steps[-1].counters.factorizations <= 1 or name == "hencky" or method == "uzawa"
 
 
+@pytest.mark.core
 def test_one_step_from_rest_is_the_static_problem():
     """Bit for bit: with a load that grows with time, and slip-dependent friction."""
     problem = mechanics.bar(SELF, 8)
@@ -80,6 +83,7 @@ def balances(problem, steps):
     return found
 
 
+@pytest.mark.core
 def test_the_area_of_the_loop_is_what_friction_takes():
     """Around the loop +U -> -U -> +U the energy comes back, and work is dissipation."""
     stepped = BLOCKS["coulomb"]
@@ -136,6 +140,7 @@ def test_penalty_comes_near():
         assert np.abs(one.state.x - two.state.x).max() < 1e-4
 
 
+@pytest.mark.core
 def test_unloaded_in_one_step_or_two_is_not_the_same():
     """Friction remembers: where the load has been matters, not only where it is."""
     there = steps_of(shaken(), [1.0, 2.0, 2.5])[-1].state
@@ -159,6 +164,7 @@ def test_the_balance_closes_with_the_steps(law):
     np.testing.assert_allclose(ratios, 4.0, rtol=0.35)
 
 
+@pytest.mark.core
 def test_a_state_can_be_gone_on_from():
     problem = shaken(Log(1.0, 0.3, yield_strain=0.003))
     ends = times(2)

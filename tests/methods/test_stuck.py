@@ -11,6 +11,7 @@ from contact.thesis.fixed_point import FixedPoint
 from tests.problems import pairs
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("push", [0.3, 0.97])
 def test_what_friction_alone_holds_is_stuck_at_first(push):
     """Without friction, as the thesis begins, it would slide away: it stalled at 1e-2."""
@@ -24,6 +25,7 @@ def test_what_friction_alone_holds_is_stuck_at_first(push):
     check_loose(case, 200)
 
 
+@pytest.mark.core
 def test_a_stack_that_friction_alone_holds():
     """It stalled at 1e-2 and more."""
     case = pairs.case(

@@ -32,6 +32,7 @@ def test_few_inner_iterations_on_fine_meshes(n, f2):
     assert all(record.kkt.contact <= 1e-8 for record in loop.history.records)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("n", "f2", "rho", "pressure", "largest"),
     [
@@ -75,6 +76,7 @@ VARIANTS = [
 ]
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("options", VARIANTS, ids=str)
 def test_every_variant_finds_the_same_solution(options, reference):
     data = contact_data(coarse(tolerance=1e-9, **options))
@@ -103,6 +105,7 @@ def test_factorisations_are_kept():
     assert loop.counters.linear_solves == sum(record.inner for record in loop.history.records)
 
 
+@pytest.mark.core
 def test_tresca_friction_is_one_step():
     """A given bound leaves nothing for the outer loop to update."""
     friction = Friction(tresca=Affine((0.001, 0.0), 0.0005))

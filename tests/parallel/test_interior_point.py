@@ -23,6 +23,7 @@ def plate(mu: float) -> dict:
     }
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 @pytest.mark.parametrize("mu", [0.0, 0.3])
 def test_a_plate_lies_down_alike(linear, mu):

@@ -53,26 +53,31 @@ def agree(comm, make):
     return together
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_example_7_2(comm, degree):
     agree(comm, lambda c: bar(c, 8 // degree, -0.005, 1e5, degree))
 
 
+@pytest.mark.core
 def test_example_7_2_with_yield_and_smoothing(comm):
     law = Log(1.0, 0.3, yield_strain=0.05)
     friction = Friction(SlipCoefficient(0.5, 0.2, 1e5), radius=0.3)
     agree(comm, lambda c: bar(c, 8, -0.05, law=law, friction=friction))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_in_space(comm, degree):
     agree(comm, lambda c: leaning_block(c, 3 - degree // 2, degree))
 
 
+@pytest.mark.core
 def test_a_body_that_only_the_foundation_holds(comm):
     agree(comm, lambda c: pressed_block(c, 3, 2, gap=0.05))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_body_of_revolution(comm, degree):
     agree(comm, lambda c: pressed_cylinder(c, 6, degree, radius=0.3))
@@ -92,6 +97,7 @@ def tower(comm, cells=(2, 24)):
     return ContactProblem(domain, body, Contact("foot", flat()), Friction(radius=0.0))
 
 
+@pytest.mark.core
 def test_a_rank_without_contact_nodes(comm):
     together = agree(comm, tower)
     counts = comm.allgather(together.problem.nodes.nodes.size)
@@ -105,6 +111,7 @@ def tower_with_friction(comm):
     return ContactProblem(plain.domain, plain.body, contact, degree=2)
 
 
+@pytest.mark.core
 def test_a_rank_without_contact_nodes_with_friction_and_smoothing(comm):
     agree(comm, tower_with_friction)
 
@@ -143,12 +150,14 @@ def idle(comm):
     return ContactProblem(domain, body, Contact("bottom", flat()), friction)
 
 
+@pytest.mark.core
 def test_ranks_without_cells(comm):
     together = agree(comm, idle)
     cells = comm.allgather(together.problem.domain.mesh.topology.index_map(2).size_local)
     assert comm.size == 1 or min(cells) == 0
 
 
+@pytest.mark.core
 def test_a_mesh_of_two_cells(comm):
     def make(c):
         domain = rectangle(c, [0.0, 0.0], [1.0, 1.0], [1, 1])
@@ -162,6 +171,7 @@ def test_a_mesh_of_two_cells(comm):
     agree(comm, make)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("radius", [0.0, 0.2, 1.0, 9.0])
 def test_smoothing(comm, radius):
     """Neighbours within the radius count, whichever rank has them."""
@@ -174,6 +184,7 @@ def test_smoothing(comm, radius):
     assert results[0] == pytest.approx(results[1], rel=1e-13)
 
 
+@pytest.mark.core
 def test_sums_norms_and_maxima_are_global(comm):
     nodes, alone = bar(comm, 8).nodes, bar(MPI.COMM_SELF, 8).nodes
     assert nodes.size == alone.size == 32
@@ -184,6 +195,7 @@ def test_sums_norms_and_maxima_are_global(comm):
     assert sorted(nodes.gather(x)) == pytest.approx(sorted(y))
 
 
+@pytest.mark.core
 def test_every_node_has_one_owner_and_full_weight(comm):
     for degree in (1, 2):
         nodes = leaning_block(comm, 2, degree).nodes
@@ -197,6 +209,7 @@ def test_every_node_has_one_owner_and_full_weight(comm):
             assert ours == pytest.approx(theirs, abs=1e-14)
 
 
+@pytest.mark.core
 def test_prescribed_values_reach_ghosts(comm):
     problem = idle(comm)
     x = problem.start().x
@@ -206,6 +219,7 @@ def test_prescribed_values_reach_ghosts(comm):
     assert set(np.unique(x[top]).tolist()) <= {0.02, -0.03}
 
 
+@pytest.mark.core
 def test_a_mesh_is_distributed_in_the_same_way_each_time(comm):
     made = [mesh.create_unit_cube(comm, 8, 8, 8).geometry.x for _ in range(8)]
     assert all(np.array_equal(made[0], x) for x in made[1:])

@@ -23,6 +23,7 @@ def flat(values):
     return {(): values}
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     "settings",
     [
@@ -37,12 +38,14 @@ def test_an_indenter_moves_alike(settings):
     alike(case, settings, 1e-7)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("condense", [True, False])
 @pytest.mark.parametrize("make", [plate, column])
 def test_plates_and_electrodes_move_alike(make, condense):
     alike(make(), NewtonOptions(tolerance=1e-11, condense=condense), 1e-8)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("degree", "condense"), [(1, False), (2, True), (2, False)])
 def test_a_ball_in_space_moves_alike(degree, condense):
     ball = indented(3, 3, displacement=[0.0, 0.0, "free"], force=[0.0, 0.0, -0.02])

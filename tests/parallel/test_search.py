@@ -40,6 +40,7 @@ def share(side, owners, seed):
     return replace(side, owners=owners, **dict(zip(names, (a[own] for a in arrays), strict=True)))
 
 
+@pytest.mark.core
 def test_rows_are_sent_where_they_are_to_go():
     rank, size = COMM.rank, COMM.size
     to = np.repeat(np.arange(size), np.arange(size) + rank)[::-1]
@@ -50,6 +51,7 @@ def test_rows_are_sent_where_they_are_to_go():
     np.testing.assert_array_equal(flags, source > 0)
 
 
+@pytest.mark.core
 def test_the_nearest_place_of_any_rank():
     """The same as of one tree of all places; of places that are equally near the first."""
     rng = np.random.default_rng(0)
@@ -66,6 +68,7 @@ def test_the_nearest_place_of_any_rank():
     assert (nearest_named(COMM, points, none, np.zeros(0, dtype=np.int64)) == -1).all()
 
 
+@pytest.mark.core
 def test_values_of_nodes_of_other_ranks():
     owners = owners_of(20)
     begin, end = owners.begins[COMM.rank : COMM.rank + 2]
@@ -83,6 +86,7 @@ def test_values_of_nodes_of_other_ranks():
     np.testing.assert_array_equal(sums[:, 0], COMM.size * np.where(nodes == 19, 2.0, 1.0))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("levels", [0, 1])
 def test_deviations_depend_on_no_share(levels):
     """On a sphere that ends, with facets of four rings on other ranks."""
@@ -112,6 +116,7 @@ def rows_of(found, nodes, numbers, matrix, count):
     return dense
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("held", [False, True], ids=["free", "held"])
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_the_mortar_operator_of_shares(kind, held):
@@ -140,6 +145,7 @@ def test_the_mortar_operator_of_shares(kind, held):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES)
 def test_areas_of_shares(kind):
     side, x = flat(kind, 6, 0.0, 1.0, 1)

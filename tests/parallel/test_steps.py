@@ -35,6 +35,7 @@ def agree(some, others):
             np.testing.assert_allclose(table[name], other_table[name], rtol=1e-11, atol=1e-10)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("law", LAWS)
 def test_the_ranks_do_not_matter(law, comm, shared_tmp_path):
     """From rest; and from the checkpoints of a run on one rank, and back."""

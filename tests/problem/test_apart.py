@@ -29,6 +29,7 @@ def of_second(solution, values):
     return values[np.argsort(points)][np.sort(points) > 1.5]
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 @pytest.mark.parametrize("method", METHODS)
@@ -73,6 +74,7 @@ def test_where_nothing_touches_is_no_solution(beside):
     assert evaluate(problem, State(x, forces)).equilibrium > 0.1
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", ["contact", "friction"])
 def test_the_laws_hold_on_each_body(beside, name):
     """A pressure of another sign, and a friction far beyond its bound."""

@@ -55,6 +55,7 @@ def bar(bolt, dim=2, degree=1, rotation=0.0, **more):
     return parse_case(data | more)
 
 
+@pytest.mark.core("force-2-1-lu", "shortening-2-1-lu", "shortening-2-2-lu")
 @pytest.mark.parallel
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 @pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
@@ -154,6 +155,7 @@ def stiffnesses():
     return bolt, 1 / sum(1 / k for k in flanges)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 @pytest.mark.parametrize("cut", [0.4, 0.8])
@@ -179,6 +181,7 @@ def test_a_bolt_and_two_flanges_in_series(cut, linear):
         assert pressures == pytest.approx(force / WIDTHS[1], rel=1e-8)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("share", [0.5, 0.99, 1.5])
 def test_a_tightened_joint_shares_a_load_until_it_opens(share):

@@ -27,6 +27,7 @@ def bar(comm: MPI.Intracomm, **options) -> ContactProblem:
     return mechanics.bar(comm, 8, friction=Friction(ConstantCoefficient(0.5)), **options)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("cells", [8, 1])
 def test_condensing_and_expanding_solves_the_whole_system(cells):
@@ -57,6 +58,7 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
         assert np.allclose(schur.interior(times * rhs), schur.interior(times * rhs))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("few", [1, 5, 10])
 def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
     """MUMPS's own estimate of its workspace is too small there."""
@@ -90,6 +92,7 @@ def test_the_first_rank_alone_holds_the_dense_matrix_and_factors():
     assert body.stiffness.matrix.shape[0] == (found.size if WORLD.rank == 0 else 0)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_a_small_block_is_condensed_on_any_number_of_ranks():
     """On three ranks one of them eliminates next to nothing."""
@@ -104,6 +107,7 @@ def test_a_small_block_is_condensed_on_any_number_of_ranks():
     assert found[0][1] == found[1][1] < 10
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_a_mesh_of_few_cells_is_solved_on_any_number_of_ranks():
     found = []
@@ -117,6 +121,7 @@ def test_a_mesh_of_few_cells_is_solved_on_any_number_of_ranks():
     assert found[0][1] == found[1][1]
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_what_is_left_of_a_problem_has_the_same_residuals():
     """The trace of a state of equilibrium is one of the condensed problem, and no other."""
@@ -150,6 +155,7 @@ def test_a_condensed_body_is_no_body_that_has_lost_its_mesh():
         assert np.isfinite(evaluate(left, state).largest)
 
 
+@pytest.mark.core
 def test_slower_methods_work_at_the_contact_nodes_too():
     problem = bar(SELF, law=Linear(1.0, 0.3))
     reference = Newton(problem, NewtonOptions(tolerance=1e-10))

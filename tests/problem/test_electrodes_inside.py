@@ -87,6 +87,7 @@ def tip(solution, length=24.0, rotation=0.0):
     return found.mean()
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_a_parallel_bimorph_bends_twice_as_far_as_one_in_series():
     """Kappa L^2/2 of the beam, and the same voltage over half the thickness."""
@@ -179,6 +180,7 @@ def test_a_stack_of_ten_layers_grows_by_ten_times_d33_V(dim):
     assert solution.charges.imbalance < 1e-9
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_a_stack_driven_by_a_charge():
     """The hot electrodes are one unknown potential: the charge gives the voltage."""

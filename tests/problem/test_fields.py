@@ -47,6 +47,7 @@ def test_small_forces_beside_large_charges(method, linear, law):
     assert raw.charge < 2 * TOLERANCE * raw.electrified
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("top", [0.0, 1e6])
 def test_each_field_is_out_of_balance_by_itself(top):
     """Without a given potential the strain alone charges the body, by a part in 1e9."""
@@ -61,6 +62,7 @@ def test_each_field_is_out_of_balance_by_itself(top):
     assert evaluate(problem, state).equilibrium < TOLERANCE
 
 
+@pytest.mark.core
 def test_what_a_potential_exerts_is_what_acts():
     """No load, nothing touched: the forces of the potential alone bend the body."""
     apart = {"contact": {"on": "bottom", "gap": 10.0}, "load": []}

@@ -91,6 +91,7 @@ def kappa_after(solution):
     return solution.problem.commit(solution.state).arrays()["material.kappa"]
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
 def test_unloading_goes_back_along_the_secant(degree):
@@ -161,6 +162,7 @@ def test_a_state_without_its_history_is_of_another_step():
     assert problem.commit(first).near(second.history, rtol=1e-14)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("size", [4, 6])
 def test_drucker_and_prager_s_cone_of_the_example(size):
     """The oedometer in closed form, the apex, and no more than the cone at random strains."""

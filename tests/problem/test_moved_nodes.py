@@ -24,6 +24,7 @@ def moved(domain, contact, supports, method="newton", **options):
     return solution
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(
     ("method", "within"), [("newton", 1e-9), ("uzawa", 1e-7), ("penalty", 0.02)]
@@ -42,6 +43,7 @@ def test_ends_that_supports_move_slip_as_the_others(method, within):
     assert borne == pytest.approx(force[0], rel=1e-6)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_there_and_back():
     domain = rectangle(COMM, (0, 0), (2, 1), (4, 2))
@@ -73,6 +75,7 @@ def test_faces_of_a_block_in_space():
     assert np.linalg.norm(force[:2]) == pytest.approx(-MU * force[2], rel=1e-3)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_a_block_that_slides_over_held_nodes():
     supports = {

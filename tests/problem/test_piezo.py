@@ -60,6 +60,7 @@ def test_plane_body_refuses_a_crystal_that_leaves_the_plane(monkeypatch):
         example(COMM, (4, 2))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("cells", [(16, 8), (4, 2, 3)], ids=["plane", "space"])
 def test_turned_body(cells):
     """Rotated body, load and poling axis: the rotated solution to rounding."""
@@ -95,6 +96,7 @@ def test_printed_ramp_does_not_conduct(monkeypatch):
     assert np.allclose(found, expected, rtol=1e-8)
 
 
+@pytest.mark.core
 def test_truncation_limits_the_charge():
     problem = example(COMM, (16, 8), -10.0, limit=3.0)
     solver = solve(problem)
@@ -121,6 +123,7 @@ def test_body_without_ground(method, limit):
     assert np.allclose(found[0], found[1], rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("k_e", [1e-3, 1e-2, 1e-1])
 def test_lagged_and_implicit_current_agree(k_e):
     found = []

@@ -44,6 +44,7 @@ def totals(solution):
     return np.array([[step.row[name] for name in names] for step in solution.steps])
 
 
+@pytest.mark.core
 def test_confined_block_on_a_smooth_foundation():
     """Yield, unloading, reversed yield and lifting off in the oedometer, in closed form."""
     pressed = [0.001625, 0.004875, 0.004875 - 875 / 269230.76923, 0.001, 0.0005]
@@ -59,6 +60,7 @@ def test_confined_block_on_a_smooth_foundation():
     assert stress[0, 0] == pytest.approx(-250.0, abs=1e-4)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("hardening", [*HARDENING][-1 if MPI.COMM_WORLD.size > 2 else 0 :])
 def test_a_restart_goes_on_with_the_same_history(tmp_path, hardening):
@@ -91,6 +93,7 @@ def accumulated(problem, state):
     return float(problem.equilibrium.laws.volumes @ a)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("hardening", list(HARDENING))
 def test_methods_agree(hardening, degree):

@@ -16,6 +16,7 @@ from tests.problems.rigid import PIEZO, column, plate, solved
 SELF = MPI.COMM_SELF
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("condense", [True, False])
 def test_a_plate_stays_plane_and_balances_force_and_moment(condense):
     solution, moved = solved(plate(), SELF, NewtonOptions(tolerance=1e-10, condense=condense))
@@ -33,6 +34,7 @@ def test_a_plate_stays_plane_and_balances_force_and_moment(condense):
     assert weight @ (solution.pressure * (x - 1.0)) < 0
 
 
+@pytest.mark.core
 def test_columns_under_a_plate_shorten_as_hooke_says():
     data = plate().model_dump(exclude_unset=True)
     data["rigid"] = [{"on": "top", "displacement": [0.0, "free"], "force": [0.0, -0.02]}]
@@ -163,6 +165,7 @@ def test_balls_whose_cuts_are_plates():
         assert part["displacement"][1] == pytest.approx(found[0]["displacement"][1], rel=1e-3)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("charge", [0.0, 2e-3])
 @pytest.mark.parametrize(
     "solver",

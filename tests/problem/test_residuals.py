@@ -84,10 +84,12 @@ def solved(request):
     return found
 
 
+@pytest.mark.core
 def test_zero_at_the_solution(solved):
     assert solved.base.largest <= SMALL
 
 
+@pytest.mark.core
 def test_a_wrong_displacement_is_out_of_equilibrium(solved):
     problem = solved.problem
     random = np.random.default_rng(0)
@@ -139,6 +141,7 @@ def test_rounding_is_what_no_solve_gets_rid_of(degree):
     assert evaluate(problem, State(spoilt, state.forces)).equilibrium > 100 * found.rounding
 
 
+@pytest.mark.core
 def test_penetration_and_gaps_under_pressure_break_the_contact_law(solved):
     for sign in (1e-4, -1e-4):
         found = solved.residuals(nodal=sign * solved.along(solved.pressed, "normal"))
@@ -149,6 +152,7 @@ def test_penetration_and_gaps_under_pressure_break_the_contact_law(solved):
         assert opened.contact <= SMALL
 
 
+@pytest.mark.core
 def test_a_wrong_pressure(solved):
     forces = solved.forces
     pressure = forces.pressure * np.where(solved.pressed, 1.01, 1.0)
@@ -164,6 +168,7 @@ def test_a_wrong_pressure(solved):
     assert solved.residuals(forces=pulled).contact > 0.5
 
 
+@pytest.mark.core
 def test_a_wrong_friction_force(solved):
     forces = solved.forces
     if solved.sticks.any():
@@ -180,6 +185,7 @@ def test_a_wrong_friction_force(solved):
             assert found.contact <= SMALL
 
 
+@pytest.mark.core
 def test_slip_of_a_sticking_node_and_slip_the_wrong_way(solved):
     if solved.sticks.any():
         found = solved.residuals(nodal=1e-4 * solved.along(solved.sticks, "tangent"))
@@ -190,6 +196,7 @@ def test_slip_of_a_sticking_node_and_slip_the_wrong_way(solved):
         assert solved.residuals(nodal=back).friction > 1e-5
 
 
+@pytest.mark.core
 def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
     """A solution for another coefficient does not pass."""
     problem = solved.problem
@@ -200,6 +207,7 @@ def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
     assert evaluate(problem, solved.state).largest <= SMALL
 
 
+@pytest.mark.core
 def test_a_query_changes_nothing(solved):
     """Residuals, forces and operators are those of the state that is asked for, in any order."""
     problem, body = solved.problem, solved.problem.equilibrium

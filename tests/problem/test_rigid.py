@@ -21,6 +21,7 @@ from tests.problems.rigid import indented, solved
 SELF = MPI.COMM_SELF
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [2, 3])
 def test_force_and_displacement_control_agree(dim):
     n = 10 if dim == 2 else 4
@@ -53,6 +54,7 @@ def test_unknown_motions_cost_no_solves(linear):
     assert forced.counters.linear_iterations <= 3 * driven.counters.linear_iterations
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     "solver",
     [
@@ -79,6 +81,7 @@ def test_a_ball_rolls_to_where_no_moment_is_left(solver):
     assert (solution.status == "stick").any()
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("solver", "tolerance"),
     [
@@ -100,6 +103,7 @@ def test_all_methods_find_the_same_motion(solver, tolerance, law):
         assert found[key] == pytest.approx(expected[key], rel=tolerance), key
 
 
+@pytest.mark.core
 def test_residuals_see_an_indenter_out_of_balance():
     case = indented(displacement=[0.0, "free"], force=[0.0, -0.01])
     problem = build_problem(case, SELF)
@@ -113,6 +117,7 @@ def test_residuals_see_an_indenter_out_of_balance():
     assert evaluate(problem, State(state.x, less)).equilibrium > 1e-3
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("condense", [True, False])
 def test_supports_on_an_inclined_normal_take_their_share(condense):
     # Half of the block: on the line of symmetry, which lies beside the ball's lowest point, the
@@ -138,6 +143,7 @@ def test_supports_on_an_inclined_normal_take_their_share(condense):
     assert moved["rigid"]["force"][1] == pytest.approx(-0.01, rel=1e-10)
 
 
+@pytest.mark.core
 def test_a_press_fit_presses():
     data = indented(n=8, displacement=[0.0, 0.0]).model_dump(exclude_unset=True)
     data["contact"]["foundation"]["centre"] = [1.0, 1.98]

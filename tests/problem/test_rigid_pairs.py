@@ -32,6 +32,7 @@ def stacked() -> ContactProblem:
     return ContactProblem(Blocks().domain(SELF), body, contact)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("how", ["condensed", "whole", "uzawa"])
 def test_a_free_plate_loads_two_bodies(how):
     problem = stacked()

@@ -45,6 +45,7 @@ def pushed(comm, degree=1, dim=2, mu=0.3, supports=(), gap=0.0, **given):
     return ContactProblem(Blocks(dim, *cells, **given).domain(comm), body, pair, degree=degree)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_methods_agree(degree):
     problem = pushed(MPI.COMM_SELF, degree)
@@ -61,6 +62,7 @@ def test_methods_agree(degree):
     np.testing.assert_allclose(state.x, found["newton"], rtol=0, atol=1e-9 * size)
 
 
+@pytest.mark.core
 def test_penalty_comes_near():
     problem = pushed(MPI.COMM_SELF, supports=[Fixed("upper_left", [ZERO, None])])
     exact, outcome = METHODS["newton"](problem, OPTIONS["newton"](tolerance=1e-11), None).solve()
@@ -102,6 +104,7 @@ def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
     assert not outcome.converged and "moved to where nothing constrains it" in outcome.ended
 
 
+@pytest.mark.core
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("condense", [True, False])
 @pytest.mark.parametrize("dim", [2, 3])
@@ -131,6 +134,7 @@ def held(fixed, load, mu=0.0, pair=("under", "over")):
 PRESS, PULL = (Load("top", [ZERO, constant(force, 2)]) for force in (-0.01, 0.01))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("pair", [("under", "over"), ("over", "under")])
 def test_a_body_may_be_held_by_contact_alone(pair):
     """It is where loads press it on; supports, or friction, have to do the rest."""
@@ -145,6 +149,7 @@ def test_a_body_may_be_held_by_contact_alone(pair):
         check_rigid_modes(held([guided], PRESS, mu=0.0, pair=pair))
 
 
+@pytest.mark.core
 def test_two_pairs_have_two_laws():
     """A ball between plates: friction below, none above, and the column `on` says which."""
     given = {
@@ -211,6 +216,7 @@ def columns(on, against, degree, **electric):
     }
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("pair", [("upper_bottom", "lower_top"), ("lower_top", "upper_bottom")])
 def test_columns_in_series(pair, degree):

@@ -41,6 +41,7 @@ def test_global_balances(cells, law):
     assert charges.foundation < 0  # it comes from a foundation at 32
 
 
+@pytest.mark.core
 def test_given_charges_balance():
     from tests.problems.mechanics import constant
 
@@ -83,6 +84,7 @@ def test_charges_need_a_potential():
         charge_balance(problem, solver.state)
 
 
+@pytest.mark.core
 def test_the_balance_of_two_bodies_that_are_both_held():
     """No resultant is left but what passes between them: the rest is rounding, not all of it."""
     given = case(mesh={"generator": "two_blocks", "lower_size": 0.5, "upper_size": 0.5})
@@ -99,6 +101,7 @@ def test_the_balance_of_two_bodies_that_are_both_held():
     assert balance.imbalance == 0  # the supports of a body that only moves feel rounding
 
 
+@pytest.mark.core
 def test_the_balance_of_a_ball_whose_contacts_cancel():
     """What passes from plate to ball and from ball to plate is no resultant, but much."""
     given = {

@@ -71,6 +71,15 @@ def state_of(problem):
     return Newton(problem, NewtonOptions(tolerance=1e-9)).solve(problem.start())[0]
 
 
+@pytest.mark.core(
+    "Hencky, 2-D-1",
+    "Hencky, 2-D-2",
+    "quadrilaterals-1",
+    "quadrilaterals-2",
+    "open, stick, slip-1",
+    "the same, two bodies-2",
+    "tube in a casing-2",
+)
 @pytest.mark.parametrize(("name", "degree"), EFFECTIVITY)
 def test_effectivity(name, degree):
     one = known()[name]
@@ -121,6 +130,7 @@ def test_wrong_pressures_in_the_fluxes_are_overestimated():
     assert 0.95 < np.sqrt(total) / error < 1.05
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_effectivity_at_the_end_of_contact(degree):
     singular = Singular()
@@ -131,6 +141,7 @@ def test_effectivity_at_the_end_of_contact(degree):
     assert 0 < found.contact < 0.3 * found.total
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_no_error_where_the_solution_is_exact_in_each_material(degree):
     """A column of two materials, held sideways: sigma_xx jumps, and no recovery may see that."""
@@ -207,6 +218,7 @@ def test_a_part_that_ends_inside_separates_as_far_as_it_goes():
 OSCILLATING = 2.2141e-8
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("cells", [8, 16, 32])
 def test_loads_that_nodes_do_not_see(cells):
@@ -286,6 +298,7 @@ def test_the_share_of_contact_is_never_negative():
     assert found.squares.min() >= 0
 
 
+@pytest.mark.core
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("degree", [1, 2])
 def test_ranks_agree(degree):

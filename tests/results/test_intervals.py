@@ -15,6 +15,7 @@ def rows(quantity, rate, kkt=1e-10, meshes=4, name="max_displacement", **more):
     ]
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("rate", [0.3, 0.5, 1.0, 2.0])
 @pytest.mark.parametrize("order", np.linspace(0.1, 4.0, 27))
 def test_they_hold_the_limit_or_there_are_none(rate, order):
@@ -26,6 +27,7 @@ def test_they_hold_the_limit_or_there_are_none(rate, order):
         assert found[1] - found[0] < 14 * 0.125**order or order > rate
 
 
+@pytest.mark.core
 def test_a_quantity_that_is_exact_has_an_interval_of_its_residual():
     """Rounding decided whether a force that equilibrium gives has one, and whether it holds it."""
     random = np.random.default_rng(0)
@@ -40,6 +42,7 @@ def test_a_quantity_that_is_exact_has_an_interval_of_its_residual():
     assert found["contact_force_x"][0] <= 0 <= found["contact_force_x"][1]
 
 
+@pytest.mark.core
 def test_without_three_meshes_of_a_falling_error_there_are_none():
     assert intervals(rows(lambda h: 1 - h, 1.0, meshes=2)) is None
     assert intervals(rows(lambda h: 1 - h, -1.0)) is None

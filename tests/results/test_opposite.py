@@ -31,6 +31,7 @@ from tests.problems.pairs import case
 COMM = MPI.COMM_WORLD
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
 def test_a_constant_pressure_is_constant_on_both_sides(dim: int, degree: int) -> None:

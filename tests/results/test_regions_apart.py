@@ -53,6 +53,7 @@ def domain(comm=COMM):
 MESH = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [6, 4]}
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
 def test_averages_stay_inside_a_region(degree):
@@ -124,6 +125,7 @@ def test_the_smallest_of_several_regions_is_the_one_of_a_cell():
     assert (regions_of(problem) == np.where(inside, 1, 0)).all()
 
 
+@pytest.mark.core
 def test_strains_and_principal_stresses():
     solution = solve(load_case(CASES / "hertz-small.toml"))
     fields = DerivedFields(solution.problem.equilibrium, solution.state)
@@ -145,6 +147,7 @@ def test_strains_and_principal_stresses():
     assert np.allclose(hooke, stress, rtol=0, atol=1e-9 * np.abs(stress).max())
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("values", [(3.0, 1.0, -2.0), (2.0, 2.0, -1.0), (0.0, 0.0, 0.0), (5,) * 3])
 def test_eigenvalues_of_known_tensors(values):
     import ufl

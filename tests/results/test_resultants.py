@@ -27,6 +27,7 @@ def pressed(dim: int, degree: int, **sections: object):
     return solve(block(dim, degree, **(case | sections)))
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
 def test_a_homogeneous_state(dim: int, degree: int, shared_tmp_path: Path) -> None:
@@ -44,6 +45,7 @@ def test_a_homogeneous_state(dim: int, degree: int, shared_tmp_path: Path) -> No
         np.testing.assert_allclose(reaction, 0.0, atol=1e-9 * force)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_supports_balance_contact(dim: int) -> None:
@@ -66,6 +68,7 @@ def test_supports_balance_contact(dim: int) -> None:
         solution.reaction("right")
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("limit", "share"), [(1e-3, 1.0), (0.1, 0.0)])
 def test_plastic_share(limit: float, share: float) -> None:
@@ -73,6 +76,7 @@ def test_plastic_share(limit: float, share: float) -> None:
     assert pressed(2, 1, material=law).plastic_share == pytest.approx(share, abs=1e-12)
 
 
+@pytest.mark.core
 def test_part_of_the_body_is_beyond_yield() -> None:
     """The share is that of the cells' areas, taken from the written strains."""
     solution = solve(block(2))
@@ -82,6 +86,7 @@ def test_part_of_the_body_is_beyond_yield() -> None:
     assert solution.plastic_share == pytest.approx(beyond, rel=1e-12)
 
 
+@pytest.mark.core
 def test_what_is_open_has_no_area() -> None:
     """A gap of which half is closed by an imposed displacement."""
     gap = "0.05*(x > 1.01)"

@@ -12,6 +12,7 @@ from scripts.cases import CASES
 from tests.problems.written import block, electric
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
 def test_contact_as_arrays_and_functions(dim: int, degree: int) -> None:
@@ -38,6 +39,7 @@ def test_contact_as_arrays_and_functions(dim: int, degree: int) -> None:
         contact.function("status")
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_fields() -> None:
     solution = solve(electric(2))

@@ -25,6 +25,7 @@ def bar(*changes: str):
     return load_case(CASES / "bar.toml", [*SMALL, *changes])
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("options", [NewtonOptions(), FixedPointOptions(), PenaltyOptions()])
 def test_a_solution_is_found_again_at_once(options):
     problem = build_problem(bar())
@@ -50,6 +51,7 @@ def test_a_coarse_state_is_linear_between_its_nodes_on_any_ranks():
     assert found[between] == pytest.approx(1 + at[between], abs=1e-6)
 
 
+@pytest.mark.core
 def test_the_solution_of_a_case_starts_another():
     """With other loads: prescribed values are those of the new problem."""
     first = solve(bar("load.0.traction=[0, -0.004]"))

@@ -38,6 +38,7 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.core
 def test_tables(tmp_path):
     solution = solve(case_of(), comm=SELF)
     write_outputs(solution, tmp_path)
@@ -82,6 +83,7 @@ def test_fields_of_every_second_step(tmp_path, fields):
         assert written >= ({"fields.bp", "cells.bp"} if fields == "vtx" else {"fields.xdmf"})
 
 
+@pytest.mark.core
 def test_formulas_in_t_say_what_amplitudes_do():
     by_name = solve(case_of(), comm=SELF)
     traction = "-0.005*where(t < 1, t, 1 - 0.8*(t - 1))"
@@ -108,6 +110,7 @@ def test_prescribed_values_in_t():
     assert max(force) < 0.9 * min(force)  # the load stays
 
 
+@pytest.mark.core
 def test_python_and_the_case_file_agree():
     case = case_of()
     states = list(evolve(build_problem(case, SELF), case.evolution.ends, case.solver))
@@ -115,6 +118,7 @@ def test_python_and_the_case_file_agree():
         assert state.near(record.state, atol=1e-14)
 
 
+@pytest.mark.core
 def test_charges_of_a_sensor(tmp_path):
     """A piezoelectric bar on a conductive foundation whose potential knows the time."""
     material = {"law": "linear", "young": 58.7102, "poisson": 0.3912, "piezo": PIEZO}
@@ -217,6 +221,7 @@ def test_the_summary_has_the_most_that_rounding_was_granted(tmp_path):
     assert summary["rounding"]["equilibrium"] == solution.steps[0].rounding > 1e-13
 
 
+@pytest.mark.core
 def test_rigid_parts_and_reactions_have_columns():
     """A plate under a force: its way and force, as of a foundation; reactions balance with it."""
     steps = {"times": [0.0, 1.0], "steps": [2]}

@@ -35,6 +35,7 @@ def triangle(folder, mu, load, method="newton", height=0.5345, poisson=0.3):
     })  # fmt: skip
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("height", "poisson"), [(0.5345, 0.3), (1.0, 0.3), (0.3, 0.45)])
 def test_critical_friction_of_a_triangle_in_closed_form(height, poisson, tmp_path):
     """K = lambda g g + mu (g g + |g|^2 I), g = (1, 1/h): K_tt/|K_nt| is the critical mu."""
@@ -128,6 +129,7 @@ def test_single_solutions_are_not_warned_of(hard):
     assert seen >= 2
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_any_number_of_ranks():
     """The factor of a beam's contact nodes, which are on all ranks."""

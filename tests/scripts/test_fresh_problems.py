@@ -30,6 +30,7 @@ def problem(name, folder):
     return mesh, tables, parse_case(tables)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in CHOSEN],
@@ -57,6 +58,7 @@ def test_wrong_results_are_seen(column, check, tmp_path):
     assert recheck(mesh, tables, tmp_path / "out")[check] > study.SMALL
 
 
+@pytest.mark.core
 def test_forces_of_the_check():
     """A triangle stretched along x in plane strain: sigma by hand, linear and beyond its yield."""
     mesh = Mesh(

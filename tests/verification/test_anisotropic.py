@@ -77,6 +77,7 @@ def test_turned_with_its_crystal_in_space(name):
     assert np.abs(other[0] - straight[0]).max() > 1e-3 * scale
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_turned_with_its_crystal_in_the_plane(degree):
     straight = pressed(2, *crystal("PZT-4", 2, PLANE), degree=degree)

@@ -53,6 +53,7 @@ def orders(make, cells, degree):
     return np.log2(np.array(found[-2]) / np.array(found[-1])), solution
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("degree", "cells"), [(1, (16, 32)), (2, (8, 16))])
 def test_lame(degree, cells):
     tube = Tube()
@@ -108,6 +109,7 @@ def test_methods_agree(comm, degree):
     assert np.abs(penalty.pressure - newton.pressure).max(initial=0.0) < 1e-2 * scale
 
 
+@pytest.mark.core
 def test_volumes_of_the_full_turn(comm):
     domain = half_plane(comm, 0.5, 1.5, 2.0, 4)
     for body in (domain, refined(domain)):
@@ -116,6 +118,7 @@ def test_volumes_of_the_full_turn(comm):
         assert area(body, "top") == pytest.approx(np.pi * 2.0, rel=1e-12)
 
 
+@pytest.mark.core
 def test_the_mollifier_is_averaged_over_rings(comm):
     """In the disc's interior R adds to r^2 the mean of s^2 under omega, whatever r."""
     radius = 0.35
@@ -130,6 +133,7 @@ def test_the_mollifier_is_averaged_over_rings(comm):
     assert np.abs(Smoothing(nodes, radius)(np.ones_like(r)) - 1).max(initial=0.0) < 1e-13
 
 
+@pytest.mark.core
 def test_no_node_on_the_axis_carries_a_multiplier(comm):
     """It has little area, or none at degree 2; total areas are exact all the same."""
     for degree, least in ((1, 1 / 6), (2, 1 / 12)):
@@ -139,6 +143,7 @@ def test_no_node_on_the_axis_carries_a_multiplier(comm):
         assert nodes.sum(np.ones(nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("diagonal", ["left", "right"])
 def test_a_constant_pressure_about_the_axis(comm, diagonal):
     block = rectangle(comm, [0.0, 0.0], [1.0, 1.0], [7, 5], diagonal=diagonal)
@@ -217,6 +222,7 @@ def test_the_iterative_solver_knows_the_one_rigid_motion(comm):
     assert np.abs(state.forces.pressure - direct.pressure).max(initial=0.0) < 1e-6 * scale
 
 
+@pytest.mark.core
 def test_strain_on_the_axis(comm):
     """Where r = 0 the hoop strain is the radial one, at the nodes of P2 elements too."""
     problem = Drum().problem(4, 2)
@@ -230,6 +236,7 @@ def test_strain_on_the_axis(comm):
     assert np.allclose(sigma[on_axis, 0, 0], sigma[on_axis, 2, 2], rtol=1e-12)
 
 
+@pytest.mark.core
 def test_the_radial_gradient_is_part_of_norms(comm):
     problem = Tube().problem(8)
     e = errors(problem.equilibrium, problem.equilibrium.rest(), lambda x: ufl.as_vector([x[0], 0]))

@@ -33,6 +33,7 @@ BLOCKS = {
 }
 
 
+@pytest.mark.core
 def test_the_slips_are_those_of_the_specification():
     assert BLOCKS["stick"].slip == 0.0
     assert BLOCKS["slip"].slip == pytest.approx(0.0125, abs=1e-12)
@@ -50,6 +51,7 @@ def nodal_displacement(loop):
     return loop.state.x.reshape(-1, loop.problem.dim)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("name", BLOCKS)
@@ -69,6 +71,7 @@ def test_sliding_block(name, dim, degree):
     assert np.all(data["sticks"] == (block.slip == 0))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize(
     ("dim", "axis"), [(2, (0.0, 1.0, 0.0)), (3, (0.0, 1.0, 0.0)), (3, (1.0, 2.0, 0.5))]

@@ -41,6 +41,7 @@ INDEPENDENT = {
 }
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", INDEPENDENT)
 @pytest.mark.parametrize("method", ["uzawa", "newton"])
 def test_independent_values_of_example_8_3(name, method):
@@ -65,6 +66,7 @@ def test_potential_and_strain_of_example_8_3():
     assert solution.max_dev_strain == pytest.approx(0.365, abs=5e-4)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("method", ["uzawa", "newton"])
 @pytest.mark.parametrize("name", ["8-3-layer", "8-4-layer"])
 def test_layer_without_stiffness_is_signorini(name, method):
@@ -100,6 +102,7 @@ def test_stiff_layer_tends_to_signorini_at_its_touch():
     assert np.allclose(np.log10(np.array(errors[:-1]) / errors[1:]), 1.0, atol=0.05)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("method", ["uzawa", "newton"])
 def test_normal_compliance_without_rigid_part(method):
     soft = solved("8-3-soft", 24, f"solver.method={method}")
@@ -149,6 +152,7 @@ def test_layer_of_the_user_in_a_case():
     assert np.allclose(softer.pressure, 5.0 * np.maximum(depth, 0.0), rtol=0, atol=1e-7)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", ["8-3-layer", "8-3-soft", "8-4-layer"])
 def test_penalty_on_a_layer(name):
     changes = ["friction.mu=0.0051", "electric.k_e=0.0051"] if "8-4" in name else []
@@ -172,6 +176,7 @@ def test_newton_has_nothing_to_lag(key):
         load_case(CASES / "compliance-8-4-layer.toml", changes)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("law", ["tresca", "slip"])
 def test_other_friction_laws_on_a_layer(law):
     case = load_case(CASES / "compliance-8-4-layer.toml", ["mesh.cells=[24, 4]"])
@@ -213,6 +218,7 @@ def test_scripts_on_coarse_meshes(script, made, tmp_path):
         assert (tmp_path / name).stat().st_size > 0
 
 
+@pytest.mark.core
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("name", ["8-3-layer", "8-4-layer"])
 def test_ranks_agree(name):

@@ -29,6 +29,7 @@ def function(domain, degree, formula):
     return f
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
 def test_nested_meshes_lose_nothing(comm, degree):
@@ -40,6 +41,7 @@ def test_nested_meshes_lose_nothing(comm, degree):
     assert np.allclose(back.x.array, wild.x.array, atol=1e-10)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_non_matching_meshes_keep_polynomials(comm):
     one = rectangle(comm, [0.0, 0.0], [2.0, 1.0], [7, 3])
@@ -52,6 +54,7 @@ def test_non_matching_meshes_keep_polynomials(comm):
     assert np.allclose(made.x.array, function(other, 2, formula).x.array, atol=1e-10)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_norms(comm):
     problem = bar(comm, 4)

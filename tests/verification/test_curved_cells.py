@@ -33,6 +33,7 @@ COMM = MPI.COMM_WORLD
 NAMES = [shape.name for shape in SHAPES]
 
 
+@pytest.mark.core("triangle", "quadrilateral")
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", NAMES)
 def test_a_ring_on_a_shaft_converges_with_the_third_order(name: str) -> None:
@@ -117,6 +118,7 @@ def test_displacements_of_degree_1_on_curved_cells(name: str) -> None:
     assert found[1] < found[0] / 2**1.4
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", NAMES)
 def test_volumes_and_areas_are_those_of_round_bodies(name: str) -> None:
@@ -129,6 +131,7 @@ def test_volumes_and_areas_are_those_of_round_bodies(name: str) -> None:
     assert nodes.sum(np.ones(nodes.nodes.size)) == pytest.approx(np.pi / 2, rel=1e-5)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
 def test_sizes_of_curved_facets_and_their_normals_close_the_cell(shape) -> None:
     """The integral of n over the boundary is 0, and that of x.n is dim times the volume."""
@@ -250,6 +253,7 @@ def test_a_disc_on_a_plane_converges_on_straight_and_on_curved_cells(tmp_path, m
         assert pressure > 0.8
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", NAMES[:2])
 def test_a_small_contact_of_a_disc_is_hertz(name: str, order: int) -> None:

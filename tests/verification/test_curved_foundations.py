@@ -25,6 +25,7 @@ def check(ratios, mean, node):
     assert np.abs(p - 1).max() < node
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", ["ring on a shaft", "ring in a bore"])
 def test_rings(name, degree):
@@ -32,6 +33,7 @@ def test_rings(name, degree):
     check(study.rings(name, 0.1, degree), 0.005, 0.05)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 def test_hertz(degree):
     """With chords degree 2 is 7 % off."""
@@ -109,6 +111,7 @@ def test_curves_that_vertices_do_not_tell_are_warned_of():
     assert re.search(r"edges tell .* nodal pressures scatter by about \S+,", found[0][0])
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("cells", "most"), [(12, 0.05), (24, 0.03)])
 def test_a_curvature_that_varies(cells, most):

@@ -11,6 +11,7 @@ from contact.methods.options import OPTIONS, with_method
 from scripts.thesis import hertz
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_small_load():
     solution, found = hertz.run(hertz.cylinder(160.0, fineness=16), 80.0)
@@ -24,6 +25,7 @@ def test_small_load():
     assert solution.outcome.kkt.largest <= 1e-8
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("direction", "mu", "b", "p"),
     [
@@ -46,6 +48,7 @@ def test_example_7_1(direction, mu, b, p):
     assert found.force_error < 1e-8
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("shape", ["half_disc", "disc"])
 def test_half_and_full_cylinder(shape):
     _, found = hertz.run(hertz.cylinder(160.0, shape=shape, fineness=12), 160.0)
@@ -55,6 +58,7 @@ def test_half_and_full_cylinder(shape):
     assert found.force_error < 1e-8
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("centre", "inside"), [(-20.0, False), (20.0, True)])
 def test_round_foundation(centre, inside):
     """On a circle of radius 20, outside or inside, the curvatures 1/8 and 1/20 add up."""

@@ -27,6 +27,7 @@ KNOWN = {
 }
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("name", KNOWN)
 def test_constants_of_the_half_space(name):
     body = Setting(name, "ball").body
@@ -38,6 +39,7 @@ def test_constants_of_the_half_space(name):
     assert n[1, 0] == pytest.approx(-n[0, 1], rel=1e-10)
 
 
+@pytest.mark.core
 def test_the_ball_on_the_material_of_the_thesis():
     body = Setting("thesis", "ball").body
     assert half_space.ball(body, 1.0, 0.1, None).force == pytest.approx(0.131471, abs=1e-6)
@@ -45,6 +47,7 @@ def test_the_ball_on_the_material_of_the_thesis():
     assert half_space.potential_beneath(body, 0.01) == pytest.approx(0.010080, abs=1e-6)
 
 
+@pytest.mark.core
 def test_without_coupling_it_is_transversely_isotropic():
     """The indentation modulus of Delafargue and Ulm, Int. J. Solids Struct. 41 (2004) 7351."""
     c11, c12, c13, c33, c44 = 139.0, 77.8, 74.3, 113.0, 25.6
@@ -56,6 +59,7 @@ def test_without_coupling_it_is_transversely_isotropic():
     assert body.conducting == pytest.approx(known, rel=1e-10)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("shape", ["punch", "cone", "ball"])
 @pytest.mark.parametrize("potential", [None, 0.002])
 def test_pzt4(shape, potential):
@@ -84,6 +88,7 @@ def test_poling_reversed_and_si_units(tmp_path):
         assert float(row["of phi"]) < 1e-8
 
 
+@pytest.mark.core
 def test_hertz_ball_with_few_unknowns():
     """P, a, p_0 within 0.2 %, and delta once the box is extrapolated."""
     depths, boxes = [], (30.0, 60.0)
@@ -120,6 +125,7 @@ def test_an_indenter_moves_along_the_axis(change, words):
         load_case(CASES / "indent-cone.toml", [change])
 
 
+@pytest.mark.core
 def test_the_cone_of_sneddon():
     solution = solve(load_case(CASES / "indent-cone.toml"))
     nodes, pressure, r = solution.problem.nodes, solution.pressure, solution.problem.nodes.points

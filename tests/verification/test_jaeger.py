@@ -71,6 +71,7 @@ def test_two_equal_bodies_slip_as_they_press():
     assert fine[0] < 0.5 * coarse[0]
 
 
+@pytest.mark.core
 def test_unlike_bodies_do_not():
     friction, pressure = away(0.04, below=1e6)
     assert friction > 0.5

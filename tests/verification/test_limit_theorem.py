@@ -19,6 +19,7 @@ def test_theorem_6_3_has_order_1_over_four_decades(layer):
     assert errors.order(8e-7, 1e-2) == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("label", limit_theorem.FIXED_POINTS)
 def test_lagged_fixed_points_converge(label):
     name, changes = limit_theorem.FIXED_POINTS[label]
@@ -27,6 +28,7 @@ def test_lagged_fixed_points_converge(label):
     assert np.all(errors[1:] < 0.5 * errors[:-1])
 
 
+@pytest.mark.core
 def test_normal_compliance_tends_to_signorini_with_order_1():
     errors = limit_theorem.stiffness_limit(COARSE, (1e4, 1e5, 1e6))
     orders = np.diff(np.log(errors.total)) / np.diff(np.log(errors.parameter))

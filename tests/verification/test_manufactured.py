@@ -23,6 +23,7 @@ def solve(problem):
 CASES = [(2, 1, (8, 16, 32)), (2, 2, (4, 8, 16)), (3, 1, (3, 6, 12)), (3, 2, (2, 4, 8))]
 
 
+@pytest.mark.core("2-1-cells0", "2-2-cells1", "3-1-cells2")
 @pytest.mark.parametrize(("dim", "degree", "cells"), CASES)
 def test_hencky_orders(dim, degree, cells):
     found = []
@@ -40,6 +41,7 @@ def test_hencky_orders(dim, degree, cells):
     assert np.all(orders > expected - (0.1 if dim == 2 else 0.25)), orders
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("degree", "h1", "largest"), [(1, 0.95, 1.2), (2, 1.3, 1.3)])
 def test_signorini_orders(degree, h1, largest):
     """P1 reaches order 1 in H1; the singularity limits P2 to 1.5."""
@@ -58,6 +60,7 @@ def test_signorini_orders(degree, h1, largest):
     assert orders[2] >= largest
 
 
+@pytest.mark.core
 def test_signorini_pressure():
     solution = Singular()
     problem = solution.problem(64)

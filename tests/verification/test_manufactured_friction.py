@@ -39,6 +39,7 @@ def test_orders_of_sliding_blocks(name, degree, cells):
     assert np.all(orders > np.array([degree, degree + 1]) - 0.15), orders
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("dim", "cells", "most", "order"),
     [(2, (16, 32), 0.015, 1.7), pytest.param(3, (4, 8), 0.08, 0.9, marks=pytest.mark.slow)],
@@ -66,6 +67,7 @@ def test_pressures_friction_and_slip(dim, cells, most, order, laws):
     assert np.all(np.log2(np.divide(*every)) > order)
 
 
+@pytest.mark.core
 def test_layers_with_current():
     layers = PiezoLayers(SCALED.law(), (pzt(2), pzt(2, scale=-0.5)))
     found = []

@@ -41,6 +41,7 @@ def pressed(foundation, approach=0.02, size=0.02):
     )
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 def test_a_parabola_by_its_heights_is_one(shared_tmp_path):
     """Cubic splines through the points of a parabola are that parabola."""
@@ -57,6 +58,7 @@ def test_a_parabola_by_its_heights_is_one(shared_tmp_path):
     assert found[1] == pytest.approx(found[0], rel=2e-3)
 
 
+@pytest.mark.core
 def test_distances_and_normals_of_heights():
     """In 3-D, with one direction other than the other, above and below."""
     x, y = np.linspace(0.0, 2.0, 21), np.linspace(-1.0, 1.0, 31)

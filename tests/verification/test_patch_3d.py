@@ -13,6 +13,7 @@ from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import SlidingBlock, contact_data, flat, pressed_block, solve
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize(("gap", "poisson"), [(0.0, 0.3), (0.0, 0.45), (0.05, 0.3)])
@@ -31,6 +32,7 @@ def test_uniform_pressure(gap, poisson, dim, degree):
     assert np.abs(loop.state.x.reshape(-1, dim) - exact).max() < 1e-9
 
 
+@pytest.mark.core
 def test_weights_carry_a_constant_pressure():
     for dim, degree in ((2, 1), (2, 2), (3, 1), (3, 2)):
         nodes = pressed_block(MPI.COMM_SELF, dim, degree).nodes
@@ -38,6 +40,7 @@ def test_weights_carry_a_constant_pressure():
         assert nodes.weight.min() > 1e-3
 
 
+@pytest.mark.core
 def test_p2_contact_nodes_of_triangles_are_all_nodes_with_positive_areas():
     problem = pressed_block(MPI.COMM_SELF, 3, 2)
     corners = problem.domain.mesh.geometry.x
@@ -52,6 +55,7 @@ def test_p2_contact_nodes_of_triangles_are_all_nodes_with_positive_areas():
     assert weight[~at_corners].max() == pytest.approx(2 / 5 / 12, rel=1e-12)
 
 
+@pytest.mark.core
 def test_normals_are_the_body_s_own_for_a_given_gap():
     """A turned block whose contact direction is computed from its facets."""
     for dim in (2, 3):
@@ -69,6 +73,7 @@ def test_normals_are_the_body_s_own_for_a_given_gap():
         assert loop.state.forces.pressure == pytest.approx(block.pressure, abs=1e-9)
 
 
+@pytest.mark.core
 def test_a_fixed_node_carries_no_contact_and_a_fixed_direction_slips_as_given():
     domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [1.0, 1.0], [4, 4])
     zero = pressed_block(MPI.COMM_SELF, 2).body.fixed[0].displacement[0]

@@ -122,6 +122,7 @@ METHODS = {
 }
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
 def test_on_a_plane(dim, degree, cell):
@@ -131,6 +132,7 @@ def test_on_a_plane(dim, degree, cell):
     assert reaction[0] == pytest.approx(2 * PRESSURE, rel=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("method", [*METHODS][1:])
 @pytest.mark.parametrize("dim", [2, 3])
@@ -138,6 +140,7 @@ def test_by_all_methods(dim, method):
     everywhere_the_same(solve(on_plane(dim), METHODS[method]), dim, 1e-8)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("condense", [True, False])
 @pytest.mark.parametrize("dim", [2, 3])
@@ -152,6 +155,7 @@ def test_on_a_plane_that_moves_under_a_force(dim, condense):
     everywhere_the_same(solution, dim)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("condense", [True, False])
 @pytest.mark.parametrize("pair", [("under", "over"), ("over", "under")], ids=["upper", "lower"])
@@ -170,6 +174,7 @@ def test_on_another_block(dim, degree, cell, pair, condense):
     assert solution.reaction("left")[0] == pytest.approx(2 * PRESSURE, rel=1e-10)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("method", ["dense", "sparse", "uzawa"])
 def test_friction_across_the_plane_of_symmetry(method):

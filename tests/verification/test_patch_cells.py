@@ -65,6 +65,17 @@ def test_uniform_pressure(cell: str, degree: int, element: str, condense: bool) 
     assert force_balance(problem, state).imbalance < 1e-12
 
 
+@pytest.mark.core(
+    "triangle-1-standard",
+    "triangle-2-standard",
+    "quadrilateral-1-standard",
+    "quadrilateral-2-standard",
+    "tetrahedron-1-standard",
+    "tetrahedron-2-standard",
+    "hexahedron-1-standard",
+    "hexahedron-2-standard",
+    "quadrilateral-1-mean_dilatation",
+)
 @pytest.mark.parallel
 @pytest.mark.parametrize(("cell", "degree", "element"), KINDS, ids=NAMES)
 def test_constant_shear_under_stick(cell: str, degree: int, element: str) -> None:
@@ -94,6 +105,7 @@ def test_constant_shear_under_stick(cell: str, degree: int, element: str) -> Non
     np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
 
 
+@pytest.mark.core("1-standard-linear", "2-standard-j2")
 @pytest.mark.parallel
 @pytest.mark.parametrize("law", ["linear", "log", "j2"])
 @pytest.mark.parametrize(

@@ -113,6 +113,7 @@ def check_constant_pressure(
     assert force_balance(problem, state).imbalance < 1e-12
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("pair", "condense"), DENSE, ids=["upper-dense", "lower-sparse"])
 @pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
@@ -137,6 +138,7 @@ def test_constant_pressure_between_facets_curved_in_their_plane(
     check_constant_pressure(domain, rollers, 2, pair, True, 1.0)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_constant_pressure_of_unlike_cells(dim: int, shared_tmp_path: Path) -> None:
@@ -178,6 +180,7 @@ def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
     np.testing.assert_allclose(np.delete(stress, 4, axis=1), 0, atol=1e-11)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("pair", "turn"), TURNED, ids=["upper-straight", "lower-turned"])
 @pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
@@ -219,6 +222,7 @@ def check_constant_stress(given: Blocks, degree: int, pair: Sequence[str]) -> No
     np.testing.assert_allclose(vectors, traction, rtol=0, atol=1e-11)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
 @pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
@@ -263,6 +267,7 @@ def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int, cell: str) 
     np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
 def test_matching_meshes_are_one_body(dim: int, degree: int, cell: str) -> None:
     """Tied by friction along matching meshes, two blocks bend as one does."""
@@ -288,6 +293,7 @@ def test_matching_meshes_are_one_body(dim: int, degree: int, cell: str) -> None:
     np.testing.assert_allclose(values, expected[nearest], rtol=0, atol=1e-10 * np.abs(values).max())
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
 @pytest.mark.parametrize("degree", [1, 2])
@@ -304,6 +310,7 @@ def test_a_chain_of_bodies(degree: int, condense: bool) -> None:
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
 @pytest.mark.parametrize("degree", [1, 2])

@@ -46,12 +46,14 @@ def errors(solver: FixedPoint, column: Column, units, degrees: float = 0.0):
     return COMM.allreduce(wrong_u, MPI.MAX), COMM.allreduce(wrong_phi, MPI.MAX)
 
 
+@pytest.mark.core
 def test_printed_values():
     assert Column().solution()[1] == pytest.approx(4.512861, abs=5e-7)
     s, phi = Column(k_e=1.0, phi_f=32.0).solution()
     assert (s, phi) == pytest.approx((-0.2538964, 12.663908), abs=5e-7)
 
 
+@pytest.mark.core
 def test_capacitor_formula():
     column = COLUMNS["capacitor"]
     biot = column.k_e * column.height / PERMITTIVITY["beta33"]
@@ -59,6 +61,7 @@ def test_capacitor_formula():
     assert column.solution()[1] == pytest.approx(expected, rel=1e-14)
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 @pytest.mark.parametrize("units", [SCALED, SI], ids=["scaled", "SI"])
 @pytest.mark.parametrize("dim", [2, 3])
@@ -72,6 +75,7 @@ def test_column(name, dim, units):
     assert np.allclose(pressure, column.pressure, rtol=1e-10)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [2, 3])
 def test_second_degree(dim):
     column = COLUMNS["conductive"]
@@ -80,6 +84,7 @@ def test_second_degree(dim):
     assert max(errors(solver, column, SCALED)) < 1e-10
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [2, 3])
 def test_lagged_charge_has_the_same_limit(dim):
     column = Column(k_e=0.1, phi_f=32.0)
@@ -89,6 +94,7 @@ def test_lagged_charge_has_the_same_limit(dim):
     assert len(solver.history.records) > 3
 
 
+@pytest.mark.core
 def test_perfect_conductor():
     column = COLUMNS["conductive"]
     problem = column.problem(COMM, 2, perfect=True)
@@ -96,6 +102,7 @@ def test_perfect_conductor():
     assert max(errors(solver, column, SCALED)) < 1e-10
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("name", ["insulated", "conductive"])
@@ -113,6 +120,7 @@ def test_units_do_not_matter(name, dim):
     assert runs[0][2] == runs[1][2]
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("dim", [2, 3])
 def test_turned_column(dim):
     """Body, foundation and poling axis turned together: the turned solution to rounding."""

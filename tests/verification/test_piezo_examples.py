@@ -50,6 +50,7 @@ INDEPENDENT = {
 }
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 @pytest.mark.parametrize("mu", INDEPENDENT)
 def test_independent_values(mu):
@@ -126,6 +127,7 @@ def test_units_do_not_matter(law):
     assert runs[0][1] == runs[1][1]
 
 
+@pytest.mark.core
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("law", [None, hencky()], ids=["8.1", "8.2"])
 def test_ranks_agree(law):
@@ -165,6 +167,7 @@ def first_solve(problem, symmetric=True, compare=True):
     return found[-1][1], wrong / size
 
 
+@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("symmetric", [True, False], ids=["MINRES", "GMRES"])
 @pytest.mark.parametrize("cells", [(32, 16), (8, 2, 4)], ids=["plane", "space"])

@@ -40,6 +40,7 @@ CASES = [
 ]
 
 
+@pytest.mark.core("2-1-cells0")
 @pytest.mark.parametrize(("dim", "degree", "cells"), CASES)
 def test_orders(dim, degree, cells):
     found = np.array([errors(dim, degree, n, SCALED.law()) for n in cells])

@@ -61,6 +61,7 @@ def solved(problem, method):
     return state, charge_balance(problem, state)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("how", ["condensed", "whole", "uzawa"])
 def test_columns_in_series(how):
     """I = V/(H_1/beta_1 + 1/k + H_2/beta_2), and what leaves one body enters the other."""
@@ -82,6 +83,7 @@ def test_columns_in_series(how):
     assert slope == pytest.approx(current / UPPER, rel=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("condense", [True, False])
 def test_an_electrode_of_given_charge_on_a_column_in_series(condense):
     problem = columns(0.25)

@@ -71,6 +71,7 @@ def uniaxial(name, stress):
     return deviator + volume / 3, -deviator / 2 + volume / 3
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", LAWS)
@@ -94,6 +95,7 @@ def tensors(solution):
     return [every[:, fields.columns[name]].reshape(-1, 3, 3) for name in ("strain", "stress")]
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 def test_a_ring_pressed_inside_is_lames_in_plane_stress():
     """U = p a^2/(E (b^2 - a^2)) ((1 - nu) r + (1 + nu) b^2/r), a = 1 and b = 2."""
@@ -139,6 +141,7 @@ def test_cooks_membrane():
     assert np.concatenate(COMM.allgather(u[end]))[0] == pytest.approx(23.96, rel=2e-3)
 
 
+@pytest.mark.core
 @pytest.mark.parallel(2)
 def test_a_ceramic_sheet_under_a_voltage_and_a_pull():
     """Strains are those of the whole compliance and of d, in all three directions."""
@@ -168,6 +171,7 @@ def test_a_ceramic_sheet_under_a_voltage_and_a_pull():
     assert charge == pytest.approx(2 * displacement, rel=1e-9)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     "law",
     [
@@ -252,6 +256,7 @@ class Steep(Isotropic):
         return Response(stress, {}, found)
 
 
+@pytest.mark.core
 def test_the_strain_across_is_found_by_bisection():
     strain = np.array([[0.1, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [1e-9, 0.0, 0.0, 0.0]])
     for start in (0.0, 0.301, -50.0):

@@ -127,6 +127,7 @@ def uniaxial_energy(steps, end, hardening, terms):
     return stress**2 / (2 * YOUNG) + isotropic + (back**2 / (2 * moduli)).sum(), lost
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("law", ["table", "voce", "K", "chaboche"])
 @pytest.mark.parametrize("steps", [1, 4])
 def test_stored_energy_is_that_of_the_state(law, steps):
@@ -163,6 +164,7 @@ def test_plane_strain_in_eight_times_as_many_steps():
     assert (stress[1, 1], stress[2, 2]) == pytest.approx(FINE, abs=1e-8)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("kind", "degree", "law"),
     [
@@ -194,6 +196,7 @@ def test_against_an_integration_of_its_own(kind, degree, law):
         assert held is None or stress[held] == pytest.approx(expected[2], abs=1e-10)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("kind", ["oedometer", "oedometer-space", "oedometer-revolved"])
 def test_oedometer(kind):
     """Exact in one step, and on the way back to where it yields again."""
@@ -206,6 +209,7 @@ def test_oedometer(kind):
         assert step == 1 or a == pytest.approx(0.00986667, abs=1e-8)
 
 
+@pytest.mark.core
 @pytest.mark.parametrize(
     ("keys", "known"),
     [
@@ -223,6 +227,7 @@ def test_uniaxial_cycle(kind, keys, known):
         assert found(solution, step)[0][up, up] == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.core
 def test_hill_s_closed_form_of_the_hollow_sphere():
     """Numbers that were computed by themselves: under pressure and unloaded."""
     found = Hill(1.0, 0.004)

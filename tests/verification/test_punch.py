@@ -71,6 +71,7 @@ def pressed(n: int, far: float, revolved: bool, motion: Motion):
     return problem, state, movements(problem, state)["rigid"]
 
 
+@pytest.mark.core
 def test_a_moment_tilts_a_flat_punch():
     """M = pi a^2 E theta/(4 (1 - nu^2)) a unit length; the force does not tilt it."""
     motion = Motion([0.0, None], [None], [0.0, -FORCE], [MOMENT], [0.0, 0.0])
@@ -98,6 +99,7 @@ def test_a_circular_punch_has_no_way_but_along_its_axis():
             pressed(2, 4.0, True, motion)
 
 
+@pytest.mark.core
 def test_a_circular_punch_sinks_by_its_force():
     """P = 2 E* a delta; what the far supports take off falls like the inverse of their distance."""
     motion = Motion([0.0, None], [0.0], [0.0, -FORCE], [0.0], [0.0, 0.0])

@@ -46,6 +46,7 @@ def test_all_methods_find_the_same_pressures(name):
         assert np.abs(one - two).max() < tolerance * np.abs(found.pressure).max()
 
 
+@pytest.mark.core
 def test_no_node_is_in_the_ball():
     """The means of the constraint hold: with them, so do nodal values, which are their mixtures."""
     radius, rise = 3.0, 0.03

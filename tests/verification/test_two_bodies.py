@@ -30,6 +30,7 @@ def effective(first, second, poisson=0.3):
     return 1 / ((1 - poisson**2) * (1 / first + 1 / second))
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_steel_cylinder_on_an_aluminium_block(mu):
     """NAFEMS R0094-1 (SSNP154): a 6.21 and p_0 3585.37 of Hertz at 35 kN a millimetre."""
@@ -105,6 +106,7 @@ def test_loop_of_two_cylinders():
     assert turn_of_cylinders(elements=12, steps=2, degree=2) == pytest.approx(1, abs=0.015)
 
 
+@pytest.mark.core
 def test_no_pressure_stands_on_an_axis():
     """Of degree 2 a function on the axis has the integral 0, and carries no multiplier."""
     for size in (0.5, 10 / 23):
@@ -152,6 +154,7 @@ def half_cylinders(size, steps):
     }
 
 
+@pytest.mark.core
 def test_partial_slip_of_two_half_cylinders():
     """Cattaneo and Mindlin: c/a = sqrt(1 - Q/(mu P)), whatever the number of steps."""
     modulus, mu = effective(1000.0, 1000.0), 0.3
@@ -176,6 +179,7 @@ def test_partial_slip_of_two_half_cylinders():
     assert away[1] < 0.05 and away[1] < 0.8 * away[0]
 
 
+@pytest.mark.core
 @pytest.mark.parametrize("seed", range(4))
 def test_random_pairs(seed):
     good, words = converges(random_case(seed), compared=seed < 2)
