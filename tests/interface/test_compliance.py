@@ -127,7 +127,6 @@ def test_a_stiff_column_does_not_cycle_between_open_and_saturated():
 def test_newton_on_columns(column):
     newton = Newton(column.problem(), NewtonOptions(tolerance=1e-11))
     assert newton.solve()[1].converged
-    assert newton.counters.linear_solves <= 8
     check_solution(column, newton)
 
 

@@ -51,7 +51,6 @@ def test_a_strap_around_a_drum(cells, ratio, mu, degree, thickness):
     problem = build_problem(parse_case(case), MPI.COMM_SELF, domain=strap(cells, thickness))
     solution = solve(problem)
     assert solution.converged, solution.outcome.reason
-    assert solution.counters.contact_solves <= 300
     # The drum bears both pulls, and the moment of friction their difference.
     force = -solution.contact_force
     assert force[1] == pytest.approx(PULL * thickness * (1 + 1 / ratio), rel=1e-9)

@@ -52,6 +52,4 @@ def test_a_bimorph_in_front_of_a_good_conductor():
     comm = MPI.COMM_WORLD
     solution = solve(build_problem(case, comm=comm), NewtonOptions())
     assert solution.converged, solution.outcome.reason
-    assert solution.counters.linear_solves <= 2
-    assert solution.counters.contact_solves <= 60
     assert any("continuation" in record.note for record in solution.history.records)

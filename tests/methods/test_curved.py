@@ -41,6 +41,5 @@ def test_rings_and_arches_pressed_flat(kind, thickness, mu):
     case["contact"] = {"on": part, "foundation": plane}
     solution = solve(parse_case(case), domain=domain)
     assert solution.converged, solution.outcome.reason
-    assert solution.counters.linear_solves <= 2
     touching = np.count_nonzero(solution.status != "open")
     assert touching >= 2 if kind == "ring" else touching > 100

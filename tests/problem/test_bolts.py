@@ -171,7 +171,6 @@ def test_a_bolt_and_two_flanges_in_series(cut, linear):
     for given in ({"shortening": s}, {"force": force}):
         solution = solve(tightened(Bolt("shank", **given), cut=cut), options)
         assert solution.converged
-        assert linear == "iterative" or solution.counters.linear_solves <= 2
         found = solution.movements["bolts"]["shank"]
         assert found["shortening"] == pytest.approx(s, rel=1e-9)
         assert found["force"] == pytest.approx(force, rel=1e-9)

@@ -104,7 +104,7 @@ def test_a_small_block_is_condensed_on_any_number_of_ranks():
         assert outcome.converged
         found.append((problem.nodes.norm(state.forces.pressure), method.counters.linear_solves))
     assert np.isclose(found[0][0], found[1][0], rtol=1e-9)
-    assert found[0][1] == found[1][1] < 10
+    assert found[0][1] == found[1][1]
 
 
 @pytest.mark.core

@@ -102,7 +102,6 @@ def test_a_plane_of_symmetry_between_boxes(on, against):
     supports = {"bottom": [0.0] * 3, "top": ["free", "free", -0.02]}
     supports |= {side: [0.0, "free", "free"] for side in sides}
     solution = moved(Blocks(3).domain(COMM), Contact(on, against=against), supports)
-    assert solution.counters.linear_solves <= 2
     contact = solution.contact
     plane = contact.points[:, 0] < contact.points[:, 0].min() + 1e-9
     assert contact.slip[plane, 0] == pytest.approx(0.0, abs=1e-15)

@@ -35,8 +35,6 @@ def test_force_and_displacement_control_agree(dim):
     assert held["rigid"]["force"][-1] == pytest.approx(-0.01, rel=1e-10)
     scale = np.abs(driven.state.x).max()
     assert np.allclose(forced.state.x, driven.state.x, rtol=0, atol=1e-10 * scale)
-    # A linear body is solved for once, however the indenter is driven.
-    assert forced.counters.linear_solves == driven.counters.linear_solves == 1
 
 
 @pytest.mark.parametrize("linear", ["lu", "iterative"])

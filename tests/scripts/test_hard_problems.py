@@ -10,11 +10,8 @@ from forms.laws import SlipCoefficient
 from scripts.studies.sweep import on_cells, problems
 
 
-@pytest.mark.parametrize(
-    ("name", "whole", "dense"),
-    [("bimorph-3", 1, 70), ("bimorph-8", 1, 60), ("unsupported-5", 1, 40)],
-)
-def test_what_takes_no_block_relaxation(name, whole, dense):
+@pytest.mark.parametrize("name", ["bimorph-3", "bimorph-8", "unsupported-5"])
+def test_what_takes_no_block_relaxation(name):
     """A bent bimorph, a good conductor, and a block that Newton's loop lets fly away.
 
     The first took 212 dense steps, the second 700 solves of the body or 970 dense ones, or was not
@@ -24,8 +21,6 @@ def test_what_takes_no_block_relaxation(name, whole, dense):
     ((_, case),) = problems(False, name, True)
     solution = solve(build_problem(case), NewtonOptions())
     assert solution.converged, solution.outcome.reason
-    assert solution.counters.linear_solves <= whole
-    assert solution.counters.contact_solves <= dense
     assert not any("block relaxation" in record.note for record in solution.history.records)
 
 
@@ -38,7 +33,6 @@ def test_contact_forces_that_are_all_rounding_are_none(condense):
     ((_, case),) = problems(False, "lifted-4", True)
     solution = solve(build_problem(case), NewtonOptions(condense=condense))
     assert solution.converged, solution.outcome.reason
-    assert solution.counters.linear_solves <= 8
     assert {record.note for record in solution.history.records} == {""}
     assert abs(solution.contact_force).max() < 1e-15
     # E A, and none of it in the supports of the contact
@@ -54,7 +48,6 @@ def test_a_node_that_begins_to_slide_goes_on():
     ((_, case),) = problems(False, "bar-67")
     solution = solve(build_problem(on_cells(case, "quadrilateral")), NewtonOptions())
     assert solution.converged, solution.outcome.reason
-    assert solution.counters.linear_solves <= 5
     nodes = solution.problem.nodes
     slip = solution.problem.interface.slip_length(nodes.apply(solution.state.x))
     slides = (slip > 1e-6) & (solution.pressure > 1e-9)

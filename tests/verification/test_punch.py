@@ -65,7 +65,6 @@ def pressed(n: int, far: float, revolved: bool, motion: Motion):
     method = Newton(problem, NewtonOptions(tolerance=1e-9))
     state, outcome = method.solve()
     assert outcome.converged
-    assert method.counters.linear_solves == 1
     # Nothing lifts off.
     assert np.all(state.forces.pressure > 0)
     return problem, state, movements(problem, state)["rigid"]

@@ -76,15 +76,13 @@ def test_a_ball_that_is_pressed_and_one_that_is_moved():
     still = [0.0, 0.0]
     case = quadratic(2, displacement=[*still, "free"], force=[*still, -0.02])
     forced, moved = solved(case, SELF)
-    whole, same = solved(case, SELF, NewtonOptions(tolerance=1e-10, condense=False, linear="lu"))
+    _, same = solved(case, SELF, NewtonOptions(tolerance=1e-10, condense=False, linear="lu"))
     depth = moved["rigid"]["displacement"][-1]
     assert same["rigid"]["displacement"][-1] == pytest.approx(depth, rel=1e-9)
     driven, held = solved(quadratic(2, displacement=[*still, depth]), SELF)
     assert held["rigid"]["force"][-1] == pytest.approx(-0.02, rel=1e-10)
     scale = np.abs(driven.pressure).max()
     assert np.allclose(forced.pressure, driven.pressure, rtol=0, atol=1e-9 * scale)
-    assert forced.counters.linear_solves == driven.counters.linear_solves == 1
-    assert whole.counters.linear_solves > 1
 
 
 @pytest.mark.parallel
