@@ -81,10 +81,13 @@ def _small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr("scripts.reporting.DPI", 60)
 
 
-#: Parts of messages that memory, rounding and Python's parser of TOML decide.
+#: Parts of messages that memory, ranks and Python's parser of TOML decide.
 OTHERS_WORDS = {
     r"[\d.e+]+ GB": "… GB",
-    r"-?\d[\d.]*e-1\d": "0",
+    r"give at most [\d.e+]+": "give at most …",
+    r"shape \(\d+, ": "shape (…, ",
+    r" at \([-\d., e]+\)": " at (…)",
+    r"0x[0-9a-f]+": "0x…",
     r"not a TOML file: .* ": "not a TOML file: … ",
     r"is broken \(.*\); ": "is broken (…); ",
 }

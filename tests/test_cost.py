@@ -78,31 +78,31 @@ LONG = {"space": {"degree": 2}}
 #: Problem -> (solution, what is seen: solves of the whole body, factorisations, and Newton
 #: iterations on the condensed problem).
 SEEN: dict[str, tuple[Callable[[], Solution], tuple[int, int, int]]] = {
-    "beam on a stop": (of_case(beam(100.0, [200, 2], TIP, 0.5)), (0, 0, 0)),
-    "beam on a stop, friction": (of_case(beam(100.0, [200, 2], TIP, 0.5, 0.3)), (0, 0, 0)),
-    "beam on the ground": (of_case(beam(100.0, [400, 4], UNIFORM, 0.5)), (0, 0, 0)),
-    "long beam": (of_case(beam(1000.0, [400, 1], LIGHT, 0.1, 0.8, **LONG)), (0, 0, 0)),
+    "beam on a stop": (of_case(beam(100.0, [200, 2], TIP, 0.5)), (1, 1, 3)),
+    "beam on a stop, friction": (of_case(beam(100.0, [200, 2], TIP, 0.5, 0.3)), (1, 1, 3)),
+    "beam on the ground": (of_case(beam(100.0, [400, 4], UNIFORM, 0.5)), (1, 1, 24)),
+    "long beam": (of_case(beam(1000.0, [400, 1], LIGHT, 0.1, 0.8, **LONG)), (6, 4, 0)),
     "beam, iterative": (
         of_case(beam(100.0, [200, 2], TIP, 0.5, solver={"linear": "iterative"})),
-        (0, 0, 0),
+        (4, 2, 0),
     ),
     "beam clamped at both ends": (
         of_case(clamped(beam(40.0, [160, 4], {"on": "top", "traction": [0.0, -3.9e-5]}, 0.3, 0.3))),
-        (0, 0, 0),
+        (1, 1, 34),
     ),
     "beam on all of its length": (
         of_case(beam(600.0, [1200, 2], {"on": "top", "traction": [0.0, -1e-3]}, 0.0, 0.3)),
-        (0, 0, 0),
+        (2, 2, 0),
     ),
-    "beam, sparse interior point": (of_case(beam(100.0, [600, 2], UNIFORM, 0.5, 0.3)), (0, 0, 0)),
-    "bimorph on a conductor": (drawn("bimorph-3"), (0, 0, 0)),
-    "bimorph on a good conductor": (drawn("bimorph-8"), (0, 0, 0)),
-    "unsupported block": (drawn("unsupported-5"), (0, 0, 0)),
-    "beam pressed along the ground": (drawn("lifted-4"), (0, 0, 0)),
-    "far in the plastic range": (drawn("yielding-0"), (0, 0, 0)),
-    "farther in the plastic range": (drawn("yielding-1"), (0, 0, 0)),
-    "falling friction": (drawn("bar-67", False, "quadrilateral"), (0, 0, 0)),
-    "blocks that approach each other": (of_case(evolution()), (0, 0, 0)),
+    "beam, sparse interior point": (of_case(beam(100.0, [600, 2], UNIFORM, 0.5, 0.3)), (33, 20, 0)),
+    "bimorph on a conductor": (drawn("bimorph-3"), (1, 1, 19)),
+    "bimorph on a good conductor": (drawn("bimorph-8"), (1, 1, 33)),
+    "unsupported block": (drawn("unsupported-5"), (1, 1, 4)),
+    "beam pressed along the ground": (drawn("lifted-4"), (7, 7, 0)),
+    "far in the plastic range": (drawn("yielding-0"), (10, 6, 24)),
+    "farther in the plastic range": (drawn("yielding-1"), (15, 10, 44)),
+    "falling friction": (drawn("bar-67", False, "quadrilateral"), (2, 1, 16)),
+    "blocks that approach each other": (of_case(evolution()), (2, 1, 2)),
     "blocks that part": (
         of_case(
             evolution(
@@ -111,27 +111,28 @@ SEEN: dict[str, tuple[Callable[[], Solution], tuple[int, int, int]]] = {
                 evolution={"times": [0.0, 1.8], "steps": [6]},
             )
         ),
-        (0, 0, 0),
+        (6, 1, 15),
     ),
-    "block on a block": (of_case(pairs.case()), (0, 0, 0)),
-    "ring between plates": (ring, (0, 0, 0)),
+    "block on a block": (of_case(pairs.case()), (1, 1, 3)),
+    # From 16 to 231 in 170 runs with moduli that differ by rounding.
+    "ring between plates": (ring, (2, 1, 231)),
     # From 47 to 381 in 120 runs with moduli that differ by 1e-12: all nodes slide.
     "block that friction cannot hold": (
         lambda: solve(wall(2, 1.01), comm=SELF),
-        (0, 0, 381),
+        (1, 1, 381),
     ),
     "indenter under a force": (
         lambda: solve(indented(2, 10, displacement=[0.0, "free"], force=[0.0, -0.01]), comm=SELF),
-        (0, 0, 0),
+        (1, 1, 4),
     ),
     "indenter under a force, 3-D": (
         lambda: solve(
             indented(3, 4, displacement=[0.0, 0.0, "free"], force=[0.0, 0.0, -0.01]), comm=SELF
         ),
-        (0, 0, 0),
+        (1, 1, 2),
     ),
-    "bar that yields": (lambda: solve(bar(16, *CASE), comm=SELF), (0, 0, 0)),
-    "linear bar": (lambda: solve(bar(16, *CASE, "material.law=linear"), comm=SELF), (0, 0, 0)),
+    "bar that yields": (lambda: solve(bar(16, *CASE), comm=SELF), (9, 1, 15)),
+    "linear bar": (lambda: solve(bar(16, *CASE, "material.law=linear"), comm=SELF), (1, 1, 6)),
 }
 
 

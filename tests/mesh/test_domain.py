@@ -10,6 +10,7 @@ from contact.case.mesh import Mesh as MeshSection
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, box, rectangle
+from tests.problems.messages import message_of
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD
@@ -132,50 +133,43 @@ def test_unknown_part_names_the_nearest_and_all():
         domain.facets("x")
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"size": (4, 0)}, r"mesh.size: given \(4, 0\); accepted: positive"),
-        ({"size": (4, 1, 1)}, "mesh.size: .* a list of 2 numbers for a rectangle"),
-        ({"origin": 0.0}, "mesh.origin: given 0.0; accepted: a list of 2"),
-        ({"cells": (4, 0)}, "mesh.cells: .* positive whole"),
-        ({"cells": (4, 1.5)}, "mesh.cells: .* positive whole"),
-        ({"diagonal": "up"}, "diagonal 'up' is unknown"),
-        (
-            {"parts": {"top": Piece("top")}},
-            "parts.top: given top; accepted: a name that no side",
-        ),
-        ({"parts": {"a": Piece("front")}}, "mesh.parts.a.side: given front; accepted: left, right"),
-        ({"parts": {"a": Piece("top", 0.3, 4.0)}}, r"parts.a.from: given 0.3; .*nearest: 0, 0.5\)"),
-        ({"parts": {"a": Piece("top", 0.5, 5.0)}}, r"parts.a.to: given 5.0; .*nearest: 4\)"),
-        ({"parts": {"a": Piece("top", 2.0, 2.0)}}, "a position beyond from"),
-        ({"parts": {"a": [Piece("top", (2.0, 1.0))]}}, "mesh.parts.a.0.from: .* a number"),
-        ({"parts": {"a": []}}, "'a' contains no facet"),
-    ],
-)
+GRID = {"origin": (0, 0), "size": (4, 1), "cells": (8, 4)}
+WRONG_RECTANGLES = {
+    "no height": {"size": (4, 0)},
+    "a size of 3-D": {"size": (4, 1, 1)},
+    "a number for an origin": {"origin": 0.0},
+    "no cells": {"cells": (4, 0)},
+    "half cells": {"cells": (4, 1.5)},
+    "diagonal": {"diagonal": "up"},
+    "a side for a name": {"parts": {"top": Piece("top")}},
+    "a side of 3-D": {"parts": {"a": Piece("front")}},
+    "a piece from between nodes": {"parts": {"a": Piece("top", 0.3, 4.0)}},
+    "a piece beyond the end": {"parts": {"a": Piece("top", 0.5, 5.0)}},
+    "a piece without length": {"parts": {"a": Piece("top", 2.0, 2.0)}},
+    "a piece of 3-D": {"parts": {"a": [Piece("top", (2.0, 1.0))]}},
+    "no pieces": {"parts": {"a": []}},
+}
+BRICK = {"origin": (0, 0, 0), "size": (4, 1, 2), "cells": (4, 1, 2)}
+WRONG_BOXES = {
+    "no axis": {"axis": (0, 0, 0)},
+    "an axis in the plane": {"axis": (0, 1)},
+    "a piece in the plane": {"parts": {"a": Piece("top", 0.5)}},
+    "a piece to between nodes": {"parts": {"a": Piece("top", (0, 0), (1.1, 1))}},
+}
+
+
+@pytest.mark.wording
 @pytest.mark.parallel
-def test_wrong_rectangles_are_refused(change, message):
-    good = {"origin": (0, 0), "size": (4, 1), "cells": (8, 4)}
-    with pytest.raises(InputError, match=message):
-        rectangle(COMM, **{**good, **change})
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"axis": (0, 0, 0)}, "axis must be 3 numbers"),
-        ({"axis": (0, 1)}, "axis must be 3 numbers"),
-        ({"parts": {"a": Piece("top", 0.5)}}, "parts.a.from: .* a list of 2 numbers"),
-        (
-            {"parts": {"a": Piece("top", (0, 0), (1.1, 1))}},
-            r"given \(1.1, 1\); .*nearest: 1, 2\)",
-        ),
-    ],
-)
-def test_wrong_boxes_are_refused(change, message):
-    good = {"origin": (0, 0, 0), "size": (4, 1, 2), "cells": (4, 1, 2)}
-    with pytest.raises(InputError, match=message):
-        box(COMM, **{**good, **change})
+def test_messages_of_wrong_grids(snapshot):
+    said = {
+        name: message_of(rectangle, COMM, **GRID | change)
+        for name, change in WRONG_RECTANGLES.items()
+    }
+    said |= {
+        f"box: {name}": message_of(box, COMM, **BRICK | change)
+        for name, change in WRONG_BOXES.items()
+    }
+    snapshot("wrong-grids", said)
 
 
 def test_grid_positions_pass_with_rounding():

@@ -36,6 +36,7 @@ from contact import (
     solve,
 )
 from contact.problem.checks import meeting_supports
+from tests.problems.messages import message_of
 from tests.problems.put_together import LAW, TOP, block, problem
 
 
@@ -60,194 +61,113 @@ def solved(*fixed: Any, **more: Any) -> Callable[[], object]:
 
 
 WRONG = {
-    "two supports": (
-        solved(TOP, Fixed("top", [0.0, -0.001])),
-        r"fixed\.1\.displacement\.1: -0\.001 on top; accepted: -0\.005, as fixed\.0 has there",
+    "two supports": solved(TOP, Fixed("top", [0.0, -0.001])),
+    "two supports on a list": solved(TOP, Fixed(["left", "top"], [lambda x: 0.1 * x[1], None])),
+    "two supports in steps": lambda: next(
+        evolve(problem(TOP, Fixed("top", [0, -0.005], amplitude=lambda t: t**2)), [0.5])
     ),
-    "two supports on a list": (
-        solved(TOP, Fixed(["left", "top"], [lambda x: 0.1 * x[1], None])),
-        r"fixed\.1\.displacement\.0: 0\.1 on left\+top; accepted: 0",
+    "two supports on the way": lambda: next(
+        evolve(problem(TOP, Fixed("top", [0, -0.005], amplitude=lambda t: t**2)), [0.5, 1])
     ),
-    "two supports in steps": (
-        lambda: next(
-            evolve(problem(TOP, Fixed("top", [0, -0.005], amplitude=lambda t: t**2)), [0.5])
-        ),
-        r"fixed\.1\.displacement\.1: -0\.00125 on top; accepted: -0\.0025",
+    "a traction without a value": solved(loads=Load("right", traction=[0, hole])),
+    "a body force without a value": solved(
+        loads=[Load("right", [0, 1e-3]), Load(body_force=[hole, 0])]
     ),
-    "two supports on the way": (
-        lambda: next(
-            evolve(problem(TOP, Fixed("top", [0, -0.005], amplitude=lambda t: t**2)), [0.5, 1])
-        ),
-        r"-0\.00125 on top; accepted: -0\.0025, as fixed\.0 has there at t = 0\.5",
+    "a displacement without a value": solved(Fixed("left", [0, 0]), Fixed("top", [None, hole])),
+    "a support without an amplitude": solved(Fixed("top", [0, -0.005], amplitude=lambda t: np.nan)),
+    "a load without an amplitude": solved(
+        loads=Load("right", [0, 1e-3], amplitude=lambda t: np.inf)
     ),
-    "a traction without a value": (
-        solved(loads=Load("right", traction=[0, hole])),
-        r"load\.0\.traction\.1: a formula is not finite everywhere on its part",
+    "a law without a value": solved(
+        Fixed("top", [0, -0.05]), law=UserLaw(10.0, 0.3, modulus=lambda t: (1e-3 - t) ** 0.5)
     ),
-    "a body force without a value": (
-        solved(loads=[Load("right", [0, 1e-3]), Load(body_force=[hole, 0])]),
-        r"load\.1\.body_force\.0: a formula is not finite",
+    "a load on the contact part": solved(loads=Load(["right", "bottom"], [0, 1e-3])),
+    "a load in free directions": lambda: Load("right", ["free", 1.0]),
+    "a load of nothing": lambda: Load("right"),
+    "a pressure in the body": lambda: Load(pressure=1.0),
+    "a traction in the body": lambda: Load(traction=[0, 1]),
+    "a body force on a part": lambda: Load("top", body_force=[0, 1]),
+    "two names for a force": lambda: Load("top", [0, 1], traction=[0, 1]),
+    "a resultant in the body": lambda: Load(force=[0, 1]),
+    "a resultant by place": lambda: Load("top", force=[0, lambda x: x[0]]),
+    "a gap of time": lambda: Contact("bottom", Growing()),
+    "a spring of time": lambda: Elastic("top", [0.0, Growing()]),
+    "a spring of time along the normal": lambda: Elastic("top", normal=Growing()),
+    "a support of nothing": lambda: Fixed("top", ["free", None]),
+    "an amplitude": lambda: Fixed("top", [0, 0], amplitude=2),
+    "no motion": lambda: Motion(),
+    "a motion as a number": lambda: Motion(0.1),
+    "a motion in words": lambda: Motion([0.0, "up"]),
+    "an angle in a list": lambda: Motion([0.0, None], [0.1, 0.0, 0.0]),
+    "a free force": lambda: Motion([0.0, None], force=[0.0, None]),
+    "a force in vain": lambda: Motion([0.0, 0.0], force=[0.0, -3.0]),
+    "no centre": lambda: Motion([0.0, None], 0.1),
+    "a moving centre": lambda: Motion([0.0, None], 0.1, centre=[0.0, None]),
+    "a rigid part in space": lambda: problem(rigid=Rigid("right", Motion([0.0, 0.0, 0.0]))),
+    "a negative gap": on(-0.001),
+    "a gap and a shape": on(Plane((0, 0), (0, 1)), gap=0.1),
+    "a point in space": on(Plane((0, 0, 0), (0, 1))),
+    "a normal in space": on(Plane((0, 0), (0, 0, 1))),
+    "a centre in space": on(Sphere((0, 0, -5), 5.0)),
+    "an axis in space": on(Cylinder((0, -5), (0, 0, 1), 5.0)),
+    "no normal": on(Plane((0, 0), (0, 0))),
+    "no direction": on(Plane((0, 0), (0, 1), direction="axis")),
+    "a direction": lambda: Plane((0, 0), (0, 1), direction="up"),
+    "a radius": lambda: Sphere((0, 0), "1"),  # type: ignore[arg-type]
+    "an angle": lambda: Cone((0, 0), (0, 1), 90.0),
+    "an angle in words": lambda: Cone((0, 0), (0, 1), "a"),  # type: ignore[arg-type]
+    "an edge in words": lambda: Punch((0, 0), (0, 1), 1.0, "a"),
+    "an edge": lambda: Punch((0, 0), (0, 1), 1.0, 2.0),
+    "a distance": on(Level(lambda x: x[1])),
+    "a number as distance": lambda: Level(1.0),  # type: ignore[arg-type]
+    "a layer": on(layer=3),
+    "half a layer": on(layer=lambda: Layer(0.1)),
+    "friction": on(friction=0.3),
+    "a law of friction": lambda: Friction(law=3),  # type: ignore[arg-type]
+    "a conductor": on(conductor=3),
+    "press": on(press="press"),
+    "no contact": lambda: problem(contact=[]),
+    "a law": lambda: Body(3, TOP),  # type: ignore[arg-type]
+    "no compressible law": lambda: Problem(
+        block(), Body(Linear(10.0, 0.5), TOP), Contact("bottom")
     ),
-    "a displacement without a value": (
-        solved(Fixed("left", [0, 0]), Fixed("top", [None, hole])),
-        r"fixed\.1\.displacement\.1: not finite at \(\d\.?\d*, 1\)",
+    "a law among materials": lambda: Body([Material(LAW), LAW], TOP),
+    "no material": lambda: Body([], TOP),
+    "regions": lambda: Material(LAW, on=3),
+    "a crystal": lambda: make_material(2, young=1.0, poisson=0.3, piezo={"e31": 1.0}),
+    "a dimension": lambda: make_material(1, name="PZT-4"),
+    "a load as support": lambda: Body(LAW, [Load("top", [0, 1])]),  # type: ignore[list-item]
+    "an electrode": lambda: problem(electrodes=Electrode("left")),
+    "a mesh": lambda: Problem(block().mesh, Body(LAW, TOP), Contact("bottom")),
+    "a start": lambda: solve(problem(), start=3),  # type: ignore[arg-type]
+    "no problem": lambda: solve(block()),  # type: ignore[arg-type]
+    "a method": lambda: solve(problem(), method="uzawa"),
+    "nan as support": lambda: solve(
+        Problem(block(), Body(LAW, Fixed("top", [np.nan, 0.0])), Contact("bottom"))
     ),
-    "a support without an amplitude": (
-        solved(Fixed("top", [0, -0.005], amplitude=lambda t: np.nan)),
-        "Fixed on 'top': amplitude: not finite at t = 1; accepted: ",
+    "a law in a list": lambda: Body([LAW], TOP),
+    "a replacement": lambda: solve(problem(), domian=3),
+    "a monitor": lambda: solve(problem(), monitor=3),  # type: ignore[arg-type]
+    "times": lambda: next(evolve(problem(), 1.0)),  # type: ignore[arg-type]
+    "times none": lambda: solve(problem(), times=[]),
+    "times in words": lambda: solve(problem(), times=["a"]),
+    "times in rows": lambda: solve(problem(), times=np.ones((2, 2))),
+    "an angle in space": lambda: make_material(3, name="PZT-4", poling=90),
+    "an axis in the plane": lambda: make_material(
+        2, name="PZT-4", poling=np.array([0.0, 0.0, 1.0])
     ),
-    "a load without an amplitude": (
-        solved(loads=Load("right", [0, 1e-3], amplitude=lambda t: np.inf)),
-        "Load on 'right': amplitude: not finite at t = 1",
-    ),
-    "a law without a value": (
-        solved(
-            Fixed("top", [0, -0.05]), law=UserLaw(10.0, 0.3, modulus=lambda t: (1e-3 - t) ** 0.5)
-        ),
-        "numbers overflow, or a law that is given has no value at these strains",
-    ),
-    "a load on the contact part": (
-        solved(loads=Load(["right", "bottom"], [0, 1e-3])),
-        r"load\.0\.on: right\+bottom shares facets with the contact part bottom",
-    ),
-    "a load in free directions": (lambda: Load("right", ["free", 1.0]), "0 where nothing acts"),
-    "a load of nothing": (lambda: Load("right"), "Load: nothing is given"),
-    "a pressure in the body": (lambda: Load(pressure=1.0), "Load: pressure: .*it on a part"),
-    "a traction in the body": (lambda: Load(traction=[0, 1]), "Load: traction: .*it on a part"),
-    "a body force on a part": (lambda: Load("top", body_force=[0, 1]), "Load: body_force: "),
-    "two names for a force": (lambda: Load("top", [0, 1], traction=[0, 1]), "Load: .*one of dens"),
-    "a resultant in the body": (lambda: Load(force=[0, 1]), "Load: force: .*it on a part"),
-    "a resultant by place": (
-        lambda: Load("top", force=[0, lambda x: x[0]]),
-        r"Load: force: .*accepted: numbers, the resultant",
-    ),
-    "a gap of time": (lambda: Contact("bottom", Growing()), "gap: given .*; accepted: .*all times"),
-    "a spring of time": (
-        lambda: Elastic("top", [0.0, Growing()]),
-        r"Elastic on 'top': stiffness\.1: given .*; accepted: .*all times",
-    ),
-    "a spring of time along the normal": (
-        lambda: Elastic("top", normal=Growing()),
-        "Elastic on 'top': normal: given .*; accepted: .*all times",
-    ),
-    "a support of nothing": (lambda: Fixed("top", ["free", None]), "nothing is prescribed"),
-    "an amplitude": (
-        lambda: Fixed("top", [0, 0], amplitude=2),
-        "Fixed on 'top': amplitude: given 2",
-    ),
-    "no motion": (lambda: Motion(), "Motion: given 'nothing'; accepted: a displacement"),
-    "a motion as a number": (lambda: Motion(0.1), r"Motion: displacement: given 0\.1; .*a comp"),
-    "a motion in words": (
-        lambda: Motion([0.0, "up"]),
-        r"Motion: displacement: given \[0\.0, 'up'\]; accepted: a list of 2: numbers or functions",
-    ),
-    "an angle in a list": (
-        lambda: Motion([0.0, None], [0.1, 0.0, 0.0]),
-        r"Motion: rotation: given \[0\.1, 0\.0, 0\.0\]; accepted: a number",
-    ),
-    "a free force": (lambda: Motion([0.0, None], force=[0.0, None]), "Motion: force: .*a list of"),
-    "a force in vain": (
-        lambda: Motion([0.0, 0.0], force=[0.0, -3.0]),
-        r"Motion: force: given \(0\.0, -3\.0\); accepted: a force where displacement is None",
-    ),
-    "no centre": (
-        lambda: Motion([0.0, None], 0.1),
-        r"Motion: centre: given \(\); accepted: a point about which it turns, a list of 2",
-    ),
-    "a moving centre": (lambda: Motion([0.0, None], 0.1, centre=[0.0, None]), "Motion: centre: "),
-    "a rigid part in space": (
-        lambda: problem(rigid=Rigid("right", Motion([0.0, 0.0, 0.0]))),
-        "rigid on 'right': the motion has 3 components, the body has 2",
-    ),
-    "a negative gap": (on(-0.001), r"contact\.gap: -0\.001 at a node"),
-    "a gap and a shape": (on(Plane((0, 0), (0, 1)), gap=0.1), "Contact: foundation: "),
-    "a point in space": (on(Plane((0, 0, 0), (0, 1))), r"foundation: Plane: point: .*2 numbers"),
-    "a normal in space": (on(Plane((0, 0), (0, 0, 1))), "Plane: normal: .*2 numbers in 2-D"),
-    "a centre in space": (on(Sphere((0, 0, -5), 5.0)), r"Sphere: centre: given \(0, 0, -5\)"),
-    "an axis in space": (on(Cylinder((0, -5), (0, 0, 1), 5.0)), "Cylinder: axis: "),
-    "no normal": (on(Plane((0, 0), (0, 0))), "Plane: normal: .*a direction, not 0"),
-    "no direction": (on(Plane((0, 0), (0, 1), direction="axis")), "Plane: along: "),
-    "a direction": (lambda: Plane((0, 0), (0, 1), direction="up"), '"foundation", "body", "axis"'),
-    "a radius": (lambda: Sphere((0, 0), "1"), "Sphere: radius: given '1'"),  # type: ignore[arg-type]
-    "an angle": (lambda: Cone((0, 0), (0, 1), 90.0), "Cone: half_angle: "),
-    "an angle in words": (lambda: Cone((0, 0), (0, 1), "a"), "Cone: half_angle: given 'a'"),  # type: ignore[arg-type]
-    "an edge in words": (
-        lambda: Punch((0, 0), (0, 1), 1.0, "a"),  # type: ignore[arg-type]
-        "Punch: edge_radius: given 'a'; accepted: a length from 0",
-    ),
-    "an edge": (lambda: Punch((0, 0), (0, 1), 1.0, 2.0), "Punch: edge_radius: "),
-    "a distance": (
-        on(Level(lambda x: x[1])),
-        r"contact\.foundation: .* of shape \(2,\); accepted: one number",
-    ),
-    "a number as distance": (lambda: Level(1.0), "Level: function: "),  # type: ignore[arg-type]
-    "a layer": (on(layer=3), "Contact: layer: given 3"),
-    "half a layer": (on(layer=lambda: Layer(0.1)), "Contact: layer: "),
-    "friction": (on(friction=0.3), r"Contact: friction: given 0\.3; accepted: Friction\(mu="),
-    "a law of friction": (lambda: Friction(law=3), "Friction: law: given 3"),  # type: ignore[arg-type]
-    "a conductor": (on(conductor=3), "Contact: conductor: given 3"),
-    "press": (on(press="press"), "Contact: press: given 'press'; accepted: True or False"),
-    "no contact": (lambda: problem(contact=[]), r"contact: given \[\]"),
-    "a law": (lambda: Body(3, TOP), "law: given 3"),  # type: ignore[arg-type]
-    "no compressible law": (
-        lambda: Problem(block(), Body(Linear(10.0, 0.5), TOP), Contact("bottom")),
-        "Poisson's ratio 0.5; accepted: a modulus > 0, a ratio between -1 and 0.5",
-    ),
-    "a law among materials": (lambda: Body([Material(LAW), LAW], TOP), r"law: given Linear\("),
-    "no material": (lambda: Body([], TOP), r"law: given \[\]; accepted: a law, Material"),
-    "regions": (lambda: Material(LAW, on=3), "on: given 3; accepted: the name of a region"),
-    "a crystal": (
-        lambda: make_material(2, young=1.0, poisson=0.3, piezo={"e31": 1.0}),
-        r"^make_material: piezo\.e33: only e31; accepted: either all of e31,",
-    ),
-    "a dimension": (lambda: make_material(1, name="PZT-4"), "make_material: dim: given 1"),
-    "a load as support": (lambda: Body(LAW, [Load("top", [0, 1])]), r"fixed: given Load\("),  # type: ignore[list-item]
-    "an electrode": (lambda: problem(electrodes=Electrode("left")), "a piezoelectric material"),
-    "a mesh": (lambda: Problem(block().mesh, Body(LAW, TOP), Contact("bottom")), "domain: "),
-    "a start": (lambda: solve(problem(), start=3), "start: given 3; accepted: an earlier sol"),  # type: ignore[arg-type]
-    "no problem": (lambda: solve(block()), "solve: given <Domain"),  # type: ignore[arg-type]
-    "a method": (
-        lambda: solve(problem(), method="uzawa"),
-        r"method: unknown; .*; a method and its tolerances as settings \[no-such-name\]$",
-    ),
-    "nan as support": (
-        lambda: solve(Problem(block(), Body(LAW, Fixed("top", [np.nan, 0.0])), Contact("bottom"))),
-        r"not finite at .* \[not-finite\]$",
-    ),
-    "a law in a list": (lambda: Body([LAW], TOP), r"a list of Material\(law, on=region\)"),
-    "a replacement": (lambda: solve(problem(), domian=3), "domian: unknown; accepted: domain"),
-    "a monitor": (lambda: solve(problem(), monitor=3), "monitor: given 3"),  # type: ignore[arg-type]
-    "times": (lambda: next(evolve(problem(), 1.0)), r"times: given 1\.0; accepted: a list"),  # type: ignore[arg-type]
-    "times none": (lambda: solve(problem(), times=[]), "times: given \\[\\]; accepted: a list"),
-    "times in words": (lambda: solve(problem(), times=["a"]), "times: given \\['a'\\]; accepted: "),
-    "times in rows": (lambda: solve(problem(), times=np.ones((2, 2))), "times: given array"),
-    "an angle in space": (
-        lambda: make_material(3, name="PZT-4", poling=90),
-        "make_material: poling: given 90.*; accepted: a vector of 3 numbers",
-    ),
-    "an axis in the plane": (
-        lambda: make_material(2, name="PZT-4", poling=np.array([0.0, 0.0, 1.0])),
-        "make_material: poling: given .*; accepted: an angle from x in degrees",
-    ),
-    "no times": (lambda: solve(problem(), times=[0.5, 0.5]), "times: given 0.5, 0.5; accepted: "),
-    "times of a case": (
-        lambda: solve(parse_case(CASE), times=[1.0]),
-        "times: given together with a case",
-    ),
-    "times and a start": (
-        lambda: solve(problem(), times=[1.0], start=problem().start()),
-        r"start: given together with times; evolve",
-    ),
+    "no times": lambda: solve(problem(), times=[0.5, 0.5]),
+    "times of a case": lambda: solve(parse_case(CASE), times=[1.0]),
+    "times and a start": lambda: solve(problem(), times=[1.0], start=problem().start()),
 }
 
 
+@pytest.mark.wording
 @pytest.mark.parallel(2)
-@pytest.mark.parametrize("name", WRONG)
-def test_what_is_refused(name: str) -> None:
-    make, words = WRONG[name]
-    with pytest.raises(InputError, match=words) as error:
-        make()
-    assert "\n" not in str(error.value)
+def test_messages_of_wrong_descriptions(
+    snapshot: Callable[[str, dict[str, str]], None],
+) -> None:
+    snapshot("wrong-descriptions", {name: message_of(make) for name, make in WRONG.items()})
 
 
 CASE = {
