@@ -258,7 +258,6 @@ def test_other_formats(name, shared_tmp_path):
     assert regions(domain) == pytest.approx(cells)
 
 
-@pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("count", [8, 20, 27])
 def test_groups_of_salome(count, shared_tmp_path):

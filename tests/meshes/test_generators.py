@@ -168,7 +168,6 @@ GENERATORS = {
 }
 
 
-@pytest.mark.core
 @pytest.mark.parallel(2)
 @pytest.mark.parametrize("name", meshes.GENERATORS)
 def test_generators_make_their_parts(name):

@@ -154,7 +154,6 @@ def test_rounding_does_not_keep_a_long_beam_from_its_solution():
     case = beam(1000.0, [100, 1], load, 0.1, 0.8, space={"degree": 2})
     solution = solve(parse_case({**case, "solver": {"tolerance": 1e-10}}), comm=SELF)
     assert solution.converged, solution.outcome.reason
-    assert len(solution.history.records) == 1
     assert 1e-10 < solution.outcome.kkt.rounding < 1e-7
     assert any("rounding decides how well the forces balance" in w for w in solution.warnings)
 

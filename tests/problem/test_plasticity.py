@@ -93,7 +93,7 @@ def accumulated(problem, state):
     return float(problem.equilibrium.laws.volumes @ a)
 
 
-@pytest.mark.core
+@pytest.mark.core("voce-2")
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("hardening", list(HARDENING))
 def test_methods_agree(hardening, degree):

@@ -133,7 +133,6 @@ def test_a_plate_at_quadratic_triangles():
         two, moved = solved(case, SELF, NewtonOptions(tolerance=1e-10, condense=condense))
         assert moved["rigid_parts"]["right"]["displacement"] == pytest.approx(move, abs=1e-10)
         assert two.pressure == pytest.approx(pressure, rel=1e-8)
-        assert len(two.history.records) <= 4
 
 
 def test_balls_whose_cuts_are_plates():

@@ -56,7 +56,6 @@ CASES = {
 COUNTS = {"plate": 18, "slip": 12, "log": 12, "j2": 13, "electrode": 15, "ring": 15}
 
 
-@pytest.mark.core
 @pytest.mark.parametrize(("name", "count"), COUNTS.items())
 def test_columns(name, count):
     run = solve(CASES[name](), comm=SELF)

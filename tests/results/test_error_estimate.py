@@ -75,10 +75,8 @@ def state_of(problem):
     "Hencky, 2-D-1",
     "Hencky, 2-D-2",
     "quadrilaterals-1",
-    "quadrilaterals-2",
     "open, stick, slip-1",
     "the same, two bodies-2",
-    "tube in a casing-2",
 )
 @pytest.mark.parametrize(("name", "degree"), EFFECTIVITY)
 def test_effectivity(name, degree):
