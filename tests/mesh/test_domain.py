@@ -133,7 +133,7 @@ def test_unknown_part_names_the_nearest_and_all():
         domain.facets("x")
 
 
-GRID = {"origin": (0, 0), "size": (4, 1), "cells": (8, 4)}
+CORRECT_RECTANGLE = {"origin": (0, 0), "size": (4, 1), "cells": (8, 4)}
 WRONG_RECTANGLES = {
     "no height": {"size": (4, 0)},
     "a size of 3-D": {"size": (4, 1, 1)},
@@ -149,7 +149,7 @@ WRONG_RECTANGLES = {
     "a piece of 3-D": {"parts": {"a": [Piece("top", (2.0, 1.0))]}},
     "no pieces": {"parts": {"a": []}},
 }
-BRICK = {"origin": (0, 0, 0), "size": (4, 1, 2), "cells": (4, 1, 2)}
+CORRECT_BOX = {"origin": (0, 0, 0), "size": (4, 1, 2), "cells": (4, 1, 2)}
 WRONG_BOXES = {
     "no axis": {"axis": (0, 0, 0)},
     "an axis in the plane": {"axis": (0, 1)},
@@ -162,11 +162,11 @@ WRONG_BOXES = {
 @pytest.mark.parallel
 def test_messages_of_wrong_grids(snapshot):
     said = {
-        name: message_of(rectangle, COMM, **GRID | change)
+        name: message_of(rectangle, COMM, **CORRECT_RECTANGLE | change)
         for name, change in WRONG_RECTANGLES.items()
     }
     said |= {
-        f"box: {name}": message_of(box, COMM, **BRICK | change)
+        f"box: {name}": message_of(box, COMM, **CORRECT_BOX | change)
         for name, change in WRONG_BOXES.items()
     }
     snapshot("wrong-grids", said)
