@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as default
+from functools import cached_property
 
 import numpy as np
 import ufl
@@ -19,7 +20,9 @@ from contact.arguments import check_finite, naming, real
 from contact.body.description import Body, Load
 from contact.body.fields import Amplitude, Field, Moving, at_time, constant
 from contact.errors import InputError
+from contact.mesh.compiled import compiled
 from contact.mesh.domain import Domain
+from contact.mesh.geometry import area, volume
 from contact.ranks import on_all_ranks
 from contact.tolerances import HUGE
 from contact.typing import Array
@@ -32,10 +35,14 @@ class _Share:
 
     amplitude: Amplitude
     moving: bool
-    work: ufl.Form
-    form: fem.Form | None = None
+    works: list[ufl.Form]
     vector: Array = default(default_factory=lambda: np.zeros(0))
     time: float = np.nan
+
+    @cached_property
+    def forms(self) -> list[fem.Form]:
+        """The compiled works: one form for each, that other bodies have too."""
+        return [compiled(work) for work in self.works]
 
 
 class Loads:
@@ -74,9 +81,9 @@ class Loads:
                 kind = load.factor, moving
                 share = next((s for s in self._shares if (s.amplitude, s.moving) == kind), None)
                 if share is None:
-                    self._shares.append(_Share(*kind, work))
+                    self._shares.append(_Share(*kind, [work]))
                 else:
-                    share.work = share.work + work
+                    share.works.append(work)
 
     def at(self, time: float) -> Array:
         """Return the owned nodal loads at a time. Collective where loads know the time."""
@@ -84,10 +91,10 @@ class Loads:
             return self._last[1]
         total = np.zeros(self._owned)
         for share in self._shares:
-            if share.form is None or (share.moving and share.time != time):
+            if np.isnan(share.time) or (share.moving and share.time != time):
                 self._time.value = time
-                share.form = share.form or fem.form(share.work)
-                share.vector, share.time = assembled(share.form, self._owned), time
+                share.vector = np.sum([assembled(f, self._owned) for f in share.forms], axis=0)
+                share.time = time
             total += share.amplitude(time) * share.vector
         self._last = time, total
         return total
@@ -124,18 +131,27 @@ def _works(
             "accepted: 0, or a traction or pressure",
             "value",
         )
-    area = 1.0 if load.force is None else domain.volume(measure)
     works = []
+    vectors: dict[tuple[str, bool], list[Expr]] = {}
     for name, field in load.named.items():
         given = expression(domain, field, x, time, f"{key}.{name}")
+        moving = isinstance(field, Moving)
         if name == "pressure":
-            work = -given * ufl.dot(ufl.FacetNormal(domain.mesh), v)
+            works.append((-given * ufl.dot(ufl.FacetNormal(domain.mesh), v), moving))
         elif name.endswith("charge"):
-            work = electric_load(xi, **{"body" if load.on is None else "surface": given})
+            place = "body" if load.on is None else "surface"
+            works.append((electric_load(xi, **{place: given}), moving))
         else:
-            work = given * v[int(name[-1])] / (area if name.startswith("force") else 1.0)
-        works.append((work * measure, isinstance(field, Moving)))
-    return works
+            kind, component = name.split(".")
+            none = [constant(domain.mesh, 0.0) for _ in range(domain.dim)]
+            vectors.setdefault((kind, moving), none)[int(component)] = given
+    for (kind, moving), given in vectors.items():
+        work = ufl.dot(ufl.as_vector(given), v)
+        if kind == "force":
+            size = volume(domain) if load.on is None else area(domain, load.on)
+            work /= constant(domain.mesh, size)
+        works.append((work, moving))
+    return [(work * measure, moving) for work, moving in works]
 
 
 def expression(
@@ -174,7 +190,7 @@ def to_blame(loads: Sequence[Load], domain: Domain, time: float = 1.0) -> str:
     for i, load in enumerate(loads):
         measure = domain.dx if load.on is None else domain.ds(load.on)
         for name, field in load.named.items():
-            form = fem.form(expression(domain, field, x, time, f"load.{i}.{name}") * measure)
+            form = compiled(expression(domain, field, x, time, f"load.{i}.{name}") * measure)
             value = domain.comm.allreduce(float(fem.assemble_scalar(form)), op=MPI.SUM)
             if not abs(value) <= HUGE:
                 return f"load.{i}.{name}"

@@ -26,7 +26,8 @@ from forms.hencky import Graded, Law
 from forms.history import HistoryLaw
 from forms.piezo import Piezo
 
-#: A material with form constants for its numbers, and the measure of its cells.
+#: A material with form constants for its numbers, and the measure of its cells, whose number is 0:
+#: the forms of materials of one law are one and the same, each with its own constants.
 MaterialMeasure: TypeAlias = tuple[Law | Graded, Piezo | None, Measure]
 
 
@@ -124,7 +125,6 @@ def material_measures(
     materials: Sequence[Material],
     cells: Sequence[Indices],
     degree: int,
-    divided: bool = False,
 ) -> Iterator[MaterialMeasure]:
     """Yield each material with the measure of its cells.
 
@@ -134,15 +134,12 @@ def material_measures(
         As in and from `cells_of`.
     degree
         Of the quadrature.
-    divided
-        Whether the cells are one of several of `in_parts`.
     """
     metadata = {"quadrature_degree": degree}
-    measures = domain.divided(cells) if divided or len(cells) > 1 else [domain.dx]
-    for material, dx in zip(materials, measures, strict=True):
+    for material, own in zip(materials, cells, strict=True):
         law, piezo = form_law(material, domain.mesh), material.piezo
         constants = None if piezo is None else piezo_with_constants(piezo, domain.mesh)
-        yield law, constants, dx(metadata=metadata)
+        yield law, constants, domain.dx_over(own)(metadata=metadata)
 
 
 def form_law(material: Material, mesh: Mesh) -> Law | Graded:

@@ -17,13 +17,14 @@ from contact._compat import lasting
 from contact.body.cuts import Cuts
 from contact.body.description import Body
 from contact.body.elements import MEAN_DILATATION, kinematics_of
-from contact.body.fields import Number
+from contact.body.fields import Number, constant
 from contact.body.internal_variables import QuadratureLaws
 from contact.body.loads import assembled, expression
 from contact.body.materials import in_parts, material_measures
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
+from contact.mesh.compiled import compiled
 from contact.mesh.domain import Domain, Measure
 from contact.mesh.entities import Indices
 from contact.ranks import on_all_ranks
@@ -111,6 +112,7 @@ class WeakForms:
         self._body, self._dim, self._cuts = body, domain.dim, cuts
         self.at, self.secant_at = fem.Function(space), fem.Function(space)
         self._mesh = domain.mesh
+        self._phi_scale = None if body.piezo is None else constant(domain.mesh, body.phi_scale)
         self._trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
         self._test = self.split(test)
         # Stresses at points are no function that more of them would integrate more exactly.
@@ -137,27 +139,22 @@ class WeakForms:
         self._elastic = [*_elastic(domain, body)]
         self._normal = ufl.FacetNormal(domain.mesh)
         parts = in_parts(domain, cells)
-        #: Integrals by quadrature rule and part of the body: sign, kinematics, law, piezoelectric
-        #: tensors, measure.
-        self._rules = [
-            [
-                (sign, kinematics, self.laws.law(law), piezo, dx)
-                for law, piezo, dx in material_measures(
-                    domain, body.materials, part, points, len(parts) > 1
-                )
-                # Stresses at points are those of the whole strain there.
-                for sign, kinematics in (
-                    ((1, seen),) * (points == exact) if isinstance(law, HistoryLaw) else terms
-                )
-            ]
+        #: Integrals by quadrature rule, part of the body and material: law, piezoelectric tensors,
+        #: measure, and the terms, each a sign and the kinematics.
+        self._integrals = [
+            (self.laws.law(law), piezo, dx, ((1, seen),) if at_points else terms)
             for points, terms in rules
             for part in parts
+            for law, piezo, dx in material_measures(domain, body.materials, part, points)
+            for at_points in [isinstance(law, HistoryLaw)]
+            # Stresses at points are those of the whole strain there.
+            if points == exact or not at_points
         ]
 
     def split(self, x: Expr) -> tuple[Expr, Expr | None]:
         """Split a function or argument into displacement and scaled-back potential."""
         u = ufl.as_vector([x[i] for i in range(self._dim)])
-        return u, (None if self._body.piezo is None else self._body.phi_scale * x[self._dim])
+        return u, (None if self._body.piezo is None else self._phi_scale * x[self._dim])
 
     def work(self, along: fem.Function, functions: ufl.Argument) -> list[fem.Form]:
         """Compile the work of the stresses at `at` along unknowns, divided among functions.
@@ -169,8 +166,7 @@ class WeakForms:
         functions
             The test function of a scalar space, whose functions add up to 1.
         """
-        forms = self._internal(self.at, self.at, self.split(along), functions)
-        return fem.form(forms)
+        return _compiled(self._internal(self.at, self.at, self.split(along), functions))
 
     def _internal(
         self,
@@ -181,8 +177,9 @@ class WeakForms:
     ) -> list[ufl.Form]:
         """Return the forces at `at`, secants and the stiffness at points being those elsewhere.
 
-        They are the forms of all quadrature rules, which add up: in one form FFCx would take values
-        of a rule of one point for those of the others.
+        They are the forms of all quadrature rules and materials, which add up: in one form FFCx
+        would take values of a rule of one point for those of the others, and forms of one material
+        are compiled once for all bodies with such a material.
         """
         u, phi, (v, xi) = self._displacement(self.at), self.split(self.at)[1], test or self._test
         frozen = {False: self._displacement(secant_at), True: self._displacement(history_at)}
@@ -193,14 +190,12 @@ class WeakForms:
                 else (sign * functions)
                 * symmetrised_form(law, piezo, u_0, u, phi, v, xi, kinematics)
                 * dx
-                for sign, kinematics, law, piezo, dx in integrals
-                for u_0 in [frozen[isinstance(law, QuadratureLaw)]]
+                for sign, kinematics in terms
             )
-            for integrals in self._rules
-            if integrals
+            for law, piezo, dx, terms in self._integrals
+            for u_0 in [frozen[isinstance(law, QuadratureLaw)]]
         ]
-        supports = [functions * form for form in self._supported(u, v)]
-        return stresses + ([sum(supports)] if supports else [])
+        return stresses + [functions * form for form in self._supported(u, v)]
 
     def _displacement(self, at: fem.Function) -> Expr:
         """Return the displacement of unknowns `at` or `secant_at`, with the jumps across cuts."""
@@ -274,7 +269,7 @@ class WeakForms:
     def _forces_across(self, at: fem.Function) -> list[list[fem.Form]]:
         assert self._cuts is not None
         count = range(len(self._cuts.places))
-        return [fem.form(self._internal(at, at, self._across(k))) for k in count]
+        return [_compiled(self._internal(at, at, self._across(k))) for k in count]
 
     @cached_property
     def _secant_border(self) -> Any:
@@ -289,8 +284,9 @@ class WeakForms:
         assert cuts is not None
 
         def along(forms: list[ufl.Form], k: int) -> list[fem.Form]:
-            made = [ufl.derivative(form, cuts.jump, cuts.directions[k]) for form in forms]
-            return fem.form(made)  # type: ignore[no-any-return]
+            return _compiled(
+                [ufl.derivative(form, cuts.jump, cuts.directions[k]) for form in forms]
+            )
 
         count = range(len(cuts.places))
         own = self._internal(secant_at, secant_at)
@@ -311,7 +307,7 @@ class WeakForms:
     def elastic_forces(self) -> list[fem.Form]:
         """Forces of each elastic support against the displacement `at`."""
         u, (v, _) = self._displacement(self.at), self._test
-        return fem.form(self._supported(u, v)) if self._elastic else []
+        return [compiled(form) for form in self._supported(u, v)]
 
     # For each function of a form dolfinx packs the values in all cells: with the law itself those
     # of one.
@@ -319,12 +315,12 @@ class WeakForms:
     @cached_property
     def law_forces(self) -> list[fem.Form]:
         """Forces at `at`, as those below by quadrature rule."""
-        return fem.form(self._internal(self.at, self.at))
+        return _compiled(self._internal(self.at, self.at))
 
     @cached_property
     def secant_forces(self) -> list[fem.Form]:
         """Forces at `at` with the secant modulus at `secant_at`."""
-        return fem.form(self._internal(self.secant_at, self.secant_at))
+        return _compiled(self._internal(self.secant_at, self.secant_at))
 
     @cached_property
     def secant(self) -> list[fem.Form]:
@@ -335,7 +331,7 @@ class WeakForms:
     @cached_property
     def pattern(self) -> fem.Form:
         """A form over all cells, with the pattern of the matrices."""
-        if len(self._rules) == 1:
+        if len(self._integrals) == 1:
             return self.secant[0]
         return fem.form(ufl.inner(self._trial, ufl.TestFunction(self.at.function_space)) * ufl.dx)
 
@@ -348,4 +344,9 @@ class WeakForms:
 
     def _derivative(self, forces: list[ufl.Form]) -> list[fem.Form]:
         """Compile the derivative of forces by `at`, all else being frozen."""
-        return fem.form([ufl.derivative(form, self.at, self._trial) for form in forces])
+        return _compiled([ufl.derivative(form, self.at, self._trial) for form in forces])
+
+
+def _compiled(forms: Sequence[ufl.Form]) -> list[fem.Form]:
+    """Compile forms that add up."""
+    return [compiled(form) for form in forms]

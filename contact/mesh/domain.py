@@ -15,7 +15,6 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -277,21 +276,15 @@ class Domain:
         """
         return np.where([self.revolved, *[False] * (self.dim - 1)], 0.0, vector)
 
-    def volume(self, measure: Measure) -> float:
-        """Return the volume or area that a measure covers. Collective."""
-        one = fem.Constant(self.mesh, np.float64(1.0))
-        return float(self.comm.allreduce(fem.assemble_scalar(fem.form(one * measure)), op=MPI.SUM))
-
     def dx_in(self, name: str) -> Measure:
         """Measure over the cells of region ``name``; raises as `cells`."""
         self.cells(name)
         return self.dx(list(self.regions).index(name))
 
-    def divided(self, groups: Sequence[Indices]) -> list[Measure]:
-        """Measures over groups of owned cells, which the integrals of one form can share."""
-        data = list(enumerate(groups))
-        dx = self._extended(ufl.Measure("dx", domain=self.mesh, subdomain_data=data))
-        return [dx(i) for i, _ in data]
+    def dx_over(self, cells: Indices) -> Measure:
+        """Measure over some owned cells, for forms whose other integrals are over the same."""
+        data = [(0, cells)]
+        return self._extended(ufl.Measure("dx", domain=self.mesh, subdomain_data=data)(0))
 
     # The integrals of a form must share one object of subdomain data for each kind of integral.
 

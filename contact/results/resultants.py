@@ -23,6 +23,8 @@ from contact.body.fields import constant, knows_time, steady
 from contact.body.loads import Loads, assembled, expression
 from contact.body.rigid import Bolt, Electrode
 from contact.errors import InputError
+from contact.mesh.compiled import compiled
+from contact.mesh.geometry import area
 from contact.mesh.together import members
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
@@ -270,7 +272,7 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
         measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
         now = constant(problem.domain.mesh, time)
         density = expression(problem.domain, load.charge, x, now, f"load.{i}.charge")
-        nodal = assembled(fem.form(density * test[d] * measure), equilibrium.owned)
+        nodal = assembled(compiled(density * test[d] * measure), equilibrium.owned)
         charges = load.factor(time) * nodal.reshape(-1, bs)[:, d]
         charge = _sum(problem, charges)
         magnitude += _sum(problem, np.abs(charges))
@@ -306,12 +308,8 @@ def mean_potential(problem: ContactProblem, state: State, part: str) -> float:
     body = problem.equilibrium
     _, phi = body.split(body.function(state.x))
     ds = problem.domain.ds(part)
-    local = [
-        fem.assemble_scalar(fem.form(phi * ds)),
-        fem.assemble_scalar(fem.form(constant(problem.domain.mesh, 1.0) * ds)),
-    ]
-    integral, area = problem.comm.allreduce(np.array(local), op=MPI.SUM)
-    return float(integral / area)
+    integral = problem.comm.allreduce(fem.assemble_scalar(compiled(phi * ds)), op=MPI.SUM)
+    return float(integral / area(problem.domain, part))
 
 
 def sensor(problem: ContactProblem, state: State, electrode: str) -> Reading:

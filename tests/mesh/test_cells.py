@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from vtkmodules import vtkCommonDataModel
@@ -14,8 +15,18 @@ from vtkmodules import vtkCommonDataModel
 import contact
 from contact.errors import InputError
 from contact.mesh.cells import SHAPES, Shape, rule, shape_of
+from contact.mesh.compiled import compiled
 from contact.mesh.domain import revolved
-from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures, sizes, volumes
+from contact.mesh.geometry import (
+    area,
+    geometry_nodes,
+    inverse,
+    jacobians,
+    measures,
+    sizes,
+    volume,
+    volumes,
+)
 from contact.mesh.grid import box, rectangle
 from contact.mesh.transfer import refined
 from tests.problems.quadrilaterals import unit_block
@@ -93,9 +104,12 @@ def test_numbers_and_order_are_those_of_vtk(name, degree, known):
 @pytest.mark.parametrize("name", NAMES)
 def test_volumes_are_those_of_dolfinx(name):
     domain = unit_block(COMM, name)
-    piece = fem.form(1.0 * domain.dx)
-    assert COMM.allreduce(volumes(domain).sum()) == pytest.approx(1.0, rel=1e-13)
-    assert COMM.allreduce(fem.assemble_scalar(piece)) == pytest.approx(1.0, rel=1e-13)
+    one = ufl.as_ufl(1.0)
+    found = [volume(domain), *(area(domain, name) for name in ("left", "top"))]
+    forms = map(compiled, (one * domain.dx, one * domain.ds("left"), one * domain.ds("top")))
+    assert found == pytest.approx([1.0] * 3, rel=1e-13)
+    known = [COMM.allreduce(fem.assemble_scalar(form)) for form in forms]
+    assert known == pytest.approx([1.0] * 3, rel=1e-13)
     if domain.dim == 2:
         ring = revolved(domain)
         assert COMM.allreduce(volumes(ring).sum()) == pytest.approx(np.pi, rel=1e-13)
@@ -137,7 +151,7 @@ def test_refined_meshes_keep_parts_regions_and_space(name):
     assert shape_of(fine.mesh).name == name
     assert fine.mesh.topology.index_map(dim).size_global == whole * 4**dim
     assert part_sizes(fine) == pytest.approx(part_sizes(domain))
-    assert integral(fine, fine.dx_in("body")) == pytest.approx(1.0)
+    assert integral(fine, region="body") == pytest.approx(1.0)
     assert fine.levels == 2
 
 
