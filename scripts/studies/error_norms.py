@@ -1,4 +1,4 @@
-"""Norms of the difference between two displacements, by quadrature."""
+"""Norms of the difference between two displacements, by quadrature in NumPy."""
 
 from __future__ import annotations
 
@@ -8,17 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
+from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.materials import material_measures
 from contact.history import BodyState
+from contact.mesh.cells import rule, shape_of
+from contact.mesh.entities import Indices
+from contact.mesh.geometry import geometry_nodes, measures
 from contact.typing import Array
-from forms.hencky import FormLaw, secant_stress
-from forms.kinematics import deviator_squared, strain
-from forms.piezo import Piezo
+from forms.elasticity import Anisotropic, mandel
+from forms.history import PAIRS, components, to_vector
+from forms.kinematics import Strained, strain
 from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory
 
 
@@ -61,51 +65,99 @@ def errors(
         A function in `body.space`, or the displacement, with the potential of a piezoelectric body,
         as a UFL vector of the coordinates; None for the norms of the solution itself.
     """
-    solution = body.function(x)
-    u, phi = body.split(solution)
-    kinematics, own = body.domain.kinematics, kinematics_of(body.domain, body.element)
-    frozen = eps = strain(u, own)
-    e, electric = u, phi
+    domain, d, bs = body.domain, body.dim, body.block_size
+    mesh, shape, kinematics = domain.mesh, shape_of(domain.mesh), domain.kinematics
+    own = kinematics_of(domain, body.element)
+    at, weights = rule(shape, 2 * body.degree + 4)
+    solution = body.nodal(x).ravel()
+    error, known = solution, None
     if isinstance(other, fem.Function):
-        e, electric = body.split(solution - other)
-        eps = strain(e, own)
+        error = solution - other.x.array
     elif other is not None:
-        every = other(ufl.SpatialCoordinate(body.domain.mesh))
-        given = ufl.as_vector([every[i] for i in range(body.dim)])
-        e, eps = u - given, eps - strain(given, kinematics)
-        electric = None if phi is None else phi - every[body.dim]
-    materials = list(
-        material_measures(body.domain, body.body.materials, body.cells, 2 * body.degree + 4)
-    )
+        every = other(ufl.SpatialCoordinate(mesh))
+        given = ufl.as_vector([every[i] for i in range(d)])
+        potential = every[d] if body.piezoelectric else None
+        known = fem.Expression(ufl.as_vector(_values(given, potential, kinematics)), at)
+
+    def linear(function: fem.Function) -> Expr:
+        u, phi = body.split(function)
+        eps = to_vector(strain(u, own), components(d))
+        return ufl.as_vector([*_values(u, phi, kinematics), *(eps[i] for i in range(len(eps)))])
+
     body.laws.fit(BodyState(x))
-    gradient = kinematics.gradient(e)
-    squares = (
-        sum(ufl.inner(e, e) * dx for _, _, dx in materials),
-        sum(ufl.inner(gradient, gradient) * dx for _, _, dx in materials),
-        sum(
-            (_elastic(body, law, frozen, eps) + _electric(piezo, electric, body.dim)) * dx
-            for law, piezo, dx in materials
-        ),
-    )
-    integrals = [fem.assemble_scalar(fem.form(square)) for square in squares]
-    totals = body.comm.allreduce(np.array(integrals), op=MPI.SUM)
+    totals, gradient, field = np.zeros(3), slice(d, d + 9), slice(d + 9, 9 + bs * d)
+    for material, cells_of in zip(body.body.materials, body.cells, strict=True):
+        chunks = (
+            body.pointwise.values("errors", linear, at, values, cells_of)
+            for values in (solution, error)
+        )
+        for (cells, all_of), (_, off) in zip(*chunks, strict=True):
+            count = all_of.shape[2] - components(d)
+            e, eps = off[..., :count], off[..., count:]
+            if known is not None:
+                exact = _sampled(known, mesh, cells, len(at))
+                e, eps = e - exact, eps - _strains(exact[..., gradient], d)
+            volumes = measures(domain.revolved, shape, geometry_nodes(domain, cells), at, weights)
+            energy = _elastic(body, material, cells, at, all_of[..., count:], eps)
+            if material.piezo is not None:
+                beta = np.asarray(material.piezo.beta)[:d, :d]
+                energy += np.einsum("cqi,ij,cqj->cq", e[..., field], beta, e[..., field])
+            squares = np.sum(e[..., :d] ** 2, axis=2), np.sum(e[..., gradient] ** 2, axis=2), energy
+            totals += [np.sum(volumes * square) for square in squares]
+    body.comm.Allreduce(MPI.IN_PLACE, totals, op=MPI.SUM)
     return Errors(*(float(np.sqrt(max(total, 0.0))) for total in totals))
 
 
-def _elastic(body: BodyEquilibrium, law: FormLaw, frozen: Expr, eps: Expr) -> Expr:
-    """Return eps : C eps with the secant stiffness C at a frozen strain."""
-    if isinstance(law, PlaneStressHistory):
+def _values(u: Expr, phi: Expr | None, kinematics: Strained) -> list[Expr]:
+    """Return the components of u, of its gradient, and of grad phi."""
+    d, gradient = len(u), kinematics.gradient(u)
+    field = [] if phi is None else [ufl.grad(phi)[i] for i in range(d)]
+    return [*(u[i] for i in range(d)), *(gradient[i] for i in np.ndindex(3, 3)), *field]
+
+
+def _sampled(expression: fem.Expression, mesh: dmesh.Mesh, cells: Indices, count: int) -> Array:
+    """Return the values of an expression at its points, shape (cells, count, components)."""
+    found = np.asarray(expression.eval(mesh, cells))
+    return found.reshape(len(cells), count, expression.value_size)
+
+
+def _strains(gradient: Array, dim: int) -> Array:
+    """Return the strains of gradients of shape (..., 9) in the basis of Mandel."""
+    g = gradient.reshape(*gradient.shape[:-1], 3, 3)
+    found = [
+        g[..., i, j] if i == j else (g[..., i, j] + g[..., j, i]) / 2**0.5
+        for i, j in PAIRS[components(dim)]
+    ]
+    return np.stack(found, axis=-1)
+
+
+def _elastic(
+    body: BodyEquilibrium,
+    material: Material,
+    cells: Indices,
+    at: Array,
+    frozen: Array,
+    eps: Array,
+) -> Array:
+    """Return eps : C eps at points of cells, C being the secant stiffness at a frozen strain."""
+    mesh, law, factor = body.domain.mesh, material.law, 1.0
+    if material.factor is not None:
+        given = fem.Expression(material.factor.ufl(ufl.SpatialCoordinate(mesh)), at)
+        factor = _sampled(given, mesh, cells, len(at))[..., 0]
+    if isinstance(law, Anisotropic):
+        kept = [0, 1, 2, 5] if body.dim == 2 else range(6)
+        stiffness = mandel(law.stiffness)[np.ix_(kept, kept)]
+        return factor * np.einsum("cqi,ij,cqj->cq", eps, stiffness, eps)
+    across = isinstance(law, PlaneStressHistory)
+    if across:
         assert isinstance(law.base, HenckyAtPoints)
-        across = ufl.as_tensor([[0, 0, 0], [0, 0, 0], [0, 0, 1]])
-        law, frozen = law.base.base, frozen + body.laws.fits[ACROSS] * across
-        g = law.secant_modulus(deviator_squared(frozen))
-        eps -= (law.bulk - 2 * g / 3) / (law.bulk + 4 * g / 3) * ufl.tr(eps) * across
-    return ufl.inner(secant_stress(law, frozen, eps), eps)
-
-
-def _electric(piezo: Piezo | None, potential: Expr | None, dim: int) -> Expr:
-    """Return E . beta E, zero in a material without a field."""
-    if piezo is None or potential is None:
-        return ufl.as_ufl(0)
-    field = ufl.grad(potential)
-    return sum(piezo.beta[i, j] * field[i] * field[j] for i in range(dim) for j in range(dim))
+        law, frozen, eps = law.base.base, frozen.copy(), eps.copy()
+        thinner = fem.Expression(body.laws.fits[ACROSS], at)
+        frozen[..., 2] += _sampled(thinner, mesh, cells, len(at))[..., 0]
+    trace = frozen[..., :3].sum(axis=2)
+    g = np.asarray(law.secant_modulus(np.sum(frozen**2, axis=2) - trace**2 / 3))
+    if across:  # the strain at which the error has no stress across
+        spared = (law.bulk - 2 * g / 3) / (law.bulk + 4 * g / 3)
+        eps[..., 2] -= spared * eps[..., :3].sum(axis=2)
+    trace = eps[..., :3].sum(axis=2)
+    return factor * ((law.bulk - 2 * g / 3) * trace**2 + 2 * g * np.sum(eps**2, axis=2))

@@ -119,22 +119,18 @@ def manufactured(
     if piezo is not None:
         sigma += coupling_stress(piezo, electric(x))
 
-    def load(expression: ufl.core.expr.Expr) -> Given:
-        # Interpolated: UFL would ask for a quadrature of a very high degree.
-        function = fem.Function(space)
-        function.interpolate(fem.Expression(expression, finer.basix_element.points))
-        return Given(lambda _: function)
-
     # The outward normal of the bottom is minus the last axis.
     axes, up = range(dim), dim - 1
-    loads = [
-        Load(None, [load(-sum(sigma[i, j].dx(j) for j in axes)) for i in axes]),
-        Load("bottom", [load(-sigma[i, up]) for i in axes]),
-    ]
+    expressions = [-sum(sigma[i, j].dx(j) for j in axes) for i in axes]
+    expressions += [-sigma[i, up] for i in axes]
     if piezo is not None:
         d = electric_displacement(piezo, eps, electric(x))
-        loads.append(Load(None, charge=load(sum(d[j].dx(j) for j in axes))))
-        loads.append(Load("bottom", charge=load(-d[up])))
+        expressions += [sum(d[j].dx(j) for j in axes), -d[up]]
+    # Interpolated: UFL would ask for a quadrature of a very high degree.
+    found = interpolated(space, expressions)
+    loads = [Load(None, found[:dim]), Load("bottom", found[dim : 2 * dim])]
+    if piezo is not None:
+        loads += [Load(None, charge=found[-2]), Load("bottom", charge=found[-1])]
     given = [Given(f) for f in parts]
     sides = ["left", "right", "top"] + ["front", "back"] * (dim == 3)
     fixed = [Fixed(side, given, None if piezo is None else Given(electric)) for side in sides]
@@ -160,6 +156,29 @@ def _without_stress_across(
     response = PlaneStressHistory(HenckyAtPoints(law)).respond(strains, across)
     found.x.array[:] = response.stress.ravel()
     return to_tensor(found)
+
+
+def interpolated(
+    space: fem.FunctionSpace, expressions: Sequence[ufl.core.expr.Expr]
+) -> list[fem.Function]:
+    """Return the interpolants of expressions, compiled together. Collective.
+
+    Parameters
+    ----------
+    space
+        Discontinuous functions of Lagrange.
+    expressions
+        The expressions, of the coordinates.
+    """
+    points, mesh = space.element.basix_element.points, space.mesh
+    index_map = mesh.topology.index_map(mesh.topology.dim)
+    cells = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    found = fem.Expression(ufl.as_vector(expressions), points).eval(mesh, cells)
+    values, dofs = np.reshape(found, (cells.size, len(points), -1)), space.dofmap.list
+    made = [fem.Function(space) for _ in expressions]
+    for i, function in enumerate(made):
+        function.x.array[dofs] = values[..., i]
+    return made
 
 
 def exact(dim: int, charged: bool = False) -> Callable[[Any], ufl.core.expr.Expr]:

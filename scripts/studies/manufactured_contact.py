@@ -24,6 +24,7 @@ from forms.kinematics import strain
 from forms.laws import ConstantCoefficient, PerfectConductivity
 from forms.ops import positive_part
 from forms.piezo import Piezo
+from scripts.studies.exact_solutions import interpolated
 
 #: A UFL expression, or a number.
 Value: TypeAlias = Any
@@ -138,24 +139,18 @@ class Sliding:
             sigma = within * sigma + (1 - within) * stress(self.laws[1], strain(u))
         name = domain.mesh.topology.cell_name()
         element = basix.ufl.element("Lagrange", name, degree + 2, discontinuous=True)
-        space, points = fem.functionspace(domain.mesh, element), element.basix_element.points
-
-        def load(expressions: list[Value]) -> list[fem.Function]:
-            found = [fem.Function(space) for _ in expressions]
-            for function, expression in zip(found, expressions, strict=True):
-                function.interpolate(fem.Expression(expression, points))
-            return found
-
         axes = range(d)
-        loads = [Load(None, load([-sum(sigma[i, j].dx(j) for j in axes) for i in axes]))]
+        given = {None: [-sum(sigma[i, j].dx(j) for j in axes) for i in axes]}
         for side, axis, sign in SIDES[: 2 * up]:
-            loads.append(Load(side, load([sign * sigma[i, axis] for i in axes])))
+            given[side] = [sign * sigma[i, axis] for i in axes]
         if not all(isinstance(law, Linear) for law in self.laws):
             contact = [-self.friction(x) * e for e in self._along] + [self.pressure(x)]
             for k in range(len(self.laws)):
                 sign = 2 * k - 1
-                rest = load([sign * (sigma[i, up] + contact[i]) for i in axes])
-                loads.append(Load(f"contact{k}", rest))
+                given[f"contact{k}"] = [sign * (sigma[i, up] + contact[i]) for i in axes]
+        space = fem.functionspace(domain.mesh, element)
+        found = interpolated(space, [one for components in given.values() for one in components])
+        loads = [Load(part, found[d * k : d * (k + 1)]) for k, part in enumerate(given)]
         fixed = [Fixed(f"far{k}", u) for k in range(len(self.laws))]
         materials = [Material(law, on=f"block{k}") for k, law in enumerate(self.laws)]
         if len(self.laws) == 1:
