@@ -1,7 +1,7 @@
 # Every target works on a fresh machine: scripts/fx finds FEniCSx or makes a place for it, once.
 FX := scripts/fx
 SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py) scripts/examples/explore_forms.py scripts/gallery.py \
-	scripts/pictures.py
+	scripts/golden.py scripts/pictures.py
 NAMES := $(notdir $(basename $(SCRIPTS)))
 # a test that hangs on some ranks is ended, and fails
 MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
@@ -16,6 +16,7 @@ help:
 	@echo "make test-rest  the other short tests"
 	@echo "make test-all  all of them, the slow ones too, and all combinations of parameters"
 	@echo "make messages  renew the texts of messages in tests/snapshots"
+	@echo "make golden   small problems of all kinds against stored numbers (ARGS=--renew stores them)"
 	@echo "make lint     ruff and mypy"
 	@echo "make format   let ruff format the sources"
 	@echo "make NAME     run a script: $(sort $(NAMES))"
