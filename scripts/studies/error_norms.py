@@ -15,6 +15,7 @@ from ufl.core.expr import Expr
 from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.fields import constant
 from contact.history import BodyState
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import Indices
@@ -142,8 +143,9 @@ def _elastic(
     """Return eps : C eps at points of cells, C being the secant stiffness at a frozen strain."""
     mesh, law, factor = body.domain.mesh, material.law, 1.0
     if material.factor is not None:
-        given = fem.Expression(material.factor.ufl(ufl.SpatialCoordinate(mesh)), at)
-        factor = _sampled(given, mesh, cells, len(at))[..., 0]
+        # It may be a number.
+        given = material.factor.ufl(ufl.SpatialCoordinate(mesh)) * constant(mesh, 1.0)
+        factor = _sampled(fem.Expression(given, at), mesh, cells, len(at))[..., 0]
     if isinstance(law, Anisotropic):
         kept = [0, 1, 2, 5] if body.dim == 2 else range(6)
         stiffness = mandel(law.stiffness)[np.ix_(kept, kept)]
