@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from contact.case.formula import Expression
 from contact.errors import InputError
+from tests.problems.messages import message_of
 
 
 def coordinates(cell):
@@ -139,58 +140,56 @@ def test_values_that_are_not_finite_name_the_point():
         Expression("1/x").numpy([[1.0, 2.0], [0.0, 2.0]])
 
 
-@pytest.mark.parametrize(
-    ("source", "fragment"),
-    [
-        ("9**9**9", "not finite"),
-        ("1e999", "not finite"),
-        ("1" * 900, "not finite"),
-        ("sqrt(-1)", "not finite"),
-        ("1/0", "division by zero"),
-        ("1/(0*x)", "division by zero"),
-        ("(0*x - 8)**0.5", "not finite"),
-        ("exp(1000 + 0*x)", "not finite"),
-        ("nan", "unknown name nan"),
-        ("inf*x", "unknown name inf"),
-        ("X", "unknown name X"),
-        ("sinh(x)", "unknown function sinh"),
-        ("x^2", "written **"),
-        ("x.__class__", "x.__class__ is not accepted"),
-        ("__import__('os').system('true')", "is not accepted"),
-        ("().__class__.__bases__", "is not accepted"),
-        ("lambda: 1", "is not accepted"),
-        ("[i for i in (1, 2)]", "is not accepted"),
-        ("x if y else z", "is not accepted"),
-        ("x and y", "is not accepted"),
-        ("x // 2", "is not accepted"),
-        ("x[0]", "is not accepted"),
-        ("sin(x=1)", "is not accepted"),
-        ("max(*x)", "is not accepted"),
-        ("x in y", "only the comparisons"),
-        ("'x'", "is not accepted"),
-        ("1j", "is not accepted"),
-        ("True", "is not accepted"),
-        ("min(x)", "2 arguments or more"),
-        ("where(x, y)", "3 arguments"),
-        ("sin(x, y)", "1 argument"),
-        ("", "not a formula"),
-        ("x +", "not a formula"),
-        ("x\ny", "not a formula"),
-        ("x\0", "not a formula"),
-        ("(" * 400 + "x" + ")" * 400, "not a formula"),
-        ("-" * 990 + "x", "nested too deeply"),
-        ("x+" * 400 + "x", "nested too deeply"),
-        ("x" * 2000, "2000 characters"),
-        (math.nan, "not finite"),
-        (math.inf, "not finite"),
-        (True, "neither a number nor a formula"),
-        (None, "neither a number nor a formula"),
-        ([1.0], "neither a number nor a formula"),
-    ],
-)
-def test_everything_else_is_refused_in_one_short_line(source, fragment):
-    with pytest.raises(InputError) as error:
-        Expression(source)
-    message = str(error.value)
-    assert fragment in message
-    assert "\n" not in message and len(message) < 300
+REFUSED = [
+    "9**9**9",
+    "1e999",
+    "1" * 900,
+    "sqrt(-1)",
+    "1/0",
+    "1/(0*x)",
+    "(0*x - 8)**0.5",
+    "exp(1000 + 0*x)",
+    "nan",
+    "inf*x",
+    "X",
+    "sinh(x)",
+    "x^2",
+    "x.__class__",
+    "__import__('os').system('true')",
+    "().__class__.__bases__",
+    "lambda: 1",
+    "[i for i in (1, 2)]",
+    "x if y else z",
+    "x and y",
+    "x // 2",
+    "x[0]",
+    "sin(x=1)",
+    "max(*x)",
+    "x in y",
+    "'x'",
+    "1j",
+    "True",
+    "min(x)",
+    "where(x, y)",
+    "sin(x, y)",
+    "",
+    "x +",
+    "x\ny",
+    "x\0",
+    "(" * 400 + "x" + ")" * 400,
+    "-" * 990 + "x",
+    "x+" * 400 + "x",
+    "x" * 2000,
+    math.nan,
+    math.inf,
+    True,
+    None,
+    [1.0],
+]
+
+
+@pytest.mark.wording
+def test_messages_of_what_is_no_formula(snapshot):
+    said = {repr(source)[:70]: message_of(Expression, source) for source in REFUSED}
+    assert len(said) == len(REFUSED)
+    snapshot("refused-formulas", said)
