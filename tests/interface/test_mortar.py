@@ -245,6 +245,26 @@ def test_concentric_arcs(degree) -> None:
         np.testing.assert_allclose(couple(slave, master, 1.0).gap, 0, atol=1e-14)
 
 
+@pytest.mark.core
+def test_directions_are_halfway_between_an_arc_and_a_line() -> None:
+    def chords(x, first):
+        corners = np.stack([x[:-1], x[1:]], axis=1)
+        out = np.diff(x, axis=0)[:, ::-1] * [-1.0, 1.0]
+        out /= np.linalg.norm(out, axis=1)[:, None]
+        nodes = first + np.column_stack([np.arange(len(out)), np.arange(1, len(x))])
+        return Surface(nodes, corners, out, *np.zeros((2, len(out), 1)), 1)
+
+    angle = np.linspace(0.4, -0.4, 9)
+    arc = chords(np.column_stack([-np.sin(angle), np.cos(angle)]), 0)
+    line = chords(np.column_stack([np.linspace(1.0, -1.0, 6), np.full(6, 1.01)]), FIRST)
+    found = couple(arc, line, 1.0)
+    inner = (found.nodes > 0) & (found.nodes < 8)
+    half = angle[found.nodes[inner]] / 2
+    np.testing.assert_allclose(
+        found.normal[inner], np.column_stack([-np.sin(half), np.cos(half)]), atol=1e-12
+    )
+
+
 def test_a_bowl_that_touches_within_facets_does_not_cut_them() -> None:
     """Those of |x - c|^2 over two triangles of degree 2, c in the middle of the edge between.
 

@@ -57,6 +57,7 @@ def test_steel_in_millimetres_is_as_stiff_as_in_metres():
         assert np.allclose(pressure, modulus * 1e-3, rtol=1e-8)
 
 
+@pytest.mark.core("table")
 @pytest.mark.parametrize("name", [*SYSTEMS, "table"])
 def test_a_piezoelectric_problem_is_the_same_in_all_systems(name):
     """Displacements, pressures, potentials and charges in SI, whatever the system."""

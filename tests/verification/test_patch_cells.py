@@ -105,7 +105,7 @@ def test_constant_shear_under_stick(cell: str, degree: int, element: str) -> Non
     np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
 
 
-@pytest.mark.core("1-standard-linear", "2-standard-j2")
+@pytest.mark.core("1-standard-linear", "1-mean_dilatation-linear", "2-standard-j2")
 @pytest.mark.parallel
 @pytest.mark.parametrize("law", ["linear", "log", "j2"])
 @pytest.mark.parametrize(

@@ -130,12 +130,13 @@ def uniaxial_energy(steps, end, hardening, terms):
 @pytest.mark.core
 @pytest.mark.parametrize("law", ["table", "voce", "K", "chaboche"])
 @pytest.mark.parametrize("steps", [1, 4])
-def test_stored_energy_is_that_of_the_state(law, steps):
+@pytest.mark.parametrize(("kind", "volume"), [("uniaxial", 1.0), ("revolved", np.pi)])
+def test_stored_energy_is_that_of_the_state(kind, volume, law, steps):
     """However long the steps are: elastic, of isotropic hardening, and of the back stresses."""
     _, hardening, terms = LAWS[law]
-    solution = run("uniaxial", material(law), path(0.02, steps=steps), cells=1)
+    solution = run(kind, material(law), path(0.02, steps=steps), cells=1)
     rows = [step.row for step in solution.steps]
-    stored, lost = uniaxial_energy(steps, 0.02, hardening, terms)
+    stored, lost = (volume * part for part in uniaxial_energy(steps, 0.02, hardening, terms))
     assert rows[-1]["energy"] == pytest.approx(stored, rel=1e-8)
     assert sum(row["plastic_dissipation"] for row in rows) == pytest.approx(lost, rel=1e-8)
 
