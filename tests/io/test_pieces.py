@@ -35,7 +35,7 @@ def rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-@pytest.mark.core
+@pytest.mark.core("pair")
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", CASES)
 def test_pieces_hold_what_one_file_holds(

@@ -60,7 +60,7 @@ def test_confined_block_on_a_smooth_foundation():
     assert stress[0, 0] == pytest.approx(-250.0, abs=1e-4)
 
 
-@pytest.mark.core
+@pytest.mark.core("voce")
 @pytest.mark.parallel
 @pytest.mark.parametrize("hardening", [*HARDENING][-1 if MPI.COMM_WORLD.size > 2 else 0 :])
 def test_a_restart_goes_on_with_the_same_history(tmp_path, hardening):

@@ -41,7 +41,6 @@ def pressed(foundation, approach=0.02, size=0.02):
     )
 
 
-@pytest.mark.core
 @pytest.mark.parallel
 def test_a_parabola_by_its_heights_is_one(shared_tmp_path):
     """Cubic splines through the points of a parabola are that parabola."""
