@@ -140,11 +140,18 @@ def pytest_report_header() -> str:
     return f"contact: {len(files)} files, {lines} lines"
 
 
+#: Identifiers of `core` by tests that have no such parameters, as far as tests are collected.
+_unknown: dict[str, set[str]] = {}
+
+
 def pytest_itemcollected(item: pytest.Item) -> None:
     """Let `core` with identifiers of parameters stand for those alone."""
     mark = item.get_closest_marker("core")
-    if mark is not None and mark.args and item.callspec.id not in mark.args:
-        item.own_markers.remove(mark)
+    if mark is not None and mark.args:
+        missing = _unknown.setdefault(item.nodeid.split("[")[0], set(mark.args))
+        missing.discard(item.callspec.id)
+        if item.callspec.id not in mark.args:
+            item.own_markers.remove(mark)
 
 
 @pytest.hookimpl(trylast=True)
@@ -155,6 +162,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     one, or on 2 where a test is not for one. Which rank has nothing, or two neighbours, depends on
     no combination. With --short that holds on one as well, and one of a test stays on 3.
     """
+    unknown = {name: wrong for name, wrong in _unknown.items() if wrong}
+    # Some parameters are for some numbers of ranks; a single item has no others beside it.
+    if unknown and _comm.size == 1 and not any("[" in given for given in config.args):
+        raise pytest.UsageError(f"core: parameters that no test has: {unknown}")
     kept, short = set(), config.getoption("--short")
     for _, group in groupby(items, key=lambda item: item.nodeid.split("[")[0]):
         some = [item for item in group if not (short and item.get_closest_marker("slow"))]
