@@ -188,6 +188,8 @@ def _scales(summary: Mapping[str, Any], nodes: Sequence[Mapping[str, str]]) -> d
     length = summary["max_displacement"]
     potential = max(abs(summary.get(key) or 0.0) for key in ("phi_min", "phi_max"))
     charge = (summary.get("charges") or {}).get("magnitude", 0.0)
+    if potential:  # of an open circuit the charges are rounding
+        charge = max(charge, 1e-6 * max(forces) * length / potential)
     return {
         "force": max(forces),
         "moment": max(forces) * size,
@@ -262,6 +264,8 @@ def compare(stored: Mapping[str, Values], found: Mapping[str, Values]) -> list[D
     differences = []
     for problem in sorted({*stored, *found}):
         old, new = stored.get(problem, {}), found.get(problem, {})
+        if "failed" in new:  # which tells more than all values that are missing
+            old = {}
         for quantity in sorted({*old, *new}):
             relative = difference(old.get(quantity), new.get(quantity))
             if not relative <= TOLERANCE:
