@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,9 @@ LEFT_OUT = frozenset((".git", "build", "results"))
 
 #: Seconds that the tests on some ranks may take: a mutant that hangs is found by that.
 LIMIT = 1200
+
+#: Status of pytest without any test, and of `timeout` where it ends a command.
+NO_TESTS, TIMEOUT = 5, 124
 
 #: A test that fails, as pytest's summary names it.
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+::\S+)", re.M)
@@ -284,14 +288,25 @@ def copied(into: Path) -> Path:
     return shutil.copytree(ROOT, into / "tree", symlinks=True, ignore=left_out)
 
 
-def found_by(tree: Path, mutant: Mutant, ranks: int) -> str:
-    """Return the first of the core tests on some ranks that fails; nothing where all pass."""
+def core_files(tree: Path, mutant: Mutant) -> tuple[list[str], list[str]]:
+    """Return the files with core tests: those near a mutant, and all others."""
     files = [
         str(path.relative_to(tree))
         for path in sorted((tree / "tests").rglob("test_*.py"))
         if "mark.core" in path.read_text()
     ]
-    files.sort(key=lambda file: not file.startswith(mutant.near))
+    near = [file for file in files if file.startswith(mutant.near)]
+    return near, [file for file in files if file not in near]
+
+
+def found_by(tree: Path, files: Sequence[str], ranks: int) -> str:
+    """Return the first core test of files that fails on some ranks; nothing where all pass.
+
+    Raises
+    ------
+    RuntimeError
+        If the tests do not run at all.
+    """
     options = ["--short", "-x", "-q", "--tb=no", "-rfE", "--color=no", "-p", "no:cacheprovider"]
     run = [sys.executable, "-m", "pytest", *files, *options, "-m", "core", "-n", "0"]
     if ranks > 1:
@@ -304,11 +319,11 @@ def found_by(tree: Path, mutant: Mutant, ranks: int) -> str:
         capture_output=True,
         text=True,
     )
-    if ended.returncode == 0:
+    if ended.returncode in (0, NO_TESTS):
         return ""
     failed = FAILED.search(ended.stdout)
-    if failed is None and ended.returncode != 124:
-        raise RuntimeError(f"mutant {mutant.name}: pytest:\n{ended.stdout}{ended.stderr}")
+    if failed is None and ended.returncode != TIMEOUT:
+        raise RuntimeError(f"pytest: {ended.stdout}{ended.stderr}")
     return failed[1] if failed else f"no end within {LIMIT} s"
 
 
@@ -328,8 +343,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 mutant.apply(tree)
             except InputError as error:
                 given.error(error.words)
-            for ranks in sorted(options.ranks, key=lambda n: (n != mutant.ranks, n)):
-                found = found_by(tree, mutant, ranks)
+            order = sorted(options.ranks, key=lambda n: (n != mutant.ranks, n))
+            for ranks, files in product(order, core_files(tree, mutant)):
+                found = found_by(tree, files, ranks)
                 if found:
                     break
         row = name, mutant.breaks, found or "nothing", ranks, round(time.perf_counter() - began)
