@@ -189,7 +189,7 @@ def _scales(summary: Mapping[str, Any], nodes: Sequence[Mapping[str, str]]) -> d
     potential = max(abs(summary.get(key) or 0.0) for key in ("phi_min", "phi_max"))
     charge = (summary.get("charges") or {}).get("magnitude", 0.0)
     if potential:  # of an open circuit the charges are rounding
-        charge = max(charge, 1e-6 * max(forces) * length / potential)
+        charge = max(charge, 1e-3 * max(forces) * length / potential)
     return {
         "force": max(forces),
         "moment": max(forces) * size,
