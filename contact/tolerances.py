@@ -15,6 +15,9 @@ ROUNDING = 500 * EPS
 #: ten digits and more, and an orthogonal basis knows a motion to some root of `EPS`.
 NEGLIGIBLE = 1e-9
 
+#: Overlap, over the size of the mesh, that is taken for rounding of positions in mesh files.
+TOUCHING = 1e-6
+
 #: The least tolerance: rounding keeps relative residuals from falling below.
 PRECISION = 1e-15
 

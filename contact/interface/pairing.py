@@ -21,14 +21,11 @@ from contact.interface.placing import check_gap
 from contact.mesh.domain import Domain
 from contact.mesh.entities import components, owned_among
 from contact.mesh.owners import Owners
-from contact.tolerances import ROUNDING
+from contact.tolerances import ROUNDING, TOUCHING
 from contact.typing import Array
 
 #: Share of the mesh's extent up to which facets are taken to face each other.
 REACH = 0.25
-
-#: Depth, in lengths of facets, that the chords of two curved sides may reach into each other.
-CHORDS = 0.25
 
 
 def find_pair(
@@ -222,16 +219,14 @@ def _apart(
     """Refuse bodies that overlap; return gaps without depths, and the largest depth. Collective.
 
     Facets are chords of a curved surface: those of two sides that lie on each other cut each other
-    by h^2/8 times the difference of the curvatures. That is taken off; a negative gap between
-    sides that are apart remains, as in front of foundations, for the mean of a gap that touches 0
-    within a facet is.
+    by their sagittas. That is taken off; a negative gap between sides that are apart remains, as in
+    front of foundations, for the mean of a gap that touches 0 within a facet is.
     """
-    comm, gap = body.comm, coupling.gap
-    least = np.minimum(coupling.apart, 0.0)
-    longest = comm.allreduce(2 * float(slave.radii.max(initial=0.0)), op=MPI.MAX)
-    cut = comm.allreduce(float(np.max(least - gap, initial=0.0)), op=MPI.MAX)
-    if cut <= CHORDS * longest:
-        return np.maximum(gap, least), cut if cut > 1e-5 * body.domain.size else 0.0
+    gap, rounding = coupling.gap, TOUCHING * body.domain.size
+    if coupling.depth <= rounding:
+        least = np.minimum(coupling.apart, 0.0)
+        cut = body.comm.allreduce(float(np.max(least - gap, initial=0.0)), op=MPI.MAX)
+        return np.maximum(gap, least), cut if cut > rounding else 0.0
     if _connected(body, coupling, slave.owners):
         raise InputError(
             f"{label} are sides of one body that look away from each other; accepted: parts of two "
@@ -239,8 +234,9 @@ def _apart(
             "pair",
         )
     raise InputError(
-        f"{label}: the undeformed bodies overlap, by up to {cut:.3g}; accepted: meshes that are "
-        "apart or touch, but for the deviation of straight facets from a curve",
+        f"{label}: the undeformed bodies overlap, by up to {coupling.depth:.3g}; accepted: meshes "
+        "that are apart or touch, but for the deviation of straight facets from a curve, or "
+        'overlap = "press" (in Python press=True), by which the overlap is an interference',
         "overlap",
     )
 

@@ -18,11 +18,11 @@ from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, contact_directions
 from contact.interface.obstacle import Obstacle, Shape
 from contact.interface.obstacle.protocol import measured
-from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
 from contact.ranks import on_all_ranks
+from contact.tolerances import TOUCHING
 from contact.typing import Array
 
 
@@ -39,8 +39,9 @@ class Candidates:
     surface
         Points of the curved surface in front of the nodes, shape (n, d) (length): nodes in the
         middle of straight edges are on chords, and gaps to a shape are measured from the surface.
-    deviation
-        Largest deviation of the curved surface from the facets (length).
+    explained
+        Depth of the nodes, shape (n,) (length), in a shape that the curved surface, or the straight
+        facets, touch.
     unknown
         The part of it that gaps do not have; none at degree 1, whose nodes are on the surface.
     owners
@@ -57,7 +58,7 @@ class Candidates:
     weight: Array
     normal: Array
     surface: Array
-    deviation: float
+    explained: Array
     unknown: float
     owners: Owners
     mixing: Mixing | None
@@ -115,6 +116,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     points = space.tabulate_dof_coordinates()[nodes, : domain.dim]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
     exact = facets.degree == 1 and not facets.refined
+    known = np.einsum("nd,nd->n", lumped.deviation, normal)
     return Candidates(
         lumped.nodes,
         nodes,
@@ -122,7 +124,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
         np.where(light, 0.0, lumped.weight),
         normal,
         points + lumped.deviation,
-        comm.allreduce(facets.largest_deviation, op=MPI.MAX),
+        np.maximum(known, known - lumped.least),
         comm.allreduce(0.0 if exact else facets.unknown_deviation, op=MPI.MAX),
         facets.owners,
         lumped.mixing,
@@ -130,16 +132,8 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     )
 
 
-def _corners(space: fem.FunctionSpace) -> NDArray[np.int32]:
-    """Return the local nodes at vertices of the mesh."""
-    layout, cells = space.dofmap.dof_layout, space.dofmap.list
-    corners = [layout.entity_dofs(0, i) for i in range(shape_of(space.mesh).corners)]
-    return np.unique(cells[:, np.concatenate(corners)])
-
-
 def _place(
     domain: Domain,
-    space: fem.FunctionSpace,
     obstacle: Obstacle,
     found: Candidates,
     direction: Array,
@@ -149,8 +143,8 @@ def _place(
     """Refuse a foundation behind or around the contact part, or one that the body cuts already.
 
     Nodes that face away are not looked at: all of a disc may be the contact part. Nodes on
-    straight facets of a curved part may lie in a ball that the facets' corners touch, by
-    the deviation of the curve from these, and their gap is 0. Where the foundation
+    straight facets of a curved part may lie in a ball that the facets' corners touch, by the
+    deviation of the curve from the facets at this node, and their gap is 0. Where the foundation
     is to press on the body from the beginning, gaps are left as they are.
 
     Returns
@@ -169,19 +163,14 @@ def _place(
             "of it, or inside = true for a body within",
             "behind",
         )
-    rounding = 1e-5 * domain.size  # that of mesh files
+    rounding = TOUCHING * domain.size
     _refuse_within(domain, obstacle, found.surface[facing > 0], gap[facing > 0], rounding)
     gap, unknown = found.to_curve(gap)
     if press:
         return gap, unknown, 0.0
-    tolerance = np.full_like(gap, rounding)
     depth = np.where(facing > 0, -gap, 0.0)
     # The contact direction may be the body's, a little aside.
-    chord = max(rounding, 1.1 * found.deviation)
-    if domain.levels > 0:
-        tolerance[:] = chord
-    elif space.ufl_element().embedded_superdegree > 1:
-        tolerance[~np.isin(found.nodes, _corners(space))] = chord
+    tolerance = rounding + 1.1 * found.explained
     cut = domain.comm.allreduce(np.max(depth, initial=0.0), op=MPI.MAX)
     if domain.comm.allreduce(bool(np.any(depth > tolerance)), op=MPI.LOR):
         raise InputError(
@@ -281,7 +270,7 @@ def find_nodes(
     if obstacle.is_shape:
         _refuse_none(domain, gap, f"{key}.foundation: {type(obstacle).__name__}")
         try:
-            gap, unknown, cut = _place(domain, space, obstacle, found, direction, gap, press)
+            gap, unknown, cut = _place(domain, obstacle, found, direction, gap, press)
         except InputError as error:
             raise error.within(f"{key}.") from None
     else:
@@ -309,7 +298,7 @@ def find_nodes(
         gap[keep],
         unknown[keep],
         space.dofmap.index_map_bs,
-        cut if cut > 1e-5 * domain.size else 0.0,
+        cut if cut > TOUCHING * domain.size else 0.0,
         domain.revolved,
         body.global_unknowns.of_foundation(points, body.block_size, part),
     )

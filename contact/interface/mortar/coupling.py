@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -107,6 +108,8 @@ class Parts:
         shape (f, k, 2, d).
     rows, columns, values
         int Phi_i (N_l o Pi): numbers of the carrier and of the master's node, shape (e,).
+    depth
+        Of the deepest overlap (length), as of `Coupling`, on this rank.
     """
 
     nodes: NDArray[np.int64]
@@ -118,6 +121,7 @@ class Parts:
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
     values: Array
+    depth: float
 
 
 def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
@@ -153,6 +157,7 @@ def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
         carriers.functions @ normal,
         gap[:, :, :, None] * direction[:, None, None, :],
         *(np.concatenate(part) for part in zip(*entries, strict=True)),
+        max((float(-points.clear.min(initial=0.0)) for points in found), default=0.0),
     )
 
 
@@ -261,6 +266,9 @@ class Coupling(Mixing):
         too: means are taken with functions that change their sign.
     covered
         Share of int N~_j that faces the master, shape (n,).
+    depth
+        Of the deepest overlap (length), on all ranks: how far the sides cut each other at a point,
+        both those of facets and the surfaces that straight facets approximate.
     """
 
     weight: Array
@@ -268,6 +276,7 @@ class Coupling(Mixing):
     gap: Array
     apart: Array
     covered: Array
+    depth: float
 
 
 def couple(
@@ -317,4 +326,5 @@ def _assembled(parts: Parts, owners: Owners, back: Array, without: NDArray[np.in
     slaves, own = matrix(nodes, owners.entries(rows.ravel(), columns.ravel(), values.ravel()))
     masters, other = matrix(nodes, owners.entries(parts.rows, parts.columns, parts.values))
     jumps = nodes, slaves, sparse.csr_array(divide @ own), masters, sparse.csr_array(divide @ other)
-    return Coupling(*jumps, weight, normal, gap, apart, covered[kept])
+    depth = owners.comm.allreduce(parts.depth, op=MPI.MAX)
+    return Coupling(*jumps, weight, normal, gap, apart, covered[kept], depth)

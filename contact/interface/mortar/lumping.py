@@ -109,6 +109,8 @@ class Lumping:
         Along the outward normals, int N~_j nu of straight facets, shape (n, d).
     deviation
         From the nodes to the curved surface that the facets approximate, shape (n, d) (length).
+    least
+        The least height of that surface above the nodes, shape (n,) (length).
     mixing
         The jumps that belong to the weights; None where they are the nodal values.
     """
@@ -117,6 +119,7 @@ class Lumping:
     weight: Array
     normal: Array
     deviation: Array
+    least: Array
     mixing: Mixing | None
 
     @staticmethod
@@ -131,14 +134,19 @@ class Lumping:
             shares = measure.sum(axis=1)[:, None, None] * np.eye(len(places))
         slopes = jacobians(surface.shape, surface.points, places)
         normals = surface.normals(np.arange(surface.count)[:, None], slopes)
+        known, least = np.moveaxis(surface.node_heights, 2, 0)
         parts = [
             areas.reshape(count, 1),
             np.einsum("fqd,fqk->fkd", normals, shares).reshape(count, d),
-            surface.node_deviations.reshape(count, d),
+            (known[..., None] * surface.normal[:, None, :]).reshape(count, d),
+            least.reshape(count, 1),
             np.ones((count, 1)),
         ]
         nodes, total = owners.sums(surface.nodes.ravel(), np.hstack(parts))
-        weight, normal, deviation, often = np.split(total, [1, 1 + d, 1 + 2 * d], axis=1)
+        weight, normal, deviation, least, often = np.split(
+            total, [1, 1 + d, 1 + 2 * d, 2 + 2 * d], axis=1
+        )
+        deviation, least = deviation / often, (least / often)[:, 0]
         change, mixing = dual_basis_transformation(surface.shape, surface.degree), None
         if not np.array_equal(change, np.eye(len(change))):
             both = np.broadcast_arrays(surface.nodes[:, :, None], surface.nodes[:, None, :])
@@ -148,7 +156,7 @@ class Lumping:
             _, first = np.unique(np.column_stack(entries[:2]), axis=0, return_index=True)
             row, column, value = entries[0][first], entries[1][first], entries[2][first]
             mixing = Mixing.alone(nodes, *matrix(nodes, (row, column, value)))
-        return Lumping(nodes, weight[:, 0], normal, deviation / often, mixing)
+        return Lumping(nodes, weight[:, 0], normal, deviation, least, mixing)
 
     def without_axis(self, surface: Surface) -> Lumping:
         """Return the areas where nodes on the axis of revolution carry no multiplier.

@@ -103,6 +103,9 @@ class Points:
         Quadrature weights, lengths or areas on the slave facet, or of its rings, shape (p,).
     gap
         Distance from the slave to the master facet along the slave's direction, shape (p,).
+    clear
+        The largest that it may be, of the facets or of the surfaces that they approximate,
+        shape (p,): below 0 the bodies overlap.
     """
 
     slave: NDArray[np.intp]
@@ -111,6 +114,7 @@ class Points:
     on_master: Array
     weight: Array
     gap: Array
+    clear: Array
 
 
 def common_points(
@@ -149,21 +153,26 @@ def common_points(
     on_slave, on_master = (
         _carried_back(side, nodes[pair], y) for side, nodes in ((slave, own), (master, other))
     )
-    gap = np.zeros(pair.size)
+    gap, change, most = np.zeros((3, pair.size))
     for sign, side, facets, at, nodes in (
         (1.0, master, j, on_master, other),
         (-1.0, slave, i, on_slave, own),
     ):
         functions = side.shape.lagrange(side.order, at)
         gap += sign * np.einsum("pk,pk->p", functions, nodes[pair, :, -1])
-        gap += sign * side.distance(facets[pair], at, direction[i[pair]])
+        where = facets[pair], at, direction[i[pair]]
+        most += np.maximum(*(sign * bound for bound in side.distance_bounds(*where)))
+        if side.follows:
+            change += sign * side.distance(*where)
+    clear = gap + np.maximum(most, 0.0)
+    gap += change
     gradients, d = slave.shape.gradients(slave.order, on_slave), slave.shape.dim
     slopes, turned = slave.slopes(i[pair], on_slave), _slopes(gradients, own[pair, :, :d])
     size = np.linalg.norm(across(slopes), axis=1) / np.abs(determinant(turned))
     if slave.revolved:
         functions = slave.shape.lagrange(slave.order, on_slave)
         size *= 2 * np.pi * np.einsum("pk,pk->p", functions, slave.points[i[pair], :, 0])
-    return Points(i[pair], j[pair], on_slave, on_master, weight * size, gap)
+    return Points(i[pair], j[pair], on_slave, on_master, weight * size, gap, clear)
 
 
 def _on_planes(

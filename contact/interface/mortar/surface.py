@@ -44,6 +44,10 @@ def dual_basis_transformation(shape: Shape, degree: int) -> Array:
     return change
 
 
+#: Unknown parts of deviations by which a surface may be off (ellipsoids of few facets have 2), and
+#: its error of third order over the deviation (spheres of facets of a fifth of the radius: .006).
+DOUBT, THIRD_ORDER = 3.0, 0.01
+
 #: Exponent of the unknown parts in the weights of two ways to know the same.
 SHARP = 4
 
@@ -64,7 +68,8 @@ class Surface:
         Of the curved surface from straight facets (`contact.mesh.deviation`), shape
         (f, edges).
     unknown
-        How much of it the vertices do not tell, shape (f, edges).
+        How much of it the vertices do not tell, shape (f, edges); of curved facets, how far they
+        are from the surface that they interpolate.
     degree
         Of the space.
     revolved
@@ -187,21 +192,41 @@ class Surface:
 
             h (h + 2 b) = w,     b = (L^2/4 - f^2)/(2 f),
 
-        and on a facet the sum over its edges. Nothing where gaps are those of the facets.
+        and on a facet the sum over its edges.
 
         Parameters
         ----------
         facets, at
             The facet of each point, shape (p,), and the points, shape (p, dim).
         """
-        if not self.follows:
-            return np.zeros(len(at))
         along, products = self._bubbles(at)
         sagitta, square = self.deviation[facets] / 4, self.edges[facets] ** 2
         base = square / 4 - sagitta**2
         root = np.sqrt(np.maximum(base**2 + 4 * sagitta**2 * products * square, 0.0))
         heights = 2 * sagitta * products * square / (base + root)
         return np.asarray(np.sum(along * heights, axis=1))
+
+    def height_bounds(self, facets: NDArray[np.intp], at: Array) -> tuple[Array, Array]:
+        """Return the least and the largest height of the surface above points of facets, (p,).
+
+        So it is to be expected of smooth surfaces, whose curvature neighbours of a facet tell.
+        Parts of an edge that has been refined are anywhere on its chord.
+
+        Parameters
+        ----------
+        facets, at
+            As of `height`.
+        """
+        if self.refined and self.order == 1:
+            along, products = self._bubbles(self.shape.middle)
+            both = np.stack([np.minimum(self.deviation, 0.0), np.maximum(self.deviation, 0.0)])
+            inside, edge = np.abs(both @ (along * products)[0]), np.abs(both).max(axis=2) / 4
+            least, most = np.maximum(inside, edge)[:, facets]
+            return -least, most
+        along, products = self._bubbles(at)
+        known, unknown = self.height(facets, at), along * products * self.unknown[facets]
+        slack = DOUBT * unknown.sum(axis=1) + THIRD_ORDER * np.abs(known)
+        return known - slack, known + slack
 
     def _bubbles(self, at: Array) -> tuple[Array, Array]:
         """Return the shares of the edges at points, and l_i l_j on them, shape (p, edges)."""
@@ -264,7 +289,7 @@ class Surface:
             Unit vectors, shape (p, d).
         """
         found = np.zeros(len(at))
-        if not self.follows or not self.deviation.any():
+        if not self.deviation.any():
             return found
         slope = self.slopes(facets, at)
         aside = np.einsum("pdr,pd->pr", slope @ inverse(slope.swapaxes(1, 2) @ slope), direction)
@@ -273,13 +298,34 @@ class Surface:
             found = self.height(facets, at + found[:, None] * aside) / rise
         return found
 
+    def distance_bounds(
+        self, facets: NDArray[np.intp], at: Array, direction: Array
+    ) -> tuple[Array, Array]:
+        """Return the least and the largest distance of the surface from points, shapes (p,).
+
+        Parameters
+        ----------
+        facets, at, direction
+            As of `distance`.
+        """
+        rise = np.einsum("pd,pd->p", self.normal[facets], direction)
+        least, most = (height / rise for height in self.height_bounds(facets, at))
+        if self.refined:
+            return np.minimum(least, most), np.maximum(least, most)
+        known, slack = self.distance(facets, at, direction), np.abs(most - least) / 2
+        return known - slack, known + slack
+
     @property
-    def node_deviations(self) -> Array:
-        """From the nodes of each facet to the curved surface, shape (f, k, d) (length)."""
+    def node_heights(self) -> Array:
+        """Heights of the surface above the nodes of each facet, shape (f, k, 2) (length).
+
+        That from which gaps are measured, and the least one.
+        """
         places = self.shape.nodes(self.degree)
-        facets = np.repeat(np.arange(self.count), len(places))
-        heights = self.height(facets, np.tile(places, (self.count, 1)))
-        return np.asarray(heights.reshape(self.count, len(places), 1) * self.normal[:, None, :])
+        facets, at = np.repeat(np.arange(self.count), len(places)), np.tile(places, (self.count, 1))
+        known = self.height(facets, at) if self.follows else np.zeros(len(at))
+        both = np.column_stack([known, self.height_bounds(facets, at)[0]])
+        return both.reshape(self.count, len(places), 2)
 
     def measures(self, at: Array, weights: Array) -> Array:
         """Return the weights of a rule's points in integrals over facets or rings, (f, q)."""
@@ -326,9 +372,26 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     normal = unit_normals(shape.facet, points, x.mean(axis=1))
     corners = shape.facet.corners
     owners = Owners.of(space.dofmap.index_map, domain.comm)
-    if order == 1:
-        deviation = deviations(names[:, :corners], points, normal, owners, domain.levels)
-    else:
-        deviation = (np.zeros((len(names), len(shape.facet.edges))),) * 2
+    straight = names[:, :corners], points[:, :corners], normal
+    deviation, unknown = deviations(*straight, owners, domain.levels)
+    if order > 1:
+        deviation = np.zeros_like(deviation)
+        unknown = 0.5 * unknown + 2 * _of_arcs(shape.facet, points, normal)
     refined = domain.levels > 0
-    return Surface(names, points, normal, *deviation, degree, domain.revolved, refined, owners)
+    return Surface(
+        names, points, normal, deviation, unknown, degree, domain.revolved, refined, owners
+    )
+
+
+def _of_arcs(shape: Shape, points: Array, normal: Array) -> Array:
+    """Return 4 f^3/L^2 of curved edges, shape (f, edges).
+
+    A parabola through the ends and the middle of an arc of the sagitta f over the chord L is off
+    by 4 f^3/L^2 s^2 (1 - s^2) for s from -1 to 1.
+    """
+    first, second = np.array(shape.edges).T
+    begin, end, middle = (
+        points[:, nodes] for nodes in (first, second, shape.corners + np.arange(len(first)))
+    )
+    sagitta = np.abs(np.einsum("fed,fd->fe", middle - (begin + end) / 2, normal))
+    return np.asarray(4 * sagitta**3 / np.sum((end - begin) ** 2, axis=2))
