@@ -317,9 +317,9 @@ class Contact(Section):
     against: Part | None = None
     """Part of another body of the mesh, or a list of parts, that it may touch, instead of a
     foundation."""
-    gap: NonNegativeFormula | None = None
+    gap: Formula | None = None
     """Gap rho to the rigid foundation along the body's normal; with `against`, added to the
-    distance between the meshes. Default: 0 without `foundation`."""
+    distance between the meshes. Below 0 it is an interference. Default: 0 without `foundation`."""
     foundation: Foundation | None = None
     """Rigid shape, instead of a gap: `[contact.foundation]`."""
     direction: Literal["foundation", "body", "axis"] = "foundation"
@@ -330,8 +330,8 @@ class Contact(Section):
     """With `direction = "axis"`: that direction, from the body towards the foundation, of any
     length."""
     overlap: Literal["refuse", "press"] = "refuse"
-    """A shape that cuts the body in the reference configuration: `refuse` it, or `press` it out,
-    as in a press fit."""
+    """Meshes of two bodies that overlap in the reference configuration, or a shape that cuts the
+    body: `refuse` that, or `press` it out as an interference."""
     rigid: Rigid | None = None
     """Motion of the foundation: `[contact.rigid]`. Absent: it is fixed."""
     layer: Annotated[
@@ -383,8 +383,11 @@ class Contact(Section):
         if self.foundation is None:
             if self.axis is not None:
                 raise fault("direction", self.direction, "axis with a foundation that is a shape")
-            if self.overlap == "press":
-                raise fault("overlap", self.overlap, "press with a foundation that is a shape")
+            gap, none = self.gap, self.against is None
+            none &= gap is not None and gap.is_constant and gap.value >= 0
+            if self.overlap == "press" and none:
+                accepted = "press with against, a foundation that is a shape, or a gap below 0"
+                raise fault("overlap", self.overlap, accepted)
         return self
 
     def obstacle(self, key: str, comm: MPI.Intracomm) -> Obstacle:

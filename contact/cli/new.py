@@ -68,6 +68,7 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
     """
     heights, facing = _heights(domain), facing_parts(domain)
     pairs = [(on, against) for _, on, against in facing]
+    overlap = max(-facing[0][0], 0.0) if facing else 0.0
     sides = {side for pair in pairs for side in pair}
     order = sorted({*heights} - sides, key=lambda name: (heights[name], name))
     if len(order) < 2:
@@ -120,7 +121,7 @@ displacement = {pressed}
 # on = {literal(highest)}
 # force = {_along(d, -1.0)}
 
-{_pairs(pairs) if pairs else _foundation(domain, lowest)}
+{_pairs(pairs, overlap) if pairs else _foundation(domain, lowest)}
 [friction]
 law = "coulomb"
 mu = 0.2
@@ -163,8 +164,8 @@ foundation = {{ shape = "plane", point = {ground}, normal = {_along(d, 1.0)} }}
 """
 
 
-def _pairs(pairs: Sequence[tuple[str, str]]) -> str:
-    """Return the contacts between bodies."""
+def _pairs(pairs: Sequence[tuple[str, str]], overlap: float) -> str:
+    """Return the contacts between bodies, whose meshes overlap by so much at most."""
     sides: dict[str, list[str]] = {}  # contacts share no nodes: one for each `on`
     for on, against in pairs:
         sides.setdefault(on, []).append(against)
@@ -176,6 +177,11 @@ against = {literal(against if len(against) > 1 else against[0])}
 """
         for on, against in sides.items()
     )
+    if overlap > 0:
+        text = f"""
+# The meshes overlap, by up to {overlap:.3g}, which is refused: move a body, or, where that is an
+# interference, add overlap = "press".
+{text}"""
     return f"""\
 # Bodies of this mesh that can touch each other. Friction and current can be given for each; `on`
 # is the finer side here, or take the softer body. A rigid foundation instead of a body:

@@ -7,6 +7,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact import _compat
 from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.rollers import APART
@@ -19,7 +20,7 @@ from contact.interface.obstacle import Obstacle
 from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
 from contact.mesh.domain import Domain
-from contact.mesh.entities import components, owned_among
+from contact.mesh.entities import cells_at, components, owned_among
 from contact.mesh.owners import Owners
 from contact.tolerances import ROUNDING, TOUCHING
 from contact.typing import Array
@@ -75,7 +76,7 @@ def find_pair(
         gap, cut = _apart(slave, body, coupling, label)
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     _, added = measured(distance, points, normal, body.comm, key)
-    check_gap(body.domain, added, key, press)
+    check_gap(body.domain, added, key)
     sides = (side.unknown_deviation for side in (slave, master))
     unknown = body.comm.allreduce(max(sides, default=0.0), op=MPI.MAX)
     movable = body.movable(local)
@@ -234,9 +235,9 @@ def _apart(
             "pair",
         )
     raise InputError(
-        f"{label}: the undeformed bodies overlap, by up to {coupling.depth:.3g}; accepted: meshes "
-        "that are apart or touch, but for the deviation of straight facets from a curve, or "
-        'overlap = "press" (in Python press=True), by which the overlap is an interference',
+        f"{label}: the undeformed bodies overlap, by up to {coupling.depth:.3g} more than straight "
+        "facets deviate from a curve; accepted: meshes that are apart or touch, or "
+        'overlap = "press" (in Python press=True) for an interference',
         "overlap",
     )
 
@@ -254,8 +255,8 @@ def _connected(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> boo
 def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
     """Return pairs of parts of different bodies that face each other, nearest first. Collective.
 
-    Each has its least gap (length), and the finer side is the first of a pair. Parts that belong to
-    several bodies are left out.
+    Each has its least gap (length), below 0 where the bodies overlap, and the finer side is the
+    first of a pair. Parts that belong to several bodies are left out.
     """
     space = fem.functionspace(domain.mesh, ("Lagrange", 1))
     piece, count = components(space)
@@ -269,20 +270,29 @@ def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
         there[piece[side.owners.named(side.nodes.ravel()) - side.owners.begin]] = 1
         comm.Allreduce(MPI.IN_PLACE, there, op=MPI.MAX)
         total = comm.allreduce(np.array([side.radii.sum(), side.count]), op=MPI.SUM)
-        longest = comm.allreduce(float(side.radii.max(initial=0.0)), op=MPI.MAX)
+        thinnest = comm.allreduce(float(_heights(domain, side, name).min(initial=np.inf)), MPI.MIN)
         if there.sum() == 1:
             # Of alike sides the first by name is the first.
             mean = float(f"{total[0] / total[1]:.9e}")
-            sides.append((mean, longest, name, side, int(there.argmax())))
+            sides.append((mean, thinnest, name, side, int(there.argmax())))
     found = []
     sides.sort(key=lambda side: (side[0], side[2]))
-    for i, (_, longest, on, slave, body) in enumerate(sides):
-        for _, _, against, master, other in sides[i + 1 :]:
+    for i, (_, thinnest, on, slave, body) in enumerate(sides):
+        for _, beside, against, master, other in sides[i + 1 :]:
             if other == body:
                 continue
-            gap = couple(slave, master, REACH * domain.size).gap
-            least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
-            # They look away from each other where it is negative.
-            if np.isfinite(least) and least > -2 * CHORDS * longest:
-                found.append((least, on, against))
+            coupling = couple(slave, master, REACH * domain.size)
+            least = comm.allreduce(float(coupling.gap.min(initial=np.inf)), op=MPI.MIN)
+            overlap = coupling.depth if coupling.depth > TOUCHING * domain.size else 0.0
+            # Between sides that look away from each other are cells of both bodies.
+            if np.isfinite(least) and overlap < thinnest + beside:
+                found.append((-overlap if overlap > 0 else max(least, 0.0), on, against))
     return sorted(found)
+
+
+def _heights(domain: Domain, side: Surface, part: str) -> Array:
+    """Return the heights of the cells above the facets of a part, shape (f,)."""
+    cells, _ = cells_at(domain.mesh, domain.facets(part))
+    nodes = domain.mesh.geometry.x[_compat.geometry_dofmap(domain.mesh)[cells]][..., : domain.dim]
+    below = side.centres[:, None] - nodes
+    return np.asarray(np.einsum("fkd,fd->fk", below, side.normal).max(axis=1, initial=0.0))

@@ -204,23 +204,11 @@ def _refuse_within(
         )
 
 
-def _refuse_none(domain: Domain, gap: Array, key: str) -> None:
-    """Refuse gaps that are no numbers. Collective."""
-    if domain.comm.allreduce(bool(np.isnan(gap).any()), op=MPI.LOR):
+def check_gap(domain: Domain, gap: Array, key: str) -> None:
+    """Refuse gaps that are no lengths; those below 0 are interferences. Collective."""
+    if domain.comm.allreduce(bool(np.any(~(gap > -np.inf))), op=MPI.LOR):
         raise InputError(
             f"{key}: the gap is no number at a node; accepted: lengths, or inf", "negative"
-        )
-
-
-def check_gap(domain: Domain, gap: Array, key: str, press: bool) -> None:
-    """Refuse given gaps that are no numbers, or none as nothing is to be pressed. Collective."""
-    _refuse_none(domain, gap, key)
-    least = domain.comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
-    if least < -1e-12 * domain.size and not press:
-        raise InputError(
-            f"{key}.gap: {least:g} at a node; accepted: values >= 0 (in Python also press=True, "
-            "by which the foundation presses the body out)",
-            "negative",
         )
 
 
@@ -268,13 +256,13 @@ def find_nodes(
         )
     unknown, cut = np.zeros_like(gap), 0.0
     if obstacle.is_shape:
-        _refuse_none(domain, gap, f"{key}.foundation: {type(obstacle).__name__}")
+        check_gap(domain, gap, f"{key}.foundation: {type(obstacle).__name__}")
         try:
             gap, unknown, cut = _place(domain, obstacle, found, direction, gap, press)
         except InputError as error:
             raise error.within(f"{key}.") from None
     else:
-        check_gap(domain, gap, key, press)
+        check_gap(domain, gap, key)
     gap = found.along(direction, gap)
     movable = body.movable(nodes)
     free = np.linalg.norm(np.einsum("nij,nj->ni", movable, direction), axis=1)

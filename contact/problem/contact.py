@@ -26,14 +26,15 @@ class Contact:
         The part, or a list of parts.
     foundation
         The obstacle; or a gap to a rigid foundation along the body's normal (length): a number, a
-        function of x, UFL (`ufl.core.expr.Expr`) or a `dolfinx.fem.Function`. By default the body
-        lies on it.
+        function of x, UFL (`ufl.core.expr.Expr`) or a `dolfinx.fem.Function`. A gap below 0 is an
+        interference. By default the body lies on it.
     layer
         The compliant layer in front of it.
     friction, conductor
         Friction and electric contact; None: those that the problem has for all contacts.
     press
-        Whether the obstacle may overlap the undeformed body; contact then removes the overlap.
+        Whether the obstacle, or the other body, may overlap the undeformed body: the overlap is an
+        interference, which contact removes.
     against
         The part of another body that `on` may touch instead of a rigid foundation; the gap of
         `foundation` is then added to that between the bodies. None for a foundation.

@@ -87,8 +87,9 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     problem, nodes = solution.problem, solution.problem.nodes
     if nodes.cut > 0:
         yield (
-            f"straight facets of the curved contact part reach {nodes.cut:.3g} into the "
-            "foundation: the gap there is taken as 0; make the mesh finer from the beginning"
+            f"straight facets of curved contact surfaces overlap by up to {nodes.cut:.3g}, less than "
+            "they deviate from the curves: the gap there is taken as 0; make the mesh finer from the "
+            "beginning, or take curved cells (mesh.order = 2)"
         )
     closed, unknown = solution.status != "open", nodes.maximum(nodes.deviation)
     if nodes.maximum(closed.astype(float)) == 0:

@@ -87,7 +87,7 @@ BAD = {
     "code": {"contact__gap": "__import__('os')"},
     "z in the plane": {"load__0__traction": ["z", 0]},
     "power": {"contact__gap": "9**9**9"},
-    "negative gap": {"contact__gap": -0.1},
+    "press of nothing": {"contact__overlap": "press"},
     "gap and shape": {"contact__foundation": {"shape": "plane", "point": [0, 0], "normal": [0, 1]}},
     "shape": {"contact__foundation": {"shape": "cube"}},
     "normal": {

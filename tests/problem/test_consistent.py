@@ -104,7 +104,7 @@ WRONG = {
     "no centre": lambda: Motion([0.0, None], 0.1),
     "a moving centre": lambda: Motion([0.0, None], 0.1, centre=[0.0, None]),
     "a rigid part in space": lambda: problem(rigid=Rigid("right", Motion([0.0, 0.0, 0.0]))),
-    "a negative gap": on(-0.001),
+    "a gap that is endless": on(-np.inf),
     "a gap and a shape": on(Plane((0, 0), (0, 1)), gap=0.1),
     "a point in space": on(Plane((0, 0, 0), (0, 1))),
     "a normal in space": on(Plane((0, 0), (0, 0, 1))),
