@@ -1,0 +1,129 @@
+"""Layers beside or around each other whose meshes overlap, and what presses them apart."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact import Body, Fixed, Linear, Load
+from contact.mesh.cells import Shape
+from contact.mesh.domain import Domain, from_mesh, revolved
+from contact.mesh.grid import box, rectangle
+
+#: Young's modulus and Poisson's ratio.
+YOUNG, POISSON = 10.0, 0.3
+
+#: Modulus of a layer that cannot widen.
+UNIAXIAL = YOUNG * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
+
+#: Ends of the layers, along x or the radius.
+RADII = (1.0, 1.5, 2.0)
+
+
+def layers(
+    comm: MPI.Intracomm,
+    cell: str,
+    order: int,
+    form: str,
+    depth: float | Sequence[float],
+    radii: Sequence[float] = RADII,
+    counts: Sequence[int] = (4, 5),
+) -> Domain:
+    """Return layers with the parts `inner0`, `outer0`, `inner1`, ... and the planes beside them.
+
+    Parameters
+    ----------
+    comm, cell, order
+        Communicator, shape of the cells, and the degree of their geometry.
+    form
+        "flat": blocks along x; "tube": the same, of revolution about x = 0; "ring": quarters of
+        rings, in 3-D of tubes.
+    depth
+        How far each layer but the first reaches into the one before.
+    radii
+        Ends of the layers before they are moved.
+    counts
+        Facets of each layer on a side; across it there are half as many cells.
+    """
+    shape = Shape(cell)
+    d, places, rows, count = shape.dim, [], [], 0
+    for k, n in enumerate(counts):
+        make = rectangle if d == 2 else box
+        numbers = [max(n // 2, 1), n, max(n // 2, 1)][:d]
+        grid = make(MPI.COMM_SELF, (0.0,) * d, (1.0,) * d, numbers, cell=cell).mesh
+        space = fem.functionspace(grid, ("Lagrange", order))
+        x = space.tabulate_dof_coordinates()[:, :d].copy()
+        x[:, 0] += 2 * k  # apart, until parts have their names
+        places.append(x)
+        rows.append(space.dofmap.list + count)
+        count += len(x)
+    element = basix.ufl.element("Lagrange", cell, order, shape=(d,), dtype=np.float64)
+    first = None if comm.rank == 0 else 0
+    cells = np.concatenate(rows).astype(np.int64)[:first]
+    mesh = dmesh.create_mesh(
+        comm, cells=cells, x=np.concatenate(places)[:first], e=ufl.Mesh(element)
+    )
+    mesh.topology.create_connectivity(d - 1, d)
+    facets = dmesh.exterior_facet_indices(mesh.topology)
+    middle = dmesh.compute_midpoints(mesh, d - 1, facets)
+    sides = {
+        f"{name}{k}": np.abs(middle[:, 0] - 2 * k - end) < 1e-9
+        for k in range(len(counts))
+        for name, end in (("inner", 0), ("outer", 1))
+    }
+    ends = {"below": (1, 0), "above": (1, 1), "front": (2, 0), "back": (2, 1)}
+    for name, (i, end) in list(ends.items())[: 2 * d - 2]:
+        sides[name] = np.abs(middle[:, i] - end) < 1e-9
+    x = mesh.geometry.x
+    k = np.floor(x[:, 0] / 2 + 1e-9).astype(int)
+    low, high = np.array(list(pairwise(radii))).T
+    shift = np.concatenate([[0.0], np.cumsum(np.broadcast_to(depth, len(counts) - 1))])
+    radius = low[k] + (high - low)[k] * (x[:, 0] - 2 * k) - shift[k]
+    angle = np.pi / 2 * x[:, 1] if form == "ring" else np.zeros(len(x))
+    x[:, 0] = radius * np.cos(angle)
+    if form == "ring":
+        x[:, 1] = radius * np.sin(angle)
+    domain = from_mesh(mesh, {name: facets[there] for name, there in sides.items()}, radii[-1])
+    return revolved(domain) if form == "tube" else domain
+
+
+def of_layer(domain: Domain, number: int) -> np.ndarray:
+    """Return which nodes of the geometry belong to a layer, of blocks that touch."""
+    nodes = np.zeros(len(domain.mesh.geometry.x), dtype=bool)
+    cells = domain.mesh.geometry.dofmap
+    nodes[cells[domain.mesh.geometry.x[cells][:, :, 0].mean(axis=1) > RADII[number]]] = True
+    return nodes
+
+
+def body(form: str, dim: int, layers: int, traction: float = 0.0) -> Body:
+    """Return the body: planes beside the layers are rollers, and flat layers held at their ends.
+
+    With a traction the last end of flat layers is pulled instead of held.
+    """
+    across = {"below": 1, "above": 0 if form == "ring" else 1, "front": 2, "back": 2}
+    held = list(across.items())[: 2 * dim - 2]
+    last, loads = f"outer{layers - 1}", []
+    if form == "flat":
+        held += [("inner0", 0)] + ([(last, 0)] if traction == 0 else [])
+        if traction != 0:
+            loads = [Load(last, [traction] + [0.0] * (dim - 1))]
+    fixed = [Fixed(part, [0.0 if i == k else None for i in range(dim)]) for part, k in held]
+    return Body(Linear(YOUNG, POISSON), fixed, loads)
+
+
+def pressure(form: str, depth: float, radii: Sequence[float] = RADII) -> float:
+    """Return the pressure on the first of two layers; of rings and tubes Lame's, in plane strain.
+
+    The second ring is drawn as deep within the first; both forces are equal.
+    """
+    a, c, b = radii
+    if form == "flat":
+        return UNIAXIAL * depth / (b - a)
+    inside, outside = (c, a), (b - depth, c - depth)
+    stretch = sum((x**2 + y**2) / (x**2 - y**2) for x, y in (inside, outside))
+    return depth * YOUNG / ((1 - POISSON**2) * c * stretch)
