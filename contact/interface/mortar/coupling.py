@@ -157,7 +157,7 @@ def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
         carriers.functions @ normal,
         gap[:, :, :, None] * direction[:, None, None, :],
         *(np.concatenate(part) for part in zip(*entries, strict=True)),
-        max((float(-points.clear.min(initial=0.0)) for points in found), default=0.0),
+        depth=max((float(-points.clear.min(initial=0.0)) for points in found), default=0.0),
     )
 
 
