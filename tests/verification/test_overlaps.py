@@ -35,7 +35,7 @@ def forms(cell):
 def mean(solution):
     """Return the mean pressure."""
     nodes = solution.problem.nodes
-    return nodes.sum(solution.pressure) / nodes.sum(np.ones(nodes.size))
+    return nodes.sum(solution.pressure) / nodes.sum(np.ones_like(nodes.weight))
 
 
 @pytest.mark.parallel
