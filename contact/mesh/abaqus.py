@@ -20,26 +20,7 @@ import numpy as np
 
 from contact.mesh.assembly import NESTING, Assembly, Member, Scope, real
 from contact.mesh.cells import distinct, once, together
-from contact.mesh.extraction import Contents, Ints, letters, same_name
-
-#: meshio's names of elements by their dimension and number of nodes.
-KINDS = {
-    (1, 2): "line",
-    (1, 3): "line3",
-    (2, 3): "triangle",
-    (2, 6): "triangle6",
-    (2, 4): "quad",
-    (2, 8): "quad8",
-    (2, 9): "quad9",
-    (3, 4): "tetra",
-    (3, 10): "tetra10",
-    (3, 8): "hexahedron",
-    (3, 20): "hexahedron20",
-    (3, 27): "hexahedron27",
-    (3, 5): "pyramid",
-    (3, 6): "wedge",
-    (3, 15): "wedge15",
-}
+from contact.mesh.contents import ELEMENTS, Contents, Ints, Kind, letters, same_name
 
 #: Types of elements: beginnings of their names, and their dimension.
 TYPES = (
@@ -58,13 +39,13 @@ NO_CELLS = re.compile(r"MASS|ROTARYI|SPRIN|DASHPOT|CONN|GAP|DCOUP|USER|U\d")
 KINEMATICS = {"CPS": "plane_stress", "CPE": "plane_strain", "CAX": "axisymmetric"}
 KINEMATICS["CGAX"] = KINEMATICS["CAX"]
 
-#: Corners of the faces S1, S2, ... of elements, by meshio's name without a number.
+#: Corners of the faces S1, S2, ... of elements.
 FACES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
-    "wedge": ((0, 1, 2), (3, 5, 4), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    "prism": ((0, 1, 2), (3, 5, 4), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     "hexahedron": (
         (0, 1, 2, 3),
         (4, 7, 6, 5),
@@ -74,9 +55,6 @@ FACES = {
         (3, 7, 4, 0),
     ),
 }
-
-#: Dimensions of elements by meshio's names.
-DIMENSIONS = {name: dim for (dim, _), name in KINDS.items()}
 
 #: Either side of a shell, which is a facet of solids as a whole.
 SIDES = {"", "S1", "S2", "SPOS", "SNEG"}
@@ -196,7 +174,7 @@ def _take(
             found.sets.setdefault(found.name(options.get("ELSET", kind)), [])
             return
         numbers = found.elements.setdefault(kind, [])
-        count = _known(kind)[1] + 1
+        count = _known(kind).nodes + 1
         values = [found.number(value) for line in lines for value in line if value]
         if len(values) % count:
             raise ValueError(f"*ELEMENT, TYPE={kind}: {len(values)} numbers, {count} an element")
@@ -233,8 +211,8 @@ def _take(
         found.other.append(keyword)
 
 
-def _known(kind: str) -> tuple[int, int]:
-    """Return the dimension and the number of nodes of a type of elements."""
+def _known(kind: str) -> Kind:
+    """Return the shape and the number of nodes of a type of elements."""
     for pattern, dim in TYPES:
         if match := pattern.match(kind):
             count = int(match[1])
@@ -242,8 +220,9 @@ def _known(kind: str) -> tuple[int, int]:
                 count = count if "D" in kind or kind.startswith("RAX") else count + 1
             if kind.startswith("STRI65"):
                 count = 6
-            if (dim, count) in KINDS:
-                return dim, count
+            for name, (of, corners, second) in ELEMENTS.items():
+                if of == dim and count in (corners, *second):
+                    return Kind(name, count)
     raise ValueError(f"*ELEMENT, TYPE={kind}: elements that are not known")
 
 
@@ -253,16 +232,16 @@ def _deck(found: Scope) -> Contents:
     blocks: list[tuple[str, Ints]] = []
     homes = [np.zeros((0, 3), dtype=np.int64)]
     for block, (kind, values) in enumerate(found.elements.items()):
-        dim, count = _known(kind)
-        rows = np.array(values, dtype=np.int64).reshape(-1, count + 1)
+        known = _known(kind)
+        rows = np.array(values, dtype=np.int64).reshape(-1, known.nodes + 1)
         nodes = np.minimum(np.searchsorted(tags, rows[:, 1:]), max(tags.size - 1, 0))
         if tags.size == 0 or np.any(tags[nodes] != rows[:, 1:]):
             raise ValueError("it has elements whose nodes it does not have")
-        if (dim, count) == (1, 3):  # the middle one last, wherever the program has it
+        if known == Kind("interval", 3):  # the middle one last, wherever the program has it
             middle = points[nodes].mean(axis=1, keepdims=True)
             order = np.argsort(-np.linalg.norm(points[nodes] - middle, axis=2), 1, kind="stable")
             nodes = np.take_along_axis(nodes, order, axis=1)
-        blocks.append((KINDS[dim, count], nodes))
+        blocks.append((known.name, nodes))
         places = np.arange(len(rows))
         homes.append(np.column_stack([rows[:, 0], np.full_like(places, block), places]))
     elements = np.concatenate(homes)
@@ -282,7 +261,7 @@ def _deck(found: Scope) -> Contents:
     for key in found.nodes:
         numbers = _members(found.nodes, key, ())
         deck.nodes[names[key]] = np.flatnonzero(np.isin(tags, numbers))
-    dim, twice = max((DIMENSIONS[name] for name, _ in blocks), default=0), []
+    dim, twice = max((kind.dim for kind in deck.kinds), default=0), []
     for key, (sort, lines) in found.surfaces.items():
         name = names[key]
         if sort == "NODE":
@@ -295,7 +274,7 @@ def _deck(found: Scope) -> Contents:
             deck.surfaces[name] = _faces(found, lines, elements, blocks, dim)
     if twice:
         deck.notes.append(same_name(twice))
-    plane = [kind for kind in found.elements if dim == 2 and _known(kind)[0] == 2]
+    plane = [kind for kind in found.elements if dim == 2 and _known(kind).dim == 2]
     made_for = {own for kind in plane for of, own in KINEMATICS.items() if kind.startswith(of)}
     if len(made_for) == 1 and made_for != {"plane_strain"}:
         deck.space["kinematics"] = made_for.pop()
@@ -342,8 +321,7 @@ def _faces(
     for given, label in rows:
         for block, members in _by_block(_named(found.sets, [given]), elements).items():
             name, nodes = blocks[block]
-            stem, of = name.rstrip("0123456789"), DIMENSIONS[name]
-            corners = FACES.get(stem, ())
+            of, corners = ELEMENTS[name][0], FACES.get(name, ())
             number = int(label[1]) if re.fullmatch(r"[SE]\d", label) else 0
             if of == dim - 1 and label in SIDES:
                 faces.append(nodes[members][:, : len(corners) or 2])
@@ -357,5 +335,5 @@ def _faces(
     every: list[Ints] = []
     for name, alike in whole.items():
         cells = distinct(np.concatenate(alike))
-        every += [cells[:, list(face)] for face in FACES[name.rstrip("0123456789")]]
+        every += [cells[:, list(face)] for face in FACES[name]]
     return together([*faces, once(together(every))] if every else faces)

@@ -175,7 +175,8 @@ class Motion:
     def __call__(self, points: Mapping[int, list[float]]) -> list[list[float]]:
         """Return the places of points."""
         x = np.array([*points.values()]).reshape(-1, 3) + self.shift - self.start
-        return [[*map(float, row)] for row in x @ self.turn.T + self.start]
+        with np.errstate(invalid="ignore"):  # infinite ones are refused with all others
+            return [[*map(float, row)] for row in x @ self.turn.T + self.start]
 
 
 @dataclass

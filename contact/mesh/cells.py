@@ -1,7 +1,7 @@
 """The shapes of cells: nothing else knows how corners and facets lie, or how cells are integrated.
 
 Points are those of the reference cell of basix, shape (q, dim); nodes are numbered as dolfinx does,
-corners first. dolfinx is not imported: it starts MPI, and files are read by processes of their own.
+corners first.
 
 References
 ----------
@@ -252,17 +252,6 @@ def barycentric(points: Array) -> Array:
     return np.column_stack([1 - points.sum(axis=1), points])
 
 
-#: Corners of cells and facets that can be cut into simplices, by the first word of Gmsh's names.
-CUT = {
-    "Line": 2,
-    "Triangle": 3,
-    "Quadrilateral": 4,
-    "Tetrahedron": 4,
-    "Pyramid": 5,
-    "Prism": 6,
-    "Hexahedron": 8,
-}
-
 #: Corners, in VTK's order, of the faces of a cell in 3-D, around them, by its number of corners.
 FACES: dict[int, tuple[tuple[int, ...], ...]] = {
     5: ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
@@ -332,42 +321,3 @@ def once(faces: Nodes) -> Nodes:
         np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
     )
     return faces[np.sort(first[count == 1])]
-
-
-#: Name, dimension and order of a type of elements, as Gmsh has them.
-Kind = tuple[str, int, int]
-
-
-def as_simplices(kinds: Sequence[Kind], collapsed: int = 0) -> tuple[Shape, list[Kind], str] | None:
-    """Return how cells that are not all of one shape of ours are taken; None if they are.
-
-    Parameters
-    ----------
-    kinds
-        The types of elements of a mesh.
-    collapsed
-        How many of its cells have a node at two corners: a hexahedron that is a prism.
-
-    Returns
-    -------
-    The shape that cells become, the types of elements then, and a note.
-    """
-    dim = max((of for _, of, _ in kinds), default=0)
-    cells = [(name, order) for name, of, order in kinds if of == dim]
-    words = {name.split()[0] for name, _ in cells}
-    if dim < 2 or not words <= {*CUT} or max(order for _, order in cells) > 2:
-        return None
-    if not collapsed and len(cells) == 1 and words <= {s.name.capitalize() for s in SHAPES}:
-        return None
-    shape = {2: TRIANGLE, 3: TETRAHEDRON}[dim]
-    found = " beside ".join(repr(name) for name, _ in cells)
-    second = any(order > 1 for _, order in cells)
-    straight = " with straight edges" if second else ""
-    alone = ", and curved edges in files of one kind alone" if second else ""
-    if collapsed:
-        found += f", {collapsed} of them with one node at several corners"
-    note = (
-        f"its cells, {found}, become {shape.plural}{straight}: a mesh has cells of one kind{alone}"
-    )
-    others = [kind for kind in kinds if kind[1] < dim]
-    return shape, [*others, (f"{shape.name.capitalize()} {shape.corners}", dim, 1)], note

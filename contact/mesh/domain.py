@@ -23,8 +23,8 @@ from ufl.core.expr import Expr
 from contact import _compat
 from contact.errors import InputError
 from contact.mesh.cells import SHAPES, shape_of
+from contact.mesh.contents import BODY
 from contact.mesh.entities import Indices, extent, exterior_facets
-from contact.mesh.extraction import BODY
 from contact.mesh.together import known, members, pieces
 from contact.typing import Array
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from contact.mesh.cells import together
-from contact.mesh.extraction import Contents, Ints, letters
+from contact.mesh.contents import Contents, Ints, letters
 
 #: Beginnings of the names of elements, and meshio's names without a number; "" for points.
 KINDS = {

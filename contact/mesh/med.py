@@ -11,27 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from contact.mesh.extraction import Contents, Ints, letters
+from contact.mesh.contents import Contents, Ints, letters
 
-#: Kinds of elements: meshio's names, and numbers of nodes.
-KINDS = {
-    "SE2": ("line", 2),
-    "SE3": ("line3", 3),
-    "TR3": ("triangle", 3),
-    "TR6": ("triangle6", 6),
-    "QU4": ("quad", 4),
-    "QU8": ("quad8", 8),
-    "QU9": ("quad9", 9),
-    "TE4": ("tetra", 4),
-    "T10": ("tetra10", 10),
-    "HE8": ("hexahedron", 8),
-    "H20": ("hexahedron20", 20),
-    "H27": ("hexahedron27", 27),
-    "PE6": ("wedge", 6),
-    "P15": ("wedge15", 15),
-    "PY5": ("pyramid", 5),
-    "P13": ("pyramid13", 13),
-}
+#: Letters of the kinds of elements, behind which is their number of nodes, and meshio's names.
+KINDS = {"SE": "line", "TR": "triangle", "QU": "quad", "TE": "tetra", "T": "tetra"}
+KINDS |= {"HE": "hexahedron", "H": "hexahedron", "PE": "wedge", "P": "wedge", "PY": "pyramid"}
 
 
 def read(file: Path) -> Contents:
@@ -69,9 +53,10 @@ def _contents(mesh: Any, dim: int, families: Any) -> Contents:
     for kind, given in mesh["MAI"].items():
         if kind == "PO1":
             continue
-        if kind not in KINDS:
+        stem = kind.rstrip("0123456789")
+        if stem not in KINDS:
             raise ValueError(f"elements {kind} that are not known")
-        name, count = KINDS[kind]
+        name, count = "pyramid" if kind == "P13" else KINDS[stem], int(kind[len(stem) :])
         rows = np.asarray(given["NOD"][()], dtype=np.int64).reshape(count, -1).T - 1
         for group, members in _groups(given, named).items():
             made.groups.setdefault(group, {})[len(blocks)] = members

@@ -10,19 +10,19 @@ import numpy as np
 import numpy.typing as npt
 
 from contact.errors import InputError
-from contact.mesh.cells import SHAPES, Shape, proper, rule
+from contact.mesh.cells import SHAPES, Shape, distinct, once, rule
+from contact.mesh.contents import BODY, Contents, Ints, Kind, in_one_shape, in_order, same_name
 from contact.mesh.domain import UNLESS
 from contact.mesh.entities import combinations
-from contact.mesh.extraction import BODY, Ints, Model
 from contact.mesh.geometry import determinant, inverse, jacobians
 from contact.typing import Array
 
-#: A cell is degenerate if its volume is below this times (longest edge)^d. Gmsh's qualities, which
-#: need its model, would not do: the signs of the volumes say whether cells overlap.
+#: A cell is degenerate if its volume is below this times (longest edge)^d: the signs of the volumes
+#: say whether cells overlap.
 FLAT = 1e-10
 
-#: Halvings of a hexahedron after which its Jacobian, still undecided, is nearly zero somewhere.
-HALVINGS = 6
+#: Points along each edge at which the Jacobian of straight hexahedra that may be folded is taken.
+POINTS = 9
 
 #: Nodes of degree 2 this near to where straight edges have them, over these, are there (rounding).
 STRAIGHT = 1e-5
@@ -99,53 +99,74 @@ SERENDIPITY = (
 )
 
 
-def check_model(model: Model) -> Cells:
+def check(contents: Contents) -> Cells:
     """Check a mesh and bring it into the form in which it is distributed.
 
-    The body consists of the cells in physical groups, or of all cells where no group has any.
     Groups may overlap. A group of facets that are not all on the boundary of the body can be
     fixed, or an electrode, but is no part of the boundary; one without a cell is set aside.
 
     Raises
     ------
     InputError
-        For other meshes than of triangles or quadrilaterals in a plane z = const, or of tetrahedra
-        or hexahedra, of order 1 or 2, for cells without volume or that overlap, and if no part is
-        left.
+        For other meshes than of triangles or quadrilaterals in a plane z = const, or of solids, of
+        order 1 or 2, for cells without volume or that overlap, and if no part is left.
     """
-    dim = model.dim
-    shape = _check_kinds(model.kinds, dim)
-    order = np.argsort(model.tags)
-    tags, points = model.tags[order], model.points[order]
-    if np.any(tags[1:] == tags[:-1]):
-        raise InputError("it has several nodes of one number", "mesh-file")
-    first = _placed(shape.nodes(1), model.places)
-    every = _places(tags, model.cells)
-    curved = _curved(points, every, model.places, shape, first)
-    kept = _placed(shape.nodes(2), model.places) if curved else first
-    regions = _join(
-        {name: _places(tags, nodes)[:, kept] for name, nodes in model.regions.items() if len(nodes)}
-        or {BODY: every[:, kept]}
-    )
-    if np.any(kept < 0):
-        points, rows = _filled(points, regions.rows, shape, kept)
-        regions = replace(regions, rows=rows)
-    notes = [*model.notes]
-    if dim == 3 and np.any(kept < 0):
-        notes.append(SERENDIPITY)
-    if left := len(np.unique(_number(every[:, first]))) - len(regions.rows):
-        notes.append(f"{left} cell(s) in no physical group are no part of the body")
+    given = contents.kinds
+    dim = max((kind.dim for kind in given), default=0)
+    for _, nodes in contents.blocks:
+        if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(contents.points):
+            raise InputError("it has elements whose nodes it does not have", "mesh-file")
+    contents = in_one_shape(contents)
+    shape = _check_kinds([kind for kind in contents.kinds if kind.dim == dim], dim)
+    blocks, kinds = contents.blocks, contents.kinds
+    whole = [b for b, kind in enumerate(kinds) if kind.dim == dim]
+    points = np.asarray(contents.points, dtype=float)
+    rows = in_order(shape, points, np.concatenate([blocks[b][1] for b in whole]))
+    corners = rows[:, : shape.corners]
+    curved = _curved(points, rows, shape)
+    rows = rows if curved else corners
+    number = _number(rows)
+    first = np.unique(number, return_index=True)[1]
+    notes = [*contents.notes]
+    if first.size < len(rows) and not contents.repeats:
+        notes.append(f"{len(rows) - first.size} cell(s) that stand twice in it count once")
+
+    parts, left, without = _parts(contents, shape, corners[first])
+    if left:
+        notes.append(same_name(left))
+    if without:
+        notes.append(f"sets of nodes that hold no facet of the boundary: {', '.join(without)}")
+
+    starts = dict(zip(whole, np.cumsum([0, *(len(blocks[b][1]) for b in whole)]), strict=False))
+    regions = {
+        name: np.concatenate([starts[b] + members for b, members in group.items() if b in starts])
+        for name, group in contents.groups.items()
+        if any(b in starts and len(members) for b, members in group.items())
+    }
+    body = np.unique(number[np.concatenate([*regions.values()])]) if regions else np.arange(0)
+    others = first.size - body.size
+    if not regions or (others and not contents.by_groups):
+        regions[BODY], body = np.arange(len(rows)), np.arange(first.size)
+    new = np.full(first.size, -1)
+    new[body] = np.arange(body.size)
+    labels, sets = combinations(body.size, [new[number[cells]] for cells in regions.values()])
+    rows = rows[first[body]]
+
+    if curved and rows.shape[1] < len(shape.nodes(2)):
+        points, rows = _filled(points, rows, shape)
+        if dim == 3:
+            notes.append(SERENDIPITY)
+    if others and body.size < first.size:
+        notes.append(f"{others} cell(s) in no physical group are no part of the body")
     # The nodes of the body alone; others may be centres of circles.
-    used = np.unique(regions.rows)
+    used = np.unique(rows)
     new = np.full(len(points), -1)
     new[used] = np.arange(used.size)
-    points = _flatten(points[used], dim)
-    cells = new[regions.rows]
+    points, rows = _flatten(points[used], dim), new[rows]
+    parts = {name: new[facets][:, shape.facet.around] for name, facets in parts.items()}
 
-    around = shape.facet.around
-    parts = {name: new[_places(tags, nodes)][:, around] for name, nodes in model.parts.items()}
-    reasons, inside = _check_cells(shape, points, cells, parts)
-    usable = {name: rows for name, rows in parts.items() if name not in reasons}
+    reasons, inside = _check_cells(shape, points, rows, parts)
+    usable = {name: facets for name, facets in parts.items() if name not in reasons}
     if not usable:
         if reasons:
             raise InputError(next(iter(reasons.values())), "part-facets")
@@ -158,13 +179,14 @@ def check_model(model: Model) -> Cells:
     notes += [
         reason if name in inside else f"ignored: {reason}" for name, reason in reasons.items()
     ]
-    kept_parts = _join(usable | {name: parts[name] for name in inside})
-    regions = replace(regions, rows=cells)
-    space = model.space
-    return Cells(shape, points, regions, kept_parts, reasons, tuple(notes), inside, space)
+    second = any(kind.dim == dim and kind.order == 2 for kind in given)
+    space = ({"degree": 2} if second else {}) | contents.space
+    cells = Groups(tuple(regions), rows, labels, sets)
+    kept = _join(usable | {name: parts[name] for name in inside})
+    return Cells(shape, points, cells, kept, reasons, tuple(notes), inside, space)
 
 
-def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
+def _check_kinds(kinds: Sequence[Kind], dim: int) -> Shape:
     """Return the shape of the cells, which must have one, and nodes up to degree 2."""
     if dim < 2:
         raise InputError(
@@ -172,69 +194,76 @@ def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
             "of physical groups alone, if there are any: the body needs a physical group, too)",
             "no-groups",
         )
-    labels = [(label, order) for label, kind_dim, order in kinds if kind_dim == dim]
-    for label, order in labels:
-        if label.split()[0].lower() not in {shape.name for shape in SHAPES} or order > 2:
-            why = "another shape" if order < 3 else f"order {order}"
+    for kind in kinds:
+        if Shape(kind.name) not in SHAPES or not kind.known:
+            why = "another shape" if kind.order < 3 else "higher order"
             raise InputError(
-                f"its cells include {label!r}, of {why}; accepted are triangles or quadrilaterals "
+                f"its cells include '{kind}', of {why}; accepted are triangles or quadrilaterals "
                 "in 2-D, tetrahedra, hexahedra, prisms or pyramids in 3-D, of order 1 or 2",
                 "cell-kinds",
             )
-    return Shape(labels[0][0].split()[0].lower())
+    return Shape(kinds[0].name)
 
 
-def _placed(nodes: Array, places: Array) -> Ints:
-    """Return which nodes of a cell of a file are those of an element, -1 for none, (k,)."""
-    distance = np.linalg.norm(nodes[:, None] - places, axis=2)
-    return np.where(distance.min(axis=1) < 0.1, distance.argmin(axis=1), -1)
+def _parts(
+    contents: Contents, shape: Shape, corners: Ints
+) -> tuple[dict[str, Ints], list[str], list[str]]:
+    """Return the facets of parts by their corners, and the names of sets that are left out.
 
-
-def _curved(points: Array, cells: Ints, places: Array, shape: Shape, first: Ints) -> bool:
-    """Tell whether some nodes of cells are not where straight edges have them.
-
-    Parameters
-    ----------
-    points, cells
-        Coordinates, shape (n, 3), and nodes, shape (m, k).
-    places, shape, first
-        The nodes of a cell in the reference cell, its shape, and which of them are its corners.
+    These are sets of nodes whose name a surface of other facets has, and those without a facet of
+    the boundary. ``corners`` are those of all cells, (m, corners), no two the same.
     """
-    if len(places) == shape.corners:
+    of, left, without = shape.facet.corners, list[str](), list[str]()
+    none = np.zeros((0, of), dtype=np.int64)
+    parts = {name: v if v.shape[1] == of else none for name, v in contents.surfaces.items()}
+
+    def add(name: str, facets: Ints) -> None:
+        there = parts.setdefault(name, facets)
+        if len(distinct(np.concatenate([there, facets]))) > len(distinct(there)):
+            left.append(name)
+
+    kinds = contents.kinds
+    for name, group in contents.groups.items():
+        sides = [
+            contents.blocks[b][1][members][:, :of]
+            for b, members in group.items()
+            if kinds[b].name == shape.facet.name and len(members)
+        ]
+        if sides:
+            add(name, np.concatenate(sides))
+    if contents.nodes:
+        facets = corners[:, shape.facet_corners[:, shape.facet.around]]
+        outside = once(facets.reshape(-1, of))
+    for name, nodes in contents.nodes.items():
+        found = outside[np.isin(outside, nodes).all(axis=1)]
+        if len(found):
+            add(name, found)
+        else:
+            without.append(name)
+    return parts, left, without
+
+
+def _curved(points: Array, cells: Ints, shape: Shape) -> bool:
+    """Tell whether some nodes of cells, (m, k), are not where straight edges have them."""
+    count = cells.shape[1]
+    if count == shape.corners:
         return False
-    corners = points[cells[:, first]]
-    aside = np.linalg.norm(points[cells] - shape.lagrange(1, places) @ corners, axis=2)
+    corners = points[cells[:, : shape.corners]]
+    straight = shape.lagrange(1, shape.nodes(2)[:count]) @ corners
+    aside = np.linalg.norm(points[cells] - straight, axis=2)
     unit = np.ptp(corners, axis=1).max(axis=1)
     return not bool(np.all(aside.max(axis=1) <= STRAIGHT * unit))
 
 
-def _filled(points: Array, cells: Ints, shape: Shape, kept: Ints) -> tuple[Array, Ints]:
-    """Return serendipity cells as those of degree 2, with the points added to them.
-
-    Parameters
-    ----------
-    points, cells
-        Coordinates, and nodes of cells, shape (m, k); where there is none in `kept` any.
-    shape, kept
-        The shape of the cells, and which nodes there are, -1 for none.
-    """
-    rows = cells.copy()
-    for nodes, ends, weights in shape.serendipity:
-        if kept[nodes[0]] < 0:
-            corners = cells[:, ends].reshape(-1, ends.shape[1])
-            number = _number(corners)
-            added = (weights @ points[cells]).reshape(-1, 3)
-            rows[:, nodes] = len(points) + number.reshape(len(cells), -1)
-            points = np.concatenate([points, added[np.unique(number, return_index=True)[1]]])
+def _filled(points: Array, cells: Ints, shape: Shape) -> tuple[Array, Ints]:
+    """Return serendipity cells, (m, k), as those of degree 2, with the points added to them."""
+    rows = cells
+    for _, ends, weights in shape.serendipity:
+        number = _number(cells[:, ends].reshape(-1, ends.shape[1]))
+        added = (weights[:, : cells.shape[1]] @ points[cells]).reshape(-1, points.shape[1])
+        rows = np.column_stack([rows, len(points) + number.reshape(len(cells), -1)])
+        points = np.concatenate([points, added[np.unique(number, return_index=True)[1]]])
     return points, rows
-
-
-def _places(tags: Ints, nodes: Ints) -> Ints:
-    """Return the positions of nodes in the ascending tags."""
-    places = np.minimum(np.searchsorted(tags, nodes), max(tags.size - 1, 0))
-    if tags.size == 0 or np.any(tags[places] != nodes):
-        raise InputError("it has elements whose nodes it does not have", "mesh-file")
-    return places
 
 
 def _flatten(points: Array, dim: int) -> Array:
@@ -293,45 +322,16 @@ def _may_fold(shape: Shape, x: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(~(np.linalg.norm(change, axis=(2, 3)).max(axis=1) < 1))
 
 
-def _folded(shape: Shape, x: Array, limit: Array) -> npt.NDArray[np.bool_]:
-    """Return which straight hexahedra have a Jacobian below a limit anywhere, or nearly.
-
-    The Jacobian is of degree 2 along each coordinate: it lies between its Bezier coefficients, and
-    has those of corners there. In between the cell is halved (Johnen, Remacle and Geuzaine,
-    Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233, 2013).
-
-    Parameters
-    ----------
-    shape, x, limit
-        Of the cells, their corners, shape (m, corners, d), and least Jacobians, (m,).
-    """
-    halves = np.array([[[4, 0, 0], [2, 2, 0], [1, 2, 1]], [[1, 2, 1], [0, 2, 2], [0, 0, 4]]]) / 4
-    to_bezier = np.array([[1.0, 0.0, 0.0], [-0.5, 2.0, -0.5], [0.0, 0.0, 1.0]])
-    at = np.moveaxis(np.indices((3, 3, 3)) / 2, 0, -1).reshape(-1, 3)
-    values = determinant(jacobians(shape, x, at)).reshape(-1, 3, 3, 3)
-    values *= np.sign(values[:, :1, :1, :1])
-    pieces = np.einsum("ia,jb,kc,mabc->mijk", *[to_bezier] * 3, values)
-    of, found = np.arange(len(x)), np.zeros(len(x), dtype=bool)
-    for _ in range(HALVINGS):
-        found[of[(pieces[:, ::2, ::2, ::2].min(axis=(1, 2, 3)) <= limit[of])]] = True
-        open_ = (pieces.min(axis=(1, 2, 3)) <= limit[of]) & ~found[of]
-        pieces = np.einsum("xia,yjb,zkc,mabc->mxyzijk", *[halves] * 3, pieces[open_])
-        pieces, of = pieces.reshape(-1, 3, 3, 3), np.repeat(of[open_], 8)
-    found[of] = True
-    return found
-
-
-def _least_volume(shape: Shape, nodes: Array) -> Array:
-    """Return the least Jacobian of curved cells over its sign at the first corner, shape (m,).
-
-    At the corners, between them, and where integrals are taken.
+def _least_volume(shape: Shape, nodes: Array, at: Array) -> Array:
+    """Return the least Jacobian of cells over its sign at the first corner, shape (m,).
 
     Parameters
     ----------
     shape, nodes
         Of the cells, and their nodes, shape (m, k, d).
+    at
+        Points of the reference cell, the first corner first, shape (q, d).
     """
-    at = np.concatenate([shape.nodes(2), rule(shape, 4)[0]])
     each = (determinant(jacobians(shape, nodes, point[None]))[:, 0] for point in at)
     first = next(each)  # one at a time, for all at once take kilobytes a cell
     return reduce(np.minimum, (volume * np.sign(first) for volume in each), np.abs(first))
@@ -365,13 +365,6 @@ def _check_cells(
     longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=-1).max(axis=(1, 2))
     volume = determinant(jacobians(shape, x, shape.nodes(1)))
     flat = ~(np.abs(volume).min(axis=1) > FLAT * longest ** points.shape[1])
-    collapsed = flat & ~proper(cells)
-    if not shape.simplex and np.any(collapsed):
-        raise InputError(
-            f"it has {collapsed.sum()} cell(s) with one node at several corners, the first near "
-            f"{_first(collapsed, x * unit)}; accepted: {shape.plural} with nodes of their own",
-            "collapsed-cells",
-        )
     if np.any(flat):
         where = _first(flat, x * unit)
         raise InputError(
@@ -387,11 +380,13 @@ def _check_cells(
     curved = nodes.shape[1] > shape.corners
     bent = np.full(len(cells), curved)
     limit = FLAT * longest ** points.shape[1]
-    if curved:
-        bent[:] = ~(_least_volume(shape, nodes) > limit)
+    if curved:  # at the corners, between them, and where integrals are taken
+        at = np.concatenate([shape.nodes(2), rule(shape, 4)[0]])
+        bent[:] = ~(_least_volume(shape, nodes, at) > limit)
     elif shape.dim == 3 and not shape.simplex:
+        at = np.moveaxis(np.indices((POINTS,) * 3) / (POINTS - 1), 0, -1).reshape(-1, 3)
         bent[:] = _may_fold(shape, x)
-        bent[bent] = _folded(shape, x[bent], limit[bent])
+        bent[bent] = ~(_least_volume(shape, x[bent], at) > limit[bent])
     if np.any(bent) and curved:
         raise InputError(
             f"it has {bent.sum()} cell(s) that are folded by their curved edges, the first near "

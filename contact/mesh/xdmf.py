@@ -11,6 +11,7 @@ mixed topologies.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,42 +19,42 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from contact.mesh.extraction import Ints
+from contact.mesh.contents import Contents, Ints
 
-#: First words of the names of topologies, and meshio's names of cells of first order.
+#: First words of the names of topologies, and names of cells.
 KINDS = {
     "polyvertex": "vertex",
-    "polyline": "line",
-    "edge": "line",
+    "polyline": "interval",
+    "edge": "interval",
     "triangle": "triangle",
     "tri": "triangle",
-    "quadrilateral": "quad",
-    "quad": "quad",
-    "tetrahedron": "tetra",
-    "tet": "tetra",
+    "quadrilateral": "quadrilateral",
+    "quad": "quadrilateral",
+    "tetrahedron": "tetrahedron",
+    "tet": "tetrahedron",
     "pyramid": "pyramid",
-    "wedge": "wedge",
+    "wedge": "prism",
     "hexahedron": "hexahedron",
     "hex": "hexahedron",
 }
 
-#: Cells of mixed topologies by their number: meshio's names, and numbers of nodes.
+#: Cells of mixed topologies by their number: names, and numbers of nodes.
 MIXED = {
     1: ("vertex", 1),
-    2: ("line", 2),
+    2: ("interval", 2),
     4: ("triangle", 3),
-    5: ("quad", 4),
-    6: ("tetra", 4),
+    5: ("quadrilateral", 4),
+    6: ("tetrahedron", 4),
     7: ("pyramid", 5),
-    8: ("wedge", 6),
+    8: ("prism", 6),
     9: ("hexahedron", 8),
-    34: ("line", 3),
-    35: ("quad", 9),
+    34: ("interval", 3),
+    35: ("quadrilateral", 9),
     36: ("triangle", 6),
-    37: ("quad", 8),
-    38: ("tetra", 10),
+    37: ("quadrilateral", 8),
+    38: ("tetrahedron", 10),
     39: ("pyramid", 13),
-    40: ("wedge", 15),
+    40: ("prism", 15),
     48: ("hexahedron", 20),
     50: ("hexahedron", 27),
 }
@@ -67,66 +68,51 @@ WINDOW = 10_000
 #: NumPy's letters of types of numbers.
 TYPES = {"Int": "i", "UInt": "u", "Float": "f", "Char": "i", "UChar": "u"}
 
+#: Formats of arrays that are in files of their own.
+FILES = ("HDF", "Binary")
+
 ACCEPTED = "accepted: one mesh, and tags of its cells and facets on the nodes of the mesh"
 
 
-def read(file: Path) -> Any:
-    """Read an XDMF file as a mesh of meshio, whose cells have the names of those of first order.
+def read(file: Path) -> Contents:
+    """Read an XDMF file: one mesh, and tags.
 
     Raises
     ------
-    ValueError
-        For anything but one mesh with tags.
     Exception
-        Of any kind, if it is damaged.
+        For anything else, of any kind if it is damaged.
     """
-    import meshio
-
     root = ElementTree.parse(file).getroot()
     grids = [grid for grid in root.iter("Grid") if grid.find("Topology/DataItem") is not None]
     given = [item for grid in grids if (item := grid.find("Geometry/DataItem")) is not None]
     if not given:
         raise ValueError(f"it has no mesh; {ACCEPTED}")
-    points, *others = (_array(item, root, file) for item in given)
-    if any(not np.array_equal(points, other) for other in others):
+    places, *others = (_array(item, root, file) for item in given)
+    if any(not np.array_equal(places, other) for other in others):
         raise ValueError(f"it has several meshes; {ACCEPTED}")
-    blocks: list[tuple[str, Ints]] = []
-    on_cells: dict[str, dict[int, Any]] = {}
-    on_nodes: dict[str, Any] = {}
+    points, blocks = np.zeros((len(places), 3)), list[tuple[str, Ints]]()
+    points[:, : places.shape[1]] = places
+    made = Contents(points, blocks, repeats=True)
     for grid in grids:
-        own = _blocks(grid, root, file)
-        at = [_among(blocks[:1], *block) for block in own]
-        numbers = [0 if k is not None else len(blocks) + i for i, k in enumerate(at)]
+        own, first = _blocks(grid, root, file), len(blocks)
+        ends = np.cumsum([len(rows) for _, rows in own])
         for name, on, values in _attributes(grid, root, file):
             if on == "Node" and len(values) == len(points):
-                on_nodes[name] = values
-            elif on == "Cell" and len(values) == sum(len(rows) for _, rows in own):
-                pieces = np.split(values, np.cumsum([len(rows) for _, rows in own])[:-1])
-                for number, place, piece in zip(numbers, at, pieces, strict=True):
-                    every = piece
-                    if place is not None:  # some cells of the mesh: 0 elsewhere
-                        every = np.zeros(len(blocks[0][1]), dtype=piece.dtype)
-                        every[place] = piece
-                    on_cells.setdefault(name, {})[number] = every
-        blocks += [block for block, place in zip(own, at, strict=True) if place is None]
-    data = {
-        name: [found.get(b, np.zeros(len(rows), dtype=int)) for b, (_, rows) in enumerate(blocks)]
-        for name, found in on_cells.items()
-    }
-    return meshio.Mesh(points, blocks, point_data=on_nodes, cell_data=data)
+                made.add_nodes(name, values)
+            elif on == "Cell" and len(values) == ends[-1]:
+                made.add_groups(name, np.split(values, ends[:-1]), first)
+        blocks += own
+    return made
 
 
-def _among(mesh: list[tuple[str, Ints]], name: str, rows: Ints) -> Ints | None:
-    """Return where cells are among those of the mesh, its first block; None if they are not."""
-    if not mesh or (mesh[0][0], mesh[0][1].shape[1]) != (name, rows.shape[1]):
-        return None
-    count = len(mesh[0][1])
-    both = np.sort(np.concatenate([mesh[0][1], rows]), axis=1)
-    number = np.unique(both, axis=0, return_inverse=True)[1].ravel()
-    place = np.full(len(both), -1)
-    place[number[:count]] = np.arange(count)
-    found = place[number[count:]]
-    return found if np.all(found >= 0) else None
+def heavy(file: Path) -> list[Path]:
+    """Return the files with the arrays of an XDMF file, each once; none of one that is damaged."""
+    with suppress(ElementTree.ParseError):
+        items = [item for _, item in ElementTree.iterparse(file) if item.tag == "DataItem"]
+        texts = [(item.get("Format"), (item.text or "").strip()) for item in items]
+        names = [t.rpartition(":")[0] if f == "HDF" else t for f, t in texts if f in FILES]
+        return [file.parent / name for name in dict.fromkeys(names)]
+    return []
 
 
 def _attributes(grid: Element, root: Element, file: Path) -> list[tuple[str, str, Any]]:
@@ -143,7 +129,7 @@ def _attributes(grid: Element, root: Element, file: Path) -> list[tuple[str, str
 
 
 def _blocks(grid: Element, root: Element, file: Path) -> list[tuple[str, Ints]]:
-    """Return the cells of a grid: meshio's names, and nodes."""
+    """Return the cells of a grid: names, and nodes."""
     topology = next(grid.iter("Topology"))
     given = topology.get("TopologyType") or topology.get("Type") or ""
     rows = _array(next(topology.iter("DataItem")), root, file).astype(np.int64)

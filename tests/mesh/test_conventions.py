@@ -308,7 +308,7 @@ def test_long_runs_of_mixed_cells():
     line = [2, 2, 8, 9]
     found = _mixed(np.concatenate([line, triangles.ravel(), line, line]))
     assert [(name, len(rows)) for name, rows in found] == [
-        *(("line", 1), ("triangle", 2 * WINDOW + 5), ("line", 2)),
+        *(("interval", 1), ("triangle", 2 * WINDOW + 5), ("interval", 2)),
     ]
     assert np.array_equal(found[1][1], triangles[:, 1:])
     assert found[2][1].tolist() == [[8, 9]] * 2

@@ -12,7 +12,7 @@ from contact.errors import InputError
 from contact.mesh.cells import HEXAHEDRON
 from contact.mesh.geometry import determinant, jacobians
 from contact.mesh.reader import from_file
-from contact.mesh.validity import _folded, _may_fold
+from contact.mesh.validity import _may_fold
 
 #: One of them, by its corners in the order of dolfinx.
 TWISTED = np.array(
@@ -37,19 +37,12 @@ def least(x: np.ndarray, n: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("amount", [0.1, 0.3, 0.45, 0.5])
-def test_folded_cells_are_found_and_no_others(amount: float) -> None:
-    """By the Jacobian at many points: where it is negative, and where it is not."""
+def test_every_folded_cell_is_suspect(amount: float) -> None:
+    """By the Jacobian at many points: where it is negative; few others are looked at."""
     x = hexahedra(amount, 3000)
-    sampled, corners = least(x, 9) <= 0, least(x, 2) <= 0
     suspect = _may_fold(HEXAHEDRON, x)
-    assert not np.any(sampled & ~suspect)
+    assert not np.any((least(x, 9) <= 0) & ~suspect)
     assert suspect.any() == (amount > 0.1)
-    found = np.zeros(len(x), dtype=bool)
-    found[suspect] = _folded(HEXAHEDRON, x[suspect], np.zeros(suspect.sum()))
-    assert not np.any(sampled & ~found)
-    # The few others are folded between the points.
-    assert len(x[found & ~sampled]) <= 3 and np.all(least(x[found & ~sampled], 41) <= 0)
-    assert np.any(found & ~corners) == (amount > 0.4)
 
 
 def test_such_a_cell_is_refused(tmp_path: Path) -> None:

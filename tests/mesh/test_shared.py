@@ -159,18 +159,17 @@ def test_other_names_and_files_that_are_there_are_refused(tmp_path, capsys):
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("harm", ["missing", "cut", "bit"])
+@pytest.mark.parametrize("harm", ["missing", "cut"])
 def test_damaged_shares_are_refused(harm, shared_tmp_path, capsys):
     _, made = written(shared_tmp_path, "square.msh")
     heavy = made.with_suffix(".h5")
     if COMM.rank == 0:
-        data = bytearray(heavy.read_bytes())
+        data = heavy.read_bytes()
         heavy.unlink()
-        data[len(data) // 2] ^= 1
-        if harm != "missing":
-            heavy.write_bytes(bytes(data) if harm == "bit" else bytes(data[:-100]))
+        if harm == "cut":
+            heavy.write_bytes(data[:-100])
     COMM.barrier()
-    with pytest.raises(InputError, match=r"part\.h5: it is (missing|not as it was)"):
+    with pytest.raises(InputError, match=r"part\.h5: it is missing or damaged"):
         from_file(COMM, made)
 
 
@@ -186,7 +185,7 @@ def test_no_rank_takes_more_than_its_share(tmp_path, monkeypatch, capsys):
             self.rank = rank
 
     monkeypatch.setattr(shared, "on_root", lambda comm, action: action())
-    shares = [shared.read(Rank(rank), *heavy) for rank in range(3)]
+    shares = [shared.read(Rank(rank), heavy) for rank in range(3)]
     for rows in ([s.points for s in shares], [s.parts.rows for s in shares]):
         sizes = [len(own) for own in rows]
         assert max(sizes) - min(sizes) <= 1

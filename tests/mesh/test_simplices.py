@@ -11,10 +11,9 @@ from mpi4py import MPI
 import meshes
 from contact.errors import InputError
 from contact.mesh.cells import FACES, simplices
-from contact.mesh.extraction import Contents
-from contact.mesh.formats import model_of
+from contact.mesh.contents import Contents
 from contact.mesh.reader import from_file
-from contact.mesh.validity import check_model
+from contact.mesh.validity import Cells, Groups, check
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD
@@ -74,22 +73,28 @@ def sizes(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.sqrt(np.linalg.det(edges @ edges.transpose(0, 2, 1))) / (count * (count - 1))
 
 
+def totals(cells: Cells, groups: Groups) -> dict[str, float]:
+    """Return the volume or area of each group."""
+    each = sizes(cells.points, groups.rows)
+    inside = [[i in groups.sets[k] for k in groups.labels] for i in range(len(groups.names))]
+    return {name: each[own].sum() for name, own in zip(groups.names, inside, strict=True)}
+
+
 @pytest.mark.core
 @pytest.mark.parametrize("seed", range(8))
 def test_neighbours_cut_their_faces_alike_whatever_the_numbers(seed):
     contents = stack()
     order = np.random.default_rng(seed).permutation(len(contents.points))
-    model = model_of(numbered(contents, order))
-    cells = check_model(model)  # which finds faces of two cells that do not meet
+    cells = check(numbered(contents, order))  # which finds faces of two cells that do not meet
     assert cells.notes[-1] == (
         "its cells, 'Hexahedron 8' beside 'Prism 6' beside 'Pyramid 5' beside 'Tetrahedron 4', "
         "become tetrahedra: a mesh has cells of one kind"
     )
     rows = cells.regions.rows
     assert len(rows) == 6 + 2 * 3 + 6 * 2 + 1
-    found = {name: sizes(model.points, nodes - 1).sum() for name, nodes in model.regions.items()}
+    found = totals(cells, cells.regions)
     assert found == pytest.approx(VOLUMES)
-    found = {name: sizes(model.points, nodes - 1).sum() for name, nodes in model.parts.items()}
+    found = totals(cells, cells.parts)
     assert found == pytest.approx(AREAS)
     facets = np.sort(rows[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
     once, count = np.unique(facets, axis=0, return_counts=True)
@@ -238,16 +243,15 @@ def test_hexahedra_that_have_collapsed_are_cut(seed):
     """Whatever the numbers: volumes of the regions, a part of a square and a triangle."""
     contents = collapsed()
     order = np.random.default_rng(seed).permutation(len(contents.points))
-    model = model_of(numbered(contents, order))
-    cells = check_model(model)
+    cells = check(numbered(contents, order))
     assert cells.notes == (
         "its cells, 'Hexahedron 8', 3 of them with one node at several corners, become "
         "tetrahedra: a mesh has cells of one kind",
     )
-    found = {name: sizes(model.points, nodes - 1).sum() for name, nodes in model.regions.items()}
+    found = totals(cells, cells.regions)
     expected = {"cube": 1.0, "prism": 1 / 2, "pyramid": 1 / 3, "tetrahedron": 1 / 6}
     assert found == pytest.approx(expected)
-    found = {name: sizes(model.points, nodes - 1).sum() for name, nodes in model.parts.items()}
+    found = totals(cells, cells.parts)
     assert found == pytest.approx({"low": 1.0, "ground": 1.5})
 
 

@@ -1,0 +1,261 @@
+"""The contents of a mesh file, whatever its format, and its cells as those of one shape."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
+
+from contact.errors import InputError
+from contact.mesh.cells import SHAPES, Shape, proper, simplices, together
+from contact.typing import Array
+
+Ints = npt.NDArray[np.int64]
+
+#: The region of a mesh whose cells nothing tells apart.
+BODY = "body"
+
+#: Names of shapes in meshio that are not those of basix.
+NAMES = {"line": "interval", "quad": "quadrilateral", "tetra": "tetrahedron", "wedge": "prism"}
+
+#: Dimension, corners, and numbers of nodes of second order of elements by their names in basix.
+ELEMENTS: dict[str, tuple[int, int, tuple[int, ...]]] = {
+    "vertex": (0, 1, ()),
+    "point": (0, 1, ()),
+    "interval": (1, 2, (3,)),
+    "triangle": (2, 3, (6,)),
+    "quadrilateral": (2, 4, (8, 9)),
+    "tetrahedron": (3, 4, (10,)),
+    "pyramid": (3, 5, (13, 14)),
+    "prism": (3, 6, (15, 18)),
+    "hexahedron": (3, 8, (20, 27)),
+}
+
+
+#: Arrays that hold tags of groups, and those of a program's own.
+TAGS = {"gmsh:physical", "cell_tags", "point_tags", "medit:ref"}
+INNER = {"gmsh:geometrical", "gmsh:bounding_entities", "GlobalElementId", "GlobalNodeId"}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A type of elements: a name in basix, or one that is not known, and a number of nodes."""
+
+    name: str
+    nodes: int
+
+    @staticmethod
+    def of(name: str, nodes: int) -> Kind:
+        """Return the type of elements with a name of meshio or basix, digits behind it or not."""
+        stem = name.rstrip("0123456789")
+        found = NAMES.get(stem, stem)
+        return Kind(found if found in ELEMENTS else name, nodes)
+
+    def __str__(self) -> str:
+        """Return its name and number of nodes, as Gmsh writes them."""
+        return f"{self.name.capitalize()} {self.nodes}" if self.name in ELEMENTS else self.name
+
+    @property
+    def known(self) -> bool:
+        """Whether it is of order 1 or 2, and can be cut into simplices."""
+        return self.name in ELEMENTS and self.order < 3
+
+    @property
+    def dim(self) -> int:
+        """Its dimension; of those that are not known 3."""
+        return ELEMENTS[self.name][0] if self.name in ELEMENTS else 3
+
+    @property
+    def corners(self) -> int:
+        """Number of corners."""
+        return ELEMENTS[self.name][1]
+
+    @property
+    def order(self) -> int:
+        """Order of its geometry; 3 for all above 2."""
+        _, corners, second = ELEMENTS.get(self.name, (3, self.nodes, ()))
+        return 1 if self.nodes == corners else 2 if self.nodes in second else 3
+
+
+@dataclass
+class Contents:
+    """The contents of a mesh file.
+
+    Attributes
+    ----------
+    points
+        Coordinates of the nodes, shape (n, 3).
+    blocks
+        Name of a shape, as meshio or basix has it, and elements by their nodes: corners in VTK's
+        order, those between them in the order of the program.
+    groups
+        Name -> number of a block -> its elements in the group.
+    nodes
+        Name -> the nodes of a set.
+    surfaces
+        Name -> facets by their corners, around them.
+    notes
+        Its other contents, one sentence each.
+    space
+        Keys of a case's ``[space]`` for which its elements were made: degree, kinematics.
+    repeats
+        Whether cells stand in it once for each of their groups.
+    by_groups
+        Whether cells in no group are no part of the body.
+    """
+
+    points: Any
+    blocks: Sequence[tuple[str, Ints]]
+    groups: dict[str, dict[int, Ints]] = field(default_factory=dict)
+    nodes: dict[str, Ints] = field(default_factory=dict)
+    surfaces: dict[str, Ints] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    space: dict[str, int | str] = field(default_factory=dict)
+    repeats: bool = False
+    by_groups: bool = False
+
+    @property
+    def kinds(self) -> list[Kind]:
+        """The type of the elements of each block."""
+        return [Kind.of(name, nodes.shape[1]) for name, nodes in self.blocks]
+
+    def add_groups(self, key: str, arrays: Sequence[Array], first: int = 0) -> None:
+        """Add the groups that whole numbers of elements mark, an array each block from one on."""
+        for name, block, members in _by_number(key, arrays):
+            group = self.groups.setdefault(name, {})
+            group[first + block] = np.union1d(group.get(first + block, members), members)
+
+    def add_nodes(self, key: str, values: Array) -> None:
+        """Add the sets of nodes that whole numbers mark."""
+        for name, _, members in _by_number(key, [values]):
+            self.nodes[name] = np.union1d(self.nodes.get(name, members), members)
+
+
+def letters(given: bytes) -> str:
+    """Return a text of a file, in the letters of Western Europe (Latin-1) if it is not UTF-8."""
+    try:
+        return given.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return given.decode("latin-1")
+
+
+def _by_number(key: str, arrays: Sequence[Array]) -> Iterator[tuple[str, int, Ints]]:
+    """Yield groups that arrays of whole numbers mark, and their members block by block; 0 is none.
+
+    The name of a group is its number, behind that of the arrays unless that is one for tags.
+    """
+    whole = [np.asarray(array) for array in arrays]
+    if key in INNER or any(v.dtype.kind not in "iub" or v.ndim != 1 for v in whole):
+        return
+    several, names = key.split("-"), {}
+    if len(several) > 1 and max(v.max(initial=0) for v in whole) == len(several) - 1:
+        # Sets that meshio has written as one array: their names, and -1 for none.
+        names, whole = dict(enumerate(several, 1)), [v + 1 for v in whole]
+    before = "" if key in TAGS else f"{key} "
+    for block, values in enumerate(whole):
+        for number in map(int, np.unique(values[values > 0])):
+            yield names.get(number, f"{before}{number}"), block, np.flatnonzero(values == number)
+
+
+def same_name(names: Sequence[str]) -> str:
+    """Return the note on sets of nodes that are left out, as a surface has their name."""
+    return f"sets left out, as a surface of other facets has their name: {', '.join(names)}"
+
+
+def in_one_shape(contents: Contents) -> Contents:
+    """Return contents whose cells have one shape of ours: they are cut into simplices if need be.
+
+    Cells that are not known, or of higher order, stay.
+    """
+    kinds = contents.kinds
+    dim = max((kind.dim for kind in kinds), default=0)
+    cells = list(dict.fromkeys(kind for kind in kinds if kind.dim == dim))
+    if dim < 2 or not all(kind.known for kind in cells):
+        return contents
+    collapsed = sum(
+        int(np.count_nonzero(~proper(rows[:, : kind.corners])))
+        for kind, (_, rows) in zip(kinds, contents.blocks, strict=True)
+        if kind.dim == dim and kind.corners > dim + 1
+    )
+    if not collapsed and len(cells) == 1 and Shape(cells[0].name) in SHAPES:
+        return contents
+    found = " beside ".join(repr(str(kind)) for kind in cells)
+    if collapsed:
+        found += f", {collapsed} of them with one node at several corners"
+    shape = "triangles" if dim == 2 else "tetrahedra"
+    note = f"its cells, {found}, become {shape}: a mesh has cells of one kind"
+    if any(kind.order > 1 for kind in cells):
+        note = (
+            f"its cells, {found}, become {shape} with straight edges: a mesh has cells of one "
+            "kind, and curved edges in files of one kind alone"
+        )
+    return _cut(contents, kinds, dim, note)
+
+
+def _cut(contents: Contents, kinds: Sequence[Kind], dim: int, note: str) -> Contents:
+    """Return the contents of a file with its cells and their facets cut into simplices."""
+    blocks: list[tuple[str, Ints]] = list(contents.blocks)
+    groups: dict[str, dict[int, Ints]] = {name: {} for name in contents.groups}
+    for b, (kind, (_, nodes)) in enumerate(zip(kinds, contents.blocks, strict=True)):
+        count = np.ones(len(nodes), dtype=np.int64)
+        if kind.dim >= dim - 1 and kind.known:
+            made = simplices(nodes[:, : kind.corners], kind.dim)
+            # Those of no volume are no part of a cell that has collapsed; no simplex may have.
+            full = proper(made.reshape(-1, kind.dim + 1)).reshape(made.shape[:2])
+            full |= made.shape[1] == 1
+            count = full.sum(axis=1)
+            if kind.dim == dim and not count.all():
+                raise InputError(
+                    f"it has {np.sum(count == 0)} cell(s) of zero volume", "mesh-geometry"
+                )
+            blocks[b] = {1: "interval", 2: "triangle", 3: "tetrahedron"}[kind.dim], made[full]
+        for name, members in contents.groups.items():
+            if b in members:
+                chosen = np.zeros(len(nodes), dtype=bool)
+                chosen[members[b]] = True
+                groups[name][b] = np.flatnonzero(np.repeat(chosen, count))
+    surfaces = {
+        name: together([simplices(faces, dim - 1).reshape(-1, dim)]) if len(faces) else faces
+        for name, faces in contents.surfaces.items()
+    }
+    notes = [*contents.notes, note]
+    return replace(contents, blocks=blocks, groups=groups, surfaces=surfaces, notes=notes)
+
+
+def in_order(shape: Shape, points: Array, rows: Ints) -> Ints:
+    """Return cells whose nodes are in the order of dolfinx, those that a serendipity cell has.
+
+    Programs number nodes between corners in ways of their own: of hexahedra Exodus has the upright
+    edges in front of the upper ones, Abaqus the middle in front of the faces, MED the lower face
+    first. A file has one order; it is the one in which the nodes are nearest to the places of
+    straight edges, and then to those within faces and the cell that the edges tell: an assignment
+    problem.
+    """
+    count = rows.shape[1]
+    second = count > shape.corners
+    columns = np.argsort(shape.vtk(1 + second)[1][:count])
+    ordered = rows[:, columns]
+    if not second or not len(rows):
+        return ordered
+    edges = shape.corners + np.arange(len(shape.edges))
+    straight = np.zeros((len(edges), count))
+    straight[:, : shape.corners] = shape.lagrange(1, shape.nodes(2)[edges])
+    expected = [(edges, straight)]
+    if shape.serendipity and count == len(shape.nodes(2)):
+        inner, _, told = map(list, zip(*shape.serendipity, strict=True))
+        expected.append((np.concatenate(inner), np.concatenate(told)))
+    for nodes, weights in expected:
+        known = np.flatnonzero(np.any(weights != 0, axis=0))
+        at = points[ordered[:, known]]
+        size = np.ptp(at, axis=1).max(axis=1)[:, None, None]
+        middle = at.mean(axis=1, keepdims=True)
+        places = weights[:, known] @ (at - middle) / size
+        given = (points[ordered[:, nodes]] - middle) / size
+        # The part of the squares of distances that depends on the order.
+        costs = -np.einsum("cid,cjd->ij", places, given)
+        ordered[:, nodes] = ordered[:, nodes[linear_sum_assignment(costs)[1]]]
+    return ordered
