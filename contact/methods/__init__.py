@@ -1,15 +1,14 @@
 """Solution methods: each takes an initial guess of a problem to a `State` and its `Outcome`.
 
-`newton` is the semismooth Newton method (primal-dual active set) with its order of fallbacks:
-all nodes open and a `working_set`, then `continuation`, `unconstrained_modes`, `interior_point`,
-and the condensed body where that was not the first. `newton_loop` iterates its
-steps: `newton_step` on the whole body, `condensed_step` on the body condensed onto its contact
-nodes, with `chord` steps. `thesis` has fixed points, Uzawa block relaxation and penalty, on which
-Newton's method does not fall back; `load_stepping` is the quasi-static load stepping around any
-method.
+`newton` is the default: it condenses the body where that pays, and loops over its material.
+`semismooth` is the semismooth Newton method (primal-dual active set) on the whole body or on the
+condensed one, and `newton_step` one step of it. `fallbacks` has what is tried where it fails, in
+order: all nodes open and a working set, a continuation, `unconstrained_modes`, `interior_point`.
+`load_stepping` is the quasi-static load stepping around any method. The fixed points, Uzawa block
+relaxation and penalty of `contact.thesis` are no fallbacks of it.
 
-Parts of methods: `cones` (slacks and multipliers of the interior point), `conductivity_derivative`
-(Newton or Picard in the conductivity) and `stagnation`. For all methods: `method` is their
+Parts of methods: `cones` (slacks and multipliers of the interior point), `step_control`
+(stagnation, chord steps, Newton or Picard in the conductivity). For all methods: `method` is their
 protocol, `options` has tolerances and limits, `complementarity_parameters` c, r and gamma, `report`
 the history and the outcome; `signals` ends a solve by Ctrl-C.
 

@@ -27,7 +27,6 @@ Methods Appl. Sci. 5 (1983).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -35,11 +34,10 @@ import numpy as np
 from contact.errors import InputError, SingularError
 from contact.interface.multipliers import Multipliers
 from contact.methods.cones import Cones, ConeStep
-from contact.methods.newton_step import Iterate, Iteration, NewtonStep
 from contact.methods.report import Outcome
-from contact.methods.stagnation import PROGRESS
-from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
-from contact.problem.protocols import Problem
+from contact.methods.semismooth import SemismoothNewton
+from contact.methods.step_control import PROGRESS
+from contact.methods.unconstrained_modes import all_loads
 from contact.problem.residuals import evaluate, evaluate_forces, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
@@ -77,52 +75,41 @@ SHARE_UNSUPPORTED = 0.1
 SHORTEST, LONGEST = 0.9, 0.999
 
 
-def interior_point(
-    iteration: Iteration,
-    whole: NewtonStep,
-    modes: UnconstrainedModes,
-    finish: Callable[[State], tuple[Iterate, Outcome]],
-    begin: State | None = None,
-) -> tuple[Iterate, Outcome]:
+def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tuple[State, Outcome]:
     """Solve by the interior point and Newton's last steps, and update the bound. Collective.
 
     Parameters
     ----------
-    iteration
-        The problem, its best iterate and the number of steps left.
-    whole
-        Newton's step, whose operator has nodal blocks that the cones take the place of.
-    modes
-        Of the whole problem.
-    finish
-        Newton's method, from a state on.
+    newton
+        Newton's method on the problem, whose operator has nodal blocks that the cones take the
+        place of.
     begin
         State without contact, whose gaps the slacks start from; None where nothing but contact
         constrains a rigid-body mode or the potential.
     """
-    problem, interface = iteration.problem, iteration.problem.interface
+    problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
     stuck = modes.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
-    aside: tuple[Iterate, Outcome] | None = None
+    aside: tuple[State, Outcome] | None = None
     best, raised = 1.0, False
     for _ in range(UPDATES):
-        method = InteriorPoint(problem, whole, bound, begin)
-        outcome, state = method.run(iteration), method.state
-        iterate = Iterate(state)
-        if not outcome.converged and iteration.left > 0:
+        method = InteriorPoint(newton, bound, begin)
+        outcome, state = method.run(), method.state
+        last = state
+        if not outcome.converged and newton.left > 0:
             try:
-                iterate, outcome = finish(state)
+                last, outcome = newton.iterate(newton.started(state), note=INTERIOR_POINT)
             except SingularError:  # with another bound other nodes may hold the body
-                whole.renew()
-        if outcome.converged and modes.pushed_aside(problem, iterate.state):
-            aside = iterate, outcome
+                newton.step.renew()
+        if outcome.converged and modes.pushed_aside(problem, last):
+            aside = last, outcome
         elif outcome.converged or not interface.friction.acts:
-            return iterate, outcome
-        if iteration.left <= 0:
+            return last, outcome
+        if newton.left <= 0:
             break
         # Pressures of the last steps are nearer where these make progress, else those of the cones.
         if aside is None and outcome.kkt.significant < PROGRESS * best:
-            state = iterate.state
+            state = last
         best = min(best, outcome.kkt.significant)
         nodal = interface.jump.apply(state.x)
         bound = interface.bound(nodal, state.forces)
@@ -132,11 +119,11 @@ def interior_point(
         multiple = modes.overload(bound)
         if multiple == np.inf or (raised and multiple > 1):
             outcome = replace(outcome, kkt=evaluate(problem, state))
-            iterate, outcome = Iterate(state), replace(outcome, ended=OVERLOADED, overloaded=True)
+            last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
             break
         if multiple > 1:  # with as much friction as the loads ask for pressures may differ
             bound, raised = np.asarray(multiple / PROGRESS * bound, dtype=float), True
-    return aside or (iterate, outcome)
+    return aside or (last, outcome)
 
 
 class InteriorPoint:
@@ -146,20 +133,18 @@ class InteriorPoint:
 
     Parameters
     ----------
-    problem
-        The contact problem.
-    whole
-        Newton's step, whose operator has nodal blocks that the cones take the place of.
+    newton
+        Newton's method on the problem, whose operator has nodal blocks that the cones take the
+        place of.
     bound
         Friction bound, shape (n,) (stress).
     begin
         State whose gaps the slacks start from; None where there is none without contact.
     """
 
-    def __init__(
-        self, problem: Problem, whole: NewtonStep, bound: Array, begin: State | None
-    ) -> None:
-        self.problem, self._whole = problem, whole
+    def __init__(self, newton: SemismoothNewton, bound: Array, begin: State | None) -> None:
+        problem = newton.problem
+        self.problem, self._newton, self._step = problem, newton, newton.step
         interface = problem.interface
         jump, self._state = interface.jump, problem.start()
         self._near = np.isfinite(jump.gap)
@@ -194,22 +179,23 @@ class InteriorPoint:
         #: without contact a gap may be small, and contact not known yet.
         self._least_work = CLOSED * self.cones.duality_gap() if begin is None else 0.0
 
-    def run(self, iteration: Iteration) -> Outcome:
+    def run(self) -> Outcome:
         """Take steps until the duality gap is closed. Collective."""
+        newton = self._newton
         kkt, self._internal = evaluate_forces(self.problem, self.state)
         ended = "the interior point was given no step"
-        for steps in range(1, min(LIMIT, iteration.left) + 1):
+        for steps in range(1, min(LIMIT, newton.left) + 1):
             try:
                 taken = self.step()
             except InputError as error:
                 # At its end the matrices are singular but for rounding; memory is another matter.
                 if error.identifier == "memory":
                     raise
-                self._whole.renew()
+                self._step.renew()
                 taken = False
             kkt, self._internal = evaluate_forces(self.problem, self.state)
-            iteration.see(Iterate(self.state), kkt)
-            iteration.history.record(kkt, INTERIOR_POINT, 2)
+            newton.see(self.state, kkt)
+            newton.history.record(kkt, INTERIOR_POINT, 2)
             ended = f"the interior point has not converged in {steps} steps"
             if not taken or not np.isfinite(kkt.significant):
                 ended = f"rounding ends the interior point after {steps} steps"
@@ -225,7 +211,7 @@ class InteriorPoint:
             ):
                 ended = f"duality gap closed after {steps} steps"
                 break
-        return Outcome(kkt, iteration.options.allowed, ended)
+        return Outcome(kkt, newton.options.allowed, ended)
 
     @property
     def state(self) -> State:
@@ -267,7 +253,7 @@ class InteriorPoint:
         normal, tangent = jump.normal[near], jump.tangent[frictional]
         blocks[near, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
         blocks[frictional, :d, :d] += tangent @ across @ tangent
-        self._whole.assemble(state, blocks / jump.weight[:, None, None])
+        self._step.assemble(self.problem, state, blocks / jump.weight[:, None, None])
 
         def solve(constants: tuple[Array, Array]) -> tuple[Array, ConeStep]:
             force, friction = cones.reduced(constants)
@@ -276,7 +262,7 @@ class InteriorPoint:
             at_nodes[frictional] += friction - np.einsum("kij,kj->ki", across, slip)
             rhs = residual.copy()
             jump.transpose(at_nodes, rhs)
-            dx = self._whole.operator.solve(rhs, FORCING)
+            dx = self._step.operator.solve(rhs, FORCING)
             moved = jump.apply(dx)
             closed = slack - jump.normal_component(moved)[near]
             return dx, cones.complete(

@@ -12,13 +12,11 @@ Nocedal and Wright, Numerical Optimization, Springer (2006): Levenberg-Marquardt
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
 
 from contact.errors import SingularError
-from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import (
     ComplementarityParameters,
     LinearisedContact,
@@ -27,10 +25,8 @@ from contact.interface.complementarity import (
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
-from contact.methods.conductivity_derivative import ConductivityDerivative
 from contact.methods.options import NewtonOptions
-from contact.methods.report import IterationHistory, Record
-from contact.methods.stagnation import Best
+from contact.methods.step_control import ConductivityDerivative
 from contact.problem.protocols import Problem
 from contact.problem.residuals import Residuals, residual_forces
 from contact.problem.state import State
@@ -54,122 +50,15 @@ REGULARISATION = 1e-2
 SMALL = 0.1
 
 
-@dataclass(frozen=True)
-class Iterate:
-    """A state, with the active set and the layer's pressure of the step that led to it.
-
-    Attributes
-    ----------
-    state
-        Unknowns and contact forces.
-    active_set
-        Which nodes were open, stick or slip in that step; None before the first one.
-    layer_pressure
-        Pressure of the linearised layer after it, shape (n,); None for that of the state.
-    linearised_at
-        Unknowns at which the material is linearised in the next step, by its secant; None for those
-        of the state. Prescribed values that have changed strain the elements beside them alone.
-    """
-
-    state: State
-    active_set: ActiveSet | None = None
-    layer_pressure: Array | None = None
-    linearised_at: Array | None = None
-
-
-@dataclass(frozen=True)
-class StepResult:
-    """The result of a step.
-
-    Attributes
-    ----------
-    iterate
-        The new iterate.
-    note
-        Its kind in the history, empty for a plain step.
-    condensed_steps
-        Newton iterations on the condensed problem that it took, a record each.
-    overloaded
-        Whether friction does not balance the loads.
-    """
-
-    iterate: Iterate
-    note: str = ""
-    condensed_steps: tuple[Record, ...] = ()
-    overloaded: bool = False
-
-
-@dataclass
-class Iteration:
-    """One solve of a problem: its iterate, the best one, and the number of steps left.
-
-    Attributes
-    ----------
-    problem, options
-        The problem, with the tolerances and limits.
-    history
-        Gets a record a step.
-    at
-        The last iterate.
-    best
-        The iterate with the least residual.
-    reserved
-        Number of steps of the limit that are kept for later stages.
-    """
-
-    problem: Problem
-    options: NewtonOptions
-    history: IterationHistory
-    at: Iterate
-    best: Best[Iterate] = field(default_factory=Best)
-    reserved: int = 0
-
-    @property
-    def left(self) -> int:
-        """Number of steps that are left of the limit."""
-        return self.options.max_outer - self.reserved - len(self.history.records)
-
-    def see(self, iterate: Iterate, residuals: Residuals) -> None:
-        """Take note of an iterate."""
-        self.at = iterate
-        self.best.see(iterate, residuals.significant)
-
-
-class Step(Protocol):
-    """A step of Newton's method."""
-
-    conductivity_derivative: ConductivityDerivative
-    #: Why a step could not be taken, in words.
-    fault: str
-
-    def begin(self) -> None:
-        """Forget the steps before: a new loop begins."""
-
-    def __call__(
-        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array | None
-    ) -> StepResult | None:
-        """Take a step; None if it cannot be taken. Collective.
-
-        Parameters
-        ----------
-        iterate
-            Where from.
-        tangent
-            Whether the material's tangent is taken, or its secant.
-        reached
-            The residuals there.
-        internal
-            The internal forces there; None where the material is linearised elsewhere.
-        """
-
-
 class NewtonStep:
-    """One assembly, one factorisation, one solve of the whole linearised problem.
+    """One assembly, one factorisation, one solve of the linearised problem.
 
     Parameters
     ----------
-    problem, options, parameters
-        The problem, the options and the complementarity parameters.
+    problem
+        Whose operator it is; steps may be those of the problem with other gaps, or another time.
+    options, parameters
+        The options and the complementarity parameters.
     counters
         Where factorisations and solves are counted.
     underconstrained
@@ -191,11 +80,9 @@ class NewtonStep:
         self._underconstrained = underconstrained
         lost = "no contact constrains the body" if underconstrained else "the stiffness is singular"
         self.fault = f"{lost} at that displacement"
-        self.problem, self.options, self.parameters = problem, options, parameters
-        self.counters = counters
+        self.options, self.parameters = options, parameters
+        self._problem, self._counters = problem, counters
         self._operator: Operator | None = None
-        #: Whether iterative solvers go to their own tolerance in place of the forcing term.
-        self.exact = False
         self.begin()
 
     def begin(self) -> None:
@@ -208,10 +95,8 @@ class NewtonStep:
         """Make a new operator in the next step: MUMPS does not recover from a failed solve."""
         self._kind, self._operator = "", None
 
-    def _forcing_term(self, reached: float) -> float | None:
-        """Return the forcing term of a step, given the residual before it; None without one."""
-        if self.exact:
-            return None
+    def _forcing_term(self, reached: float) -> float:
+        """Return the forcing term of a step, given the residual before it."""
         self._stagnant = 0 if reached < self._nearest else self._stagnant + 1
         self._nearest = min(self._nearest, reached)
         if self._stagnant >= STAGNANT:
@@ -222,49 +107,72 @@ class NewtonStep:
     def operator(self) -> Operator:
         """The operator of the linear systems."""
         if self._operator is None:
-            interface, body = self.problem.interface, self.problem.equilibrium
+            interface, body = self._problem.interface, self._problem.equilibrium
             asymmetric = interface.friction.acts or interface.law.active or not body.symmetric
-            self._operator = self.problem.operator(
-                symmetric=not asymmetric, counters=self.counters, kind=self.options.linear
+            self._operator = self._problem.operator(
+                symmetric=not asymmetric, counters=self._counters, kind=self.options.linear
             )
         return self._operator
 
-    def assemble(self, state: State, blocks: Array) -> None:
+    def assemble(self, problem: Problem, state: State, blocks: Array) -> None:
         """Assemble the operator with given blocks, and those of layer and current. Collective."""
-        interface, body = self.problem.interface, self.problem.equilibrium
+        interface, body = problem.interface, problem.equilibrium
         if interface.law.active:
             nodal = interface.jump.apply(state.x)
             blocks = blocks + interface.law.block(nodal, interface.pressure(nodal, state.forces))
         weighted = interface.weighted(blocks, state.x)
         self.operator.update("secant", state, weighted, constant=body.linear)
 
-    def without_contact(self, state: State, rtol: float | None = None) -> State:
+    def without_contact(self, problem: Problem, state: State) -> State:
         """Return the state after one linear solve with all nodes open. Collective."""
-        problem, jump = self.problem, self.problem.interface.jump
-        body, free = problem.equilibrium, replace(state, forces=Multipliers.zero(jump))
-        self.assemble(free, np.zeros((jump.nodes.size, jump.block_size, jump.block_size)))
-        step = self.operator.solve(-residual_forces(problem, free), rtol)
+        nodes, body = problem.interface.jump, problem.equilibrium
+        free = State(state.x, Multipliers.zero(nodes), state.time, state.history)
+        size = nodes.block_size
+        self.assemble(problem, free, np.zeros((nodes.nodes.size, size, size)))
+        step = self.operator.solve(-residual_forces(problem, free))
         return replace(free, x=body.prescribe(body.moved(free.x, step), free.time))
 
     def __call__(
-        self, iterate: Iterate, tangent: bool, reached: Residuals, internal: Array | None
-    ) -> StepResult | None:
-        """Take a step; see `Step`."""
-        state, interface = iterate.state, self.problem.interface
-        body, jump = self.problem.equilibrium, interface.jump
+        self,
+        problem: Problem,
+        state: State,
+        tangent: bool,
+        reached: Residuals,
+        linearised_at: Array | None = None,
+        internal: Array | None = None,
+        exact: bool = False,
+    ) -> State | None:
+        """Take a step; None if its matrix is singular. Collective.
+
+        Parameters
+        ----------
+        problem, state
+            The problem, and where from.
+        tangent
+            Whether the material's tangent is taken, or its secant.
+        reached
+            The residuals there.
+        linearised_at
+            Unknowns at which the secant is taken; those of the state by default.
+        internal
+            The internal forces of the state, where they are known already.
+        exact
+            Whether iterative solvers go to their own tolerance in place of the forcing term.
+        """
+        interface = problem.interface
+        body, jump = problem.equilibrium, interface.jump
         nodal = jump.apply(state.x)
         contact = linearise(
             interface,
             nodal,
             state.forces,
             self.parameters,
-            iterate.active_set,
+            state.active_set,
             softening=self.options.softening,
         )
-        layer, shift = linearised_layer(
-            interface, nodal, iterate, self.parameters, contact.unchanged
-        )
-        blocks = contact.blocks + layer + self._current(nodal, contact, reached.significant)
+        layer, shift = linearised_layer(interface, nodal, state, self.parameters, contact.unchanged)
+        current = self._current(interface, nodal, contact, reached.significant)
+        blocks = contact.blocks + layer + current
         kind, last = "tangent" if tangent else "secant", self._kind
         remains = kind == last and reached.equilibrium < SMALL * reached.significant
         if self._underconstrained and not contact.unchanged:
@@ -274,17 +182,17 @@ class NewtonStep:
             along = jump.normal[:, :, None] * jump.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)
-        x = iterate.linearised_at
-        at = state if x is None else replace(state, x=x)
+        at = state if linearised_at is None else replace(state, x=linearised_at)
         self.operator.update(kind, at, blocks, constant=body.linear or remains)
         self._kind = kind
         here = replace(state, forces=contact.forces)
-        residual = residual_forces(self.problem, here, iterate.linearised_at, internal)
+        residual = residual_forces(problem, here, linearised_at, internal)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
+        forcing = None if exact else self._forcing_term(reached.significant)
         try:
-            increment = self.operator.solve(-residual, self._forcing_term(reached.significant))
+            increment = self.operator.solve(-residual, forcing)
         except SingularError:
-            if body.linear or (self._underconstrained and iterate.active_set is None):
+            if body.linear or (self._underconstrained and state.active_set is None):
                 raise
             self.renew()
             return None  # it has been moved too far, or the material has softened too much
@@ -296,12 +204,14 @@ class NewtonStep:
         known = interface.law.layer_pressure(nodal) + shift + pressed
         # Nodes of a rigid part that has moved far and comes back follow it but for rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
-        new = replace(state, x=x, forces=forces)
-        return StepResult(Iterate(new, contact.active_set, known))
+        return replace(
+            state, x=x, forces=forces, active_set=contact.active_set, layer_pressure=known
+        )
 
-    def _current(self, nodal: Array, contact: LinearisedContact, reached: float) -> Array | float:
+    def _current(
+        self, interface: Interface, nodal: Array, contact: LinearisedContact, reached: float
+    ) -> Array | float:
         """Return the derivative of the current, with psi followed or frozen."""
-        interface = self.problem.interface
         law = interface.law
         if not law.active:
             return 0.0
@@ -314,7 +224,7 @@ class NewtonStep:
 def linearised_layer(
     interface: Interface,
     nodal: Array,
-    iterate: Iterate,
+    state: State,
     parameters: ComplementarityParameters,
     full: bool,
 ) -> tuple[Array, Array]:
@@ -329,8 +239,8 @@ def linearised_layer(
     if graph is None:
         return law.layer_block(nodal, full), np.zeros(nodal.shape[0])
     u_n, layer = jump.normal_component(nodal), law.layer_pressure(nodal)
-    known = layer if iterate.layer_pressure is None else iterate.layer_pressure
-    place = graph.displacement(iterate.state.forces.pressure + known + c * u_n, c)
+    known = layer if state.layer_pressure is None else state.layer_pressure
+    place = graph.displacement(state.forces.pressure + known + c * u_n, c)
     linearised_at = nodal.copy()
     linearised_at[:, : interface.dim] += (place - u_n)[:, None] * jump.normal
     block = law.layer_block(linearised_at, full)

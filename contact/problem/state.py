@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from contact.history import History
+from contact.interface.active_set import ActiveSet
 from contact.interface.multipliers import Multipliers
 from contact.typing import Array
 
@@ -30,12 +31,18 @@ class State:
     history
         That at the beginning of the step that led here; empty for a step from the reference
         configuration.
+    active_set
+        Which nodes were open, stick or slip in the Newton step that led here; None after none.
+    layer_pressure
+        Pressure of the linearised layer after it, shape (n,); None for that of the unknowns.
     """
 
     x: Array
     forces: Multipliers
     time: float = 1.0
     history: History = field(default_factory=History)
+    active_set: ActiveSet | None = None
+    layer_pressure: Array | None = None
 
     def __post_init__(self) -> None:
         """Keep whoever holds the state from changing it."""

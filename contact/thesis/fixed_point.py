@@ -21,9 +21,9 @@ import numpy as np
 
 from contact.linear.operator import Operator
 from contact.methods.complementarity_parameters import automatic_r
-from contact.methods.conductivity_derivative import ConductivityDerivative
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import Outcome
+from contact.methods.step_control import ConductivityDerivative
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.residuals import Residuals
 from contact.problem.state import State

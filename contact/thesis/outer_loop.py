@@ -17,7 +17,7 @@ import numpy as np
 from contact.linear.operator import Counters
 from contact.methods.options import LoopOptions
 from contact.methods.report import IterationHistory, Monitor, Outcome, Record
-from contact.methods.stagnation import Best, Stagnation, undeformed_equilibrium
+from contact.methods.step_control import Best, Stagnation, undeformed_equilibrium
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State

@@ -32,7 +32,7 @@ from contact.interface.nodes import ContactNodes
 from contact.linear.multigrid import TOLERANCE
 from contact.linear.operator import Operator
 from contact.methods.options import FixedPointOptions
-from contact.methods.stagnation import Stagnation
+from contact.methods.step_control import Stagnation
 from contact.problem.protocols import Problem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State

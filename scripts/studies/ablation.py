@@ -26,21 +26,17 @@ from contact.case.file import Case, parse_case
 from contact.interface import complementarity
 from contact.linear import block, dense, multigrid
 from contact.methods import (
-    chord,
     complementarity_parameters,
-    condensed_step,
-    conductivity_derivative,
-    continuation,
+    fallbacks,
     interior_point,
-    newton,
     newton_step,
-    stagnation,
+    semismooth,
+    step_control,
 )
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.methods.unconstrained_modes import UnconstrainedModes
-from contact.methods.working_set import working_set
 from contact.problem.residuals import evaluate
 from scripts.benchmarks import bench_one
 from scripts.cases import CASES
@@ -100,19 +96,18 @@ def _nothing(*_: Any, **__: Any) -> None:
     return None
 
 
-def _no_fallback(iteration: Any, *_: Any) -> tuple[Any, Outcome]:
-    residuals = evaluate(iteration.problem, iteration.at.state)
-    return iteration.at, Outcome(residuals, iteration.options.allowed, "no interior point")
+def _no_fallback(method: Any, *_: Any) -> tuple[Any, Outcome]:
+    residuals = evaluate(method.problem, method.at)
+    return method.at, Outcome(residuals, method.options.allowed, "no interior point")
 
 
 def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
     """Return the layer linearised about the displacement alone."""
 
-    def plain(interface: Any, nodal: Any, iterate: Any, of: Any, full: bool) -> Any:
-        about = replace(iterate, layer_pressure=interface.law.layer_pressure(nodal))
-        forces = replace(about.state.forces, pressure=0.0 * about.state.forces.pressure)
-        return old(interface, nodal, replace(about, state=replace(about.state, forces=forces)),
-                   of, full)  # fmt: skip
+    def plain(interface: Any, nodal: Any, state: Any, of: Any, full: bool) -> Any:
+        forces = replace(state.forces, pressure=0.0 * state.forces.pressure)
+        about = replace(state, forces=forces, layer_pressure=interface.law.layer_pressure(nodal))
+        return old(interface, nodal, about, of, full)
 
     return plain
 
@@ -246,16 +241,16 @@ def _finer(name: str, cells: tuple[int, ...]) -> Callable[[], Case]:
 
 DEVICES = (
     Device("interior point", (interior_point,), "Mehrotra 1992; Nesterov and Todd 1998",
-           ((newton, "interior_point", _no_fallback),)),
+           ((fallbacks, "interior_point", _no_fallback),)),
     Device("updates of the friction bound", (), "Haslinger 1983",
            ((interior_point, "UPDATES", 1),)),
     Device("sticking start where friction alone restrains", (UnconstrainedModes.stuck_bound,), "-",
            ((UnconstrainedModes, "stuck_bound", _nothing),), (), _dragged),
-    Device("continuation in the conductivity", (continuation,), "Allgower and Georg 2003",
-           ((Newton, "_continuation", _nothing),)),
+    Device("continuation in the conductivity", (fallbacks.continuation,), "Allgower and Georg 2003",
+           ((fallbacks, "_in_the_conductivity", _nothing),)),
     Device("estimate of the stiffness from the first step",
            (complementarity_parameters.overestimates_stiffness,), "-",
-           ((newton, "overestimates_stiffness", lambda *_: False),), (), _stop),
+           ((semismooth, "overestimates_stiffness", lambda *_: False),), (), _stop),
     Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
            ((newton_step, "REGULARISATION", 0.0),), (), _spheres),
     Device("forcing term that tightens", (newton_step.NewtonStep._forcing_term,),
@@ -267,14 +262,15 @@ DEVICES = (
     Device("sliding nodes at their bound", (complementarity.at_bound,), "-",
            ((complementarity, "at_bound", lambda _, friction, *__: friction),), (),
            _finer("bar-67", (640, 160))),
-    Device("derivative of the conductivity by the gap", (conductivity_derivative,), "-",
-           ((conductivity_derivative.ConductivityDerivative, "__call__", lambda *_: False),)),
+    Device("derivative of the conductivity by the gap", (step_control.ConductivityDerivative,), "-",
+           ((step_control.ConductivityDerivative, "__call__", lambda *_: False),)),
     Device("stagnation limit of the continuation", (), "-",
-           ((newton, "CONTINUATION_LIMIT", None),), (), _conducting),
-    Device("zero displacement where nothing acts", (stagnation.undeformed_equilibrium,), "-",
-           ((newton.NewtonLoop, "_loss_of_contact", _nothing),), (), _unloaded),
-    Device("working set of contact nodes, from all open", (Newton._from_open, working_set),
-           "Goldfarb and Idnani 1983", ((Newton, "_from_open", _nothing),), (), _stop),
+           ((fallbacks, "CONTINUATION_LIMIT", None),), (), _conducting),
+    Device("zero displacement where nothing acts", (step_control.undeformed_equilibrium,), "-",
+           ((semismooth.Iteration, "_loss_of_contact", _nothing),), (), _unloaded),
+    Device("working set of contact nodes, from all open",
+           (fallbacks.from_open, fallbacks.working_set), "Goldfarb and Idnani 1983",
+           ((fallbacks, "from_open", lambda _: (None, None)),), (), _stop),
 )  # fmt: skip
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
@@ -283,8 +279,9 @@ LINEAR = (
            (("nested", False),), _pulled),
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
            _block),
-    Device("chord steps", (chord,), "Kelley 1995", (), (("keep", "never"),), _plane),
-    Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
+    Device("chord steps", (step_control.Chord,), "Kelley 1995", (), (("keep", "never"),), _plane),
+    Device("static condensation", (Newton._condensed_steps,), "Guyan 1965", (),
+           (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
            ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _lying),
     Device("elimination of unknowns without contact", (), "Golub and Van Loan 2013",

@@ -1,16 +1,18 @@
 """A factorisation that is kept while the material moves on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact import build_problem, solve
 from contact.interface.friction import Friction
-from contact.methods.chord import Chord
 from contact.methods.newton import Newton
-from contact.methods.newton_step import Iterate
 from contact.methods.options import NewtonOptions
+from contact.methods.step_control import Chord
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 from forms.hencky import Log
 from forms.laws import ConstantCoefficient
 from scripts.studies.sweep import problems
@@ -69,14 +71,14 @@ def test_a_body_that_flies_away_is_not_said_to_be_free():
     assert not outcome.converged
 
 
-def begun(reached: float) -> tuple[Chord, Iterate]:
+def begun(reached: float) -> tuple[Chord, State]:
     """Return the rule after one step with a new factorisation, which led to a residual."""
     state = yielding().start()
     kept = Chord(1e-8, 10.0)
-    iterate, keep = kept.choose(Iterate(state), 1.0)
+    iterate, keep = kept.choose(state, 1.0)
     assert not keep
     kept.note_factorisation()
-    iterate, keep = kept.choose(Iterate(state), reached)
+    iterate, keep = kept.choose(state, reached)
     assert keep
     return kept, iterate
 
@@ -84,12 +86,12 @@ def begun(reached: float) -> tuple[Chord, Iterate]:
 @pytest.mark.parametrize(("rate", "keeps"), [(0.1, True), (0.5, False)])
 def test_it_is_kept_as_long_as_that_is_fast(rate, keeps):
     kept, iterate = begun(1e-3)
-    assert kept.choose(Iterate(iterate.state), 1e-3 * rate)[1] is keeps
+    assert kept.choose(replace(iterate), 1e-3 * rate)[1] is keeps
 
 
 def test_a_step_that_makes_things_worse_is_taken_back():
     kept, iterate = begun(1e-3)
-    again, keep = kept.choose(Iterate(iterate.state), 2e-3)
+    again, keep = kept.choose(replace(iterate), 2e-3)
     assert again is iterate and not keep
 
 

@@ -5,9 +5,9 @@ import pytest
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
-from contact.methods.conductivity_derivative import ConductivityDerivative
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.step_control import ConductivityDerivative
 from contact.thesis.fixed_point import FixedPoint
 from forms.laws import SlipCoefficient
 from tests.problems.piezo import example, potential

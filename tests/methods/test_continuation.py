@@ -6,7 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, solve
-from contact.methods.continuation import FIRST_PART, continuation
+from contact.methods.fallbacks import FIRST_PART, continuation
 from contact.methods.options import NewtonOptions
 from scripts.studies.sweep import problems
 

@@ -62,42 +62,41 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     state, outcome = Newton(problem, NewtonOptions()).solve()
     assert outcome.converged
     method = Newton(problem, NewtonOptions(condense=False))
-    found, outcome = interior_point(
-        method.iteration, method.whole, method._modes, method.last_steps
-    )
+    found, outcome = interior_point(method.whole)
     assert outcome.converged, outcome.reason
-    assert found.state.near(state, rtol=1e-6, atol=1e-9)
+    assert found.near(state, rtol=1e-6, atol=1e-9)
 
 
 def test_a_singular_matrix_in_the_last_steps_leaves_another_bound():
     """It ended the solve, though with the next friction bound there is a solution."""
     problem = mechanics.bar(SELF, 8, -0.05, friction=COULOMB)
-    method = Newton(problem, NewtonOptions(condense=False))
-    failed = []
+    newton = Newton(problem, NewtonOptions(condense=False)).whole
+    iterate, failed = newton.iterate, []
 
-    def finish(state):
+    def finish(state, **given):
         if not failed:
             failed.append(state)
             raise SingularError("the linear system is singular", "singular")
-        return method.last_steps(state)
+        return iterate(state, **given)
 
-    begin = method.whole.without_contact(problem.start())
-    _, outcome = interior_point(method.iteration, method.whole, method._modes, finish, begin)
+    newton.iterate = finish
+    begin = newton.step.without_contact(problem, problem.start())
+    _, outcome = interior_point(newton, begin)
     assert failed and outcome.converged
 
 
 def test_too_little_memory_in_an_interior_point_is_said(monkeypatch):
     """It counted as the end of its digits."""
     problem = mechanics.bar(SELF, 8, -0.05, friction=COULOMB)
-    method = Newton(problem, NewtonOptions(condense=False))
-    begin = method.whole.without_contact(problem.start())
+    newton = Newton(problem, NewtonOptions(condense=False)).whole
+    begin = newton.step.without_contact(problem, problem.start())
 
     def exhausted(self):
         raise InputError("out of memory in the factorisation", "memory")
 
     monkeypatch.setattr("contact.methods.interior_point.InteriorPoint.step", exhausted)
     with pytest.raises(InputError, match="out of memory"):
-        interior_point(method.iteration, method.whole, method._modes, method.last_steps, begin)
+        interior_point(newton, begin)
 
 
 def test_what_an_interior_point_has_reached_is_kept_when_it_is_interrupted():
@@ -124,13 +123,11 @@ def interior(
     """Solve by the interior point; tell also whether Newton's method finds the same."""
     problem = build_problem(parse_case(case), SELF)
     state, _ = Newton(problem, NewtonOptions()).solve()
-    method = Newton(problem, NewtonOptions(condense=False, linear=linear))
-    supported = method._modes.constrained_by_supports
-    begin = method.whole.without_contact(problem.start()) if supported else None
-    found, outcome = interior_point(
-        method.iteration, method.whole, method._modes, method.last_steps, begin
-    )
-    return outcome, found.state.near(state, rtol=1e-6, atol=atol)
+    newton = Newton(problem, NewtonOptions(condense=False, linear=linear)).whole
+    supported = newton.modes.constrained_by_supports
+    begin = newton.step.without_contact(problem, problem.start()) if supported else None
+    found, outcome = interior_point(newton, begin)
+    return outcome, found.near(state, rtol=1e-6, atol=atol)
 
 
 @pytest.mark.parametrize("linear", ["lu", "iterative"])

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.case.file import parse_case
-from contact.methods import newton
+from contact.methods import fallbacks, newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
 from contact.problem.residuals import evaluate
@@ -72,7 +72,7 @@ def test_a_bridge_that_touches_at_several_nodes_is_that_of_an_interior_point(mu)
     case["fixed"].append({"on": "right", "displacement": [0.0, 0.0]})
     case["contact"]["gap"] = "0.5 + 0.2*(1 - cos(6*pi*x/100))"
     found = solve(parse_case(case))
-    with patch.object(newton, "working_set", lambda *_: None):
+    with patch.object(fallbacks, "working_set", lambda *_: None):
         other = solve(parse_case(case))
     assert found.converged and other.converged
     notes = [" ".join(r.note for r in s.history.records) for s in (found, other)]
@@ -208,14 +208,16 @@ def test_a_beam_with_many_contact_nodes_takes_the_sparse_interior_point(mu):
     """Dense steps took five times as long; they remain for where the sparse ones fail."""
     case = parse_case(beam(100.0, [600, 2], UNIFORM, 0.5, mu))
 
-    def none(iteration, *_):
-        residuals = evaluate(iteration.problem, iteration.at.state)
-        return iteration.at, Outcome(residuals, iteration.options.allowed, "no interior point")
+    def none(newton, *_):
+        residuals = evaluate(newton.problem, newton.at)
+        return newton.at, Outcome(residuals, newton.options.allowed, "no interior point")
 
     sparse = solve(case, comm=SELF)
-    whole = newton.interior_point
+    whole = fallbacks.interior_point
     first = [none]
-    with patch.object(newton, "interior_point", lambda *a: (first.pop() if first else whole)(*a)):
+    with patch.object(
+        fallbacks, "interior_point", lambda *a: (first.pop() if first else whole)(*a)
+    ):
         dense = solve(case, comm=SELF)
     assert sparse.converged and dense.converged
     assert sparse.counters.contact_solves == 0 < dense.counters.contact_solves

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from contact.interface.friction import Friction
 from contact.methods.options import FixedPointOptions, PenaltyOptions
-from contact.methods.stagnation import Best, Stagnation
+from contact.methods.step_control import Best, Stagnation
 from contact.problem.residuals import evaluate
 from contact.thesis.fixed_point import FixedPoint
 from contact.thesis.penalty import Penalty

@@ -1,0 +1,306 @@
+"""The fallbacks of the semismooth Newton method, and their order.
+
+Where Newton's steps have ended without convergence the state with all nodes open is tried, by one
+linear solve, where the supports constrain all rigid-body modes, and from there contact at one node
+more in turn (`working_set`). If neither is a solution these follow, in this order:
+
+1. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
+   foundation (`continuation`);
+2. on a condensed body that the supports do not constrain, a rigid motion to a state in which
+   all nodes are open (`unconstrained_modes`);
+3. a primal-dual interior point on the same operator, which finds the active sets, with the friction
+   bound updated outside, and Newton's last steps from there (`interior_point`). A converged
+   solution in which contact has moved a body to where nothing constrains it, although friction
+   could, gives way to that of a fallback if there is one;
+4. the condensed body, where it has so many contact nodes that it was not condensed before.
+
+The notes of the history name the first three. A condensed contact problem has fallbacks 1 to 3 of
+its own.
+
+References
+----------
+Allgower and Georg, Introduction to Numerical Continuation Methods, SIAM (2003).
+Goldfarb and Idnani, A numerically stable dual method for solving strictly convex quadratic
+programs, Math. Program. 27 (1983).
+Nocedal and Wright, Numerical Optimization, Springer (2006), chapter 16: working sets.
+Haslinger, Approximation of the Signorini problem with friction, obeying the Coulomb law, Math.
+Methods Appl. Sci. 5 (1983).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.errors import SingularError
+from contact.interface.interface import Interface
+from contact.methods.interior_point import interior_point
+from contact.methods.report import Outcome
+from contact.methods.semismooth import SemismoothNewton
+from contact.methods.step_control import PROGRESS
+from contact.methods.unconstrained_modes import RIGID_MOTION
+from contact.problem.condensed import CondensedProblem
+from contact.problem.residuals import evaluate, residual_forces
+from contact.problem.state import State
+from contact.ranks import summed
+from contact.typing import Array
+
+logger = logging.getLogger("contact.solver")
+
+#: Solves the whole problem from a state on by another way.
+LastFallback: TypeAlias = Callable[[State], tuple[State, Outcome]]
+
+#: Notes of the steps of the working set and of the continuation in the history.
+WORKING_SET, CONTINUATION = "working set", "continuation"
+
+#: Factor by which the conductivity grows: the first, and the least one that is tried.
+FACTOR, LEAST_FACTOR = 1e3, 1.2
+
+#: First part of the conductivity: three of the first factors below the whole.
+FIRST_PART = FACTOR**-3
+
+#: Stagnation limit in a continuation: condensed steps cost little beside another value of the
+#: parameter, and Example 8.4 with ten times its conductivity needs them.
+CONTINUATION_LIMIT = 20
+
+
+def solve_contact(
+    newton: SemismoothNewton,
+    state: State,
+    linearised_at: Array | None = None,
+    last: LastFallback | None = None,
+) -> tuple[State, Outcome]:
+    """Solve a problem by the semismooth Newton method and its fallbacks. Collective.
+
+    Parameters
+    ----------
+    newton
+        The method on the problem.
+    state, linearised_at
+        Initial guess, and where the material is linearised first.
+    last
+        Solves from a state on where all else fails; None without such a method.
+    """
+    state, outcome = newton.iterate(state, linearised_at, give_up=True)
+    if outcome.converged and newton.modes.pushed_aside(newton.problem, state):
+        found = fall_back(newton, state, outcome, None, last)
+        return found if found[1].converged else (state, outcome)
+    return completed(newton, state, outcome, last)
+
+
+def completed(
+    newton: SemismoothNewton, state: State, outcome: Outcome, last: LastFallback | None = None
+) -> tuple[State, Outcome]:
+    """Return the end of an iteration, or of the fallbacks where it has failed. Collective.
+
+    The best iterate if all fail.
+    """
+    if outcome.converged or outcome.overloaded:
+        return state, outcome
+    without_contact = None
+    if newton.modes.constrained_by_supports:
+        # Active sets may cycle on contact forces that are rounding of the other forces. Where
+        # contact constrains a mode, a body moved aside may be in balance with all nodes open too,
+        # though friction has another solution that holds it.
+        found, without_contact = from_open(newton)
+        if found is not None:
+            return found
+    state, outcome = fall_back(newton, state, outcome, without_contact, last)
+    if not (outcome.converged or outcome.overloaded) and newton.best.found is not None:
+        state = newton.best.found
+        outcome = replace(outcome, kkt=evaluate(newton.problem, state))
+    return state, outcome
+
+
+def from_open(
+    newton: SemismoothNewton,
+) -> tuple[tuple[State, Outcome] | None, State | None]:
+    """Return a solution with all nodes open, or with a working set, if any. Collective.
+
+    And the state after a linear solve without contact, if that is regular.
+    """
+    problem, best = newton.problem, newton.best.found
+    try:
+        state = newton.step.without_contact(problem, problem.start() if best is None else best)
+    except SingularError:  # without contact nothing may hold the potential
+        newton.step.renew()
+        return None, None
+    allowed = newton.options.allowed
+    residuals = evaluate(problem, state)
+    if not residuals.excess(allowed):
+        return (state, Outcome(residuals, allowed)), state
+    found = working_set(newton, state)
+    if found is not None:
+        residuals = evaluate(problem, found)
+        newton.see(found, residuals)
+        if (outcome := Outcome(residuals, allowed)).converged:
+            return (found, outcome), state
+    return None, state
+
+
+def fall_back(
+    newton: SemismoothNewton,
+    state: State,
+    outcome: Outcome,
+    without_contact: State | None,
+    last: LastFallback | None,
+) -> tuple[State, Outcome]:
+    """Try the fallbacks in turn, on the condensed body where there is one. Collective.
+
+    Their many steps cost one factorisation of the body there. They start from the zero initial
+    guess: where the active sets cycle, a body may have moved far away.
+    """
+    problem, singular = newton.problem, None
+    if isinstance(problem, CondensedProblem):
+        found = _in_the_conductivity(newton, problem) or _separated(newton, problem, outcome)
+        if found is not None:
+            return found
+    if newton.left > 0:
+        logger.info("%s; going on with an interior point", outcome.ended)
+        # Half of the steps remain for the condensed body, where that is still to come.
+        newton.reserved = 0 if last is None else (newton.left + 1) // 2
+        try:
+            state, outcome = interior_point(newton, without_contact)
+        except SingularError as error:
+            newton.step.renew()
+            singular = error
+        newton.reserved = 0
+    if last is not None and not (outcome.converged or outcome.overloaded) and newton.left > 0:
+        logger.info("%s; going on with the condensed body", outcome.ended)
+        found = last(problem.start())
+        # Where steps are left the interior point says more of the reason.
+        if found[1].converged or newton.left <= 0:
+            state, outcome = found
+    # Another material may have softened too much at the strains of a step.
+    if singular is not None and problem.equilibrium.linear and not outcome.converged:
+        raise singular
+    return state, outcome
+
+
+def _separated(
+    newton: SemismoothNewton, problem: CondensedProblem, outcome: Outcome
+) -> tuple[State, Outcome] | None:
+    """Return a state with all nodes open that a rigid motion leads to, if any. Collective."""
+    if outcome.converged or newton.modes.constrained_by_supports:
+        return None
+    state = newton.modes.separated(
+        problem, newton.step.operator, newton.step.parameters.nodal_stiffness
+    )
+    if state is None:
+        return None
+    # All forces are rounding then: they are relative to those at zero displacement.
+    body = problem.equilibrium
+    left, first = (
+        body.norm(body.unbalanced(residual_forces(problem, at))) for at in (state, problem.start())
+    )
+    equilibrium = left / first if first > 0 else 0.0
+    residuals = replace(evaluate(problem, state), equilibrium=equilibrium)
+    newton.history.record(residuals, RIGID_MOTION, inner=2)
+    newton.see(state, residuals)
+    outcome = Outcome(residuals, newton.options.allowed)
+    return (state, outcome) if outcome.converged else None
+
+
+def working_set(newton: SemismoothNewton, state: State) -> State | None:
+    """Return a solution that penetrates nowhere, by a working set of contact nodes. Collective.
+
+    For bodies that touch at one node or two: at stops, tips, corners. Such a body mostly touches at
+    one node, but without contact most of its nodes penetrate: active sets of all these cycle.
+    Contact is therefore stated at the node of largest penetration alone, and at one more in turn
+    while others penetrate, as a dual active set method adds the constraint that is violated most.
+    Where one more node does not halve the number of those that penetrate, the working set is given
+    up, and None returned: an interior point then takes fewer steps.
+
+    Parameters
+    ----------
+    newton
+        The method on the problem.
+    state
+        After a linear solve without contact.
+    """
+    problem, interface = newton.problem, newton.problem.interface
+    nodes = interface.jump
+    inside = np.zeros(nodes.gap.shape, dtype=bool)
+    deepest, count = _penetrating(interface, state, inside)
+    while count > 0:
+        opening = interface.opening(nodes.apply(state.x))
+        inside |= opening <= -deepest
+        gap = np.where(inside, nodes.gap, np.inf)
+        less = problem.with_interface(replace(interface, jump=replace(nodes, gap=gap)))
+        # Of one stiff node in a soft body a forcing term leaves pressures of any size and sign.
+        state, outcome = newton.on(less).iterate(state, note=WORKING_SET, exact=True)
+        before = count
+        deepest, count = _penetrating(interface, state, inside)
+        if not outcome.converged or count > PROGRESS * before:
+            return None
+    return state
+
+
+def _penetrating(
+    interface: Interface, state: State, inside: NDArray[np.bool_]
+) -> tuple[float, int]:
+    """Return the largest penetration of other nodes (length), and how many do. Collective."""
+    nodal = interface.jump.apply(state.x)
+    depth = np.where(inside, 0.0, -interface.opening(nodal))
+    deepest = interface.jump.maximum(depth)
+    rounding = interface.rounding(nodal) / interface.stiffness
+    count = int(summed(interface.comm, np.count_nonzero(depth > rounding)))
+    return deepest, count
+
+
+def continuation(
+    solve: Callable[[float, State], tuple[State, Outcome]], start: State
+) -> tuple[State, Outcome] | None:
+    """Return the solution with the whole of a parameter; None where continuation fails. Collective.
+
+    After a part that fails the square root of the factor is tried. Where the first part fails the
+    parameter is not the cause, and no other is tried.
+
+    Parameters
+    ----------
+    solve
+        Solves the problem with a part of the parameter, from a state on.
+    start
+        Initial guess of the first problem.
+    """
+    state, reached, part, factor = start, 0.0, FIRST_PART, FACTOR
+    while factor > LEAST_FACTOR:
+        tried, outcome = solve(part, state)
+        if outcome.converged and part == 1.0:
+            return tried, outcome
+        if outcome.converged:
+            state, reached = tried, part
+        elif reached == 0:
+            break
+        else:
+            factor = factor**0.5
+        part = reached * factor
+        part = part if part * LEAST_FACTOR < 1 else 1.0
+    return None
+
+
+def _in_the_conductivity(
+    newton: SemismoothNewton, problem: CondensedProblem
+) -> tuple[State, Outcome] | None:
+    """Return the solution by continuation in the conductivity of the foundation. Collective.
+
+    A foundation of high conductivity fixes the potential of a node that comes near and releases it
+    where the node leaves, so that the active set cycles. With a small part of the conductivity k_e
+    the problem is nearly one of contact alone; the part is raised to 1, and each solution is the
+    initial guess of the next problem.
+    """
+    interface = problem.interface
+    if interface.law.conductor is None:
+        return None
+
+    def solve(part: float, state: State) -> tuple[State, Outcome]:
+        less = replace(interface, law=interface.law.conducting(part))
+        method = newton if part == 1.0 else newton.on(problem.with_interface(less))
+        return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
+
+    return continuation(solve, problem.start())

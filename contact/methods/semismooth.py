@@ -1,0 +1,269 @@
+"""Semismooth Newton method on one problem: its iteration, on a whole body or on a condensed one.
+
+Each step linearises all laws together (`newton_step`); the iteration ends by the residuals, which
+are computed from scratch. It knows no fallback: `newton` has their order, and each of them is given
+the iteration that failed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contact.interface.active_set import touching
+from contact.interface.multipliers import Multipliers
+from contact.methods.complementarity_parameters import overestimates_stiffness
+from contact.methods.newton_step import NewtonStep
+from contact.methods.options import NewtonOptions
+from contact.methods.report import IterationHistory, Outcome, Record
+from contact.methods.step_control import PROGRESS, Best, Stagnation, undeformed_equilibrium
+from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.problem.protocols import Problem
+from contact.problem.residuals import Residuals, evaluate_forces
+from contact.problem.state import State
+from contact.typing import Array
+
+#: Why an iteration ends whose complementarity parameter overestimates the stiffness.
+OVERESTIMATED = "the complementarity parameter is far above the stiffness of the body"
+
+
+class SemismoothNewton:
+    """The semismooth Newton method on one problem, with the operator of one body.
+
+    Parameters
+    ----------
+    problem, options
+        The problem, and the tolerances and limits.
+    step
+        Takes the steps.
+    modes
+        Rigid-body modes of the whole problem.
+    history
+        Gets a record a step.
+
+    Attributes
+    ----------
+    at, best
+        The last iterate, and the one with the least residual.
+    reserved
+        Number of steps of the limit that are kept for later stages.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        options: NewtonOptions,
+        step: NewtonStep,
+        modes: UnconstrainedModes,
+        history: IterationHistory,
+    ) -> None:
+        self.problem, self.options, self.step = problem, options, step
+        self.modes, self.history = modes, history
+        self.at, self.reserved = problem.start(), 0
+        self.best: Best[State] = Best()
+
+    @property
+    def left(self) -> int:
+        """Number of steps that are left of the limit."""
+        return self.options.max_outer - self.reserved - len(self.history.records)
+
+    def see(self, state: State, residuals: Residuals) -> None:
+        """Take note of an iterate."""
+        self.at = state
+        self.best.see(state, residuals.significant)
+
+    def on(self, problem: Problem) -> SemismoothNewton:
+        """Return the method on the problem with another interface, with the same operator."""
+        other = SemismoothNewton(problem, self.options, self.step, self.modes, self.history)
+        other.reserved = self.reserved
+        return other
+
+    def started(self, start: State) -> State:
+        """Return a state with its active set, to start from."""
+        interface, c = self.problem.interface, self.step.parameters.c
+        nodal = interface.jump.apply(start.x)
+        # A remainder of pressure where a node is open would give it a friction bound: one of the
+        # size of rounding, with friction of any direction, on which the node would stick.
+        closed = touching(start.forces.pressure, interface.opening(nodal), c)
+        pressure = np.where(closed, start.forces.pressure, 0.0)
+        forces = Multipliers.of(interface.jump, pressure, start.forces.friction)
+        bound = interface.bound(nodal, forces)
+        active_set = interface.active_set(nodal, forces, bound, c)
+        return replace(start, forces=forces, active_set=active_set, layer_pressure=None)
+
+    def iterate(
+        self,
+        state: State,
+        linearised_at: Array | None = None,
+        note: str = "",
+        stagnation_limit: int | None = None,
+        give_up: bool = False,
+        exact: bool = False,
+    ) -> tuple[State, Outcome]:
+        """Take steps until the residuals say that they have converged or stagnate. Collective.
+
+        Parameters
+        ----------
+        state
+            Initial guess.
+        linearised_at
+            Unknowns at which the material is linearised first; those of the state by default.
+        note
+            Note of the steps in the history.
+        stagnation_limit
+            Stagnation limit; that of the options by default.
+        give_up
+            Whether to end after a first step from the zero initial guess whose penetration shows
+            that c overestimates the stiffness of the body.
+        exact
+            Whether iterative solvers go to their own tolerance.
+        """
+        problem, options, step = self.problem, self.options, self.step
+        linear = problem.equilibrium.linear
+        loop = Iteration(self, state, note, stagnation_limit)
+        if loop.starts_converged:
+            return state, loop.outcome()
+        step.begin()
+        # A start from elsewhere is near the solution; zero displacement has no better tangent.
+        tangent = state.active_set is not None and linearised_at is None and not linear
+        for _ in range(min(options.max_iterations, self.left)):
+            before, residuals = state, loop.residuals
+            known = loop.internal if linearised_at is None else None
+            taken = step(problem, state, tangent, residuals, linearised_at, known, exact)
+            if taken is None:
+                return state, loop.outcome(step.fault)
+            state, linearised_at = taken, None
+            loop.evaluate(state)
+            worse = step.conductivity_derivative.worsened(loop.residuals.significant)
+            loop.record(state, "tangent" * tangent, "rejected" * worse)
+            if worse:
+                state = before
+                loop.evaluate(state)
+            if (found := loop.ended(state)) is not None:
+                return found
+            if give_up and before.active_set is None:
+                if overestimates_stiffness(problem, step.parameters, state):
+                    return state, loop.outcome(OVERESTIMATED)
+            if not linear:
+                falls = loop.residuals.equilibrium < max(residuals.equilibrium, options.tolerance)
+                # After a tangent that overshoots, the secant (Kacanov), as where unloading differs
+                # from loading.
+                tangent = falls or not tangent
+            if (stalled := loop.stalled()) is not None:
+                return state, stalled
+        return state, loop.out_of_steps()
+
+
+class Iteration:
+    """The residuals of the iterates of one loop of steps, and whether they end it.
+
+    Parameters
+    ----------
+    newton
+        Whose problem, tolerances and history they are.
+    state
+        Initial guess.
+    note
+        Note of the steps in the history.
+    stagnation_limit
+        Stagnation limit; that of the options by default.
+
+    Attributes
+    ----------
+    residuals, internal
+        Residuals of the last iterate, and its internal forces.
+    """
+
+    def __init__(
+        self,
+        newton: SemismoothNewton,
+        state: State,
+        note: str = "",
+        stagnation_limit: int | None = None,
+    ) -> None:
+        self._newton, self._note = newton, note
+        self._problem, self._options = newton.problem, newton.options
+        limit = stagnation_limit or self._options.stagnation_limit
+        self._stagnation = Stagnation(limit, PROGRESS, cumulative=True)
+        self.residuals, self.internal = evaluate_forces(self._problem, state)
+        self._pressed = self._largest_pressure(state)
+        self.starts_converged = state.active_set is not None and self.converged
+        if self.starts_converged:
+            newton.see(state, self.residuals)
+            newton.history.record(self.residuals, f"{note} initial guess".strip(), inner=0)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the residuals of the last iterate are within the tolerance, or rounding."""
+        return self.residuals.significant <= self._options.tolerance
+
+    def evaluate(self, state: State) -> None:
+        """Evaluate the residuals of an iterate. Collective."""
+        self.residuals, self.internal = evaluate_forces(self._problem, state)
+        self._newton.see(state, self.residuals)
+
+    def record(self, state: State, *words: str, steps: tuple[Record, ...] = ()) -> None:
+        """Append a record of the step to an iterate. Collective."""
+        note = " ".join(word for word in (self._note, *words) if word)
+        sizes = _node_counts(state, self._problem)
+        self._newton.history.record(self.residuals, note, sizes=sizes, steps=steps)
+
+    def ended(self, state: State) -> tuple[State, Outcome] | None:
+        """Return the end of a loop that has converged, diverged, or lost contact. Collective."""
+        if self.converged:
+            return state, self.outcome()
+        if (found := self._loss_of_contact(state)) is not None:
+            return found
+        self._pressed = max(self._pressed, self._largest_pressure(state))
+        if not np.isfinite(self.residuals.significant):
+            return state, self.outcome("Newton's method diverged")
+        return None
+
+    def stalled(self) -> Outcome | None:
+        """Count a step; return the outcome where the stagnation limit is reached."""
+        if not self._stagnation(self.residuals.significant):
+            return None
+        return self.outcome(f"Newton's method stalled at {self._stagnation.best:.1e}")
+
+    def out_of_steps(self) -> Outcome:
+        """Return the outcome of a loop that has taken all of its steps."""
+        return self.outcome(f"not converged in {len(self._newton.history.records)} steps")
+
+    def outcome(self, ended: str = "") -> Outcome:
+        """Return the outcome at the last iterate."""
+        return Outcome(self.residuals, self._options.allowed, ended)
+
+    def _largest_pressure(self, state: State) -> float:
+        return self._problem.interface.jump.maximum(state.forces.pressure)
+
+    def _loss_of_contact(self, state: State) -> tuple[State, Outcome] | None:
+        """Return zero displacement where nothing touches any more and nothing acts. Collective.
+
+        Displacements fall by their rounding in each step then, and so do the forces beside which
+        residuals are measured: nodes that touch press by a part of the largest pressure before.
+        """
+        counts, tolerance = _node_counts(state, self._problem), self._options.tolerance
+        if counts is None:
+            return None
+        if counts[1] + counts[2] > 0 and self._largest_pressure(state) > tolerance * self._pressed:
+            return None
+        found = undeformed_equilibrium(self._problem, tolerance)
+        if found is None:
+            return None
+        undeformed = replace(
+            found[0], active_set=state.active_set, layer_pressure=state.layer_pressure
+        )
+        self.residuals = found[1]
+        self._newton.see(undeformed, self.residuals)
+        words = f"{self._note} zero displacement".strip()
+        self._newton.history.record(self.residuals, words, inner=0)
+        return undeformed, self.outcome()
+
+
+def _node_counts(state: State, problem: Problem) -> tuple[int, int, int] | None:
+    """Return the numbers of nodes that are open, stick and slip, if they are known. Collective."""
+    if state.active_set is None:
+        return None
+    interface = problem.interface
+    return interface.node_counts(interface.jump.apply(state.x), state.active_set)
