@@ -42,21 +42,6 @@ from forms.laws import (
 )
 
 
-def _each(name: str) -> Any:
-    """Return the method that evaluates those of this name, of each law at its own nodes."""
-
-    def at_each(self: Grouped, *given: Array) -> Array:
-        """Return the values at all nodes."""
-        return self.evaluated(name, given)
-
-    return at_each
-
-
-def _largest(name: str) -> Any:
-    """Return the property that is the largest one of the laws."""
-    return property(lambda self: max(getattr(law, name) for law in self.laws))
-
-
 @dataclass(frozen=True)
 class Grouped:
     """Laws of groups of nodes in place of one, of whatever kind (`forms.laws`).
@@ -83,8 +68,8 @@ class Grouped:
         """Return the bounds of groups of given sizes."""
         return tuple(int(bound) for bound in np.cumsum([0, *sizes]))
 
-    def evaluated(self, name: str, given: Sequence[Array]) -> Array:
-        """Return a method of each law at its own nodes."""
+    def _at_each(self, name: str, *given: Array) -> Array:
+        """Return the values of a method of each law at its own nodes."""
         parts, label = [], self.label
         if label and name != "__call__":
             label = f"{label}: {name}"
@@ -95,11 +80,63 @@ class Grouped:
                 parts.append(real(values, (end - begin,), "one number for each node"))
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
 
-    __call__, derivative = _each("__call__"), _each("derivative")
-    by_slip, by_pressure = _each("by_slip"), _each("by_pressure")
-    at, gap_slope, transposed = _each("at"), _each("gap_slope"), _each("transposed")
-    maximum, lipschitz, radius = _largest("maximum"), _largest("lipschitz"), _largest("radius")
-    k_e, delta, follows_gap = _largest("k_e"), _largest("delta"), _largest("follows_gap")
+    def __call__(self, *given: Array) -> Array:
+        """Return s(|u_tau|, p), p_nu, h_nu, phi_L, or the smoothed pressure R p."""
+        return self._at_each("__call__", *given)
+
+    def derivative(self, argument: Array) -> Array:
+        """Return the derivative of a law of one argument."""
+        return self._at_each("derivative", argument)
+
+    def by_slip(self, slip: Array, pressure: Array) -> Array:
+        """Return the derivative of a friction law by the slip."""
+        return self._at_each("by_slip", slip, pressure)
+
+    def by_pressure(self, slip: Array, pressure: Array) -> Array:
+        """Return the derivative of a friction law by the pressure."""
+        return self._at_each("by_pressure", slip, pressure)
+
+    def transposed(self, values: Array) -> Array:
+        """Return the transpose of R on nodal values."""
+        return self._at_each("transposed", values)
+
+    def at(self, gap: Array, pressed: Array, loaded: Array) -> Array:
+        """Return the conductivity psi."""
+        return self._at_each("at", gap, pressed, loaded)
+
+    def gap_slope(self, gap: Array, pressed: Array) -> Array:
+        """Return the derivative of psi by the gap."""
+        return self._at_each("gap_slope", gap, pressed)
+
+    @property
+    def maximum(self) -> float:
+        """The largest mu, or phi_L."""
+        return max(law.maximum for law in self.laws)
+
+    @property
+    def lipschitz(self) -> float:
+        """The largest Lipschitz constant of mu by the slip."""
+        return max(law.lipschitz for law in self.laws)
+
+    @property
+    def radius(self) -> float:
+        """The largest radius of R."""
+        return max(law.radius for law in self.laws)
+
+    @property
+    def k_e(self) -> float:
+        """The largest conductivity."""
+        return max(law.k_e for law in self.laws)
+
+    @property
+    def delta(self) -> float:
+        """The steepest ramp of a conductivity."""
+        return max(law.delta for law in self.laws)
+
+    @property
+    def follows_gap(self) -> bool:
+        """Whether a conductivity depends on the gap."""
+        return any(law.follows_gap for law in self.laws)
 
 
 #: Laws of an obstacle without friction, layer or current.

@@ -197,6 +197,9 @@ class ContactProblem:
         """Return the problem with other laws, or gaps, at the same contact nodes."""
         other = copy(self)
         other.interface = interface
+        other.__dict__.pop(
+            "constraint", None
+        )  # that of the other nodes is made when it is asked for
         return other
 
     def commit(self, state: State) -> History:
