@@ -80,19 +80,19 @@ class Grouped:
                 parts.append(real(values, (end - begin,), "one number for each node"))
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
 
-    def __call__(self, *given: Array) -> Array:
+    def __call__(self, *given: Any) -> Any:
         """Return s(|u_tau|, p), p_nu, h_nu, phi_L, or the smoothed pressure R p."""
         return self._at_each("__call__", *given)
 
-    def derivative(self, argument: Array) -> Array:
+    def derivative(self, s: Any) -> Any:
         """Return the derivative of a law of one argument."""
-        return self._at_each("derivative", argument)
+        return self._at_each("derivative", s)
 
-    def by_slip(self, slip: Array, pressure: Array) -> Array:
+    def by_slip(self, slip: Any, pressure: Any) -> Any:
         """Return the derivative of a friction law by the slip."""
         return self._at_each("by_slip", slip, pressure)
 
-    def by_pressure(self, slip: Array, pressure: Array) -> Array:
+    def by_pressure(self, slip: Any, pressure: Any) -> Any:
         """Return the derivative of a friction law by the pressure."""
         return self._at_each("by_pressure", slip, pressure)
 
@@ -100,13 +100,13 @@ class Grouped:
         """Return the transpose of R on nodal values."""
         return self._at_each("transposed", values)
 
-    def at(self, gap: Array, pressed: Array, loaded: Array) -> Array:
+    def at(self, s: Any, pressed: Any, loaded: Any) -> Any:
         """Return the conductivity psi."""
-        return self._at_each("at", gap, pressed, loaded)
+        return self._at_each("at", s, pressed, loaded)
 
-    def gap_slope(self, gap: Array, pressed: Array) -> Array:
+    def gap_slope(self, s: Any, pressed: Any) -> Any:
         """Return the derivative of psi by the gap."""
-        return self._at_each("gap_slope", gap, pressed)
+        return self._at_each("gap_slope", s, pressed)
 
     @property
     def maximum(self) -> float:
@@ -137,6 +137,11 @@ class Grouped:
     def follows_gap(self) -> bool:
         """Whether a conductivity depends on the gap."""
         return any(law.follows_gap for law in self.laws)
+
+
+def _grouped(laws: Sequence[Any], bounds: tuple[int, ...], label: str = "") -> Any:
+    """Return one law of the kind of given ones, see `Grouped`."""
+    return Grouped(tuple(laws), bounds, label)
 
 
 #: Laws of an obstacle without friction, layer or current.
@@ -282,8 +287,8 @@ def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFrict
     if any(laws):
         every = tuple(NO_FRICTION if own is None else own for own in laws)
         own = any(entry.friction.law is not None for entry in entries)
-        law = Grouped(every, bounds, "Friction: law" if own else "Friction: mu")
-    return NodalFriction(law, Grouped(smoothing, bounds), SlipHistory.rest(nodes))
+        law = _grouped(every, bounds, "Friction: law" if own else "Friction: mu")
+    return NodalFriction(law, _grouped(smoothing, bounds), SlipHistory.rest(nodes))
 
 
 def joined_law(
@@ -319,8 +324,8 @@ def _joined_layers(given: Sequence[Layer | None], bounds: tuple[int, ...]) -> La
     layers = [layer or NO_LAYER for layer in given]
     return Layer(
         np.repeat([layer.thickness for layer in layers], np.diff(bounds)),
-        Grouped(tuple(layer.p_nu for layer in layers), bounds, "layer: p_nu"),
-        Grouped(tuple(layer.h_nu for layer in layers), bounds, "layer: h_nu"),
+        _grouped(tuple(layer.p_nu for layer in layers), bounds, "layer: p_nu"),
+        _grouped(tuple(layer.h_nu for layer in layers), bounds, "layer: h_nu"),
         _alike([layer.lagged for layer in given if layer is not None]),
     )
 
@@ -339,9 +344,9 @@ def _joined_conductors(
 
     moving = any(conductor.phi_f_at is not None for conductor in conductors)
     return Conductor(
-        Grouped(tuple(conductor.psi for conductor in conductors), bounds, "Conductor: psi"),
+        _grouped(tuple(conductor.psi for conductor in conductors), bounds, "Conductor: psi"),
         np.repeat([conductor.phi_f for conductor in conductors], np.diff(bounds)),
-        Grouped(tuple(conductor.phi_l for conductor in conductors), bounds, "Conductor: phi_l"),
+        _grouped(tuple(conductor.phi_l for conductor in conductors), bounds, "Conductor: phi_l"),
         _alike([conductor.lagged for conductor in given if conductor is not None]),
         phi_f if moving else None,
     )
