@@ -137,11 +137,6 @@ def test_two_electrodes_under_one_body() -> None:
             "friction: beside friction of every contact; accepted: one of them",
         ),
         (
-            [{"on": "one"}, {"on": "two", "gap": "x - 3"}],
-            {},
-            r"contact\.1\.gap: -0\.5 at a node",
-        ),
-        (
             [
                 {"on": "one"},
                 {"on": "two", "foundation": {"shape": "plane", "point": [0, 1], "normal": [0, 1]}},
