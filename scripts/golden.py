@@ -59,7 +59,7 @@ class Difference(NamedTuple):
 #: Quantity -> value.
 Values = Mapping[str, Value]
 
-#: Keys of the summary, or below them, that are compared, and what gives their scale.
+#: Keys of the summary, or below them, that are compared, and the keys of their scales.
 KEYS = {
     "contact_force": "force", "reactions": "force", "force": "force",
     "contact_moment": "moment", "reaction_moments": "moment", "moment": "moment",
@@ -74,7 +74,7 @@ KEYS = {
 #: Keys of the summary that have other ones below them.
 GROUPS = ("rigid", "rigid_parts", "electrodes", "bolts")
 
-#: Columns of steps.csv: work of the steps, and what is looked at in each.
+#: Columns of steps.csv: work of the steps, and the values that are compared in each.
 WORK = ("work", "dissipation", "plastic_dissipation")
 IN_STEPS = ("max_pressure", "max_displacement")
 
@@ -260,7 +260,7 @@ def _of_steps(steps: Sequence[Mapping[str, str]]) -> dict[str, Value]:
 
 
 def compare(stored: Mapping[str, Values], found: Mapping[str, Values]) -> list[Difference]:
-    """Return what differs: values, and rows that the table or the problems have alone."""
+    """Return all differences: of values, and rows that the table or the problems have alone."""
     differences = []
     for problem in sorted({*stored, *found}):
         old, new = stored.get(problem, {}), found.get(problem, {})

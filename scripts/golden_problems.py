@@ -159,7 +159,7 @@ def of_case(name: str, *changes: str) -> dict[str, Value]:
 
 
 def of_example(name: str) -> dict[str, Value]:
-    """Solve an example of the gallery, and return what its page compares too. Collective."""
+    """Solve an example of the gallery, and return the values of its page too. Collective."""
     example = EXAMPLES[name]
     solution = solve(case_of(example.case, *example.changes))
     with tempfile.TemporaryDirectory() as place:
@@ -359,10 +359,10 @@ def ring() -> dict[str, Value]:
 
 
 def block_in_steps() -> dict[str, Value]:
-    """Solve the sliding block of closed form 1 pushed to and fro. Collective."""
+    """Solve the sliding block of closed form 1 pushed back and forth. Collective."""
     law = materials.LAWS["norm"]
     block = mechanics.SlidingBlock(law, mechanics.SlipCoefficient(0.3, 0.2, 50.0), 0.02, 0.0, 0.0)
-    given = stepped.SteppedBlock(block, stepped.to_and_fro(0.03, 0.01))
+    given = stepped.SteppedBlock(block, stepped.back_and_forth(0.03, 0.01))
     return in_steps(lambda: given.problem(COMM), given.times)
 
 

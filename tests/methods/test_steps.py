@@ -17,19 +17,19 @@ from scripts.cases import CASES
 from tests.problems import mechanics
 from tests.problems.mechanics import SlidingBlock
 from tests.problems.shaken import SELF, TIGHT, shaken, steps_of, times
-from tests.problems.stepped import SteppedBlock, to_and_fro
+from tests.problems.stepped import SteppedBlock, back_and_forth
 
 #: The stress p mu is that of the shear 0.0175: with pushes of 0.00875 no step both sticks and
 #: slides.
 COULOMB = SlidingBlock(Linear(1.0, 0.3), ConstantCoefficient(0.5), 0.01, 0.0, 0.0)
 BLOCKS = {
-    "coulomb": SteppedBlock(COULOMB, to_and_fro(0.035, 0.00875)),
+    "coulomb": SteppedBlock(COULOMB, back_and_forth(0.035, 0.00875)),
     "slip-dependent": SteppedBlock(
-        replace(COULOMB, mu=SlipCoefficient(0.5, 0.2, 100.0)), to_and_fro(0.06, 0.02)
+        replace(COULOMB, mu=SlipCoefficient(0.5, 0.2, 100.0)), back_and_forth(0.06, 0.02)
     ),
     "hencky": SteppedBlock(
         SlidingBlock(Log(1.0, 0.3, yield_strain=0.05), ConstantCoefficient(0.3), 0.08, 0.0, 0.0),
-        to_and_fro(0.2, 0.1),
+        back_and_forth(0.2, 0.1),
     ),
 }
 

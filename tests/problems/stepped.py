@@ -1,4 +1,4 @@
-"""The sliding block of closed form 1 pushed to and fro: its slip at the end of every step."""
+"""The sliding block of closed form 1 pushed back and forth: its slip at the end of every step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -97,7 +97,7 @@ class SteppedBlock:
         )
 
 
-def to_and_fro(largest: float, step: float) -> list[float]:
+def back_and_forth(largest: float, step: float) -> list[float]:
     """Return pushes 0 -> largest -> -largest -> largest in steps of one size, without the 0."""
     count = round(largest / step)
     ways = [*range(1, count + 1), *range(count - 1, -count - 1, -1), *range(1 - count, count + 1)]
