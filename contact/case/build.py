@@ -182,6 +182,7 @@ def _contacts(
                 None if electric is None else electric.build(case, domain, contact.on),
                 contact.overlap == "press",
                 contact.against,
+                name=contact.name,
             )
         )
     return made

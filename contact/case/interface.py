@@ -312,6 +312,8 @@ class Contact(Section):
 
     on: Part
     """Part of the boundary, or a list of parts, that may touch the foundation."""
+    name: Annotated[str, Field(min_length=1), Accepted("a text")] | None = None
+    """Name of its results, `contacts` of the summary. Default: that of its part."""
     law: Literal["signorini", "compliance"] = "signorini"
     """`signorini`: rigid foundation; `compliance`: with a compliant layer in front."""
     against: Part | None = None

@@ -102,8 +102,13 @@ def _results(solution: Solution) -> list[str]:
     force = ", ".join(f"{component:.6g}" for component in solution.contact_force)
     seconds = ", ".join(f"{name} {value:.2f}" for name, value in solution.seconds.items())
     share = f"{sticks / area:.1%} of the contact area" if area > 0 else "nothing touches"
+    shares = solution.contacts if len(solution.contacts) > 1 else {}
     rows = {
         "contact force": f"({force})",
+        **{
+            f"  {name}": f"({', '.join(f'{component:.6g}' for component in one.force)})"
+            for name, one in shares.items()
+        },
         "contact area": f"{area:.6g}",
         "largest pressure": f"{nodes.maximum(solution.pressure):.6g} {solution.units.stress or ''}",
         **({"sticking": share} if solution.problem.frictional else {}),

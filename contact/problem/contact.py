@@ -40,6 +40,8 @@ class Contact:
         `foundation` is then added to that between the bodies. None for a foundation.
     gap
         The same as a gap for `foundation`, by its name in the case file.
+    name
+        Of its results; that of the part by default.
 
     Raises
     ------
@@ -59,6 +61,7 @@ class Contact:
     conductor: Conductor | None
     press: bool
     against: str | None
+    name: str
 
     def __init__(
         self,
@@ -70,8 +73,13 @@ class Contact:
         press: bool = False,
         against: str | Sequence[str] | None = None,
         gap: Static | None = None,
+        name: str | None = None,
     ) -> None:
         fill(self, on=part(on), against=None if against is None else part(against))
+        accepted = "a text without blanks at its ends, or None"
+        fits = name is None or (isinstance(name, str) and name.strip() == name != "")
+        expect("Contact: name", name, accepted, fits)
+        fill(self, name=self.on if name is None else name)
         if gap is not None:
             alone = isinstance(foundation, float) and foundation == 0.0
             expect("Contact: foundation", foundation, "this, or a gap", alone)

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.arguments import expect, several
 from contact.body.description import Body
@@ -157,6 +158,13 @@ class ContactProblem:
             )
             for contact in given
         )
+        names = [contact.name for contact in self.contacts]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(
+                    f"contact.name: {name!r} is that of several contacts; accepted: one each",
+                    "contact-name",
+                )
         self.equilibrium = BodyEquilibrium(domain, body, degree, element)
         self.interface = self._interface()
         self.scales = self._scales()
@@ -330,6 +338,12 @@ class ContactProblem:
             area=own,
             spacing=(mesh_area / self.nodes.size) ** (1 / (d - 1)),
         )
+
+    @property
+    def entry_numbers(self) -> NDArray[np.intp]:
+        """Number of the contact of each owned contact node, shape (n,)."""
+        sizes = [entry.nodes.nodes.size for entry in self.entries]
+        return np.repeat(np.arange(len(sizes)), sizes)
 
     @cached_property
     def constraint(self) -> Constraint | None:

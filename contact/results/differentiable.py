@@ -10,6 +10,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.body.rigid import Electrode, Rigid
 from contact.results.resultants import (
@@ -47,17 +48,34 @@ class Differentiable(Quantity, Protocol):
         """
 
 
+def _of_contact(problem: ContactProblem, number: int | None) -> NDArray[np.bool_]:
+    """Return which owned contact nodes are those of one contact; of all for None."""
+    return np.ones(problem.nodes.weight.size, bool) if number is None else (
+        problem.entry_numbers == number
+    )
+
+
 @dataclass(frozen=True)
 class ContactForce:
-    """A component of the force of the body on the foundations, as ``contact_force_x``."""
+    """A component of the force of the body on the foundations, as ``contact_force_x``.
+
+    Attributes
+    ----------
+    axis
+        The component.
+    contact
+        Number of the contact; None for the sum of all.
+    """
 
     axis: int
+    contact: int | None = None
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
         nodes = problem.nodes
         stress = problem.interface.stress(problem.nodal(state), state.forces)
-        return self._turn(problem) * nodes.sum(stress[:, self.axis])
+        own = _of_contact(problem, self.contact)
+        return self._turn(problem) * nodes.sum(np.where(own, stress[:, self.axis], 0.0))
 
     def _turn(self, problem: ContactProblem) -> float:
         """Return how much of a force per radian there is: the full turn of a ring."""
@@ -66,7 +84,8 @@ class ContactForce:
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        jump, turn = problem.nodes, self._turn(problem)
+        jump = problem.nodes
+        turn = np.where(_of_contact(problem, self.contact), self._turn(problem), 0.0)
         by_force = np.zeros_like(jump.normal)
         by_force[:, self.axis] = turn * jump.weight
         layer = problem.interface.law.layer_gradient(problem.nodal(state))
@@ -103,11 +122,14 @@ class Largest(ABC):
 
 @dataclass(frozen=True)
 class MaxPressure(Largest):
-    """The largest contact pressure."""
+    """The largest contact pressure; `contact` is the number of a contact, None for all."""
+
+    contact: int | None = None
 
     def values(self, problem: ContactProblem, state: State) -> Array:
         """Return the pressures."""
-        return problem.interface.pressure(problem.nodal(state), state.forces)
+        pressure = problem.interface.pressure(problem.nodal(state), state.forces)
+        return np.where(_of_contact(problem, self.contact), pressure, 0.0)
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
@@ -282,6 +304,11 @@ def named_quantities(problem: ContactProblem) -> dict[str, Quantity]:
     if body.laws.initial is not None:
         found["plastic_dissipation"] = _lost
     found |= {f"contact_force_{axis}": ContactForce(i) for i, axis in enumerate(axes)}
+    for number, contact in enumerate(problem.contacts if len(problem.contacts) > 1 else ()):
+        name = contact.name
+        found |= {f"contact_force_{x}_{name}": ContactForce(i, number) for i, x in enumerate(axes)}
+        found[f"max_pressure_{name}"] = MaxPressure(number)
+        found[f"dissipation_{name}"] = partial(_rubbed, contact=number)
     driven = DrivenPart.of(problem)
     for i, axis in enumerate(axes):
         for part in holding(problem, electric=False):
@@ -327,6 +354,13 @@ def _of_rigid(problem: ContactProblem, index: int, end: str) -> dict[str, Quanti
                 partial(_given, index=index, i=first + i),
             )
     return found
+
+
+def _rubbed(problem: ContactProblem, state: State, contact: int) -> float:
+    """Return the energy that friction of one contact takes in the step of a state. Collective."""
+    slip = problem.interface.slip(problem.nodal(state))
+    work = np.einsum("ni,ni->n", state.forces.friction, slip)
+    return problem.nodes.sum(np.where(_of_contact(problem, contact), work, 0.0))
 
 
 def _lost(problem: ContactProblem, state: State) -> float:

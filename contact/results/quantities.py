@@ -91,13 +91,26 @@ _RUN = (
     Quantity(
         "contact_force", "force", "Force that the body exerts on the foundation, a vector; in 2-D "
         "per unit of depth. Between bodies the one that the body with `on` exerts on the other. "
-        "With several contacts their sum; `traction`, `weight` and `entry` of `contact.vtu` have "
-        "the force of each.", files=_MESHES, component=VECTOR,
+        "With several contacts their sum; `contacts` has the force of each.",
+        files=_MESHES, component=VECTOR,
     ),
     Quantity(
         "contact_moment", "force · length", "Moment of the contact forces about the origin of "
         "coordinates, at points of the reference configuration: in 2-D a list of one number, about "
         "z and counter-clockwise, in 3-D a vector.", component=VECTOR,
+    ),
+    Quantity(
+        "contacts", "", "Results of each contact, by its `name`: `force` and `moment` as above, "
+        "`area` as `contact_area`, `max_pressure` and `mean_pressure`, the latter over that area, "
+        "`stick` and `slip` (shares of that area), `dissipation` by friction, in all steps.",
+        lambda r: {name: vars(share) for name, share in r.contacts.items()},
+    ),
+    Quantity(
+        "contact_force_AXIS_NAME", "", "The same of each of several contacts, in a step: "
+        "`contact_force_x_NAME`..., `contact_moment_NAME` (in 3-D `contact_moment_x_NAME`...), "
+        "`contact_area_NAME`, `max_pressure_NAME`, `mean_pressure_NAME`, `stick_NAME`, "
+        "`slip_NAME`, `dissipation_NAME`.",
+        lambda r: r.contact_columns, (STEPS, SWEEP),
     ),
     Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(

@@ -19,6 +19,7 @@ from contact.errors import InputError
 from contact.linear.operator import Counters
 from contact.methods.load_stepping import LoadStep
 from contact.methods.report import IterationHistory, Outcome
+from contact.results.contacts import ContactShare, contact_columns, contact_shares
 from contact.results.error_estimate import Estimate
 from contact.results.fields import Deformation, DerivedFields, unknowns
 from contact.results.intervals import Intervals
@@ -325,6 +326,32 @@ class Solution(Solved):
     def contact_moment(self) -> Array:
         """The moment of the contact forces about the origin, shape (1,) or (3,). Collective."""
         return contact_resultant(self.problem, self.state).moment
+
+    @cached_property
+    def contacts(self) -> Mapping[str, ContactShare]:
+        """Force, area, pressures, stick and slip of each contact, by its name. Collective.
+
+        The dissipation is that of friction in all steps of an evolution.
+        """
+        found = contact_shares(self.problem, self.state, self.status)
+        if not self.steps:
+            return found
+        alone = len(found) == 1
+        return {
+            name: replace(
+                share,
+                dissipation=sum(
+                    float(step.row["dissipation" if alone else f"dissipation_{name}"])
+                    for step in self.steps
+                ),
+            )
+            for name, share in found.items()
+        }
+
+    @property
+    def contact_columns(self) -> dict[str, float]:
+        """Results of each of several contacts by their columns. Collective."""
+        return contact_columns(self.contacts)
 
     @property
     def contact_area(self) -> float:

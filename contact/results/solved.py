@@ -228,9 +228,7 @@ def contact_result(solved: Solved, whole: bool = True) -> ContactResult:
         "traction": solved.pressure[:, None] * nodes.normal + forces.friction,
         "friction_bound": solved.friction_bound,
         "status": solved.status,
-        "entry": np.repeat(
-            np.arange(len(problem.entries)), [entry.nodes.nodes.size for entry in problem.entries]
-        ),
+        "entry": problem.entry_numbers,
         "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
     }
     if problem.piezoelectric:

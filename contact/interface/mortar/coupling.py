@@ -149,6 +149,7 @@ def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
         normals = _normals(points, slave, master, direction)
         _add(normal, points.slave, own_share[:, :, None] * normals[:, None, :])
         entries.append(_master_entries(points, phi, carriers.nodes, master))
+    rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
     return Parts(
         slave.nodes,
         carriers.nodes,
@@ -156,7 +157,9 @@ def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
         np.einsum("fij,fj->fi", carriers.functions, integrals(slave)),
         carriers.functions @ normal,
         gap[:, :, :, None] * direction[:, None, None, :],
-        *(np.concatenate(part) for part in zip(*entries, strict=True)),
+        rows,
+        columns,
+        values,
         depth=max((float(-points.clear.min(initial=0.0)) for points in found), default=0.0),
     )
 
