@@ -2,8 +2,8 @@
 
 `newton` is the default: it condenses the body where that pays, and loops over its material.
 `semismooth` is the semismooth Newton method (primal-dual active set) on the whole body or on the
-condensed one, and `newton_step` one step of it. `fallbacks` has what is tried where it fails, in
-order: all nodes open and a working set, a continuation, `unconstrained_modes`, `interior_point`.
+condensed one, and `newton_step` one step of it. `fallbacks` has the methods after it, in order: all
+nodes open and a working set, a continuation, `unconstrained_modes`, `interior_point`.
 `load_stepping` is the quasi-static load stepping around any method. The fixed points, Uzawa block
 relaxation and penalty of `contact.thesis` are no fallbacks of it.
 
