@@ -15,7 +15,7 @@ ROUNDING = 500 * EPS
 #: ten digits and more, and an orthogonal basis knows a motion to some root of `EPS`.
 NEGLIGIBLE = 1e-9
 
-#: Overlap, over the size of the mesh, that is taken for rounding of positions in mesh files.
+#: Overlap of two bodies, over the size of the mesh, that is rounding of positions in files.
 TOUCHING = 1e-6
 
 #: The least tolerance: rounding keeps relative residuals from falling below.

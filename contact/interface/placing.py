@@ -22,8 +22,11 @@ from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
 from contact.ranks import on_all_ranks
-from contact.tolerances import TOUCHING
 from contact.typing import Array
+
+#: Depth in a shape, over the size of the mesh, that is taken for rounding: its numbers are written
+#: by hand, with fewer digits than positions in files.
+ROUNDED = 1e-5
 
 
 @dataclass(frozen=True)
@@ -163,7 +166,7 @@ def _place(
             "of it, or inside = true for a body within",
             "behind",
         )
-    rounding = TOUCHING * domain.size
+    rounding = ROUNDED * domain.size
     _refuse_within(domain, obstacle, found.surface[facing > 0], gap[facing > 0], rounding)
     gap, unknown = found.to_curve(gap)
     if press:
@@ -286,7 +289,7 @@ def find_nodes(
         gap[keep],
         unknown[keep],
         space.dofmap.index_map_bs,
-        cut if cut > TOUCHING * domain.size else 0.0,
+        cut if cut > ROUNDED * domain.size else 0.0,
         domain.revolved,
         body.global_unknowns.of_foundation(points, body.block_size, part),
     )
