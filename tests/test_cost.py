@@ -180,14 +180,14 @@ def test_a_slender_body_starts_from_a_coarser_mesh(monkeypatch: pytest.MonkeyPat
 def test_a_coarser_mesh_that_does_not_fit_the_case_is_left_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With an odd number of cells it has other nodes, at one of which this gap is negative."""
+    """With an odd number of cells it has other nodes, at one of which this mu is negative."""
     monkeypatch.setitem(nesting.MANY, "whole", 1000)
     beam = cantilever(PUSHED, [803, 9], 1, 0.0, 0.5)
     beam["mesh"]["size"] = [402.0, 1.0]
-    beam["contact"]["gap"] = "0.05 * sqrt(abs(x - 200)) - 0.0005"
+    beam["friction"] = {"law": "coulomb", "mu": "0.05 * sqrt(abs(x - 200)) - 0.0005"}
     found = solve(parse_case(beam))
     assert (found.start, found.converged) == ("the zero initial guess", True)
-    with pytest.raises(InputError, match=r"gap: .* at a node"):
+    with pytest.raises(InputError, match=r"mu: .* at a node"):
         solve(parse_case({**beam, "solver": {"nested": True}}))
 
 
