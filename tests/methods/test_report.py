@@ -1,9 +1,13 @@
 """What the end of a solve says: `converged` and `reason` both come from the residuals."""
 
+from dataclasses import replace
+
 import pytest
 
+from contact import build_problem, load_case, solve
+from contact.methods.options import OPTIONS, with_method
 from contact.methods.report import Outcome
-from contact.problem.residuals import Residuals
+from contact.problem.residuals import Residuals, evaluate
 
 ALLOWED = Residuals(1e-8, 1e-8, 1e-8)
 MET = Residuals(1e-9, 0.0, 1e-10)
@@ -52,3 +56,16 @@ def test_a_criterion_of_its_own_is_named():
     assert Outcome(Residuals(1.0, 0.0, 0.0), ALLOWED, criterion=words).reason.startswith(
         f"{words}, but "
     )
+
+
+@pytest.mark.parametrize("most", [1, 5, 200])
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+def test_convergence_is_that_of_the_residuals_in_a_problem_built_anew(method, most):
+    changes = ["mesh.cells=[32,8]", "friction.mu=0.6", "load.0.traction.1=-0.02"]
+    case = load_case("scripts/cases/bar.toml", changes)
+    solution = solve(case, replace(with_method(case.solver, OPTIONS[method]), max_outer=most))
+    residuals, allowed = evaluate(build_problem(case), solution.state), solution.outcome.allowed
+    names = "equilibrium", "contact", "friction"
+    met = all(getattr(residuals, name) <= 1.01 * getattr(allowed, name) for name in names)
+    assert solution.converged == met
+    assert solution.converged or most < 200
