@@ -5,13 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from contact.case.file import load_case
 from contact.cli.check import mean_ratio, quality
 from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.cli.new import case_text
 from contact.mesh.cells import HEXAHEDRON, QUADRILATERAL
 from meshes import write
 from scripts.cases import CASES
+from tests.problems.overlapping import layers
 
 FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"
 
@@ -264,3 +267,13 @@ def test_bodies_of_one_part_each(tmp_path: Path, capsys: pytest.CaptureFixture) 
         capsys.readouterr().err
     )
     assert not mesh.with_suffix(".toml").exists()
+
+
+def test_meshes_that_overlap() -> None:
+    """It is told, with the key by which that is an interference."""
+    for depth in (0.0, 0.01):
+        domain = layers(MPI.COMM_SELF, "quadrilateral", 1, "flat", depth)
+        text = case_text(domain, Path("layers.msh"), Path("layers.toml"))
+        assert 'against = "outer0"' in text or 'against = "inner1"' in text
+        told = "The meshes overlap, by up to 0.01," in text and 'overlap = "press"' in text
+        assert told == (depth > 0)

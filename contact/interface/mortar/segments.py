@@ -153,19 +153,19 @@ def common_points(
     on_slave, on_master = (
         _carried_back(side, nodes[pair], y) for side, nodes in ((slave, own), (master, other))
     )
-    gap, change, most = np.zeros((3, pair.size))
-    for sign, side, facets, at, nodes in (
-        (1.0, master, j, on_master, other),
-        (-1.0, slave, i, on_slave, own),
-    ):
+    sides = (1.0, master, j, on_master, other), (-1.0, slave, i, on_slave, own)
+    clear, change = np.zeros((2, pair.size))
+    for sign, side, facets, at, nodes in sides:
         functions = side.shape.lagrange(side.order, at)
-        gap += sign * np.einsum("pk,pk->p", functions, nodes[pair, :, -1])
-        where = facets[pair], at, direction[i[pair]]
-        most += np.maximum(*(sign * bound for bound in side.distance_bounds(*where)))
+        clear += sign * np.einsum("pk,pk->p", functions, nodes[pair, :, -1])
         if side.follows:
-            change += sign * side.distance(*where)
-    clear = gap + np.maximum(most, 0.0)
-    gap += change
+            change += sign * side.distance(facets[pair], at, direction[i[pair]])
+    gap, cut = clear + change, np.flatnonzero(clear < 0)
+    most, there = np.zeros(cut.size), pair[cut]
+    for sign, side, facets, at, _ in sides:
+        bounds = side.distance_bounds(facets[there], at[cut], direction[i[there]])
+        most += np.maximum(*(sign * bound for bound in bounds))
+    clear[cut] += np.maximum(most, 0.0)
     gradients, d = slave.shape.gradients(slave.order, on_slave), slave.shape.dim
     slopes, turned = slave.slopes(i[pair], on_slave), _slopes(gradients, own[pair, :, :d])
     size = np.linalg.norm(across(slopes), axis=1) / np.abs(determinant(turned))
