@@ -208,7 +208,7 @@ MUTANTS = (
         "contact/mesh/owners.py",
         "        vector.scatter_reverse(la.InsertMode.add)\n",
         "",
-        ("tests/problem/test_two_bodies.py", "tests/parallel"),
+        ("tests/problem/test_two_bodies.py",),
         2,
     ),
     Mutant(
