@@ -10,6 +10,7 @@ from contact.body.rigid import Electrode as Electrode
 from contact.body.rigid import Motion as Motion
 from contact.body.rigid import Rigid as Rigid
 from contact.case.build import build_problem as build_problem
+from contact.case.data import read_data as read_data
 from contact.case.file import Case as Case
 from contact.case.file import load_case as load_case
 from contact.case.file import parse_case as parse_case
@@ -37,7 +38,6 @@ from contact.interface.obstacle import Shape as Shape
 from contact.interface.obstacle import Sphere as Sphere
 from contact.interface.obstacle import Triangles as Triangles
 from contact.io.files import write_outputs as write_outputs
-from contact.io.formats import read_data as read_data
 from contact.mesh.domain import Domain as Domain
 from contact.mesh.reader import from_file as from_file
 from contact.mesh.reader import from_msh as from_msh

@@ -42,12 +42,10 @@ LONGEST = 500
 #: has to leave its list; nothing may join one.
 DOWNWARDS: set[tuple[str, str]] = {
     ("contact.case.digest", "contact.io.step_files"),
-    ("contact.case.interface", "contact.io.formats"),
     ("contact.io.files", "contact.plot.figures"),
     ("contact.results.solution", "contact.plot.figures"),
     ("contact.results.solution", "contact.plot.run"),
     ("contact.results.solved", "contact.io.formats"),
-    ("contact.results.surface", "contact.io.formats"),
 }
 CYCLIC: set[str] = set()
 LONG: set[str] = set()

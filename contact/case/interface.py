@@ -15,6 +15,7 @@ from pydantic import Field, Tag, model_validator
 from contact.arguments import expect, naming
 from contact.body.fields import steady
 from contact.case.body import Rigid
+from contact.case.data import read_data
 from contact.case.formula import Expression, NodalField, as_field, as_number
 from contact.case.messages import Words, fault
 from contact.case.section import (
@@ -35,7 +36,6 @@ from contact.interface.law import Conductor
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction, Obstacle, Shape
 from contact.interface.obstacle.triangles import read_stl
-from contact.io.formats import read_data
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import area, volume
 from contact.mesh.together import meet

@@ -24,12 +24,13 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.io.folder import ROOM
-from contact.io.formats import Grid, Values, in_pieces, write_share
+from contact.io.formats import in_pieces, write_share
 from contact.mesh.cells import shape_of
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root
 from contact.results.fields import DerivedFields, linear, unknowns
+from contact.results.grid import Grid, Values
 from contact.results.solution import Solution
 from contact.results.surface import contact_surface
 

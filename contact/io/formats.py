@@ -8,49 +8,18 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
-from contact.errors import InputError
-from contact.mesh.cells import Shape
 from contact.mesh.owners import Owners
 from contact.ranks import on_each, on_root
-from contact.typing import Array
+from contact.results.grid import Grid, Table, Values
 
 #: Nodes of all ranks up to which a file lists them together; of more, a file a rank.
 TOGETHER = 100_000
-
-Values = NDArray[Any]
-#: Columns of equal length by name.
-Table = Mapping[str, Values]
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Cells with fields, or this rank's share of them.
-
-    Attributes
-    ----------
-    points
-        Coordinates of the nodes, shape (n, d), those of the ranks one rank after the other.
-    cells
-        Nodes of each cell in dolfinx's order, numbered over all ranks, shape (m, nodes a cell).
-    shape
-        Of the cells.
-    at_points, in_cells
-        Fields by name, one row per node or cell.
-    """
-
-    points: Array
-    cells: NDArray[np.int64]
-    shape: Shape
-    at_points: Mapping[str, Values]
-    in_cells: Mapping[str, Values] = field(default_factory=dict)
 
 
 def gathered(comm: MPI.Intracomm, share: Grid) -> Grid | None:
@@ -218,53 +187,3 @@ def write_mappings(
     """Write rows of named values, under the names in the header and all others. On one rank."""
     names = list(dict.fromkeys([*header, *(name for row in rows for name in row)]))
     write_csv(path, names, ([row.get(name) for name in names] for row in rows))
-
-
-def read_data(path: str | Path) -> dict[str, Array]:
-    """Read measurements from a CSV file with a row of names.
-
-    Parameters
-    ----------
-    path
-        The file; columns are separated by commas, numbers have a decimal point.
-
-    Returns
-    -------
-    Column -> values, shape (n,).
-
-    Raises
-    ------
-    InputError
-        If the file is no such table.
-    """
-    path = Path(path)
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            numbered = [(i, row) for i, row in enumerate(csv.reader(file), 1) if row]
-        if not numbered:
-            raise ValueError("it is empty")
-        names = [name.strip() for name in numbered[0][1]]
-        if len(set(names)) < len(names):
-            raise ValueError("a name stands twice")
-        values = np.array([_numbers(number, names, row) for number, row in numbered[1:]])
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; accepted: a CSV file", "data-file") from None
-    except ValueError as error:
-        raise InputError(
-            f"{path}: {error}; accepted: a row of names, then rows of numbers", "data-file"
-        ) from None
-    columns = values.reshape(-1, len(names)).T
-    return dict(zip(names, columns, strict=True))
-
-
-def _numbers(number: int, names: Sequence[str], row: Sequence[str]) -> list[float]:
-    """Return the numbers of a row, or raise a ValueError that says where there is none."""
-    if len(row) != len(names):
-        raise ValueError(f"row {number} has {len(row)} values for {len(names)} names")
-    found = []
-    for name, text in zip(names, row, strict=True):
-        try:
-            found.append(float(text))
-        except ValueError:
-            raise ValueError(f"row {number}, column {name}: {text!r} is no number") from None
-    return found

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from contact.errors import InputError
-from contact.io.formats import Table
 from contact.plot.run import Run
 from contact.plot.style import (
     BLUE,
@@ -34,6 +33,7 @@ from contact.plot.style import (
     sheet,
     smooth,
 )
+from contact.results.grid import Table
 from contact.results.quantity import STATUS
 from contact.typing import Array
 

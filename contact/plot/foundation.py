@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from contact.io.formats import Table
 from contact.plot.contact import ends
 from contact.plot.run import Run
 from contact.plot.style import BLUE
+from contact.results.grid import Table
 from contact.typing import Array
 
 #: Overlap of bodies, over the diameter, that is not seen.

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from contact.errors import InputError
-from contact.io.formats import Table
 from contact.plot.style import heading
 from contact.ranks import refused
+from contact.results.grid import Table
 from contact.results.options import Units
 from contact.results.quantity import OPPOSITE
 from contact.typing import Array

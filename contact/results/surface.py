@@ -13,7 +13,7 @@ from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import shape_of
 from contact.mesh.owners import Owners
-from contact.io.formats import Grid, Table, Values
+from contact.results.grid import Grid, Table, Values
 from contact.results.quantities import values_of
 from contact.results.quantity import AGAINST, NODES, SURFACE
 from contact.results.solution import Solution

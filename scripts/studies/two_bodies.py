@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contact import load_case, parse_case
-from contact.io.formats import Table
+from contact.results.grid import Table
 from contact.results.solution import Solution
 from contact.results.surface import contact_table
 from contact.typing import Array

@@ -15,10 +15,10 @@ from mpi4py import MPI
 from contact import Solution, build_problem, load_case
 from contact.interface.complementarity import project_disc
 from contact.interface.layer import NormalLaw
-from contact.io.formats import Table
 from contact.plot.body import Picture, draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.plot.style import Look
+from contact.results.grid import Table
 from contact.results.solved import tangent_of
 from contact.results.surface import contact_table
 from contact.typing import Array

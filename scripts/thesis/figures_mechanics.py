@@ -12,10 +12,10 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution
-from contact.io.formats import Table
 from contact.plot.body import draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.plot.style import Look
+from contact.results.grid import Table
 from contact.results.surface import contact_table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots

@@ -10,9 +10,10 @@ from pyvista import UnstructuredGrid
 
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.io.files import write_outputs
-from contact.io.formats import Grid, gathered, write_share
+from contact.io.formats import gathered, write_share
 from contact.mesh.cells import TRIANGLE, VTK
 from contact.plot.run import read_grid
+from contact.results.grid import Grid
 from contact.solving import solve
 from tests.problems.written import block, electric
 
