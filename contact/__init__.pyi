@@ -37,7 +37,6 @@ from contact.interface.obstacle import Punch as Punch
 from contact.interface.obstacle import Shape as Shape
 from contact.interface.obstacle import Sphere as Sphere
 from contact.interface.obstacle import Triangles as Triangles
-from contact.io.files import write_outputs as write_outputs
 from contact.mesh.domain import Domain as Domain
 from contact.mesh.reader import from_file as from_file
 from contact.mesh.reader import from_msh as from_msh
@@ -51,6 +50,7 @@ from contact.solving import NotConvergedError as NotConvergedError
 from contact.solving import SolveInterrupted as SolveInterrupted
 from contact.solving import evolve as evolve
 from contact.solving import solve as solve
+from contact.writing import write_outputs as write_outputs
 from forms.hencky import Linear as Linear
 from forms.hencky import Log as Log
 from forms.hencky import UserLaw as UserLaw

@@ -28,11 +28,10 @@ from contact.case.build import (
     named,
     replaced_by,
 )
-from contact.case.digest import check_restart, digest
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.io.checkpoint import Checkpoints, read_steps
+from contact.io.checkpoint import Checkpoints, check_restart, read_steps
 from contact.methods.load_stepping import LoadStepping, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
@@ -225,8 +224,7 @@ def solve(
             keep = None
             if folder is not None:
                 here = restart is not None and restart.samefile(folder)
-                text, files = to_toml(case, anchored=True), on_root(comm, lambda: digest(case))
-                keep = Checkpoints(folder, problem, text, kept, here, files).keep
+                keep = Checkpoints(folder, problem, case, kept, here).keep
             solution = run(problem, kept=kept, keep=keep)
         else:
             guess, chosen = GIVEN, case.model_copy(update={"solver": settings})

@@ -8,7 +8,6 @@ computed from the same input.
 from __future__ import annotations
 
 import csv
-import hashlib
 import itertools
 import logging
 import time
@@ -27,8 +26,8 @@ from contact.case.file import Case, load_case
 from contact.case.messages import listed
 from contact.case.text import literal, to_toml
 from contact.errors import InputError, counted, nearest
-from contact.io.folder import replace_whole
-from contact.io.formats import write_csv
+from contact.io.folder import write_whole
+from contact.io.tables import write_csv
 from contact.mesh.domain import Domain
 from contact.methods.load_stepping import Reached, predicted, solve_step
 from contact.methods.method import METHODS, Method
@@ -50,8 +49,8 @@ logger = logging.getLogger("contact.sweep")
 #: Names of the table and of the case that was swept.
 TABLE, CASE = "sweep.csv", "sweep.toml"
 
-#: Column with the digests of the files that the case of a row reads, and the row's own by `SEAL`.
-INPUT, SEAL = "input", "row"
+#: Column with the digests of the files that the case of a row reads.
+INPUT = "input"
 
 #: Most values of a range.
 MOST = 10_000
@@ -261,7 +260,7 @@ def sweep(
                 more = summary_columns(solution, columns)
                 row |= {name: value for name, value in more.items() if name not in row}
                 row["seconds"] = seconds
-                row[INPUT] = f"{given} {SEAL}={_seal(row)}".strip()
+                row[INPUT] = given
                 said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
                 tell(logger, (len(rows) + 1) / len(cases), said)
             rows.append(row)
@@ -279,13 +278,6 @@ def _input(case: Case) -> str:
     return " ".join(f"{key}={value[:12]}" for key, value in digest(case).items())
 
 
-def _seal(row: Mapping[str, Any]) -> str:
-    """Return a short digest of the texts of a row."""
-    row = {key: value for key, value in row.items() if key != INPUT}
-    texts = [f"{key}={'' if value is None else value}" for key, value in row.items()]
-    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:12]
-
-
 def _kept_rows(
     folder: Path,
     names: list[str],
@@ -301,58 +293,37 @@ def _kept_rows(
     Raises
     ------
     InputError
-        If the files there are damaged, no sweep's, or those of a sweep of other input or without
-        the further ``columns``.
+        If the files there are no sweep's, or those of a sweep of other input or without the
+        further ``columns``.
     """
-    table, before = folder / TABLE, folder / CASE
-    for path in (table, before):
-        if path.is_symlink() or (path.exists() and not path.is_file()):
-            raise InputError(
-                f"{path} is no file of ours; accepted: a folder without it", "not-ours"
-            )
-    refused = f"--out {folder}: given"
+    table, before, where = folder / TABLE, folder / CASE, f"--out {folder}"
     rows = _read(table) if table.exists() else []
-    if rows:
-        swept = [*itertools.takewhile(lambda column: column != "converged", rows[0])]
-        if swept != names:
-            raise InputError(
-                f"{refused} a sweep over other keys; accepted: one over {', '.join(swept)}, or "
-                "another folder",
-                "sweep-table",
-            )
-        for name in columns:
-            if not any(is_of(column, name) for column in rows[0]):
-                raise InputError(
-                    f"--columns {name}: the rows of {table} have other columns; accepted: columns "
-                    "that they have, or another folder",
-                    "sweep-table",
-                )
-    text = to_toml(load(first), anchored=True)
-    if before.exists():
-        stored, where = to_toml(load(first, before), anchored=True), f"--out {folder}"
-        accepted = "the same, or another folder"
-        check_same(where, "a sweep", stored, text, accepted, ignored=frozenset())
-    elif table.exists():
-        raise InputError(
-            f"{refused} a {TABLE} without the {CASE} that a sweep leaves beside it; accepted: "
-            "another folder",
-            "sweep-table",
+    swept = [*itertools.takewhile(lambda column: column != "converged", rows[0] if rows else names)]
+    if swept != names:
+        raise _refused(
+            f"{where}: given a sweep over other keys", f"one over {', '.join(swept)}, or "
         )
+    for name in columns if rows else ():
+        if not any(is_of(column, name) for column in rows[0]):
+            words = f"--columns {name}: the rows of {table} have other columns"
+            raise _refused(words, "columns that they have, or ")
+    if before.exists():
+        stored, given = (to_toml(load(first, file), anchored=True) for file in (before, None))
+        check_same(where, "a sweep", stored, given, "the same, or another folder", frozenset())
+    elif table.exists():
+        raise _refused(f"{where}: given a {TABLE} without the {CASE} that a sweep leaves beside it")
     for row in rows:
         point = {name: row[name] for name in names}
         then, now = (
             dict(pair.partition("=")[::2] for pair in text.split())
             for text in (row[INPUT], _input(load(point)))
         )
-        made = f"the row {', '.join(_set(point))} was computed"
-        if then.pop(SEAL, "") != _seal(row):
-            raise InputError(
-                f"{table}: the row {', '.join(_set(point))} has been changed since it was "
-                "computed; accepted: the table as a sweep has left it, or another folder",
-                "sweep-table",
-            )
-        check_files(f"--out {folder}", made, then, now)
-    return {tuple(row[name] for name in names): dict(row) for row in rows}
+        check_files(where, f"the row {', '.join(_set(point))} was computed", then, now)
+    return {tuple(row[name] for name in names): row for row in rows}
+
+
+def _refused(words: str, accepted: str = "") -> InputError:
+    return InputError(f"{words}; accepted: {accepted}another folder", "sweep-table")
 
 
 def _read(table: Path) -> list[dict[str, str]]:
@@ -360,34 +331,26 @@ def _read(table: Path) -> list[dict[str, str]]:
     try:
         with table.open(newline="", encoding="utf-8-sig") as file:
             header, *rows = csv.reader(file, strict=True)
-        computed = [*itertools.dropwhile(lambda column: column != "converged", header)]
         found = [dict(zip(header, row, strict=True)) for row in rows]
-        whole = {*COLUMNS} <= {*header} and len({*header}) == len(header)
-        for row in found:
-            whole = whole and row["converged"] in ("True", "False") and f"{SEAL}=" in row[INPUT]
-            [float(row[column]) for column in computed if column not in ("converged", INPUT)]
     except (ValueError, csv.Error):
-        whole = False
-    if not whole:
-        raise InputError(
-            f"{table}: damaged, or no table of a sweep of this version; accepted: another folder",
-            "sweep-table",
-        )
+        header, found = [], []
+    if not {*COLUMNS} <= {*header}:
+        raise _refused(f"{table}: damaged, or no table of a sweep of this version")
     return found
 
 
 def _write(folder: Path, rows: Sequence[Mapping[str, Any]], first: Case) -> None:
     """Write the table, and the case of its first row before that, once there is one."""
     if any([*row] != [*rows[0]] for row in rows):
-        raise InputError(
+        raise _refused(
             f"{folder / TABLE}: its rows have other columns than those of this version, or other "
-            "--columns; accepted: another folder",
-            "sweep-table",
+            "--columns"
         )
     if not (folder / CASE).exists():
-        (folder / CASE).write_text(to_toml(first, anchored=True), encoding="utf-8")
+        text = to_toml(first, anchored=True)
+        write_whole(folder / CASE, lambda draft: draft.write_text(text, encoding="utf-8"))
     values = (row.values() for row in rows)
-    replace_whole(folder / TABLE, lambda draft: write_csv(draft, rows[0], values))
+    write_whole(folder / TABLE, lambda draft: write_csv(draft, rows[0], values))
 
 
 class _Runner:

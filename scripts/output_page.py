@@ -38,7 +38,7 @@ INTRODUCTION = """\
 | `fields.pvd`, `contact.pvd` | of an evolution: steps of body and contact part, for ParaView |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
 | `fields.xdmf`, `fields.h5` | the same with `output.fields = "xdmf"`: degree 1 at most |
-| `checkpoint.npz` | with `output.checkpoint = true`; on several ranks a file of each |
+| `checkpoint.npz` | with `output.checkpoint = true` |
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `figure-*-step-N.png` | of a step of an evolution, by `contact plot DIR --step N` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
@@ -47,13 +47,8 @@ Once all files are complete, they replace those of an earlier run; other files i
 touched. Results of another problem are replaced with `--overwrite` only. The same problem may be
 solved again by another method, to another tolerance, with other outputs.
 
-**Large contacts.** With more than 100,000 contact nodes on several ranks, each rank writes a file
-of its own nodes, sorted by x, y and z: `contact.0000.csv`, `contact.0001.csv` and so on, and the
-pieces of `contact.pvtu`, which ParaView and pyvista open as one. `row` is the row in the file of
-the rank that has the node. `contact-steps` and `contact-against` are divided in the same way, and
-so are the fields of a body with as many nodes, into the pieces of `fields.pvtu`. A point between
-two pieces is in both; `node` numbers the points of all pieces. Figures of the body can be drawn
-from pieces, those of the contact cannot.
+**Large bodies.** A file is one whatever the number of ranks: rank 0 gathers and writes it. Instead,
+all ranks write with `output.fields = "vtx"`.
 
 `contact sweep` writes `sweep.csv`, one row per case, and `sweep.toml`, the case that was swept.
 

@@ -1,4 +1,4 @@
-"""Measurements from CSV files: amplitudes, and what is identified from."""
+"""Measurements from CSV files: amplitudes, curves to identify parameters from."""
 
 from __future__ import annotations
 

@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from contact.case.file import Case, load_case
+from contact.case.file import Case
 from contact.case.messages import shown
 from contact.case.section import FilePath, walk
-from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.io.step_files import stored_input
 from contact.library.materials import PACKAGED
 from contact.mesh.formats import files
 
@@ -75,15 +73,6 @@ def check_files(where: str, made: str, before: Mapping[str, str], now: Mapping[s
                 "another folder",
                 "changed-input",
             )
-
-
-def check_restart(folder: Path, case: Case) -> None:
-    """Refuse, by an InputError, to continue checkpoints of a folder that other input made."""
-    path, files = stored_input(folder)
-    where, now = f"--restart {folder}", to_toml(case, anchored=True)
-    accepted = "the same case; [solver] and [output] alone may differ"
-    check_same(where, "checkpoints", to_toml(load_case(path)), now, accepted)
-    check_files(where, "the checkpoints were written", files, digest(case))
 
 
 def check_same(

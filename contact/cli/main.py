@@ -132,10 +132,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def run() -> NoReturn:
     """Run the command line and leave with its status."""
-    status = main()
-    writers = sys.modules.get("contact.io.field_files")
-    if writers is not None and writers.abandoned:  # their libraries must not clean up
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)
-    sys.exit(status)
+    sys.exit(main())

@@ -6,33 +6,31 @@ import argparse
 import logging
 import signal
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
-from contact.case.digest import check_restart, check_same
-from contact.case.file import Case, load_case
+from contact.case.digest import check_same
+from contact.case.file import Case, load_case, override, parse_case
 from contact.case.text import to_toml
 from contact.cli.check import amplitude_notes
 from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
 from contact.errors import InputError, counted
-from contact.io.files import write_outputs
-from contact.io.folder import SUMMARY, check_members, read_json, result_folder
-from contact.io.step_files import case_of, discard, kept_case
+from contact.io.checkpoint import check_restart, discard, files_of, kept_case
+from contact.io.folder import SUMMARY, read_json, result_folder
 from contact.methods.signals import SIGNALLED, Terminated, signals_held
 from contact.ranks import on_root
 from contact.results.discretisation import locks
 from contact.results.solution import Solution
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep
+from contact.writing import write_outputs
 
 #: The case of `contact demo`.
 DEMO = Path(__file__).parents[1] / "cases" / "bar.toml"
-
-#: Seconds after a signal from which on a second one ends the writing of results too.
-GRACE = 2.0
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -55,7 +53,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     restart = None if options.restart is None else Path(options.restart)
     for note in amplitude_notes(case) if comm.rank == 0 else ():
         logging.getLogger("contact.case").warning(note)
-    with result_folder(out, comm, overwrite=True) as folder:
+    with result_folder(out, comm, options.overwrite) as folder:
         if not options.overwrite:
             on_root(comm, lambda: _check_results(folder.path, case))
         with progress(comm, options.quiet, options.log, options.verbose) as monitor:
@@ -72,7 +70,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         if outcome.signal and not begun and earlier:  # which are worth more
             raise Terminated if outcome.signal == signal.SIGTERM else KeyboardInterrupt
         # Results that have taken long to compute are written, signal or not.
-        with signals_held(GRACE) as caught:
+        with signals_held() as caught:
             write_outputs(solution, folder, figures=options.plot)
             if outcome.converged:
                 on_root(comm, lambda: discard(folder.path))
@@ -135,18 +133,23 @@ def _load(options: argparse.Namespace) -> Case:
             raise InputError("--out: missing; accepted: a folder to write to", "missing")
         return load_case(options.case, options.set)
     folder = Path(options.restart)
-    case = load_case(options.case or case_of(folder), options.set)
+    if options.case is None:
+        source, data = str(files_of(folder)[0]), tomllib.loads(kept_case(folder) or "")
+        for text in options.set:
+            override(data, text, source)
+        case = parse_case(data, source=source)
+    else:
+        case = load_case(options.case, options.set)
     check_restart(folder, case)
     return case
 
 
 def _check_results(folder: Path, case: Case) -> None:
-    """Refuse to replace results or checkpoints of another case, or a user's own files."""
+    """Refuse to replace results or checkpoints of another case."""
     where, accepted = f"--out {folder}", "--overwrite to replace them, or another folder"
     if (folder / SUMMARY).exists():
         before = read_json(folder / SUMMARY).get("case")
         check_same(where, "a folder with results", before, to_toml(case), accepted)
-    check_members(folder, overwrite=False)
     kept = kept_case(folder)
     if kept is not None:
         accepted = f"--restart {folder} to go on with that, {accepted}"

@@ -1,69 +1,57 @@
 """Checkpoints: the state of a solution, and of each step of an evolution, for any number of ranks.
 
-Files a step, one of each rank: whatever ends a run, the steps before remain. Nodes are found again
-by where they are, on other ranks too. A manifest names the files with their checksums: it alone
-says which of them belong to a run.
+A checkpoint is one file of NumPy, which rank 0 writes. Places stand beside the values: nodes are
+found again by where they are. The file of a step has the case and the digests of its files, too,
+and the name of its run: a new run replaces the first file, and those behind it, which have another
+name, count no longer.
 """
 
 from __future__ import annotations
 
 import json
-import logging
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any, TypeAlias
+from zipfile import BadZipFile
 
 import numpy as np
 from dolfinx import fem
 from dolfinx.la import InsertMode
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from contact.case.digest import check_files, check_same, digest
+from contact.case.file import Case
+from contact.case.text import to_toml
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.multipliers import Multipliers
-from contact.io.folder import settle
-from contact.io.shares import (
-    Arrays,
-    Matching,
-    as_written,
-    matching,
-    packed,
-    piece_of,
-    read_share,
-)
-from contact.io.step_files import (
-    CASE,
-    FOLDER,
-    FRESH,
-    check_own,
-    cut,
-    files_of,
-    load,
-    name_of,
-    remove,
-    replace_earlier,
-    save,
-)
+from contact.io.folder import write_whole
 from contact.mesh.geometry import geometry_nodes
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.ranks import on_all_ranks, on_each, on_root
+from contact.ranks import on_root
 from contact.results.solution import Solution, StepRecord
 from contact.typing import Array
 
-#: The places of the nodes in the files of the first steps; a run that has gone on, perhaps on other
-#: ranks, has them in a file with the number of the last step before.
-_NODES = "nodes.npz"
-#: Begin of the names of the arrays of a history in a checkpoint, and the arrays that are of no rank
-#: alone: file of the nodes, further numbers of the step, and those of the state.
-HISTORY, ONCE = "history ", ("nodes", "said", "row", "motion", "t")
+Arrays: TypeAlias = dict[str, NDArray[Any]]
+
+#: Folder of the checkpoints of an evolution, in that of its results, and their names.
+FOLDER, STEPS = "checkpoints", "[0-9]" * 5 + ".npz"
+#: Places of the nodes of the body, beside those of a history.
+NODES = "nodes"
+#: Begin of the names of the arrays of a history.
+HISTORY = "history "
+#: Keys of the file of a step: its run, the case, the digests of its files, and the record.
+RUN, CASE, FILES, RECORD = "run", "case", "files", "record"
 #: How near a node has to be to where it was, over the size of the body.
 _NEAR = 1e-9
 
-logger = logging.getLogger("contact.steps")
-
 
 class Checkpoints:
-    """The checkpoints that a run writes. Collective.
+    """The checkpoints that a run writes after its steps. Collective.
 
     Parameters
     ----------
@@ -72,97 +60,137 @@ class Checkpoints:
     problem
         The problem of the evolution.
     case
-        The case, as `contact check` prints it.
+        The case, which a restart is held against.
     kept
-        Records of earlier steps. Where those are already in the folder, the next one follows
-        them; else they are written there first.
+        Records of earlier steps, which are written first unless they stand there.
     here
-        Whether they are.
-    digest
-        Digests of the input of the problem, by names; None where nothing is known of them.
+        Whether they do.
 
     Raises
     ------
     InputError
-        If something stands under the name of the folder that no run has left there.
+        If there are files of these names that no run has left.
     """
 
     def __init__(
         self,
         folder: Path,
         problem: ContactProblem,
-        case: str,
+        case: Case,
         kept: Sequence[StepRecord] = (),
         here: bool = False,
-        digest: Mapping[str, str] | None = None,
     ) -> None:
-        self._folder, self._problem, comm = folder, problem, problem.comm
-        self._count = len(kept) if here else 0
-        self._nodes = f"nodes-{self._count:05d}.npz" if here else _NODES
-        points = _places(problem)
-        self._begin = comm.exscan(len(points)) or 0
-        place = folder / (FOLDER if here else FRESH)
+        self._folder, self._problem = folder / FOLDER, problem
+        self._about: Arrays = {}  # on rank 0
 
         def begin() -> None:
-            if here:
-                cut(folder, self._count)
-                return
-            check_own(folder)
-            remove(place)
-            place.mkdir(parents=True, exist_ok=True)
+            for path in () if here else self._folder.glob(STEPS):
+                if _run_of(path) is None:
+                    raise InputError(
+                        f"{path}: no run has left it; accepted: a folder of results without it, "
+                        "checkpoints of the evolution go there",
+                        "not-ours",
+                    )
+            run = _run_of(files_of(folder)[0]) if here else uuid.uuid4().hex
+            about = {RUN: run, CASE: to_toml(case, anchored=True), FILES: json.dumps(digest(case))}
+            self._about.update({key: np.array(text) for key, text in about.items()})
 
-        on_root(comm, begin)
-        if not here:
-            save(comm, place, CASE, case.encode() if comm.rank == 0 else None, digest)
-        save(comm, place, self._nodes, packed(comm, {"points": points}, {}))
+        on_root(problem.comm, begin)
+        self._count = len(kept) if here else 0
         for record in () if here else kept:
             self.keep(record)
 
     def keep(self, record: StepRecord) -> None:
         """Write the checkpoint of the next step; the first replaces those of an earlier run."""
         self._count += 1
-        comm, first = self._problem.comm, self._count == 1
-        own, once = _arrays(self._problem, record.state, self._begin)
-        said = {"enthalpy": record.enthalpy, "rounding": record.rounding}
-        once |= {"said": np.array(json.dumps(said)), "row": np.array(json.dumps(record.row))}
-        once["nodes"] = np.array(self._nodes)
-        place = self._folder / (FRESH if first else FOLDER)
-        save(comm, place, name_of(self._count), packed(comm, own, once))
-        if first:
-            on_root(comm, lambda: replace_earlier(self._folder))
+        said = {"row": record.row, "enthalpy": record.enthalpy, "rounding": record.rounding}
+        arrays = _gathered(self._problem, record.state)
+        arrays |= self._about | {RECORD: np.array(json.dumps(said))}
+
+        def write() -> None:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            _write(self._folder / f"{self._count:05d}.npz", arrays)
+            for path in sorted(self._folder.glob(STEPS))[1:] if self._count == 1 else ():
+                path.unlink()
+
+        on_root(self._problem.comm, write)
 
 
-def _arrays(problem: ContactProblem, state: State, begin: int) -> tuple[Arrays, Arrays]:
-    """Return the arrays of a state on this rank, and those that no rank has a share of.
+def files_of(folder: Path) -> list[Path]:
+    """Return the checkpoints in a folder, one after the other. On one rank.
 
-    Collective. The owned nodes are numbered from `begin`.
+    Raises
+    ------
+    InputError
+        If there are none.
     """
-    body, history = problem.equilibrium, state.history or problem.initial
-    values = {
-        "x": body.nodal(state.x)[: body.owned // body.block_size],
-        "contact": begin + problem.nodes.nodes.astype(np.int64),
-        "pressure": state.forces.pressure,
-        "friction": state.forces.friction,
-    }
-    values |= {HISTORY + name: array for name, array in history.arrays().items()}
-    if QUADRATURE_POINTS in history.places:
-        values[QUADRATURE_POINTS] = problem.points(QUADRATURE_POINTS)
-    return values, {"motion": body.motion(state.x), "t": np.array(state.time)}
+    found: list[Path] = []
+    while (run := _run_of(path := folder / FOLDER / f"{len(found) + 1:05d}.npz")) is not None:
+        if found and run != _run_of(found[0]):
+            break
+        found.append(path)
+    if not found:
+        raise InputError(
+            f"--restart {folder}: no checkpoints there; accepted: the folder of an evolution that "
+            "was ended before its last step, of one mesh (none are kept with [mesh.adapt])",
+            "no-checkpoint",
+        )
+    return found
+
+
+def kept_case(folder: Path) -> str | None:
+    """Return the case of the checkpoints in a folder; None without any. On one rank."""
+    with suppress(InputError):
+        return str(_read(files_of(folder)[0])[CASE])
+    return None
+
+
+def check_restart(folder: Path, case: Case) -> None:
+    """Refuse, by an InputError, to continue checkpoints that other input made. On one rank."""
+    stored, where = _read(files_of(folder)[0]), f"--restart {folder}"
+    accepted = "the same case; [solver] and [output] alone may differ"
+    now = to_toml(case, anchored=True)
+    check_same(where, "checkpoints", str(stored[CASE]), now, accepted)
+    before = json.loads(str(stored[FILES]))
+    check_files(where, "the checkpoints were written", before, digest(case))
+
+
+def discard(folder: Path) -> None:
+    """Remove the checkpoints of a run that has come to its end. On one rank."""
+    with suppress(InputError):
+        files_of(folder)  # else they are of somebody else
+        for path in sorted((folder / FOLDER).glob(STEPS)):
+            path.unlink()
+    with suppress(OSError):  # it is not there, or not empty
+        (folder / FOLDER).rmdir()
+
+
+def read_steps(folder: str | Path, problem: ContactProblem) -> list[StepRecord]:
+    """Return the records of the steps that a run has left in a folder. Collective.
+
+    Raises
+    ------
+    InputError
+        If there are none, or they are damaged, or of another problem.
+    """
+    files: list[Path] = on_root(problem.comm, lambda: files_of(Path(folder)))
+    reader, found = _Reader(problem), list[StepRecord]()
+    for path in files:
+        state, record = reader.read(path)
+        found.append(StepRecord(state, **json.loads(record)))
+    return found
 
 
 def write_checkpoint(solution: Solution, path: str | Path) -> None:
-    """Write the state of a solution into a file, of several ranks one of each. Collective.
+    """Write the state of a solution into a file. Collective.
 
     Raises
     ------
     InputError
         If that is refused.
     """
-    problem, points = solution.problem, _places(solution.problem)
-    comm = problem.comm
-    own, once = _arrays(problem, solution.state, comm.exscan(len(points)) or 0)
-    data = packed(comm, own | {"points": points}, once)
-    on_each(comm, lambda: piece_of(Path(path), comm.rank).write_bytes(data))
+    arrays = _gathered(solution.problem, solution.state)
+    on_root(solution.problem.comm, lambda: _write(Path(path), arrays))
 
 
 def read_checkpoint(path: str | Path, problem: ContactProblem) -> State:
@@ -173,138 +201,147 @@ def read_checkpoint(path: str | Path, problem: ContactProblem) -> State:
     InputError
         If there is none, or it is of another problem.
     """
-    path, comm = Path(path), problem.comm
-    on_root(comm, lambda: settle(path.parent))
-    said, own = read_share(comm, path, Path.read_bytes, ONCE)
-    found = _Nodes.of(problem, own["points"]) if "points" in own else None
-    if found is None:
-        raise InputError(_other(path), "other-checkpoint")
-    return _state(problem, path, (said, own), found)
+    return _Reader(problem).read(Path(path))[0]
 
 
-def _other(path: Path) -> str:
-    return f"{path}: the checkpoint does not fit the problem; accepted: that of the same case"
+def _write(path: Path, arrays: Mapping[str, Any]) -> None:
+    def write(draft: Path) -> None:
+        with draft.open("wb") as file:  # savez would change the name
+            np.savez(file, **arrays)
+
+    write_whole(path, write)
 
 
-def read_steps(folder: str | Path, problem: ContactProblem) -> list[StepRecord]:
-    """Return the records of the steps that a run has left in a folder, up to a damaged one.
+@contextmanager
+def _as_written(path: Path) -> Iterator[None]:
+    """Refuse files that are missing or damaged."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (OSError, EOFError, BadZipFile, LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{path}: no checkpoint, or a damaged one ({error}); accepted: as a run has left it",
+            "no-checkpoint",
+        ) from None
 
-    Collective.
 
-    Raises
-    ------
-    InputError
-        If there are none, or they belong to another mesh.
-    """
-    comm, found = problem.comm, list[StepRecord]()
-    files: list[Path] = on_root(comm, lambda: files_of(Path(folder)))
-    nodes: dict[str, _Nodes] = {}
-    for path in files:
-        try:
-            found.append(_read(problem, path, nodes))
-        except InputError as error:
-            if not found:
-                raise
-            if comm.rank == 0:
-                words = "%s; going on from step %d, the last one intact"
-                logger.warning(words, error.words, len(found))
-            return found
-    if comm.rank == 0 and len([*files[0].parent.glob("0????.npz")]) > len(files):
-        missing = files[0].parent / name_of(len(files) + 1)
-        logger.warning("%s is missing; going on from step %d", missing, len(files))
+def _read(path: Path) -> Arrays:
+    with _as_written(path), np.load(path) as arrays:
+        return dict(arrays)
+
+
+def _run_of(path: Path) -> str | None:
+    """Return the name of the run that has left the checkpoint of a step; None of another file."""
+    with suppress(InputError), _as_written(path), np.load(path) as arrays:
+        return str(arrays[RUN])
+    return None
+
+
+def _gathered(problem: ContactProblem, state: State) -> Arrays:
+    """Return a state and its places on rank 0; nothing elsewhere. Collective."""
+    comm, found = problem.comm, Arrays()
+    for name, values in (_places(problem) | _values(problem, state)).items():
+        shares = comm.gather(values)
+        if shares is not None:
+            found[name] = np.concatenate(shares)
+    once = {"motion": problem.equilibrium.motion(state.x), "t": np.array(state.time)}
+    return found | once if comm.rank == 0 else {}
+
+
+def _values(problem: ContactProblem, state: State) -> Arrays:
+    """Return the arrays of a state on this rank."""
+    body, history = problem.equilibrium, state.history or problem.initial
+    return {
+        "x": body.nodal(state.x)[: body.owned // body.block_size],
+        "pressure": state.forces.pressure,
+        "friction": state.forces.friction,
+        **{HISTORY + name: array for name, array in history.arrays().items()},
+    }
+
+
+def _places(problem: ContactProblem) -> Arrays:
+    """Return the places of the arrays of `_values` that this rank owns. Collective."""
+    nodes = _nodes(problem)
+    found = {NODES: nodes, CONTACT_NODES: nodes[problem.nodes.nodes]}
+    if QUADRATURE_POINTS in problem.initial.places:
+        found[QUADRATURE_POINTS] = problem.points(QUADRATURE_POINTS)
     return found
 
 
-@dataclass(frozen=True)
-class _Nodes:
-    """The nodes of files: the keys that this rank has read, its own, and where these are."""
+class _Reader:
+    """Reads states of a problem; rank 0 finds the places of all ranks in a file. Collective."""
 
-    read: Array
-    own: Array
-    matching: Matching
+    def __init__(self, problem: ContactProblem) -> None:
+        self._problem, self._initial = problem, problem.start()
+        self._asked = {k: problem.comm.gather(own) for k, own in _places(problem).items()}
+        self._shapes = {k: v.shape[1:] for k, v in _values(problem, self._initial).items()}
+        #: The places in the last file, and their rows for each rank.
+        self._found: dict[str, tuple[Array, list[NDArray[np.intp]]]] = {}
 
-    @staticmethod
-    def of(problem: ContactProblem, read: Array) -> _Nodes | None:
-        """Return those of a problem; None if they are of another mesh. Collective."""
-        own = _places(problem)
-        found = matching(problem.comm, read, own, _NEAR * problem.domain.size)
-        return None if found is None else _Nodes(read, own, found)
+    def read(self, path: Path) -> tuple[State, str]:
+        """Return the state in a file, and the record beside it."""
+        problem, stored = self._problem, Arrays()
 
+        def begin() -> tuple[Array, float, str]:
+            stored.update(_read(path))
+            with _as_written(path):
+                self._check(path, stored)
+                for place in self._asked:
+                    self._find(path, place, stored[place])
+                return stored["motion"], float(stored["t"]), str(stored.get(RECORD, ""))
 
-def _read(problem: ContactProblem, path: Path, nodes: dict[str, _Nodes]) -> StepRecord:
-    """Return the record of a step, given the nodes of the files so far by name. Collective."""
-    said, own = load(problem.comm, path, ONCE)
-    with as_written(path):
-        about, row = (dict(json.loads(str(said[name]))) for name in ("said", "row"))
-        if not row:
-            raise ValueError("the row of the step is missing")
-        numbers = float(about["enthalpy"]), float(about["rounding"])
-        place = path.with_name(str(said.get("nodes", _NODES)))
-    if place.name not in nodes:
-        keys = load(problem.comm, place, ONCE)[1]
-        found = _Nodes.of(problem, keys["points"]) if "points" in keys else None
-        if found is None:
-            raise InputError(
-                f"--restart {path.parent.parent}: given checkpoints of another mesh; accepted: "
-                "those of the same case",
-                "other-checkpoint",
-            )
-        nodes[place.name] = found
-    return StepRecord(_state(problem, path, (said, own), nodes[place.name]), row, *numbers)
-
-
-def _state(
-    problem: ContactProblem, path: Path, arrays: tuple[Arrays, Arrays], nodes: _Nodes
-) -> State:
-    """Return this rank's share of a state, given the arrays as read. Collective."""
-    (said, own), comm, initial, body = arrays, problem.comm, problem.initial, problem.equilibrium
-    asked = {name: place for place in initial.places for name in initial.arrays(place)}
-    kept = {name.removeprefix(HISTORY) for name in own if name.startswith(HISTORY)}
-    if kept != asked.keys():
-        raise InputError(
-            f"checkpoints: given the history {sorted(kept)}; accepted: {sorted(asked)}, that of "
-            "the materials of the problem",
-            "other-checkpoint",
+        motion, time, record = on_root(problem.comm, begin)
+        initial = problem.initial
+        place_of = {"x": NODES, "pressure": CONTACT_NODES, "friction": CONTACT_NODES}
+        for place in initial.places:
+            place_of |= {HISTORY + name: place for name in initial.arrays(place)}
+        own: Arrays = {}
+        for name, place in place_of.items():
+            rows = self._found[place][1] if stored else ()
+            own[name] = problem.comm.scatter([stored[name][row] for row in rows] or None)
+        state = State(
+            problem.equilibrium.local(np.concatenate([own["x"].ravel(), motion])),
+            Multipliers.of(problem.nodes, own["pressure"], own["friction"]),
+            time,
+            initial.replaced({name: own[HISTORY + name] for name in initial.arrays()}),
         )
-    here = {CONTACT_NODES: nodes.own[problem.nodes.nodes]}
-    if QUADRATURE_POINTS in initial.places:
-        here[QUADRATURE_POINTS] = problem.points(QUADRATURE_POINTS)
-    # Places and shapes of the rows of each array.
-    rows = {"pressure": (CONTACT_NODES, ()), "friction": (CONTACT_NODES, (problem.dim,))}
-    rows |= {HISTORY + k: (asked[k], array.shape[1:]) for k, array in initial.arrays().items()}
-    begin, rest = comm.exscan(len(nodes.read)) or 0, body.motion(body.rest())
-    with on_all_ranks(comm), as_written(path):
-        read = {CONTACT_NODES: nodes.read[own["contact"] - begin]}
-        if QUADRATURE_POINTS in here:
-            read[QUADRATURE_POINTS] = own[QUADRATURE_POINTS]
-        shapes = {name: (len(read[place]), *shape) for name, (place, shape) in rows.items()}
-        shapes["x"] = (len(nodes.read), body.block_size)
-        motion, time = said["motion"], float(said["t"])
-        for name, shape in shapes.items():
-            if len(own[name]) != shape[0]:
-                raise ValueError(f"{len(own[name])} rows of {name}")
-        if motion.shape != rest.shape or any(own[k].shape != shape for k, shape in shapes.items()):
-            raise InputError(_other(path), "other-checkpoint")
-    near, found = _NEAR * problem.domain.size, dict[str, Matching]()
-    for place, points in here.items():
-        matched = matching(comm, read[place], points, near)
-        if matched is None:
-            raise InputError(_other(path), "other-checkpoint")
-        found[place] = matched
-    values = {name: found[place](own[name]) for name, (place, _) in rows.items()}
-    return State(
-        body.local(np.concatenate([nodes.matching(own["x"]).ravel(), motion])),
-        Multipliers.of(problem.nodes, values["pressure"], values["friction"]),
-        time,
-        initial.replaced({name: values[HISTORY + name] for name in asked}),
+        return state, record
+
+    def _check(self, path: Path, stored: Arrays) -> None:
+        """Refuse arrays of other names, or with rows of other shapes."""
+        motion = self._problem.equilibrium.motion(self._initial.x)
+        given = {k: v.shape[1:] for k, v in stored.items() if k in self._shapes or HISTORY in k}
+        for name in {**given, **self._shapes}:
+            if given.get(name) != self._shapes.get(name) or stored["motion"].shape != motion.shape:
+                raise _other(path, name)
+
+    def _find(self, path: Path, place: str, stored: Array) -> None:
+        """Find the rows of the places of all ranks, unless they are those of the last file."""
+        if place in self._found and np.array_equal(self._found[place][0], stored):
+            return
+        shares = self._asked[place]
+        asked = np.concatenate(shares)
+        if stored.shape != asked.shape:
+            raise _other(path, place)
+        distance, rows = cKDTree(stored).query(asked)
+        if distance.max(initial=0.0) > _NEAR * self._problem.domain.size:
+            raise _other(path, place)
+        self._found[place] = stored, np.split(rows, np.cumsum([len(own) for own in shares])[:-1])
+
+
+def _other(path: Path, name: str) -> InputError:
+    return InputError(
+        f"{path}: the checkpoint does not fit the problem ({name}); accepted: that of the same "
+        "case, mesh and materials",
+        "other-checkpoint",
     )
 
 
-def _places(problem: ContactProblem) -> Array:
-    """Return keys of the owned nodes: their points, and the means of the cells around.
+def _nodes(problem: ContactProblem) -> Array:
+    """Return the points of the owned nodes, and the means of the cells around them. Collective.
 
-    Nodes of two bodies that touch may have the same point, but not the same cells. Shape
-    (nodes, 2 d). Collective.
+    Nodes of two bodies that touch have one point, but not the same cells. Shape (nodes, 2 d).
     """
     body, d = problem.equilibrium, problem.dim
     mesh, space = body.domain.mesh, body.space

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from PIL import Image
 
 from contact.errors import InputError
-from contact.io.folder import add, begin, discard, result_folder
+from contact.io.folder import added, result_folder
 from contact.plot.body import body_figure, picture
 from contact.plot.contact import contact_figure
 from contact.plot.foundation import magnification
@@ -151,12 +151,10 @@ def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
         )
     with result_folder(folder, MPI.COMM_SELF, overwrite=True):  # it only adds
         try:
-            files = draw(begin(folder))
-            add(folder, files)
+            with added(folder) as new:
+                files = draw(new)
         except OSError as error:
             raise refused(error) from None
-        finally:
-            discard(folder)
     return [folder / path.name for path in files]
 
 

@@ -29,7 +29,7 @@ T = TypeVar("T")
 #: Most frames of an animation.
 MOST = 100
 
-_SET = re.compile(r'timestep="([^"]+)" file="([\w-]+\.p?vtu)"')
+_SET = re.compile(r'timestep="([^"]+)" file="([\w-]+\.vtu)"')
 
 
 @dataclass(frozen=True)
@@ -117,15 +117,8 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
     InputError
         If the folder has not all that is needed.
     """
-    if (folder / "contact.pvtu").exists():
-        raise InputError(
-            f"{folder}: the contact part is in pieces, one a rank; accepted: results of one rank, "
-            "or of fewer contact nodes; ParaView opens contact.pvtu",
-            "contact-in-pieces",
-        )
     about = summary or read(folder, "summary.json", _table_of)
-    bodies = "fields.pvtu" if (folder / "fields.pvtu").exists() else "fields.vtu"
-    surface, body = (read(folder, name, read_grid) for name in ("contact.vtu", bodies))
+    surface, body = (read(folder, name, read_grid) for name in ("contact.vtu", "fields.vtu"))
     columns = read(folder, "contact.csv", _nodes)
     files = about.get("files", [path.name for path in folder.iterdir()])
 
@@ -241,7 +234,7 @@ def _table_of(path: Path) -> dict[str, Any]:
 
 
 def read_grid(path: Path) -> Any:
-    """Read a grid of pyvista with its fields; points of several pieces are one.
+    """Read a grid of pyvista with its fields.
 
     Raises
     ------
@@ -255,20 +248,7 @@ def read_grid(path: Path) -> Any:
         grid = pyvista.read(path)
     if errors.events or not grid.n_cells:
         raise ValueError("it has no grid")
-    return _joined(grid) if path.suffix == ".pvtu" else grid
-
-
-def _joined(pieces: Any) -> Any:
-    """Return a grid each of whose points is there once."""
-    numbers = pieces.point_data["node"]
-    _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
-    cells = {shape: place[nodes] for shape, nodes in pieces.cells_dict.items()}
-    made = pyvista.UnstructuredGrid(cells, pieces.points[first])
-    for name in pieces.point_data:
-        made.point_data[name] = pieces.point_data[name][first]
-    for name in pieces.cell_data:
-        made.cell_data[name] = pieces.cell_data[name]
-    return made
+    return grid
 
 
 def _columns(path: Path) -> dict[str, NDArray[Any]]:

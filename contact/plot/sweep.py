@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from contact.errors import InputError, nearest
-from contact.io.folder import replace_whole
+from contact.io.folder import write_whole
 from contact.plot.figures import image
 from contact.plot.style import (
     BLUE,
@@ -95,7 +95,7 @@ def plot_sweep(
                 files.append(folder / f"figure-sweep{ending}.{kind}")
                 try:
                     drawn = image(figure, kind)
-                    replace_whole(files[-1], partial(Path.write_bytes, data=drawn))
+                    write_whole(files[-1], partial(Path.write_bytes, data=drawn))
                 except OSError as error:
                     raise refused(error) from None
     return files

@@ -332,7 +332,7 @@ _RUN = (
     Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: versions()),
     Quantity("files", "", "Files of this run: a later run replaces them.", elsewhere),
     Quantity("seconds", "s", "Time for this row.", elsewhere, (SWEEP,)),
-    Quantity("input", "", "Digests of the case's files, and of the row.", elsewhere, (SWEEP,)),
+    Quantity("input", "", "Digests of the case's files.", elsewhere, (SWEEP,)),
 )  # fmt: skip
 
 _HISTORY = (

@@ -238,11 +238,6 @@ class Solution(Solved):
         return contact_result(self)
 
     @cached_property
-    def listed_contact(self) -> ContactResult:
-        """The contact nodes that this rank lists in files: all, or its own. Collective."""
-        return contact_result(self, whole=False) if self.in_pieces else self.contact
-
-    @cached_property
     def _derived(self) -> dict[str, fem.Function]:
         return DerivedFields(self.problem.equilibrium, self.state).cells()
 

@@ -15,7 +15,6 @@ from contact.errors import InputError, counted
 from contact.interface.mortar.surface import surface_of
 from contact.interface.multipliers import Multipliers
 from contact.mesh.entities import paths
-from contact.io.formats import in_pieces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -39,11 +38,6 @@ class Solved:
 
     problem: ContactProblem
     state: State
-
-    @property
-    def in_pieces(self) -> bool:
-        """Whether each rank writes its own contact nodes. Collective."""
-        return in_pieces(self.problem.comm, self.problem.nodes.size)
 
     @property
     def nodal(self) -> Array:
@@ -202,16 +196,8 @@ class ContactResult:
         return made
 
 
-def contact_result(solved: Solved, whole: bool = True) -> ContactResult:
-    """Return the contact nodes of a solved problem. Collective.
-
-    Parameters
-    ----------
-    solved
-        The solved problem.
-    whole
-        Whether those of all ranks; else those of this one, in the order of their places.
-    """
+def contact_result(solved: Solved) -> ContactResult:
+    """Return the contact nodes of a solved problem, those of all ranks. Collective."""
     problem, nodes, forces = solved.problem, solved.problem.nodes, solved.forces
     gap, normal_displacement = problem.interface.law.jump.gap, solved.normal_displacement
     own: dict[str, NDArray[Any]] = {
@@ -234,13 +220,10 @@ def contact_result(solved: Solved, whole: bool = True) -> ContactResult:
     if problem.piezoelectric:
         own["potential"] = problem.equilibrium.phi_scale * solved.nodal[:, -1]
         own["charge"] = problem.interface.law.charge(solved.nodal, solved.pressure)
-    if whole:
-        own = {name: nodes.gather(values) for name, values in own.items()}
-        order = _by_position(problem, nodes.gather(nodes.points))
-        if problem.dim == 2:
-            order = _along_chain(own["node"], order, nodes.gather(_links(problem)))
-    else:
-        order = _by_position(problem, nodes.points)
+    own = {name: nodes.gather(values) for name, values in own.items()}
+    order = _by_position(problem, nodes.gather(nodes.points))
+    if problem.dim == 2:
+        order = _along_chain(own["node"], order, nodes.gather(_links(problem)))
     order = order[np.argsort(own["entry"][order], kind="stable")]
     arrays: dict[str, Any] = {name: values[order] for name, values in own.items()}
     return ContactResult(**arrays, _problem=problem)

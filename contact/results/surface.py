@@ -51,7 +51,7 @@ def contact_surface(solution: Solution) -> Grid:
     }
     if problem.piezoelectric:
         fields["potential"] = body.phi_scale * x[:, d]
-    listed, size = solution.listed_contact, owners.begins[-1]
+    listed, size = solution.contact, owners.begins[-1]
     known, numbers = owner * size + np.concatenate(nodes), listed.entry * size + listed.node
     for name, values in values_of(SURFACE, listed).items():
         fields[name] = _at(known, numbers, values)

@@ -3,7 +3,7 @@
 ``mpirun -n P python3 -m scripts.benchmarks.weak BODIES N [--solve]``: BODIES, 1 or 2, are bars of
 P x 1 x 1 that touch along their length, N the cells of a rank along each edge of its slice: N = 43
 makes 250,000 unknowns a rank of one body, N = 34 of two. Without ``--solve`` a problem is made,
-its residuals are evaluated, and files are written; with it, it is solved, and with ``--length L``
+its residuals are evaluated; with it, it is solved, and with ``--length L``
 the bars are L x 1 x 1 on any number of ranks. Each rank counts the bytes of the arrays of
 Python at their peak (`tracemalloc`), those of the coupling, and those that it receives through the
 communicator; counts do not depend on the machine, or on how many cores it has.
@@ -18,9 +18,6 @@ import tracemalloc
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
-from shutil import rmtree
-from tempfile import mkdtemp
 from typing import Any, ClassVar
 
 import basix.ufl
@@ -34,21 +31,13 @@ from contact._compat import destinations
 from contact.body.description import Body, Fixed
 from contact.interface import pairing
 from contact.interface.friction import Friction
-from contact.io import formats
-from contact.io.checkpoint import read_checkpoint
-from contact.io.files import write_outputs
-from contact.linear.operator import Counters
 from contact.mesh.domain import Domain, from_mesh
 from contact.methods.options import NewtonOptions
-from contact.methods.report import IterationHistory, Outcome
 from contact.nesting import prolong
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
-from contact.ranks import on_root
-from contact.results.options import OutputOptions
 from contact.results.recovery import nodal_means
-from contact.results.solution import Solution, StepRecord
 from forms.hencky import Linear
 from scripts.benchmarks.bench_one import rank_memory
 
@@ -170,43 +159,14 @@ def held(problem: ContactProblem) -> int:
 
 
 def outputs(problem: ContactProblem, n: int, bodies: int) -> dict[str, Callable[[], object]]:
-    """Return the actions on a problem that are counted one by one, by name. Collective.
-
-    All files are in pieces, of a step too, with a checkpoint, which is read again.
-    """
-    comm, state = problem.comm, problem.start()
-    files = OutputOptions(checkpoint=True)
-    found = Solution(
-        problem,
-        state,
-        Outcome(evaluate(problem, state), NewtonOptions().allowed),
-        *_NOTHING,
-        {"output": 0.0},
-    )
-    found.output, found.steps = files, [StepRecord(state, {"t": 0.0}, 0.0)]
-    folder = Path(comm.bcast(mkdtemp() if comm.rank == 0 else ""))
-    coarse = problem_of(comm, n // 2, bodies)
+    """Return the actions on a problem that are counted one by one, by name. Collective."""
+    coarse = problem_of(problem.comm, n // 2, bodies)
     cells = np.arange(problem.domain.mesh.topology.index_map(3).size_local, dtype=np.int32)
     values = np.ones((cells.size, 6))
-
-    def write() -> None:
-        most, formats.TOGETHER = formats.TOGETHER, 0
-        try:
-            write_outputs(found, folder)
-        finally:
-            formats.TOGETHER = most
-
     return {
-        "written": write,
-        "read": lambda: read_checkpoint(folder / "checkpoint.npz", problem),
         "nested": lambda: prolong(coarse, coarse.start(), problem),
         "separated": lambda: nodal_means(problem.domain, cells, values, ["middle"]),
-        "": lambda: on_root(comm, lambda: rmtree(folder)),
     }
-
-
-#: History, counters and method of a solution that is none.
-_NOTHING: tuple[IterationHistory, Counters, str] = (IterationHistory(), Counters(), "")
 
 
 def measure(comm: MPI.Intracomm, n: int, bodies: int) -> dict[str, Any]:
@@ -229,8 +189,7 @@ def measure(comm: MPI.Intracomm, n: int, bodies: int) -> dict[str, Any]:
             do()
             most = comm.allreduce(tracemalloc.get_traced_memory()[1] - here, op=MPI.MAX)
             gone = comm.allreduce(Counted.received["bytes"] - before, op=MPI.SUM)
-            if name:
-                stages |= {name: most, f"{name}, received": gone}
+            stages |= {name: most, f"{name}, received": gone}
     finally:
         tracemalloc.stop()
         Domain.comm = whole  # type: ignore[method-assign]

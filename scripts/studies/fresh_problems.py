@@ -22,7 +22,7 @@ from mpi4py import MPI
 from contact import InputError, Solution, solve
 from contact.case.file import Case, parse_case
 from contact.case.text import to_toml
-from contact.io.files import write_outputs
+from contact.writing import write_outputs
 from scripts.reporting import Report, append, parser
 from scripts.studies.fresh_check import Mesh, recheck
 from scripts.studies.fresh_families import FAMILIES, Bodies, Rng, Tables, draw

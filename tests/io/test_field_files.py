@@ -12,11 +12,11 @@ from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.history import BodyState
 from contact.io.checkpoint import read_checkpoint
-from contact.io.files import write_outputs
 from contact.problem.residuals import evaluate
 from contact.results.fields import DerivedFields
 from contact.results.options import OutputOptions
 from contact.solving import solve
+from contact.writing import write_outputs
 from tests.problems.written import block, electric, written
 
 

@@ -11,12 +11,12 @@ import pytest
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.io.files import write_outputs
 from contact.methods.options import OPTIONS, with_method
 from contact.results.options import OutputOptions
 from contact.results.solved import tangent_of
 from contact.results.surface import contact_table
 from contact.solving import solve
+from contact.writing import write_outputs
 from tests.problems.written import block, electric, written
 
 # Debian's adios2 would take its serial library in a run without mpirun.

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from contact.io.files import write_outputs
 from contact.io.reference import files_help
 from contact.plot.run import read_grid
 from contact.results import quantities as registry
 from contact.results.quantities import QUANTITIES, quantities
 from contact.results.quantity import BODY, HISTORY, NODES, STEPS, SUMMARY, SURFACE, SWEEP, Quantity
 from contact.solving import solve
+from contact.writing import write_outputs
 from scripts.output_page import PAGE, page
 from tests.problems.rigid import column, indented, plate
 from tests.problems.written import block, electric

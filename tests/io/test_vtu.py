@@ -9,12 +9,12 @@ from mpi4py import MPI
 from pyvista import UnstructuredGrid
 
 from contact.cli.main import BAD_INPUT, CONVERGED, main
-from contact.io.files import write_outputs
-from contact.io.formats import gathered, write_share
+from contact.io.fields import gathered, write_grid
 from contact.mesh.cells import TRIANGLE, VTK
 from contact.plot.run import read_grid
 from contact.results.grid import Grid
 from contact.solving import solve
+from contact.writing import write_outputs
 from tests.problems.written import block, electric
 
 ROOT = MPI.COMM_WORLD.rank == 0
@@ -89,7 +89,7 @@ def test_ranks_with_nothing(shared_tmp_path: Path) -> None:
         cells = 3 * first + np.arange(3 * n).reshape(-1, 3)
         share = Grid(points, cells, TRIANGLE, {"number": np.arange(3 * n)}, {"v": points[:n]})
         whole, path = gathered(comm, share), shared_tmp_path / "ranks.vtu"
-        write_share(comm, share, path)
+        write_grid(comm, share, path)
         if whole is None or not len(whole.cells):
             continue
         read = read_grid(path)

@@ -1,4 +1,4 @@
-"""Arrays, files, messages of a rank do not grow with the number of ranks, at fixed work each."""
+"""Arrays and messages of a rank do not grow with the number of ranks, at fixed work each."""
 
 import pytest
 from mpi4py import MPI
@@ -7,8 +7,8 @@ from scripts.benchmarks.weak import measure
 
 COMM = MPI.COMM_WORLD
 
-#: All files in pieces, a checkpoint read again, a start from a coarser mesh, means beside a part.
-STAGES = ("written", "read", "nested", "separated")
+#: A start from a coarser mesh, means beside a part.
+STAGES = ("nested", "separated")
 
 
 @pytest.mark.parallel(3, alone=False)  # which measures 1 and 2 as well

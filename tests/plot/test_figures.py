@@ -17,7 +17,6 @@ from scipy.spatial import KDTree
 
 from contact.cli.arguments import parse
 from contact.errors import InputError
-from contact.io.files import write_outputs
 from contact.plot.body import draw_plane, picture
 from contact.plot.contact import draw_line, draw_surface
 from contact.plot.figures import draw
@@ -29,6 +28,7 @@ from contact.results.options import OutputOptions, Units
 from contact.results.quantity import STATUS
 from contact.results.solution import Solution
 from contact.solving import solve
+from contact.writing import write_outputs
 from tests.problems.written import block, electric
 
 

@@ -17,7 +17,7 @@ from contact import InputError, Material, evolve, parse_case, solve
 from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
 from contact.io.checkpoint import read_steps
-from contact.io.field_files import body_share
+from contact.io.fields import body_share
 from contact.results.fields import DerivedFields, check_variables
 from forms.hencky import Isotropic
 from forms.history import HistoryLaw, Response, isotropic_stiffness

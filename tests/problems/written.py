@@ -5,8 +5,8 @@ import json
 from pathlib import Path
 
 from contact.case.file import Case, parse_case
-from contact.io.files import write_outputs
 from contact.results.solution import Solution
+from contact.writing import write_outputs
 from tests.problems.rigid import PIEZO
 
 

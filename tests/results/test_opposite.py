@@ -15,7 +15,7 @@ from contact.interface.obstacle import GapFunction
 from contact.methods.options import NewtonOptions
 from contact.plot.figures import figures_of
 from contact.plot.run import read_grid, read_run
-from contact.io.files import write_outputs
+from contact.writing import write_outputs
 from contact.results.quantities import quantities
 from contact.results.quantity import AGAINST, OPPOSITE
 from contact.results.surface import opposite_surface

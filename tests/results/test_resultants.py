@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contact.errors import InputError
-from contact.io.field_files import body_share
+from contact.io.fields import body_share
 from contact.solving import solve
 from tests.problems.written import block, written
 

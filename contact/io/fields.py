@@ -1,21 +1,20 @@
-"""The files of fields.
+"""The files of fields: VTK's XML files (.vtu), which ParaView, pyvista and meshio open; VTX; XDMF.
 
-ADIOS2 and HDF5 throw where a disk is full, and again where a failed writer is closed by its
-destructor, which ends a process; on several ranks those that had room wait for the others. So the
-room is asked for first; and a writer that fails all the same, for others write to the disk too, is
-never destroyed.
+Shares of grids are gathered on rank 0, which writes one .vtu file. VTX and XDMF are written by all
+ranks.
 """
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+import sys
+from base64 import b64encode
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from dolfinx import fem, has_adios2, io, la
@@ -23,8 +22,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.errors import InputError
-from contact.io.folder import ROOM
-from contact.io.formats import in_pieces, write_share
 from contact.mesh.cells import shape_of
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -36,6 +33,9 @@ from contact.results.surface import contact_surface
 
 #: A time, and the state then.
 Frame: TypeAlias = tuple[float, State]
+
+#: VTK's names of kinds of numbers.
+KINDS = {"float64": "Float64", "int32": "Int32", "int64": "Int64", "uint8": "UInt8"}
 
 #: Fields that are written for every step, and internal variables.
 SERIES = ("displacement", "potential", "von_mises")
@@ -54,7 +54,7 @@ def write_fields(solution: Solution, folder: Path) -> None:
     Raises
     ------
     InputError
-        If there is no room for them, or dolfinx has no ADIOS2 for VTX files.
+        If dolfinx has no ADIOS2 for VTX files, or a file cannot be written.
     OSError
         On a rank where the library fails all the same; others may wait for it.
     """
@@ -66,18 +66,13 @@ def write_fields(solution: Solution, folder: Path) -> None:
             if solution.error is not None:
                 in_cells["error"] = solution.error.cells
             share = replace(share, in_cells=in_cells)
-            write_share(problem.comm, share, folder / "fields.vtu", _in_pieces(problem))
+            write_grid(problem.comm, share, folder / "fields.vtu")
             if solution.steps:
                 _write_series(solution, frames, folder)
         case "vtx":
             _write_vtx(problem, frames, folder)
         case "xdmf":
             _write_xdmf(problem, frames, folder)
-
-
-def _in_pieces(problem: ContactProblem) -> bool:
-    """Whether each rank writes its own share of the body."""
-    return in_pieces(problem.comm, problem.equilibrium.layout.index_map.size_global)
 
 
 def regions_of(problem: ContactProblem) -> NDArray[np.int32]:
@@ -114,12 +109,13 @@ def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> 
     for k, (time, state) in enumerate(frames):
         derived.move_to(state)
         shares = {
-            "fields": (body_share(problem, state, names, derived), _in_pieces(problem)),
-            "contact": (contact_surface(solution.at_step(state)), solution.in_pieces),
+            "fields": body_share(problem, state, names, derived),
+            "contact": contact_surface(solution.at_step(state)),
         }
-        for kind, (share, pieces) in shares.items():
-            path = write_share(problem.comm, share, folder / f"{kind}-{k:04d}.vtu", pieces)
-            lines[kind].append(f'<DataSet timestep="{time!r}" file="{path.name}"/>')
+        for kind, share in shares.items():
+            name = f"{kind}-{k:04d}.vtu"
+            write_grid(problem.comm, share, folder / name)
+            lines[kind].append(f'<DataSet timestep="{time!r}" file="{name}"/>')
 
     def write_names() -> None:
         for kind, sets in lines.items():
@@ -216,19 +212,18 @@ def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -
         )
     derived = DerivedFields(problem.equilibrium, frames[0][1])
     at_nodes, in_cells = _at_nodes(problem, frames[0][1], derived), list(derived.cells().values())
-    claim_room(problem.comm, folder, len(frames) * (_bytes(at_nodes) + _bytes(in_cells)))
-    paths = folder / "fields.bp", folder / "cells.bp"
+    comm, nodal, cellwise = problem.comm, folder / "fields.bp", folder / "cells.bp"
     with (
-        library_errors(paths[0]),
-        closing(_vtx(paths[0], at_nodes)) as nodal,
-        closing(_vtx(paths[1], in_cells)) as cellwise,
+        _os_errors(folder),
+        io.VTXWriter(comm, nodal, at_nodes, engine="BP4") as at_nodes_file,
+        io.VTXWriter(comm, cellwise, in_cells, engine="BP4") as in_cells_file,
     ):
         for time, state in frames:
             derived.move_to(state)
             _copy(_at_nodes(problem, state, derived), at_nodes)
             _copy(derived.cells().values(), in_cells)
-            nodal.write(time)
-            cellwise.write(time)
+            at_nodes_file.write(time)
+            in_cells_file.write(time)
 
 
 def _copy(given: Iterable[fem.Function], into: Iterable[fem.Function]) -> None:
@@ -238,10 +233,8 @@ def _copy(given: Iterable[fem.Function], into: Iterable[fem.Function]) -> None:
 
 def _write_xdmf(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
     derived = DerivedFields(problem.equilibrium, frames[0][1])
-    at_corners = _at_corners(problem, frames[0][1], derived)
-    claim_room(problem.comm, folder, len(frames) * _bytes(at_corners))
     path = folder / "fields.xdmf"
-    with library_errors(path), closing(lambda: io.XDMFFile(problem.comm, path, "w")) as file:
+    with _os_errors(path), io.XDMFFile(problem.comm, path, "w") as file:
         file.write_mesh(problem.domain.mesh)
         for time, state in frames:
             derived.move_to(state)
@@ -272,57 +265,8 @@ def _at_corners(
     return found
 
 
-def _vtx(path: Path, functions: Sequence[fem.Function]) -> Callable[[], Any]:
-    comm = functions[0].function_space.mesh.comm
-    return lambda: io.VTXWriter(comm, path, functions, engine="BP4")
-
-
-def _bytes(functions: Sequence[fem.Function]) -> int:
-    """Bound the bytes that this rank adds to a file of functions of one degree, with their mesh."""
-    total = OVERHEAD
-    for function in functions:
-        space = function.function_space
-        index_map, components = space.dofmap.index_map, space.dofmap.index_map_bs
-        nodes = index_map.size_local + index_map.num_ghosts
-        # Vectors and tensors are filled up to 3 and 9 components.
-        total += 8 * nodes * next(filled for filled in (1, 3, 9) if components <= filled)
-    links = space.dofmap.list
-    # Coordinates, numbers, marks of ghosts; and the corners of the cells.
-    corners = max(links.shape[1], shape_of(space.mesh).corners)
-    points = max(nodes, corners * len(links) if links.shape[1] == 1 else nodes)
-    return total + points * (24 + 8 + 1) + len(links) * (corners + 1) * 8
-
-
-#: Bytes that each rank adds to a file besides the numbers: names, offsets, extremes.
-OVERHEAD = 16384
-
-
-def claim_room(comm: MPI.Intracomm, folder: Path, own: int) -> None:
-    """Check that there is room in a folder for the bytes that each rank will write. Collective.
-
-    Raises
-    ------
-    InputError
-        If there is not.
-    """
-    needed = comm.allreduce(own, op=MPI.SUM)
-
-    def ask() -> None:
-        # Quotas do not show in the free space that a file system reports.
-        path = folder / ROOM
-        try:
-            with path.open("wb") as file:
-                os.posix_fallocate(file.fileno(), 0, needed)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(folder)) from None
-        finally:
-            path.unlink(missing_ok=True)
-
-    on_root(comm, ask)
-
-
 @contextmanager
-def library_errors(path: Path) -> Iterator[None]:
+def _os_errors(path: Path) -> Iterator[None]:
     """Turn the errors of a library that writes a file into OSErrors."""
     try:
         yield
@@ -331,18 +275,71 @@ def library_errors(path: Path) -> Iterator[None]:
         raise OSError(number, os.strerror(number), str(path)) from error
 
 
-#: Writers that have failed. Some libraries abort the process where they clean up after these.
-abandoned: list[str] = []
+def gathered(comm: MPI.Intracomm, share: Grid) -> Grid | None:
+    """Return the shares of all ranks together on rank 0, None elsewhere. Collective."""
+
+    def together(values: Values) -> Values:
+        found = comm.gather(values)
+        return values if found is None else np.concatenate(found)
+
+    whole = Grid(
+        together(share.points),
+        together(share.cells),
+        share.shape,
+        {name: together(values) for name, values in share.at_points.items()},
+        {name: together(values) for name, values in share.in_cells.items()},
+    )
+    return whole if comm.rank == 0 else None
 
 
-@contextmanager
-def closing(open_: Callable[[], Any]) -> Iterator[Any]:
-    """Yield the writer of a file, and close it; where that fails, it is left as it is."""
-    writer = open_()
-    try:
-        yield writer
-        writer.close()
-    except RuntimeError:
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))  # not to be destroyed
-        abandoned.append(type(writer).__name__)
-        raise
+def write_vtu(path: Path, grid: Grid) -> None:
+    """Write a file; vectors of the plane get a third component 0. On one rank.
+
+    VTK's own writer may crash where the disk is full.
+    """
+    count = grid.cells.shape[1]
+    kind, order = grid.shape.vtk(grid.shape.degree_of(count))
+    cells = {
+        "connectivity": grid.cells[:, order].ravel(),
+        "offsets": np.arange(1, len(grid.cells) + 1) * count,
+        "types": np.full(len(grid.cells), kind, dtype=np.uint8),
+    }
+    points = np.zeros((len(grid.points), 3))
+    points[:, : grid.points.shape[1]] = grid.points
+    sections: dict[str, Mapping[str, Values]] = {
+        "PointData": {name: _filled(values) for name, values in grid.at_points.items()},
+        "CellData": {name: _filled(values) for name, values in grid.in_cells.items()},
+        "Points": {"points": points},
+        "Cells": cells,
+    }
+    with path.open("w", encoding="ascii") as file:
+        file.write(
+            '<VTKFile type="UnstructuredGrid" version="1.0" header_type="UInt64" '
+            f'byte_order="{sys.byteorder.capitalize()}Endian">\n<UnstructuredGrid>\n'
+            f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(grid.cells)}">\n'
+        )
+        for section, arrays in sections.items():
+            file.write(f"<{section}>\n")
+            for name, values in arrays.items():
+                head = f'type="{KINDS[values.dtype.name]}" format="binary"'
+                if values.ndim > 1:
+                    head += f' NumberOfComponents="{values.shape[1]}"'
+                data = np.uint64(values.nbytes).tobytes() + values.tobytes()
+                text = b64encode(data).decode()
+                file.write(f'<DataArray Name="{name}" {head}>{text}</DataArray>\n')
+            file.write(f"</{section}>\n")
+        file.write("</Piece>\n</UnstructuredGrid>\n</VTKFile>\n")
+
+
+def write_grid(comm: MPI.Intracomm, share: Grid, path: Path) -> None:
+    """Write the shares of all ranks into one file. Collective."""
+    whole = gathered(comm, share)
+    on_root(comm, lambda: None if whole is None else write_vtu(path, whole))
+
+
+def _filled(values: Values) -> Values:
+    """Return values with three components where they have two, as VTK has vectors."""
+    values = values.astype(np.float64 if values.dtype.kind == "f" else np.int32, copy=False)
+    if values.ndim == 2 and values.shape[1] == 2:
+        values = np.column_stack([values, np.zeros(len(values))])
+    return np.ascontiguousarray(values)

@@ -1,19 +1,21 @@
-"""The files of a solve: summary, tables, fields, checkpoint, figures."""
+"""The files of a solution: summary, tables, fields, checkpoint, figures."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from contact.arguments import expect
-from contact.io.field_files import write_fields
+from contact.io.checkpoint import write_checkpoint
+from contact.io.fields import gathered, write_fields, write_grid, write_vtu
 from contact.io.folder import ResultFolder, result_folder
-from contact.io.formats import gathered, write_mappings, write_rows, write_share
+from contact.io.tables import write_columns, write_mappings
 from contact.ranks import on_all_ranks, on_root
 from contact.results.quantities import quantities, values_of
 from contact.results.quantity import (
@@ -29,6 +31,7 @@ from contact.results.quantity import (
 from contact.results.solution import Solution
 from contact.results.surface import (
     contact_surface,
+    contact_table,
     opposite_surface,
     opposite_table,
 )
@@ -75,34 +78,28 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
     failures: list[Exception] = []
 
     def write(new: Path) -> Mapping[str, Any]:
-        surface, opposite = contact_surface(solution), opposite_surface(solution)
-        table, pieces = values_of(NODES, solution.listed_contact), solution.in_pieces
-        write_rows(comm, table, new / NODES, pieces)
-        write_share(comm, surface, new / SURFACE, pieces)
-        if opposite is not None:
-            whole = opposite if pieces else gathered(comm, opposite)
-            rows = None if whole is None else opposite_table(solution.problem, whole)
-            write_rows(comm, rows, new / AGAINST, pieces)
-            write_share(comm, opposite, new / OPPOSITE, pieces)
+        opposite = opposite_surface(solution)
+        write_grid(comm, contact_surface(solution), new / SURFACE)
+        whole = None if opposite is None else gathered(comm, opposite)
+        table, records = contact_table(solution), solution.history.records
 
         def write_tables() -> None:
-            records = [values_of(HISTORY, record) for record in solution.history.records]
-            write_mappings(
-                new / "history.csv", records, [quantity.name for quantity in quantities(HISTORY)]
-            )
+            write_columns(new / NODES, table)
+            if whole is not None:
+                write_vtu(new / OPPOSITE, whole)
+                write_columns(new / AGAINST, opposite_table(solution.problem, whole))
+            rows = [values_of(HISTORY, record) for record in records]
+            write_mappings(new / HISTORY, rows, [quantity.name for quantity in quantities(HISTORY)])
             if solution.steps:
                 write_mappings(new / STEPS, [record.row for record in solution.steps])
             if solution.adaptation:
                 write_mappings(new / ADAPT, solution.adaptation)
 
         on_root(comm, write_tables)
-        if solution.steps:
-            _write_contact_steps(solution, new)
+        _write_contact_steps(solution, new / "contact-steps.csv")
         if solution.output.fields != "none":
             write_fields(solution, new)
         if solution.output.checkpoint:
-            from contact.io.checkpoint import write_checkpoint
-
             write_checkpoint(solution, new / "checkpoint.npz")
         solution.seconds["output"] += time.perf_counter() - begin
         summary = {key: _plain(value) for key, value in values_of(SUMMARY, solution).items()}
@@ -120,14 +117,12 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             raise failure
 
 
-def _write_contact_steps(solution: Solution, folder: Path) -> None:
-    """Write ``contact-steps.csv``, of pieces one of each rank. Collective."""
-    path = folder / "contact-steps.csv"
-    for record in solution.steps:
-        step = solution.at_step(record.state)
-        table = values_of(NODES, step.listed_contact)
-        table = {"t": np.full(len(table["x"]), step.state.time), **table}
-        write_rows(solution.problem.comm, table, path, solution.in_pieces, more=True)
+def _write_contact_steps(solution: Solution, path: Path) -> None:
+    """Write the contact nodes of all steps. Collective."""
+    for k, record in enumerate(solution.steps):
+        table = contact_table(solution.at_step(record.state))
+        table = {"t": np.full(len(table["x"]), record.state.time), **table}
+        on_root(solution.problem.comm, partial(write_columns, path, table, more=k > 0))
 
 
 def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:
