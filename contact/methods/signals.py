@@ -19,44 +19,18 @@ from contact.ranks import largest
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.methods.report import Monitor, Record
 
-#: Seconds in which a second signal is taken for an echo of the first.
+#: The signals that ask a run to end.
+ENDING = signal.SIGINT, signal.SIGTERM
+
+#: Seconds in which a second signal is taken for an echo of the first: a launcher and its process
+#: group may both deliver the same one.
 REPEAT = 2.0
 
 #: Added to the number of the signal that ended a run: its exit status.
 SIGNALLED = 128
 
-
 #: A handler of signals, as `signal.signal` takes it.
 Handler: TypeAlias = Callable[[int, FrameType | None], object] | int
-
-
-@contextmanager
-def _handled(
-    handler: Handler,
-    signals: tuple[int, ...] = (signal.SIGINT, signal.SIGTERM),
-    replaces: Callable[[object], bool] = lambda old: True,
-) -> Iterator[dict[int, Handler]]:
-    """Install a handler of signals in place of some; yield those, which come back in the end.
-
-    Signals can be caught in the main thread alone; in others nothing is changed.
-    """
-    before: dict[int, Handler] = {}
-    if threading.current_thread() is threading.main_thread():
-        for number in signals:
-            old = signal.getsignal(number)
-            if old is not None and replaces(old):  # None: not installed from Python
-                before[number] = old
-                signal.signal(number, handler)
-    try:
-        yield before
-    finally:
-        _restore(before)
-
-
-def _restore(before: dict[int, Handler]) -> None:
-    for number, handler in before.items():
-        signal.signal(number, handler)
-    before.clear()
 
 
 class Interrupted(Exception):
@@ -88,9 +62,9 @@ class Stop:
     monitor
         Told of every outer iteration first.
     caught
-        The first signal on this rank, or nothing.
+        The signals on this rank.
     told
-        Whether `Interrupted` has been raised for it.
+        Whether `Interrupted` has been raised for them.
     """
 
     comm: MPI.Intracomm
@@ -106,74 +80,24 @@ class Stop:
 
     def poll(self) -> None:
         """Look for signals, once an inner iteration. Collective."""
-        number = self._first()
+        number = self.first()
         if number:
             self.told = True
             raise Interrupted(number)
 
-    def agree(self) -> None:
-        """Take a signal on any rank for one on all of them. Collective."""
-        number = self._first()
-        if number and not self.caught:
-            self.caught.append(number)
-
-    def _first(self) -> int:
+    def first(self) -> int:
+        """Return the number of a signal on any rank; 0 for none. Collective."""
         return int(largest(self.comm, self.caught[0] if self.caught else 0))
-
-
-@contextmanager
-def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Stop]:
-    """Yield a monitor that raises `Interrupted` on all ranks after a SIGINT or SIGTERM on any.
-
-    Parameters
-    ----------
-    comm
-        Communicator of the problem.
-    monitor
-        Told of every iteration first.
-
-    Notes
-    -----
-    The first signal is noted; one that comes more than `REPEAT` seconds later has its usual
-    effect (a launcher and its process group may both deliver the same one). So has one for which
-    nothing was raised, after the last iteration, in the end and on all ranks.
-    """
-    stop = Stop(comm, monitor)
-    since: list[float] = []
-
-    def note(number: int, frame: FrameType | None) -> None:
-        if stop.caught and time.monotonic() - since[0] > REPEAT:
-            _restore(before)
-            signal.raise_signal(number)
-        if not stop.caught:
-            stop.caught.append(number)
-            since.append(time.monotonic())
-
-    try:
-        with _handled(note) as before:
-            outside = [handler for handler in before.values() if isinstance(handler, Ending)]
-            for number in [handler.caught[0] for handler in outside if handler.caught][:1]:
-                note(number, None)
-            try:
-                yield stop
-                stop.agree()
-            finally:
-                for handler in outside if stop.told and since else []:
-                    handler.deaf_until = since[0] + REPEAT
-    finally:
-        if stop.caught and not stop.told:
-            signal.raise_signal(stop.caught[0])
 
 
 @dataclass
 class Ending:
-    """Handler of SIGINT and SIGTERM outside of a solve: ends the run by an exception.
+    """Handler of signals outside of a solve: ends the run by an exception.
 
     Attributes
     ----------
     caught
-        The signals so far. Where the exception is lost, in a library that swallows it, the next
-        solve stops for them.
+        The signals so far. Where a library swallows the exception, the next solve stops for them.
     deaf_until
         Until when a signal is an echo of the one that has stopped a solve (monotonic seconds).
     """
@@ -183,38 +107,54 @@ class Ending:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Note a signal, and raise KeyboardInterrupt or `Terminated`."""
-        if time.monotonic() < self.deaf_until:
-            return
-        self.caught.append(number)
-        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+        if time.monotonic() >= self.deaf_until:
+            self.caught.append(number)
+            raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
 
 
 @contextmanager
-def signals_held(timeout: float = math.inf) -> Iterator[list[int]]:
+def _handled(handler: Handler, replaces: Callable[[object], bool]) -> Iterator[None]:
+    """Install a handler in place of some, which come back in the end.
+
+    Signals can be caught in the main thread alone; in others nothing is changed.
+    """
+    before = {number: signal.getsignal(number) for number in ENDING}
+    if threading.current_thread() is not threading.main_thread():
+        before.clear()
+    before = {k: old for k, old in before.items() if old is not None and replaces(old)}
+    for number in before:
+        signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+@contextmanager
+def signals_held() -> Iterator[list[int]]:
     """Let signals wait until the end of the block, which must not be left half done.
 
-    Parameters
-    ----------
-    timeout
-        Seconds after the first signal from which on another one has its effect at once.
+    One that comes more than `REPEAT` seconds after the first ends the process.
 
     Yields
     ------
     The signals so far. They have their effect in the end, unless the list is cleared.
     """
     caught: list[int] = []
-    since: list[float] = []
+    last = math.inf
 
     def note(number: int, frame: FrameType | None) -> None:
-        caught.append(number)
-        since.append(time.monotonic())
-        if since[-1] - since[0] > timeout:
-            caught.clear()
-            _restore(before)
+        nonlocal last
+        if time.monotonic() > last:
+            signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
+        if not caught:
+            last = time.monotonic() + REPEAT
+        caught.append(number)
 
     try:
-        with _handled(note, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)) as before:
+        with _handled(note, lambda old: True):
             yield caught
     finally:
         if caught:
@@ -222,19 +162,51 @@ def signals_held(timeout: float = math.inf) -> Iterator[list[int]]:
 
 
 @contextmanager
-def ending_on_signal() -> Iterator[Ending]:
-    """Let SIGINT and SIGTERM end a run in words, where Python's own handlers stand."""
-    ending, own = Ending(), (signal.SIG_DFL, signal.default_int_handler)
-    with _handled(ending, replaces=lambda old: old in own):
-        yield ending
+def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Stop]:
+    """Yield a monitor that raises `Interrupted` on all ranks after a signal on any.
+
+    A signal for which nothing was raised, after the last iteration, has its usual effect in the
+    end, on all ranks.
+
+    Parameters
+    ----------
+    comm
+        Communicator of the problem.
+    monitor
+        Told of every iteration first.
+    """
+    stop = Stop(comm, monitor)
+    outside = [old for old in map(signal.getsignal, ENDING) if isinstance(old, Ending)][:1]
+    try:
+        with signals_held() as stop.caught:
+            stop.caught += [number for ending in outside for number in ending.caught[:1]]
+            try:
+                yield stop
+                number = stop.first()
+                if number and not stop.caught:
+                    stop.caught.append(number)
+            finally:
+                if stop.told:
+                    stop.caught.clear()
+    finally:
+        for ending in outside if stop.told else ():
+            ending.deaf_until = time.monotonic() + REPEAT
+
+
+@contextmanager
+def ending_on_signal() -> Iterator[None]:
+    """Let signals end a run in words, where Python's own handlers stand."""
+    own = signal.SIG_DFL, signal.default_int_handler
+    with _handled(Ending(), lambda old: old in own):
+        yield
 
 
 @contextmanager
 def deaf() -> Iterator[None]:
-    """Let SIGINT and SIGTERM end the process at once, where `ending_on_signal` would end the run.
+    """Let signals end the process at once, where `ending_on_signal` would end the run.
 
     For work of a library that takes minutes without returning to Python, before anything has
     been computed.
     """
-    with _handled(signal.SIG_DFL, replaces=lambda old: isinstance(old, Ending)):
+    with _handled(signal.SIG_DFL, lambda old: isinstance(old, Ending)):
         yield
