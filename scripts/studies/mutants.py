@@ -34,6 +34,9 @@ LIMIT = 1200
 #: Status of pytest without any test, and of `timeout` where it ends a command.
 NO_TESTS, TIMEOUT = 5, 124
 
+#: As `make test` has it: one thread a rank, and ranks that wait give way.
+ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+
 #: A test that fails, as pytest's summary names it.
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+::\S+)", re.M)
 
@@ -315,7 +318,7 @@ def found_by(tree: Path, files: Sequence[str], ranks: int) -> str:
     ended = subprocess.run(
         ["timeout", str(LIMIT), *run],
         cwd=tree,
-        env={**os.environ, "PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1"},
+        env={**os.environ, **ENVIRONMENT, "PYTHONPATH": str(tree)},
         capture_output=True,
         text=True,
     )
