@@ -29,7 +29,7 @@ and a problem that is put together in Python by
   `SolveInterrupted` by Ctrl-C.
 
 Wherever a field is given - a displacement, a load, a gap, a coefficient of friction - a number, a
-function of x, UFL or a dolfinx Function will do.
+formula such as "0.1*x", a function of x, UFL or a dolfinx Function will do.
 
 The names stand in the stub `contact/__init__.pyi` and are imported on first use, so that a program
 can import the package and still initialise PETSc with its own arguments.

@@ -1,14 +1,7 @@
 """The public names: for type checkers, and for `contact/__init__.py`, which imports them lazily."""
 
 from contact.body.description import Body as Body
-from contact.body.description import Elastic as Elastic
-from contact.body.description import Fixed as Fixed
-from contact.body.description import Load as Load
 from contact.body.description import Material as Material
-from contact.body.rigid import Bolt as Bolt
-from contact.body.rigid import Electrode as Electrode
-from contact.body.rigid import Motion as Motion
-from contact.body.rigid import Rigid as Rigid
 from contact.case.build import build_problem as build_problem
 from contact.case.data import read_data as read_data
 from contact.case.file import Case as Case
@@ -43,6 +36,13 @@ from contact.mesh.reader import from_msh as from_msh
 from contact.methods.options import FixedPointOptions as FixedPointOptions
 from contact.methods.options import NewtonOptions as NewtonOptions
 from contact.methods.options import PenaltyOptions as PenaltyOptions
+from contact.model.body import Bolt as Bolt
+from contact.model.body import Elastic as Elastic
+from contact.model.body import Electrode as Electrode
+from contact.model.body import Fixed as Fixed
+from contact.model.body import Load as Load
+from contact.model.rigid import Motion as Motion
+from contact.model.rigid import Rigid as Rigid
 from contact.problem.contact import Contact as Contact
 from contact.problem.problem import ContactProblem as Problem  # noqa: F401
 from contact.results.solution import Solution as Solution

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
@@ -97,12 +96,11 @@ def is_law(given: object) -> bool:
         return False
 
 
-class Returned(ValueError):
-    """A function has returned a value that is not accepted; for `naming`."""
+class Returned(InputError):
+    """A function has returned a value that is not accepted; `naming` says whose."""
 
     def __init__(self, words: str, identifier: str = "own-function") -> None:
-        super().__init__(words)
-        self.identifier = identifier
+        super().__init__(words, identifier)
 
 
 def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
@@ -149,10 +147,10 @@ def naming(name: str) -> Iterator[None]:
     """Let errors in a user's function name the argument."""
     try:
         yield
+    except Returned as error:
+        raise error.within(f"{name}: ") from None
     except InputError:
         raise
-    except Returned as error:
-        raise InputError(f"{name}: {error}", error.identifier) from None
     except Exception as error:
         raise InputError(
             f"{name}: the function raises {type(error).__name__}: {shorten(str(error))}",
@@ -160,7 +158,6 @@ def naming(name: str) -> Iterator[None]:
         ) from error
 
 
-@dataclass(frozen=True)
 class OfTime:
     """A user's function of time.
 
@@ -172,8 +169,18 @@ class OfTime:
         Its name in messages.
     """
 
-    function: Callable[[float], Any]
-    name: str = field(compare=False)
+    names = frozenset({"t"})  # as of formulas
+
+    def __init__(self, function: Callable[[float], Any], name: str) -> None:
+        self.function, self.name = function, name
+
+    def __eq__(self, other: object) -> bool:
+        """Compare the functions."""
+        return isinstance(other, OfTime) and self.function == other.function
+
+    def __hash__(self) -> int:
+        """Hash the function."""
+        return hash(self.function)
 
     def __call__(self, time: float) -> float:
         """Return its value at a time."""
@@ -181,6 +188,10 @@ class OfTime:
             value = real(self.function(time), (), "a number")
             check_finite(value.reshape(1), lambda _: f"at t = {time:g}")
             return float(value)
+
+    def number(self, time: float) -> float:
+        """Return its value at a time, as of formulas."""
+        return self(time)
 
 
 def sampled(name: str, shape: tuple[int, ...], *calls: Callable[[], Any]) -> list[Array] | None:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import json
 import re
 from collections.abc import Iterable
+from typing import Any
 
 #: How NumPy writes a number where Python's own writing is asked for.
 NUMBER = re.compile(r"\bnp\.(?:u?int|float|bool|str)\d*_?\(([^()]*)\)|\bnp\.(True|False)_?\b")
+
+#: Most characters of a quoted value.
+VALUE = 60
 
 
 def counted(number: float, noun: str) -> str:
@@ -20,6 +25,18 @@ def clipped(text: str, length: int = 100) -> str:
     """Cut a text that is too long, and show characters that are not printable by their codes."""
     text = text if len(text) <= length else text[: length - 3] + "..."
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def shown(given: Any) -> str:
+    """Show a given value as in the case file."""
+    try:
+        text = str(given) if isinstance(given, float) else json.dumps(given, default=str)
+    except ValueError:
+        # Python writes out integers up to a limit of digits only.
+        text = "a whole number of thousands of digits"
+    except RecursionError:
+        text = "a deeply nested list"
+    return clipped(text, VALUE)
 
 
 def nearest(name: str, options: Iterable[str], words: str = " (did you mean {}?)") -> str:

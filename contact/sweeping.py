@@ -23,7 +23,6 @@ from mpi4py import MPI
 from contact.case.build import build_problem, named
 from contact.case.digest import check_files, check_same, digest
 from contact.case.file import Case, load_case
-from contact.case.messages import listed
 from contact.case.text import literal, to_toml
 from contact.errors import InputError, counted, nearest
 from contact.io.folder import write_whole
@@ -34,6 +33,7 @@ from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
 from contact.methods.signals import Interrupted, stop_on_signal
+from contact.model.messages import listed
 from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root

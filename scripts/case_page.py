@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from argparse import ArgumentParser
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import is_dataclass
@@ -14,10 +15,10 @@ from pathlib import Path
 from pydantic.fields import FieldInfo
 
 import meshes
-from contact.case import formula as formulas
 from contact.case.file import DEFAULT, Case
-from contact.case.messages import accepted_by, either, keys_of, kinds_of, sections_of, shown
 from contact.case.text import literal
+from contact.model import formula as formulas
+from contact.model.messages import accepted_by, either, keys_of, kinds_of, sections_of, shown
 from contact.settings import ReadWith
 
 PAGE = Path(__file__).parents[1] / "docs" / "case-file.md"
@@ -76,7 +77,7 @@ def _describe(key: str, section: type, elsewhere: Collection[type]) -> Iterator[
     elsewhere
         Sections that have a place of their own.
     """
-    text = (inspect.getdoc(section) or "").partition("\n\nAttributes\n")[0]
+    text = re.split(r"\n\n(?:Attributes|Parameters)\n", inspect.getdoc(section) or "")[0]
     if is_dataclass(section):
         name, kinds = kinds_of([section])
         if not kinds:

@@ -23,6 +23,7 @@ LAYERS = (
     },
     {"mesh", "library"},
     {"linear"},
+    {"model"},
     {"body"},
     {"interface"},
     {"problem"},

@@ -22,14 +22,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.description import Body
-from contact.body.fields import constant
 from contact.body.global_unknowns import GlobalUnknowns
 from contact.body.loads import Loads
-from contact.body.rigid import Bolt
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices, cell_facets, connected
 from contact.mesh.together import members
+from contact.model.body import Bolt
+from contact.model.fields import constant
 from contact.ranks import summed
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array

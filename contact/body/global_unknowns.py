@@ -12,18 +12,21 @@ potentials as those of the nodes: all of q is then of one kind.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
+from pydantic_core import PydanticCustomError
 from scipy import sparse
 
 from contact.body.description import Body
-from contact.body.rigid import Bolt, Electrode, Rigid, numbers_at, rigid_motions
 from contact.errors import InputError
 from contact.mesh.domain import Domain
+from contact.model.body import Bolt, Electrode
+from contact.model.messages import describe_fault
+from contact.model.rigid import Rigid, numbers_at, rigid_motions
 from contact.ranks import summed
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
@@ -68,8 +71,8 @@ class Member:
         if not isinstance(self.description, Rigid):
             return np.full(1, self.scale)
         motion = self.description.motion
-        turns = np.full(len(motion.rotation), 1 / self.scale)
-        return np.concatenate([np.ones(len(motion.displacement)), turns])
+        turns = np.full(len(motion.turns), 1 / self.scale)
+        return np.concatenate([np.ones(len(motion.displacement or ())), turns])
 
     @property
     def free(self) -> NDArray[np.bool_]:
@@ -213,7 +216,7 @@ def make_global_unknowns(
     described: list[Rigid | Electrode | Bolt] = [*body.rigid, *body.electrodes, *body.bolts]
     for given in described:
         if isinstance(given, Rigid):
-            _check_motion(given, domain)
+            given = _moving(given, domain)
         begin = members[-1].columns.stop if members else 0
         scale = body.phi_scale if isinstance(given, Electrode) else domain.size
         scale = 1.0 if isinstance(given, Bolt) else scale
@@ -228,23 +231,27 @@ def make_global_unknowns(
     return GlobalUnknowns(domain.comm, tuple(members), unknown, ties, tied)
 
 
-def _check_motion(rigid: Rigid, domain: Domain) -> None:
-    """Refuse motions of another dimension, and those that a body of revolution has not."""
-    if (size := len(rigid.motion.displacement)) != domain.dim:
-        raise InputError(
-            f"{rigid.name} on {rigid.on!r}: the motion has {size} components, the body has "
-            f"{domain.dim}",
-            "components",
-        )
-    if not domain.revolved:
-        return
-    radial, _, turn = rigid.values
-    if any(value is None or callable(value) or value != 0 for value in (radial, turn)):
+def _moving(rigid: Rigid, domain: Domain) -> Rigid:
+    """Return a rigid part with all components of its motion, if that is one of the body."""
+    motion, place = rigid.motion, f"{rigid.name} on {rigid.on!r}: "
+    for key in ("displacement", "force", "centre"):
+        given = getattr(motion, key)
+        if given is not None and len(given) != domain.dim:
+            raise InputError(
+                f"{place}{key} has {len(given)} components, the body has {domain.dim}",
+                "components",
+            )
+    try:
+        motion.check_dimension(domain.dim)
+    except PydanticCustomError as error:
+        raise describe_fault(error).within(place) from None
+    if domain.revolved and motion.off_axis is not None:
         raise InputError(
             f"{rigid.name} on {rigid.on!r}: a rigid part moves along the axis alone where space is "
             "axisymmetric; accepted: 0 for the first component of the displacement, no rotation",
             "rigid-part",
         )
+    return replace(rigid, motion=motion.filled(domain.dim))
 
 
 def _tie(

@@ -17,12 +17,13 @@ from ufl.core.expr import Expr
 from ufl.corealg.traversal import traverse_unique_terminals
 
 from contact.arguments import check_finite, naming, real
-from contact.body.description import Body, Load
-from contact.body.fields import Amplitude, Field, Moving, at_time, constant
+from contact.body.description import Body
 from contact.errors import InputError
 from contact.mesh.compiled import compiled
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import area, volume
+from contact.model.body import Load
+from contact.model.fields import Amplitude, Field, Moving, at_time, constant
 from contact.ranks import on_all_ranks
 from contact.tolerances import HUGE
 from contact.typing import Array
@@ -123,7 +124,7 @@ def _works(
                 f"{domain.dim}",
                 "components",
             )
-    if load.charge is not None and xi is None:
+    if xi is None and any(name.endswith("charge") for name in load.named):
         raise InputError(f"load on {place}: a charge needs a piezoelectric material", "piezo")
     if domain.revolved and load.force is not None and not getattr(load.force[0], "is_zero", False):
         raise InputError(

@@ -14,12 +14,12 @@ from mpi4py import MPI
 
 from contact.arguments import expect
 from contact.body.description import Material
-from contact.body.fields import constant, values_at
 from contact.body.pointwise import CHUNK
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices, Measure
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import geometry_nodes
+from contact.model.fields import constant, values_at
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import Graded, Law

@@ -12,12 +12,12 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.description import Body
-from contact.body.fields import Amplitude, Field, Moving, values_at
 from contact.errors import InputError
 from contact.linear.layout import Inclined
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import facet_normals
+from contact.model.fields import Amplitude, Field, Moving, values_at
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
@@ -234,7 +234,7 @@ class Rollers:
             facets = self._domain.facets_anywhere(fixed.on)
             nodes = fem.locate_dofs_topological(self._space, self._domain.dim - 1, facets)
             there = comm.bcast(bool(np.isin(node, nodes)), root)
-            moves = fixed.displacement is not None or fixed.normal is not None
+            moves = fixed.normal is not None or bool(fixed.components)
             beside += [fixed.on] * (moves and there and number != self.each[k].number)
         number = self.each[k].number
         names = " and ".join(repr(name) for name in beside) or "the axis"

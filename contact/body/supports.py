@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 from dolfinx.la import InsertMode
+from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact._compat import collapse, lasting
 from contact.body.description import Body
-from contact.body.fields import Amplitude, Field, Moving, steady, values_at
 from contact.errors import InputError
 from contact.mesh.domain import Domain, on_axis
+from contact.model.fields import Amplitude, Field, Moving, steady, values_at
 from contact.typing import Array
 
 
@@ -84,32 +85,50 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
     supports, dim = [], domain.dim
     domain.mesh.topology.create_connectivity(dim - 1, dim)
     for number, fixed in enumerate(body.fixed):
-        given: list[Field | Moving | None] = [None] * dim
-        if fixed.displacement is not None:
-            if len(fixed.displacement) != dim:
-                raise InputError(
-                    f"fixed on {fixed.on!r}: displacement has {len(fixed.displacement)} "
-                    f"components, the body has {dim}",
-                    "components",
-                )
-            given = list(fixed.displacement)
-        if fixed.potential is not None:
-            if body.piezo is None:
-                raise InputError(
-                    f"fixed on {fixed.on!r}: a potential needs a piezoelectric material", "piezo"
-                )
-            given.append(fixed.potential)
-        for component, value in enumerate(given):
-            if value is not None:
-                scale = body.phi_scale if component == dim else 1.0
-                key = "potential" if component == dim else f"displacement.{component}"
-                name = f"fixed.{number}.{key}"
-                supports.append(
-                    _support(domain, space, component, fixed.on, value, scale, fixed.factor, name)
-                )
+        if fixed.symmetry is not None:
+            _check_across(f"fixed.{number}.symmetry", domain, fixed.on, "xyz".index(fixed.symmetry))
+        if fixed.displacement is not None and len(fixed.displacement) != dim:
+            raise InputError(
+                f"fixed on {fixed.on!r}: displacement has {len(fixed.displacement)} components, "
+                f"the body has {dim}",
+                "components",
+            )
+        if fixed.potential is not None and body.piezo is None:
+            raise InputError(
+                f"fixed on {fixed.on!r}: a potential needs a piezoelectric material", "piezo"
+            )
+        for key, value in fixed.given.items():
+            if key == "normal":
+                continue
+            component = dim if key == "potential" else int(key[-1])
+            scale = body.phi_scale if component == dim else 1.0
+            name = f"fixed.{number}.{key}"
+            supports.append(
+                _support(domain, space, component, fixed.on, value, scale, fixed.factor, name)
+            )
     if domain.revolved:
         supports.append(_axis(domain, space))
     return supports
+
+
+def _check_across(key: str, domain: Domain, on: str, axis: int) -> None:
+    """Refuse a part that lies in no plane across an axis. Collective."""
+    name = "xyz"[axis]
+    if axis >= domain.dim or (domain.revolved and axis == 0):
+        known = "y" if domain.revolved else " or ".join("xyz"[: domain.dim])
+        raise InputError(f'{key}: given "{name}"; accepted: {known}', "value")
+    facets, there = domain.facets(on), np.zeros(0)
+    if facets.size:  # which `entities_to_geometry` divides by
+        nodes = entities_to_geometry(domain.mesh, domain.dim - 1, facets)
+        there = domain.mesh.geometry.x[nodes.ravel(), axis]
+    low = domain.comm.allreduce(float(there.min(initial=np.inf)), op=MPI.MIN)
+    high = domain.comm.allreduce(float(there.max(initial=-np.inf)), op=MPI.MAX)
+    if high - low > 1e-6 * domain.size:
+        raise InputError(
+            f"{key}: {on} reaches from {name} = {low:.6g} to {high:.6g}; accepted: a part in a "
+            f"plane across {name}",
+            "symmetry",
+        )
 
 
 def _axis(domain: Domain, space: fem.FunctionSpace) -> Support:

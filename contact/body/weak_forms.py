@@ -17,7 +17,6 @@ from contact._compat import lasting
 from contact.body.cuts import Cuts
 from contact.body.description import Body
 from contact.body.elements import MEAN_DILATATION, kinematics_of
-from contact.body.fields import Number, constant
 from contact.body.internal_variables import QuadratureLaws
 from contact.body.loads import assembled, expression
 from contact.body.materials import in_parts, material_measures
@@ -27,6 +26,8 @@ from contact.mesh.cells import shape_of
 from contact.mesh.compiled import compiled
 from contact.mesh.domain import Domain, Measure
 from contact.mesh.entities import Indices
+from contact.model.fields import constant
+from contact.model.formula import Expression
 from contact.ranks import on_all_ranks
 from contact.typing import Array
 from forms.hencky import is_linear, secant_form
@@ -47,7 +48,7 @@ def _elastic(domain: Domain, body: Body) -> Iterator[tuple[list[Expr], Expr, Mea
                 "elastic",
             )
         key = f"elastic.{number}"
-        normal = Number(0.0) if support.normal is None else support.normal
+        normal = Expression(0.0) if support.normal is None else support.normal
         for name, value in (
             *((f"stiffness.{i}", k) for i, k in enumerate(given)),
             ("normal", normal),

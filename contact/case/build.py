@@ -5,23 +5,26 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TypedDict
+from typing import TypedDict, TypeVar
 
 from mpi4py import MPI
 
 from contact.arguments import check_range
 from contact.body.description import Body, Material
-from contact.body.rigid import Rigid
 from contact.case.file import REPLACEABLE, Case
 from contact.errors import InputError
 from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain, revolved
+from contact.model.body import Bolt, Electrode, Fixed, Load
+from contact.model.rigid import Motion, Rigid
 from contact.problem.checks import check_problem, check_supports
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Law
 from forms.laws import FrictionCoefficient, FrictionLaw
+
+Given = TypeVar("Given", Fixed, Load, Electrode, Bolt, Motion)
 
 
 class Replacements(TypedDict, total=False):
@@ -82,12 +85,12 @@ def build_problem(
         case.check_mesh(domain.dim, domain.names)
         body = Body(
             _materials(case, domain, law),
-            [fixed.build(f"fixed.{i}", case, domain) for i, fixed in enumerate(case.fixed)],
-            [load.build(f"load.{i}", case, domain.comm) for i, load in enumerate(case.load)],
-            elastic=[e.build(f"elastic.{i}", domain.comm) for i, e in enumerate(case.elastic)],
-            rigid=_rigid(case, domain.dim),
-            electrodes=tuple(electrode.build(case) for electrode in case.electrode),
-            bolts=tuple(bolt.build(case) for bolt in case.bolt),
+            [_acting(case, fixed) for fixed in case.fixed],
+            [_acting(case, load) for load in case.load],
+            elastic=case.elastic,
+            rigid=_rigid(case),
+            electrodes=[_acting(case, electrode) for electrode in case.electrode],
+            bolts=[_acting(case, bolt) for bolt in case.bolt],
         )
         contacts = _contacts(case, domain, foundation, layer, coefficient, friction)
         problem = ContactProblem(
@@ -143,14 +146,19 @@ def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
     return made
 
 
-def _rigid(case: Case, dim: int) -> tuple[Rigid, ...]:
+def _acting(case: Case, given: Given) -> Given:
+    """Return a support, load, electrode, bolt or motion with the function of its amplitude."""
+    return given.model_copy(update={"amplitude": case.amplitude(given.amplitude)})
+
+
+def _rigid(case: Case) -> tuple[Rigid, ...]:
     """Return the foundations and parts that move as rigid bodies."""
     foundations = [
-        Rigid(contact.on, contact.rigid.motion(case, dim), foundation=True)
+        Rigid(contact.on, _acting(case, contact.rigid), foundation=True)
         for _, contact in case.contacts
         if contact.rigid is not None
     ]
-    return (*foundations, *(Rigid(part.on, part.motion(case, dim)) for part in case.rigid))
+    return (*foundations, *(Rigid(part.on, _acting(case, part)) for part in case.rigid))
 
 
 def _contacts(
@@ -171,14 +179,14 @@ def _contacts(
         )
     made = []
     for key, contact in case.contacts:
-        place, friction = case.friction_of(key, contact)
+        friction = case.friction_of(key, contact)[1]
         electric = case.electric_of(key, contact)[1]
         made.append(
             Contact(
                 contact.on,
-                contact.obstacle(key, domain.comm) if foundation is None else foundation,
+                contact.obstacle() if foundation is None else foundation,
                 contact.compliant_layer() if layer is None else layer,
-                friction.build(place, domain.comm, coefficient, law),
+                friction.build(coefficient, law),
                 None if electric is None else electric.build(case, domain, contact.on),
                 contact.overlap == "press",
                 contact.against,

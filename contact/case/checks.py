@@ -7,19 +7,19 @@ from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 from contact.body.elements import needed
-from contact.body.fields import CONSTANT
-from contact.case.body import ZERO
-from contact.case.formula import Expression
-from contact.case.messages import Words, fault, listed
-from contact.case.section import (
+from contact.case.units import check_units
+from contact.errors import nearest
+from contact.mesh.together import meet, members
+from contact.model.body import ZERO
+from contact.model.fields import CONSTANT
+from contact.model.formula import Expression
+from contact.model.messages import Words, fault, listed
+from contact.model.section import (
     AMPLITUDE,
     PART,
     as_given,
     walk,
 )
-from contact.case.units import check_units
-from contact.errors import nearest
-from contact.mesh.together import meet, members
 from contact.settings import SPATIAL
 from contact.tolerances import HUGE
 
@@ -75,7 +75,7 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
     """Raise a fault if a case does not fit its mesh."""
     known = sorted(parts)
     for path, section in case.moving:
-        section.check_dimension(path, dimension)
+        section.check_dimension(dimension, f"{path}.")
     for path, value, marks in walk(case):
         if SPATIAL in marks and isinstance(value, tuple) and len(value) != dimension:
             raise fault(path, as_given(value), f"{dimension} components in {dimension}-D")
@@ -224,8 +224,9 @@ def _check_rigid(case: Case) -> None:
         if any(meet(part.on, contact.on) for _, contact in case.contacts):
             raise fault(f"rigid.{i}.on", part.on, "a part beside the contact part")
     for path, motion in case.moving:
-        if case.space.kinematics == "axisymmetric":
-            motion.check_along_axis(path)
+        if case.space.kinematics == "axisymmetric" and (key := motion.off_axis) is not None:
+            accepted = "0 across the axis of a body of revolution, and no rotation"
+            raise fault(f"{path}.{key}", Words("given"), accepted, "rigid-part")
     for key in ("rigid", "electrode", "bolt"):
         parts = [section.on for section in getattr(case, key)]
         for i, on in enumerate(parts):

@@ -12,11 +12,11 @@ from typing import Any
 from urllib.parse import quote
 
 from contact.case.file import Case
-from contact.case.messages import shown
-from contact.case.section import FilePath, walk
 from contact.errors import InputError
 from contact.library.materials import PACKAGED
 from contact.mesh.formats import files
+from contact.model.messages import shown
+from contact.model.section import FilePath, walk
 
 #: Key of the mesh file.
 MESH = "mesh.file"

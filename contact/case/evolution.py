@@ -10,9 +10,9 @@ from typing import Annotated, Self, TypeAlias
 import numpy as np
 from pydantic import Field, model_validator
 
-from contact.case.messages import Words, fault
-from contact.case.section import File, Section, Text, as_tuple
 from contact.errors import InputError
+from contact.model.messages import Words, fault
+from contact.model.section import File, Section, Text, as_tuple
 from contact.settings import Accepted, Count, Number
 
 #: Share of an amplitude's range from which on an extreme value that no step meets is told.

@@ -11,11 +11,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import (
     AfterValidator,
     Discriminator,
+    Field,
     PlainSerializer,
     PrivateAttr,
     Tag,
@@ -24,15 +25,19 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from contact.body.fields import CONSTANT, Amplitude, Ramp, steady
-from contact.case.body import Bolt, Elastic, Electrode, Fixed, Load, Moving, RigidPart, Space
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
 from contact.case.interface import Contact, Electric, Friction
 from contact.case.material import Material
 from contact.case.mesh import Mesh, cut_about_axis
-from contact.case.messages import describe, describe_fault, fault, keys_of, path_of, shown
-from contact.case.section import (
+from contact.case.units import Labels, share
+from contact.errors import InputError, clipped
+from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
+from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
+from contact.model.fields import CONSTANT, Amplitude, Ramp, steady
+from contact.model.messages import describe, describe_fault, fault, keys_of, path_of, shown
+from contact.model.rigid import Motion, RigidPart
+from contact.model.section import (
     FromTable,
     OneOrSome,
     Section,
@@ -41,9 +46,6 @@ from contact.case.section import (
     check_conditions,
     without_effect,
 )
-from contact.case.units import Labels, share
-from contact.errors import InputError, clipped
-from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
 from contact.results.options import OutputOptions, Units
 from contact.settings import Accepted
 
@@ -101,6 +103,22 @@ else:
         PlainSerializer(_read_by),
         Accepted("a table"),
     ]
+
+
+class Space(Section):
+    """`[space]`: finite elements, and the kinematics of the body."""
+
+    degree: Annotated[int, Field(ge=1, le=2), Accepted("1 or 2")] = 1
+    """Degree of the Lagrange elements of the displacement and the potential."""
+    element: Literal["standard", "mean_dilatation"] = "standard"
+    """`"mean_dilatation"`: volumetric strains are averaged over each cell, so that nearly
+    incompressible bodies, and yielding ones, do not lock. On triangles and tetrahedra with
+    `degree = 2` (P2-P0), on quadrilaterals and hexahedra with `degree = 1` (Q1-P0)."""
+    kinematics: Literal["plane_strain", "plane_stress", "axisymmetric"] = "plane_strain"
+    """The body of a mesh in 2-D: in plane strain; in plane stress, a sheet of unit thickness that
+    is free to grow thinner; or a body of revolution, of which the mesh is the half plane x = r, y
+    along the axis. Displacements across the axis are then 0 without a support, and loads, forces
+    and charges are those of the full turn."""
 
 
 class About(Section):
@@ -175,7 +193,7 @@ class Case(Section):
         return _entries("contact", self.contact)
 
     @property
-    def moving(self) -> Iterator[tuple[str, Moving]]:
+    def moving(self) -> Iterator[tuple[str, Motion]]:
         """The sections about rigid motions, with their keys."""
         for path, contact in self.contacts:
             if contact.rigid is not None:
@@ -195,8 +213,10 @@ class Case(Section):
             return f"{key}.electric", contact.electric
         return "electric", self.electric
 
-    def amplitude(self, name: str | None) -> Amplitude | None:
+    def amplitude(self, name: Amplitude | str | None) -> Amplitude | None:
         """Return a factor of time by its name; for none growth over the first stage."""
+        if callable(name):
+            return name
         if self.evolution is None:
             return None
         if name is None:

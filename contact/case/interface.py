@@ -9,16 +9,24 @@ from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
-from mpi4py import MPI
 from pydantic import Field, Tag, model_validator
 
 from contact.arguments import expect, naming
-from contact.body.fields import steady
-from contact.case.body import Rigid
 from contact.case.data import read_data
-from contact.case.formula import Expression, NodalField, as_field, as_number
-from contact.case.messages import Words, fault
-from contact.case.section import (
+from contact.errors import InputError
+from contact.interface import friction, obstacle
+from contact.interface.law import Conductor
+from contact.interface.layer import Layer
+from contact.interface.obstacle import GapFunction, Obstacle, Shape
+from contact.interface.obstacle.triangles import read_stl
+from contact.mesh.domain import Domain
+from contact.mesh.geometry import area, volume
+from contact.mesh.together import meet
+from contact.model.fields import steady
+from contact.model.formula import Expression, as_number
+from contact.model.messages import Words, fault
+from contact.model.rigid import Motion
+from contact.model.section import (
     AmplitudeName,
     Direction,
     File,
@@ -30,15 +38,6 @@ from contact.case.section import (
     TimeFormula,
     formula_or_law,
 )
-from contact.errors import InputError
-from contact.interface import friction, obstacle
-from contact.interface.law import Conductor
-from contact.interface.layer import Layer
-from contact.interface.obstacle import GapFunction, Obstacle, Shape
-from contact.interface.obstacle.triangles import read_stl
-from contact.mesh.domain import Domain
-from contact.mesh.geometry import area, volume
-from contact.mesh.together import meet
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
 from forms import laws
@@ -239,8 +238,6 @@ class Friction(Section):
 
     def build(
         self,
-        key: str,
-        comm: MPI.Intracomm,
         coefficient: laws.FrictionCoefficient | None = None,
         law: laws.FrictionLaw | None = None,
     ) -> friction.Friction:
@@ -248,13 +245,13 @@ class Friction(Section):
         if coefficient is not None or law is not None:
             return friction.Friction(coefficient, radius=self.radius, law=law)
         if self.law == "tresca":
-            return friction.Friction(tresca=as_field(f"{key}.bound", self.bound, comm, 0.0))
+            return friction.Friction(tresca=self.bound)
         if isinstance(self.mu, Section):
             return friction.Friction(law=self.mu.friction(), radius=self.radius)
         if self.mu is not None and self.mu.is_constant:
             constant = laws.ConstantCoefficient(self.mu.value)
             return friction.Friction(constant, radius=self.radius)
-        return friction.Friction(mu=as_field(f"{key}.mu", self.mu, comm, 0.0), radius=self.radius)
+        return friction.Friction(mu=self.mu, radius=self.radius)
 
 
 class Electric(Section):
@@ -334,7 +331,7 @@ class Contact(Section):
     overlap: Literal["refuse", "press"] = "refuse"
     """Meshes of two bodies that overlap in the reference configuration, or a shape that cuts the
     body: `refuse` that, or `press` it out as an interference."""
-    rigid: Rigid | None = None
+    rigid: Motion | None = None
     """Motion of the foundation: `[contact.rigid]`. Absent: it is fixed."""
     layer: Annotated[
         float, Field(ge=0, **INFINITE), COMPLIANT, Accepted("a number >= 0, or inf")
@@ -392,11 +389,11 @@ class Contact(Section):
                 raise fault("overlap", self.overlap, accepted)
         return self
 
-    def obstacle(self, key: str, comm: MPI.Intracomm) -> Obstacle:
-        """Return the rigid foundation itself; ``key`` is the section's own."""
+    def obstacle(self) -> Obstacle:
+        """Return the rigid foundation itself."""
         if self.foundation is None:
             assert self.gap is not None  # filled in
-            return GapFunction(NodalField(f"{key}.gap", self.gap, comm).numpy)
+            return GapFunction.of(self.gap)
         given = self.foundation
         shape = given.build() if isinstance(given, Section) else given
         return replace(shape, direction=self.direction, along=self.axis or ())

@@ -13,8 +13,12 @@ from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from contact.arguments import expect
 from contact.body import description
-from contact.case.messages import Words, describe, fault, shown
-from contact.case.section import (
+from contact.case.units import SystemOfUnits, UnitSystem
+from contact.errors import InputError
+from contact.library import units as systems
+from contact.library.materials import PACKAGED, Entry, find
+from contact.model.messages import Words, describe, fault, shown
+from contact.model.section import (
     Axis,
     Either,
     File,
@@ -23,10 +27,6 @@ from contact.case.section import (
     Text,
     as_tuple,
 )
-from contact.case.units import SystemOfUnits, UnitSystem
-from contact.errors import InputError
-from contact.library import units as systems
-from contact.library.materials import PACKAGED, Entry, find
 from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
 from contact.typing import Array, TableValue
 from forms import j2

@@ -15,9 +15,18 @@ from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, model_validator
 
 import meshes
-from contact.case.formula import Expression
-from contact.case.messages import UNKNOWN, Words, fault
-from contact.case.section import (
+from contact.errors import InputError
+from contact.mesh import grid
+from contact.mesh.cells import SHAPES, Shape
+from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_further_names
+from contact.mesh.geometry import shares, volumes
+from contact.mesh.grid import rotate
+from contact.mesh.reader import from_file, from_generator
+from contact.mesh.transfer import check_adaptable, refined
+from contact.methods.signals import deaf
+from contact.model.formula import Expression
+from contact.model.messages import UNKNOWN, Words, fault
+from contact.model.section import (
     Axis,
     Either,
     Few,
@@ -29,15 +38,6 @@ from contact.case.section import (
     Vector,
     as_tuple,
 )
-from contact.errors import InputError
-from contact.mesh import grid
-from contact.mesh.cells import SHAPES, Shape
-from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_further_names
-from contact.mesh.geometry import shares, volumes
-from contact.mesh.grid import rotate
-from contact.mesh.reader import from_file, from_generator
-from contact.mesh.transfer import check_adaptable, refined
-from contact.methods.signals import deaf
 from contact.ranks import on_all_ranks
 from contact.settings import Accepted, Count, Number, Positive
 from contact.typing import Array

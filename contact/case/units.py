@@ -8,9 +8,9 @@ from typing import Annotated, Any, Self, TypeAlias
 from annotated_types import Predicate
 from pydantic import BeforeValidator, Discriminator, Tag, WithJsonSchema, model_validator
 
-from contact.case.messages import Words, either, fault, listed, shown
-from contact.case.section import FromTable, Section, Text
 from contact.library import units as systems
+from contact.model.messages import Words, either, fault, listed, shown
+from contact.model.section import FromTable, Section, Text
 from contact.results.options import Units
 from contact.settings import Accepted
 

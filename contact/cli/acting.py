@@ -9,8 +9,9 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.global_unknowns import Member
-from contact.body.rigid import Electrode, Rigid
 from contact.cli.geometry import table, vector
+from contact.model.body import Electrode
+from contact.model.rigid import Rigid
 from contact.problem.checks import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.tolerances import NEGLIGIBLE
@@ -138,7 +139,7 @@ def _member(member: Member, time: float) -> list[Row]:
     if isinstance(given, Rigid):
         where = f"foundation of {given.on!r}" if given.foundation else f"rigid part {given.on!r}"
         names = (("displacement", "rotation"), ("force", "moment"))
-    d = len(given.motion.displacement) if isinstance(given, Rigid) else 1
+    d = len(given.motion.displacement or ()) if isinstance(given, Rigid) else 1
     values = [member.given(time) * member.units, member.forces(time) / member.units]
     values[0][d:] = np.rad2deg(values[0][d:])
     rows = []

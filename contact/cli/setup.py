@@ -15,12 +15,12 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from contact import _compat
-from contact.body.fields import Field, Moving, at_time
 from contact.case.file import Case
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets, paths
 from contact.mesh.geometry import facet_normals
+from contact.model.fields import Field, Moving, at_time
 from contact.plot.body import rendered
 from contact.plot.style import BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, YELLOW, heading
 from contact.problem.problem import ContactProblem

@@ -20,11 +20,11 @@ from contact.arguments import (
     real,
     sampled,
 )
-from contact.body.fields import Field, Moving, Scalar, field, values_at
 from contact.errors import InputError
 from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoother
+from contact.model.fields import Field, Moving, Scalar, field, values_at
 from contact.ranks import on_all_ranks
 from contact.tolerances import EPS
 from contact.typing import Array
@@ -96,8 +96,8 @@ class Friction:
             fits = given is None or all(hasattr(given, method) for method in methods)
             words = f"an object with {', '.join(methods)}"
             expect(f"Friction: {name}", given, words, fits)
-        fill(self, coefficient=coefficient, tresca=field(tresca), radius=radius)
-        fill(self, mu=field(cast(Scalar | None, mu)), law=law)
+        fill(self, coefficient=coefficient, tresca=field(tresca, "Friction: tresca"), radius=radius)
+        fill(self, mu=field(cast(Scalar | None, mu), "Friction: mu"), law=law)
 
     @property
     def _laws(self) -> tuple[object, ...]:
@@ -119,10 +119,10 @@ class Friction:
             that of its law.
         """
         if self.tresca is not None:
-            bound = _at("tresca", self.tresca, nodes)
+            bound = _at("friction.bound", self.tresca, nodes)
             return Tresca(bound) if nodes.maximum(bound) > 0 else None
         if self.mu is not None:
-            mu = _at("mu", self.mu, nodes)
+            mu = _at("friction.mu", self.mu, nodes)
             return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
         if self.coefficient is None:
             with on_all_ranks(nodes.comm):
@@ -139,7 +139,7 @@ class Friction:
             given = self.coefficient
             check_slope("Friction: mu: derivative", given, given.derivative, SAMPLES)
             _check_constants("Friction: mu", "mu", Coulomb(given))
-        _check("coefficient without slip", resists, nodes)
+        _check("Friction: coefficient without slip", resists, nodes)
         most = nodes.comm.allreduce(self.coefficient.maximum, op=MPI.MAX)
         return Coulomb(self.coefficient) if most > 0 else None
 
@@ -195,7 +195,7 @@ def _check_constants(name: str, symbol: str, law: FrictionLaw) -> None:
 
 def _at(name: str, given: Field | Moving, nodes: ContactNodes) -> Array:
     """Return a bound or coefficient at contact nodes. Collective."""
-    values = values_at(given, nodes.points, 1.0, f"Friction: {name}", nodes.comm)
+    values = values_at(given, nodes.points, 1.0, name, nodes.comm)
     _check(name, values, nodes)
     return values
 
@@ -206,7 +206,7 @@ def _check(name: str, values: Array, nodes: ContactNodes) -> None:
     worst = np.concatenate(nodes.comm.allgather(bad[:1]))
     if worst.size > 0:
         raise InputError(
-            f"Friction: {name} is {worst[0]:g} at a node; accepted: finite values >= 0", "negative"
+            f"{name} is {worst[0]:g} at a node; accepted: finite values >= 0", "negative"
         )
 
 

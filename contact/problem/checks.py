@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from contact.arguments import check_range
-from contact.body.description import Fixed
-from contact.body.fields import Field, Moving, values_at
 from contact.body.loads import to_blame
 from contact.errors import InputError
 from contact.interface.law import InterfaceLaw
+from contact.model.fields import values_at
 from contact.problem.limit_analysis import UnilateralSupport
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
@@ -151,7 +150,7 @@ def check_supports(problem: ContactProblem) -> None:
         if not shared:
             continue
         nodes = fem.locate_dofs_topological(space, problem.dim - 1, facets)
-        for name in sorted(_prescribed(first).keys() & _prescribed(last).keys()):
+        for name in sorted(first.given.keys() & last.given.keys()):
             found = _differing(problem, (i, j), name, nodes)
             if found is not None:
                 when = "" if time == 1.0 else f" at t = {time:g}"
@@ -170,7 +169,7 @@ def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterato
     d, space = problem.dim, problem.equilibrium.space
     for i, j in combinations(range(len(problem.body.fixed)), 2):
         first, last = problem.body.fixed[i], problem.body.fixed[j]
-        names = sorted(_prescribed(first).keys() & _prescribed(last).keys() - {"normal"})
+        names = sorted(first.given.keys() & last.given.keys() - {"normal"})
         if not names or _shared(problem, first.on, last.on)[1]:
             continue
         sides = (problem.domain.facets_anywhere(fixed.on) for fixed in (first, last))
@@ -215,7 +214,7 @@ def _differing(
     values = np.zeros((len(points), 2))
     for k, number in enumerate(pair):
         fixed, key = problem.body.fixed[number], f"fixed.{number}.{name}"
-        given = values_at(_prescribed(fixed)[name], points, problem.time, key, problem.comm)
+        given = values_at(fixed.given[name], points, problem.time, key, problem.comm)
         values[:, k] = fixed.factor(problem.time) * given
     size = problem.comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX)
     # Rounding of a zero, such as sin(pi), is no value.
@@ -226,11 +225,6 @@ def _differing(
     some = np.column_stack([values, points])[differ][:1]
     found = np.concatenate(problem.comm.allgather(some)) + 0.0  # no -0
     return found[0] if found.size > 0 else None
-
-
-def _prescribed(fixed: Fixed) -> dict[str, Field | Moving]:
-    """Return the fields of a support by their keys."""
-    return {name: field for name, field in fixed.given.items() if field is not None}
 
 
 def check_rigid_modes(problem: ContactProblem) -> None:

@@ -17,7 +17,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.cuts import Pieces
-from contact.body.rigid import Bolt, Rigid, rigid_motions
+from contact.model.body import Bolt
+from contact.model.rigid import Rigid, rigid_motions
 from contact.problem.problem import ContactProblem
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array

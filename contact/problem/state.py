@@ -27,7 +27,7 @@ class State:
         Multipliers of the unilateral constraint and of friction.
     time
         When: loads and prescribed values are those of this time. A value without an amplitude
-        grows with it, so that 1 stands for all of it (`contact.body.fields`).
+        grows with it, so that 1 stands for all of it (`contact.model.fields`).
     history
         That at the beginning of the step that led here; empty for a step from the reference
         configuration.

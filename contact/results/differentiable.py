@@ -12,7 +12,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.rigid import Electrode, Rigid
+from contact.model.rigid import Rigid
+from contact.model.body import Electrode
 from contact.results.resultants import (
     NAMES,
     DrivenPart,

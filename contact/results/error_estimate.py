@@ -24,7 +24,7 @@ from contact.body.description import Material
 from contact.body.elements import MEAN_DILATATION
 from contact.body.materials import factor_of
 from contact.body.pointwise import in_chunks
-from contact.body.rigid import Bolt
+from contact.model.body import Bolt
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at

@@ -13,7 +13,7 @@ from dolfinx import fem, la
 from numpy.typing import NDArray
 
 from contact import _compat
-from contact.body.fields import Number, constant
+from contact.model.fields import constant
 from contact.body.loads import expression
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain, Indices
@@ -47,7 +47,9 @@ def oscillation(problem: ContactProblem, time: float) -> Array:
         varying = {
             name: field
             for name, field in load.named.items()
-            if not (isinstance(field, Number) or name.startswith("force") or "charge" in name)
+            if not (
+                getattr(field, "is_constant", False) or name.startswith("force") or "charge" in name
+            )
         }
         if not varying:
             continue

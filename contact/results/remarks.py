@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.rigid import Rigid
+from contact.model.rigid import Rigid
 from contact.errors import counted
 from contact.interface.law import Conductor
 from contact.results import bodies, discretisation, foundations

@@ -19,9 +19,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.description import Body
-from contact.body.fields import constant, knows_time, steady
+from contact.model.fields import constant, knows_time, steady
 from contact.body.loads import Loads, assembled, expression
-from contact.body.rigid import Bolt, Electrode
+from contact.model.body import Bolt, Electrode
 from contact.errors import InputError
 from contact.mesh.compiled import compiled
 from contact.mesh.geometry import area
@@ -106,8 +106,9 @@ def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[
     found: dict[str, tuple[NDArray[np.int32], Array]] = {}
     left = ~body.unsupported[:, slice(d, None) if electric else slice(d)]
     for number, fixed in enumerate(problem.body.fixed):
-        values = (fixed.potential,) if electric else fixed.displacement or (None,) * d
-        held = np.array([value is not None for value in values])
+        held = np.isin(np.arange(d), [*fixed.components])
+        if electric:
+            held = np.array([fixed.potential is not None])
         rolls = fixed.normal is not None and not electric
         for part in members(fixed.on) if held.any() or rolls else ():
             nodes = nodes_of(problem, part)
@@ -189,8 +190,7 @@ class DrivenPart:
 
 def _driven(body: Body) -> str | None:
     for fixed in body.fixed:
-        ways = (*(fixed.displacement or ()), fixed.normal)
-        given = [component for component in ways if component is not None]
+        given = [value for key, value in fixed.given.items() if key != "potential"]
         moves = any(not getattr(component, "is_zero", False) for component in given)
         if moves and (knows_time(given) or fixed.factor is not steady):
             return str(fixed.on)
@@ -267,11 +267,12 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     body = 0.0
     x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(equilibrium.space)
     for i, load in enumerate(problem.body.loads):
-        if load.charge is None:
+        key = "charge" if load.body_charge is None else "body_charge"
+        if key not in load.named:
             continue
         measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
         now = constant(problem.domain.mesh, time)
-        density = expression(problem.domain, load.charge, x, now, f"load.{i}.charge")
+        density = expression(problem.domain, load.named[key], x, now, f"load.{i}.{key}")
         nodal = assembled(compiled(density * test[d] * measure), equilibrium.owned)
         charges = load.factor(time) * nodal.reshape(-1, bs)[:, d]
         charge = _sum(problem, charges)
@@ -397,7 +398,7 @@ def movements(problem: ContactProblem, state: State) -> Movements:
         if problem.domain.revolved:
             # Over the full turn forces across the axis, and moments about it, cancel.
             own = np.where(np.arange(own.size) == 1, own, 0.0)
-        own, d = own / member.units, len(member.description.motion.displacement)
+        own, d = own / member.units, len(member.description.motion.displacement or ())
         (foundations if member.foundation else parts)[part] = {
             "displacement": [float(value) for value in values[:d]],
             "rotation": _one_or_more(np.rad2deg(values[d:])),

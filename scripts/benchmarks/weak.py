@@ -28,11 +28,12 @@ from petsc4py import PETSc
 
 from contact import solve
 from contact._compat import destinations
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.interface import pairing
 from contact.interface.friction import Friction
 from contact.mesh.domain import Domain, from_mesh
 from contact.methods.options import NewtonOptions
+from contact.model.body import Fixed
 from contact.nesting import prolong
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

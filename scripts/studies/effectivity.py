@@ -16,10 +16,11 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body
 from contact.body.elements import MEAN_DILATATION
 from contact.mesh.grid import box
 from contact.mesh.transfer import carry
+from contact.model.body import Fixed, Load
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated

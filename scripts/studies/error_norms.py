@@ -15,11 +15,11 @@ from ufl.core.expr import Expr
 from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.fields import constant
 from contact.history import BodyState
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import Indices
 from contact.mesh.geometry import geometry_nodes, measures
+from contact.model.fields import constant
 from contact.typing import Array
 from forms.elasticity import Anisotropic, mandel
 from forms.history import PAIRS, components, to_vector

@@ -5,9 +5,10 @@ import pytest
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.history import BodyState
 from contact.linear.operator import SparseOperator
+from contact.model.body import Fixed
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import energy_density

@@ -8,12 +8,12 @@ from mpi4py import MPI
 
 import contact
 from contact import Body, Contact, Fixed, InputError, Linear, Load, Problem, evolve, solve
-from contact.body.fields import Ramp
 from contact.case.build import build_problem
 from contact.case.checks import growing
 from contact.case.file import parse_case
 from contact.mesh.domain import revolved
 from contact.mesh.grid import box, rectangle
+from contact.model.fields import Ramp
 from tests.problems.bar import changed
 
 pytestmark = pytest.mark.parallel(2)
@@ -89,7 +89,10 @@ def test_other_resultants_are_refused(keys, words):
 
 
 def test_a_resultant_in_the_whole_body_is_refused():
-    with pytest.raises(InputError, match="together with everywhere = true"):
+    with pytest.raises(
+        InputError,
+        match=r"load.0.force: given in the whole body; accepted: in the whole body: body_force",
+    ):
         parse_case(changed(load=[{"everywhere": True, "force": [0.0, 1.0]}]))
 
 

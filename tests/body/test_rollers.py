@@ -269,7 +269,9 @@ def test_a_roller_alone_leaves_a_motion_along_it():
 
 
 def test_in_python_both_are_refused():
-    with pytest.raises(InputError, match="normal and displacement; accepted: one of them"):
+    with pytest.raises(
+        InputError, match="accepted: one of normal and displacement, and for more another entry"
+    ):
         Fixed("left", [0.0, None], normal=0.0)
 
 

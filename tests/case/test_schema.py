@@ -13,11 +13,11 @@ from pydantic import ValidationError
 
 import meshes
 from contact.case.file import Case, load_case, parse_case
-from contact.case.messages import keys_of, sections_of
 from contact.case.schema import below, schema
-from contact.case.section import FromTable, Section
 from contact.case.text import to_toml
 from contact.errors import InputError
+from contact.model.messages import keys_of, sections_of
+from contact.model.section import FromTable, Section
 from scripts.cases import CASES
 
 jsonschema = pytest.importorskip("jsonschema")

@@ -8,9 +8,9 @@ from mpi4py import MPI
 
 from contact.case import mesh
 from contact.case.file import parse_case
-from contact.case.messages import LIST, listed, path_of, shown
 from contact.cli.main import main
 from contact.errors import clipped
+from contact.model.messages import LIST, listed, path_of, shown
 from tests.cli.running import check_identifier
 
 TABLES = {

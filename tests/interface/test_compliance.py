@@ -9,12 +9,13 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve as solve_case
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
+from contact.model.body import Fixed
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint

@@ -39,17 +39,17 @@ class Negative(ConstantCoefficient):
 @pytest.mark.parametrize(
     ("friction", "said"),
     [
-        (Friction(mu=-1e-3), "mu is -0.001 at a node"),
-        (Friction(mu=np.nan), "mu: not finite at "),
-        (Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu: not finite at "),
-        (Friction(tresca=lambda x: 1.0 - x[0]), "tresca is -.* at a node"),
-        (Friction(tresca=np.inf), "tresca: not finite at "),
-        (Friction(Negative()), "coefficient without slip is -0.2 at a node"),
+        (lambda: Friction(mu=-1e-3), "mu is -0.001 at a node"),
+        (lambda: Friction(mu=np.nan), "mu: nan is not finite"),
+        (lambda: Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu: not finite at "),
+        (lambda: Friction(tresca=lambda x: 1.0 - x[0]), "bound is -.* at a node"),
+        (lambda: Friction(tresca=np.inf), "tresca: inf is not finite"),
+        (lambda: Friction(Negative()), "coefficient without slip is -0.2 at a node"),
     ],
 )
 def test_what_resists_is_not_negative(friction, said):
-    with pytest.raises(InputError, match=rf"Friction: {said}.*; accepted: .*finite"):
-        problem(Contact("bottom", friction=friction))
+    with pytest.raises(InputError, match=rf"riction(: |\.){said}.*; accepted: .*finite"):
+        problem(Contact("bottom", friction=friction()))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial import Delaunay
 
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.segments import clipped
@@ -16,6 +16,7 @@ from contact.interface.mortar.surface import Surface, dual_basis_transformation,
 from contact.mesh.cells import INTERVAL, QUADRILATERAL, TRIANGLE, rule
 from contact.mesh.deviation import deviations
 from contact.mesh.grid import box, rectangle
+from contact.model.body import Fixed
 from forms.hencky import Linear
 from tests.problems.mechanics import constant
 from tests.problems.sides import FIRST, KINDS, NAMES, bowed, flat, oriented

@@ -5,7 +5,7 @@ import pytest
 from dolfinx import mesh
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
@@ -14,6 +14,7 @@ from contact.interface.obstacle import GapFunction, Level, Plane, Sphere
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
+from contact.model.body import Fixed, Load
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.resultants import supports

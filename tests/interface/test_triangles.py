@@ -10,7 +10,7 @@ import pytest
 from dolfinx import mesh
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.errors import InputError
 from contact.interface.obstacle import (
     Level,
@@ -18,6 +18,7 @@ from contact.interface.obstacle import (
 )
 from contact.interface.obstacle.triangles import read_stl
 from contact.mesh.domain import from_mesh
+from contact.model.body import Fixed
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

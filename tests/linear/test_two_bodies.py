@@ -5,12 +5,13 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, parse_case, solve
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body
 from contact.interface.friction import Friction
 from contact.linear import multigrid
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
+from contact.model.body import Fixed, Load
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

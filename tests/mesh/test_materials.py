@@ -5,13 +5,14 @@ import pytest
 from mpi4py import MPI
 
 from contact import parse_case, solve
-from contact.body.description import Body, Fixed, Load, Material
+from contact.body.description import Body, Material
 from contact.body.equilibrium import BodyEquilibrium
 from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.history import BodyState
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
+from contact.model.body import Fixed, Load
 from contact.results.fields import DerivedFields
 from forms.hencky import Linear
 from forms.piezo import hexagonal

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.rigid import rigid_motions
 from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
@@ -19,6 +18,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome, Record
 from contact.methods.signals import Interrupted
+from contact.model.rigid import rigid_motions
 from contact.problem.residuals import Residuals, evaluate
 from contact.solving import solve
 from forms.laws import ConstantCoefficient

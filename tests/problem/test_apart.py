@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Fixed
-from contact.body.rigid import Motion, Rigid
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.model.body import Fixed
+from contact.model.rigid import Motion, Rigid
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, left_as_pressures, residual_forces
 from contact.problem.state import State

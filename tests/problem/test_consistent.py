@@ -95,7 +95,6 @@ WRONG = {
     "a spring of time along the normal": lambda: Elastic("top", normal=Growing()),
     "a support of nothing": lambda: Fixed("top", ["free", None]),
     "an amplitude": lambda: Fixed("top", [0, 0], amplitude=2),
-    "no motion": lambda: Motion(),
     "a motion as a number": lambda: Motion(0.1),
     "a motion in words": lambda: Motion([0.0, "up"]),
     "an angle in a list": lambda: Motion([0.0, None], [0.1, 0.0, 0.0]),

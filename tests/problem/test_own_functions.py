@@ -99,7 +99,7 @@ PLACES: dict[str, tuple[Callable[[Own], object], str]] = {
     "force": (lambda f: solved(load=Load(body_force=[0.0, f])), r"load\.0\.body_force\.1"),
     "gap": (lambda f: solved(contact=Contact("bottom", f)), "contact"),
     "shape": (lambda f: solved(contact=Contact("bottom", Level(f))), "contact"),
-    "mu": (lambda f: solved(mu=f), "Friction: mu"),
+    "mu": (lambda f: solved(mu=f), r"friction\.mu"),
     "coefficient": (lambda f: solved(mu=Coefficient(f)), "Friction: "),
     "slope": (lambda f: solved(mu=Coefficient(np.ones_like, f)), "Friction: mu: derivative"),
     "amplitude": (

@@ -48,14 +48,16 @@ def test_a_plate_in_python_is_that_of_a_case():
     """Components that are not given are 0, one angle is a number, and None leaves it free."""
     case = plate(rigid=[{"on": "top", "displacement": [0.0, "free"], "force": [0.0, -0.02]}])
     held = Motion([0.0, None], force=[0.0, -0.02])
-    assert (held.rotation, held.moment, held.centre) == ((0.0,), (0.0,), (0.0, 0.0))
-    assert Motion(rotation=[0.0, 0.0, 0.1], centre=[1.0, 0.0, 0.0]).displacement == (0.0, 0.0, 0.0)
+    whole = held.filled(2)
+    assert (whole.values, whole.centre) == ((0.0, None, 0.0), (0.0, 0.0))
+    turned = Motion(rotation=[0.0, 0.0, 0.1], centre=[1.0, 0.0, 0.0]).filled(3)
+    assert turned.values == (0.0, 0.0, 0.0, 0.0, 0.0, 0.1)
     solution = solved(case, SELF)[0]
     same = solve(built_of(case, Rigid("top", held)), NewtonOptions(tolerance=1e-10))
     assert same.pressure == pytest.approx(solution.pressure, rel=1e-12)
     for angle in (None, "free"):
         tilting = Motion([0.0, "free"], angle, [0.0, -0.02], 0.002, [1.0, 1.0])
-        assert tilting.rotation == (None,) and tilting.displacement == (0.0, None)
+        assert tilting.filled(2).values == (0.0, None, None)
         free = solve(built_of(case, Rigid("top", tilting)), NewtonOptions(tolerance=1e-10))
         part = movements(free.problem, free.state)["rigid_parts"]["top"]
         assert part["moment"] == pytest.approx(0.002, rel=1e-10)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
+from contact.model.body import Fixed, Load
 from contact.problem import residuals
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

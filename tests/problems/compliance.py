@@ -6,10 +6,11 @@ import numpy as np
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body
 from contact.interface.law import Conductor
 from contact.interface.layer import Layer
 from contact.mesh.grid import box, rectangle
+from contact.model.body import Fixed, Load
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -7,11 +7,12 @@ from dolfinx.fem.petsc import assemble_vector
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
+from contact.model.body import Fixed
 from forms.hencky import Linear
 
 

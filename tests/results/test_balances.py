@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from contact import parse_case
 from contact import solve as solve_case
-from contact.body.description import Load
+from contact.model.body import Load
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.methods.options import FixedPointOptions

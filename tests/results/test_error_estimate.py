@@ -9,7 +9,8 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
-from contact.body.description import Body, Fixed, Material
+from contact.body.description import Body, Material
+from contact.model.body import Fixed
 from contact.case.build import build_problem
 from contact.cli.solve import _results
 from contact.mesh.cells import rule, shape_of

@@ -10,7 +10,8 @@ import pytest
 from mpi4py import MPI
 
 from contact import parse_case, solve
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body
+from contact.model.body import Fixed, Load
 from contact.interface.obstacle import GapFunction
 from contact.methods.options import NewtonOptions
 from contact.plot.figures import figures_of

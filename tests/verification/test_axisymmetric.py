@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 import contact
 from contact import solve
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.history import BodyState
@@ -21,6 +21,7 @@ from contact.mesh.grid import box, rectangle
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.model.body import Fixed
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

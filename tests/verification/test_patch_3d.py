@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.mesh.grid import rectangle
+from contact.model.body import Fixed
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

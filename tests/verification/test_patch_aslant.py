@@ -29,11 +29,11 @@ from contact import (
     sensitivity,
     solve,
 )
-from contact.body.rigid import Motion
 from contact.derivatives.differences import Parameter
 from contact.interface.obstacle import GapFunction
 from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
+from contact.model.rigid import Motion
 from contact.results.differentiable import named_quantities
 from contact.results.resultants import contact_resultant, supports
 from forms.laws import ConstantCoefficient

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body
 from contact.interface.friction import Friction
 from contact.interface.obstacle import Plane
 from contact.mesh.domain import revolved
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
+from contact.model.body import Fixed, Load
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields

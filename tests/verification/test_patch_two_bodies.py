@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial import cKDTree
 
-from contact.body.description import Body, Fixed, Load, Material
+from contact.body.description import Body, Material
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.mesh.cells import Shape
@@ -18,6 +18,7 @@ from contact.mesh.domain import Domain, revolved
 from contact.mesh.reader import from_file
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
+from contact.model.body import Fixed, Load
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields

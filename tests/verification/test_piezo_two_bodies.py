@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed, Material
-from contact.body.rigid import Electrode
+from contact.body.description import Body, Material
 from contact.interface.law import Conductor
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.model.body import Electrode, Fixed
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate

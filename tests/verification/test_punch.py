@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed
-from contact.body.rigid import Motion, Rigid
+from contact.body.description import Body
 from contact.errors import InputError
 from contact.interface.obstacle import Plane
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
+from contact.model.body import Fixed
+from contact.model.rigid import Motion, Rigid
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.resultants import movements

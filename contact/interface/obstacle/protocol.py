@@ -11,8 +11,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.arguments import LEAST, OFF, SHARE, SMOOTH, STEP, expect, naming, real
-from contact.body.fields import Static, static
 from contact.errors import InputError
+from contact.model.fields import Static, static
 from contact.ranks import on_all_ranks
 from contact.settings import Internal
 from contact.typing import Array
@@ -227,7 +227,7 @@ class GapFunction:
 
     @staticmethod
     def of(value: Static) -> GapFunction:
-        """Return the gap that is given as `contact.body.fields.field` takes it.
+        """Return the gap that is given as `contact.model.fields.field` takes it.
 
         Parameters
         ----------
@@ -241,6 +241,8 @@ class GapFunction:
         InputError
             If it is nothing of these.
         """
+        if isinstance(value, float) and np.isinf(value):  # which is no value of a field
+            return GapFunction(lambda points: np.full(len(points), value))
         return GapFunction(static(value, "gap").numpy)
 
     direction = "body"

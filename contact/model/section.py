@@ -1,4 +1,4 @@
-"""Building blocks of the case file's models: tables, and the kinds of values in them.
+"""Building blocks of descriptions: tables of a case file, and the kinds of values in them.
 
 Each kind of value carries the accepted ones in words, and where it matters a mark by which `walk`
 finds it: `SPATIAL`, `PART`, `AMPLITUDE`, `FilePath`.
@@ -6,12 +6,26 @@ finds it: `SPATIAL`, `PART`, `AMPLITUDE`, `FilePath`.
 
 from __future__ import annotations
 
+import inspect
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar, get_args, get_origin
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    Self,
+    TypeAlias,
+    TypeVar,
+    cast,
+    get_args,
+    get_origin,
+)
 
+import numpy as np
 from annotated_types import Predicate
 from pydantic import (
     AfterValidator,
@@ -19,24 +33,30 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Discriminator,
-    Field,
     PlainSerializer,
     PlainValidator,
     SerializerFunctionWrapHandler,
     Tag,
+    ValidationError,
     ValidationInfo,
     WithJsonSchema,
     model_serializer,
     model_validator,
 )
+from pydantic import (
+    Field as Bounds,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
+from ufl.core.expr import Expr
 
 from contact import settings
-from contact.case.formula import Expression
-from contact.case.messages import Words, accepted_by, fault, keys_of, shown
+from contact.arguments import OfTime
 from contact.errors import InputError
 from contact.mesh import together
+from contact.model.fields import Amplitude, Field, GivenAmplitude, Moving, field, own_amplitude
+from contact.model.formula import Expression, of_time
+from contact.model.messages import Words, accepted_by, describe, fault, keys_of, shown
 from contact.settings import SPATIAL, Accepted, Number, ReadWith
 
 Table = TypeVar("Table")
@@ -75,6 +95,39 @@ class Section(BaseModel):
         return {key: value for key, value in handler(self).items() if key not in unread}
 
 
+#: The context of a description that is made in Python, where values may be objects.
+IN_PYTHON = {"python": True}
+
+
+class Described(Section):
+    """A section that is made in Python too: its `__init__` has the arguments of Python."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Let tables be read without `__init__`, so that messages name their keys."""
+        super().__init_subclass__(**options)
+        cls.__init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        """Enter the keys under "Parameters" in the docstring, in the order of the arguments."""
+        said = {key: field.description or "" for key, field in keys_of(cls).items()}
+        own = [key for key in inspect.signature(cls.__init__).parameters if key in said]
+        lines = [line for key in own for line in (key, textwrap.indent(said[key], "    "))]
+        text, _, examples = inspect.cleandoc(cls.__doc__ or "").partition("\n\nExamples\n")
+        parts = [text, "\n".join(["Parameters", "----------", *lines])]
+        cls.__doc__ = "\n\n".join([*parts, *([f"Examples\n{examples}"] if examples else [])])
+
+    def __init__(self, **given: Any) -> None:
+        try:
+            self.__pydantic_validator__.validate_python(
+                given, self_instance=self, context=IN_PYTHON
+            )
+        except ValidationError as error:
+            raise describe(
+                error, type(self), _called(type(self).__name__, given.get("on"))
+            ) from None
+
+
 @cache
 def conditions(of: type) -> tuple[tuple[str, FieldInfo, ReadWith], ...]:
     """Return the keys of a kind of table that are read under a condition."""
@@ -95,13 +148,13 @@ def without_effect(table: Any) -> set[str]:
 def check_conditions(table: Table) -> Table:
     """Return a table, if no key is without effect and none is missing."""
     of: Any = type(table)
-    for key, field, needs in conditions(of):
+    for key, info, needs in conditions(of):
         value, other = getattr(table, key), getattr(table, needs.key)
         if not needs.met(other):
-            if value != field.default:
+            if value != info.default:
                 raise fault(key, as_given(value), f"{key} with {needs}")
         elif needs.required and value is None:
-            accepted = accepted_by(field.annotation, field.metadata)
+            accepted = accepted_by(info.annotation, info.metadata)
             raise fault(key, Words("missing"), f"{accepted} with {needs.key} = {shown(other)}")
     return table
 
@@ -191,21 +244,80 @@ def _expression(given: Any) -> Expression:
     return given if isinstance(given, Expression) else Expression(given)
 
 
-def _not_negative(expression: Expression) -> Expression:
-    if expression.is_constant and expression.value < 0:
+def _value(given: Any) -> Field | Moving:
+    """Return a given function of position and time; of a case file a number or a formula."""
+    plain = given is None or isinstance(given, bool | int | float | str | list | Mapping)
+    return cast(Field | Moving, field(Expression(given) if plain else given))
+
+
+def _static(given: Field | Moving, info: ValidationInfo) -> Field | Moving:
+    """Return a value that is the same at all times; of a case file that is checked with others."""
+    if isinstance(given, Moving) and info.context == IN_PYTHON:
         raise InputError(
-            f"{expression} is negative; accepted: a number >= 0 or a formula", "negative"
+            f"{given} depends on the time; accepted: a number or a function of position, the same "
+            "at all times",
+            "formula-variable",
         )
-    return expression
+    return given
 
 
-def _of_time(given: Any) -> Any:
-    if isinstance(given, Expression) and given.names - {"t"}:
+def _placeless(given: Field | Moving) -> Field | Moving:
+    if not isinstance(given, Expression | Moving):
         raise InputError(
             f"{given} depends on the place; accepted: a number or a formula in t",
             "formula-variable",
         )
-    return given
+    return cast(Field | Moving, of_time(given))
+
+
+def _timed(given: Any, info: ValidationInfo) -> Expression | OfTime:
+    """Return a given number, formula in t, or function of time."""
+    if callable(given):
+        return (
+            given
+            if isinstance(given, OfTime)
+            else OfTime(given, f"{_named(info)}: {info.field_name}")
+        )
+    given = float(given) if isinstance(given, np.number) else given
+    return cast(Expression, of_time(_value(given)))
+
+
+def _free(given: Any) -> Field | Moving | Literal["free"]:
+    """Return a component, or "free" where it is not given."""
+    unset = given is None or (isinstance(given, str) and given == "free")
+    return "free" if unset else _value(given)
+
+
+def _free_timed(given: Any, info: ValidationInfo) -> Expression | OfTime | Literal["free"]:
+    unset = given is None or (isinstance(given, str) and given == "free")
+    return "free" if unset else _timed(given, info)
+
+
+def _factor(given: Any, info: ValidationInfo) -> GivenAmplitude | str:
+    """Return an amplitude: of a case file its name, in Python a function of time."""
+    if info.context == IN_PYTHON:
+        return cast(Amplitude, own_amplitude(_named(info), given))
+    if isinstance(given, str) and given:
+        return given
+    raise PydanticCustomError("amplitude", "amplitude")
+
+
+def _called(title: Any, on: Any) -> str:
+    """Return the name of a description in messages."""
+    return f"{title} on {on!r}" if on else str(title)
+
+
+def _named(info: ValidationInfo) -> str:
+    """Return the same for the function that is validated."""
+    return _called((info.config or {}).get("title"), info.data.get("on"))
+
+
+def _not_negative(expression: Any) -> Any:
+    if isinstance(expression, Expression) and expression.is_constant and expression.value < 0:
+        raise InputError(
+            f"{expression} is negative; accepted: a number >= 0 or a formula", "negative"
+        )
+    return expression
 
 
 def _part(given: Any) -> str:
@@ -223,12 +335,33 @@ formula_or_law = Discriminator(
     )
 )
 
-as_tuple = BeforeValidator(lambda given: tuple(given) if isinstance(given, list) else given)
+
+def _components(given: Any) -> Any:
+    """Return the components of a list, an array, or UFL of vectors."""
+    if isinstance(given, Expr) and len(given.ufl_shape) == 1:
+        return tuple(given[k] for k in range(given.ufl_shape[0]))
+    if isinstance(given, np.ndarray) and given.ndim:
+        given = [*given]
+    return tuple(given) if isinstance(given, list) else given
+
+
+def _in_time(given: Any, info: ValidationInfo) -> Any:
+    """Return the components, functions of time with their names in messages."""
+    given, name = _components(given), f"{_named(info)}: {info.field_name}"
+    if not isinstance(given, tuple):
+        return given
+    return tuple(OfTime(v, f"{name}.{k}") if callable(v) else v for k, v in enumerate(given))
+
+
+as_tuple = BeforeValidator(_components)
 _as_source = PlainSerializer(lambda value: getattr(value, "source", value))
 
 #: A list of 2 or 3, of one or more; a single value, or a list; one, or a list of the same.
-Few: TypeAlias = Annotated[tuple[One, ...], Field(min_length=2, max_length=3), as_tuple]
-Some: TypeAlias = Annotated[tuple[One, ...], Field(min_length=1), as_tuple]
+Few: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=2, max_length=3), as_tuple]
+FewTimed: TypeAlias = Annotated[
+    tuple[One, ...], Bounds(min_length=2, max_length=3), BeforeValidator(_in_time)
+]
+Some: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=1), as_tuple]
 Either: TypeAlias = Annotated[
     Annotated[One, Tag("one")] | Annotated[Many, Tag("many")], one_or_many
 ]
@@ -243,10 +376,10 @@ _NAMES = WithJsonSchema({**_NAME, "type": ["string", "array"], "minItems": 1, "i
 _FORMULA = {"type": ["number", "string"], "minLength": 1}
 
 Text: TypeAlias = Annotated[str, Accepted("a text")]
-Name: TypeAlias = Annotated[str, Field(min_length=1), Accepted("the name of a part")]
+Name: TypeAlias = Annotated[str, Bounds(min_length=1), Accepted("the name of a part")]
 Names: TypeAlias = Annotated[
     tuple[Name, ...],
-    Field(min_length=1),
+    Bounds(min_length=1),
     BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
     as_tuple,
     Accepted("a name, or a list of names"),
@@ -268,7 +401,7 @@ Part: TypeAlias = Annotated[
 ]
 AmplitudeName: TypeAlias = Annotated[
     str,
-    Field(min_length=1),
+    Bounds(min_length=1),
     AMPLITUDE,
     Accepted('a name below evolution.amplitudes, or "constant"'),
 ]
@@ -276,7 +409,7 @@ Vector: TypeAlias = Annotated[settings.Vector, as_tuple]
 Direction: TypeAlias = Annotated[settings.Direction, as_tuple]
 Triple: TypeAlias = Annotated[
     tuple[Number, ...],
-    Field(min_length=3, max_length=3),
+    Bounds(min_length=3, max_length=3),
     as_tuple,
     Accepted("a list of 3 numbers"),
 ]
@@ -299,18 +432,54 @@ NonNegativeFormula: TypeAlias = Annotated[
     WithJsonSchema({**_FORMULA, "minimum": 0}),
 ]
 TimeFormula: TypeAlias = Annotated[
-    Formula, AfterValidator(_of_time), Accepted("a number or a formula in t")
+    Formula, AfterValidator(of_time), Accepted("a number or a formula in t")
 ]
-Component: TypeAlias = Annotated[
-    Expression | Literal["free"],
-    PlainValidator(lambda given: given if given == "free" else _expression(given)),
+#: The same where Python may give functions, UFL and dolfinx Functions too.
+Value: TypeAlias = Annotated[
+    Field | Moving,
+    PlainValidator(_value),
+    _as_source,
+    Accepted("a number or a formula"),
+    WithJsonSchema(_FORMULA),
+]
+Values: TypeAlias = Annotated[
+    Few[Value], SPATIAL, Accepted("a list of 2 numbers or formulas in 2-D, 3 in 3-D")
+]
+NonNegativeValue: TypeAlias = Annotated[
+    Value,
+    AfterValidator(_static),
+    AfterValidator(_not_negative),
+    Accepted("a number >= 0 or a formula"),
+    WithJsonSchema({**_FORMULA, "minimum": 0}),
+]
+Placeless: TypeAlias = Annotated[
+    Value, AfterValidator(_placeless), Accepted("a number or a formula in t")
+]
+Free: TypeAlias = Annotated[
+    Field | Moving | Literal["free"],
+    PlainValidator(_free),
     _as_source,
     Accepted('a number, a formula or "free"'),
     WithJsonSchema(_FORMULA),
 ]
-TimeComponent: TypeAlias = Annotated[
-    Component, AfterValidator(_of_time), Accepted('a number, a formula in t or "free"')
+Timed: TypeAlias = Annotated[
+    Expression | OfTime,
+    PlainValidator(_timed),
+    _as_source,
+    Accepted("a number or a formula in t"),
+    WithJsonSchema(_FORMULA),
 ]
-FormulaVector: TypeAlias = Annotated[
-    Few[Formula], SPATIAL, Accepted("a list of 2 numbers or formulas in 2-D, 3 in 3-D")
+FreeTimed: TypeAlias = Annotated[
+    Expression | OfTime | Literal["free"],
+    PlainValidator(_free_timed),
+    _as_source,
+    Accepted('a number, a formula in t or "free"'),
+    WithJsonSchema(_FORMULA),
+]
+FactorOfTime: TypeAlias = Annotated[
+    Amplitude | str,
+    PlainValidator(_factor),
+    AMPLITUDE,
+    Accepted('a name below evolution.amplitudes, or "constant"'),
+    WithJsonSchema({"type": "string", "minLength": 1}),
 ]

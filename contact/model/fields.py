@@ -1,4 +1,4 @@
-"""Given functions of position and time: numbers, functions, UFL, dolfinx Functions, amplitudes."""
+"""Given functions of position and time: numbers, formulas, callables, UFL, amplitudes."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact import _compat
-from contact.arguments import OfTime, check_finite, expect, naming, real
+from contact.arguments import OfTime, check_finite, expect, naming, real, shorten
 from contact.errors import InputError
+from contact.model.formula import Expression, InTime
 from contact.ranks import on_all_ranks
 from contact.typing import Array
 
@@ -54,7 +55,7 @@ def steady(time: float) -> float:
 
 
 class Field(Protocol):
-    """A given function of position, for instance `contact.case.formula.Expression`."""
+    """A given function of position, for instance `contact.model.formula.Expression`."""
 
     def ufl(self, x: Expr) -> Expr | float:
         """Return the function as a UFL expression of the coordinates, or a number."""
@@ -71,12 +72,15 @@ class Moving(Protocol):
         """Return the function of position at a time: a number, or a constant of a form."""
 
 
-#: A given function of position: a number, a function of x of shape (3, n) that returns n values, a
-#: scalar UFL expression (`dolfinx.fem.Function` is one), or an object.
-Static: TypeAlias = float | Callable[[Array], Array | float] | Expr | Field
+#: A given function of position: a number, a formula, a function of x of shape (3, n) that returns
+#: n values, a scalar UFL expression (`dolfinx.fem.Function` is one), or an object.
+Static: TypeAlias = float | str | Callable[[Array], Array | float] | Expr | Field
 
 #: The same, perhaps with a time: all that `field` takes.
 Scalar: TypeAlias = Static | Moving
+
+#: A number, a formula in t, or a function of time.
+GivenTimed: TypeAlias = float | str | Amplitude
 
 #: A given vector, as `vector` takes it: its components, or one UFL expression of vectors.
 Vector: TypeAlias = Sequence[Scalar] | Array | Expr
@@ -98,21 +102,22 @@ def own_amplitude(name: str, given: GivenAmplitude | None) -> Amplitude | None:
     """Return a given function of time so that it says whose amplitude it is where it fails."""
     if isinstance(given, str) and given == CONSTANT:
         return steady
-    fits = given is None or callable(given)
-    accepted = f'a function of time, such as lambda t: 2 * t, or "{CONSTANT}"'
-    expect(f"{name}: amplitude", given, accepted, fits)
+    if not (given is None or callable(given)):
+        accepted = f'a function of time, such as lambda t: 2 * t, or "{CONSTANT}"'
+        raise InputError(f"given {shorten(repr(given))}; accepted: {accepted}", "value")
     plain = given is None or given is steady or isinstance(given, Ramp)
     made = given if plain else OfTime(cast(Amplitude, given), f"{name}: amplitude")
     return cast(Amplitude | None, made)
 
 
-def amplitude_of(given: Amplitude | None, known: bool) -> Amplitude:
+def amplitude_of(given: Amplitude | str | None, known: bool) -> Amplitude:
     """Return the amplitude of values where none may be given: a `Ramp` by default.
 
     Of values some of which are `known` functions of time themselves it is `steady`.
     """
     if given is None or isinstance(given, Ramp):
         return steady if known else (given or Ramp())
+    assert not isinstance(given, str), "a case has exchanged the name for the function"
     return given
 
 
@@ -144,19 +149,23 @@ def constant(mesh: Mesh, value: float) -> fem.Constant:
 
 
 ACCEPTED = (
-    "a number, a function of x as dolfinx interpolates it (x[0], x[1], ... are arrays), a scalar "
-    "UFL expression or dolfinx Function, or an object with the methods ufl(x) and numpy(points)"
+    "a number, a formula, a function of x as dolfinx interpolates it (x[0], x[1], ... are arrays), "
+    "a scalar UFL expression or dolfinx Function, or an object with the methods ufl(x) and "
+    "numpy(points)"
 )
 
 
-def field(value: Scalar | None) -> Field | Moving | None:
+def field(value: Scalar | None, name: str = "") -> Field | Moving | None:
     """Return a given function of position as a `Field` or `Moving`; None as it is.
 
     Parameters
     ----------
     value
-        A number, a function of x as dolfinx interpolates it, a scalar `ufl.core.expr.Expr` or
-        `dolfinx.fem.Function`, or an object that is a `Field` or `Moving`.
+        A number, a formula of x, y, z and t as in a case file (``"-10*x"``), a function of x as
+        dolfinx interpolates it, a scalar `ufl.core.expr.Expr` or `dolfinx.fem.Function`, or an
+        object that is a `Field` or `Moving`.
+    name
+        Its name in messages.
 
     Returns
     -------
@@ -167,18 +176,29 @@ def field(value: Scalar | None) -> Field | Moving | None:
     InputError
         If it is nothing of the kind.
     """
+    try:
+        return _field(value)
+    except InputError as error:
+        raise error.within(f"{name}: " if name else "") from None
+
+
+def _field(value: Scalar | None) -> Field | Moving | None:
     if value is None or isinstance(value, Moving):
         return value
     if isinstance(value, np.ndarray) and value.shape == ():
         value = value[()]
-    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
-        return Number(float(value))
+    if isinstance(value, np.number):
+        value = float(value)
+    if isinstance(value, int | float | str) and not isinstance(value, bool):
+        value = Expression(value)
+    if isinstance(value, Expression):
+        return InTime(value.source) if "t" in value.names else value
     if isinstance(value, Expr):
         if value.ufl_shape != ():
             raise InputError(f"given UFL of shape {value.ufl_shape}; accepted: {ACCEPTED}", "field")
         # UFL makes numbers of 0 * x[0] and of components of vectors.
         everywhere = not ufl.domain.extract_domains(value)
-        return Number(float(value)) if everywhere else Ufl(value)
+        return Expression(float(value)) if everywhere else Ufl(value)
     if hasattr(value, "ufl") and hasattr(value, "numpy"):
         return cast(Field, value)
     if callable(value):
@@ -194,14 +214,14 @@ def static(value: Static, name: str) -> Field:
     InputError
         If it is nothing of the kind, with the name of the value where it depends on time.
     """
-    made = field(value)
+    made = field(value, name)
     accepted = "a number or a function of position, the same at all times"
     expect(name, value, accepted, not isinstance(made, Moving))
     return cast(Field, made)
 
 
 def vector(
-    value: FreeVector | None, free: bool = False
+    value: FreeVector | None, free: bool = False, name: str = ""
 ) -> tuple[Field | Moving | None, ...] | None:
     """Return the components of a vector; None as it is.
 
@@ -211,6 +231,8 @@ def vector(
         A list of arguments of `field`, or a UFL expression or Function of vectors.
     free
         Whether None or "free" leaves a component free.
+    name
+        Its name in messages.
 
     Raises
     ------
@@ -227,32 +249,15 @@ def vector(
             "[0.0, 0.0] in the plane, or UFL or a Function of vectors",
             "field",
         )
-    found = tuple(None if isinstance(v, str) and v == "free" else field(v) for v in value)
+    found = tuple(
+        None if isinstance(v, str) and v == "free" else field(v, f"{name}.{k}" if name else "")
+        for k, v in enumerate(value)
+    )
     if not free and any(component is None for component in found):
         raise InputError(
             f"given {value!r} for a vector; accepted: 0 where nothing acts", "load-values"
         )
     return found
-
-
-@dataclass(frozen=True)
-class Number:
-    """The same everywhere."""
-
-    value: float
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether it is nothing."""
-        return self.value == 0
-
-    def ufl(self, x: Expr) -> float:
-        """Return the number."""
-        return self.value
-
-    def numpy(self, points: Array) -> Array:
-        """Return it for each of the points."""
-        return np.full(len(points), self.value)
 
 
 @dataclass(frozen=True)

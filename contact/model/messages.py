@@ -7,7 +7,6 @@ The words come from the models: each kind of value carries the accepted ones in 
 from __future__ import annotations
 
 import inspect
-import json
 import re
 import types
 from collections.abc import Iterable, Mapping
@@ -19,11 +18,11 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError, PydanticUndefined
 
-from contact.errors import InputError, clipped, nearest
+from contact.errors import InputError, clipped, nearest, shown
 from contact.settings import Accepted, Internal
 
-#: Most characters of a quoted value, a key, a path of keys, and a list of accepted names.
-VALUE, KEY, PATH, LIST = 60, 60, 100, 300
+#: Most characters of a key, a path of keys, and a list of accepted names.
+KEY, PATH, LIST = 60, 100, 300
 
 #: pydantic's names for an unknown key, of a section and of a class of options.
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
@@ -62,18 +61,6 @@ def fault(key: str, given: Any, accepted: str, identifier: str = "") -> Pydantic
     """
     context = {"key": key, "given": given, "accepted": accepted, "identifier": identifier}
     return PydanticCustomError("fault", "fault", context)
-
-
-def shown(given: Any) -> str:
-    """Show a given value as in the case file."""
-    try:
-        text = str(given) if isinstance(given, float) else json.dumps(given, default=str)
-    except ValueError:
-        # Python writes out integers up to a limit of digits only.
-        text = "a whole number of thousands of digits"
-    except RecursionError:
-        text = "a deeply nested list"
-    return clipped(text, VALUE)
 
 
 def path_of(keys: Iterable[str]) -> str:

@@ -11,8 +11,8 @@ import ufl
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from contact.case.formula import Expression
 from contact.errors import InputError
+from contact.model.formula import Expression
 from tests.problems.messages import message_of
 
 

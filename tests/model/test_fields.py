@@ -27,7 +27,7 @@ from contact import (
     Sphere,
     solve,
 )
-from contact.body.fields import field, vector
+from contact.model.fields import field, vector
 
 pytestmark = pytest.mark.parallel(2)
 
@@ -50,6 +50,7 @@ def forms_of_one_field(mesh: dmesh.Mesh) -> dict[str, Any]:
     return {
         "arithmetic": lambda x: 0.3 - 0.1 * x[0],
         "NumPy": lambda x: np.add(0.3, np.multiply(-0.1, x[0])),
+        "a formula": "0.3 - 0.1*x",
         "UFL": 0.3 - 0.1 * x[0],
         "Function": function,
         "of Functions": 2 * function - 0.3 + 0.1 * x[0],
@@ -178,10 +179,16 @@ def made(law: Linear, contact: Any = None) -> Problem:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Fixed("top", "free"), "accepted: a list with an entry a component"),
-        (lambda: Fixed("top", 0.0), "accepted: a list with an entry a component"),
-        (lambda: Fixed("top", ["x", 0.0]), "accepted: a number, a function of x"),
-        (lambda: Load("top", pressure=True), "accepted: a number, a function of x"),
+        (
+            lambda: Fixed("top", "free"),
+            "displacement: given .free.; accepted: a list of 2 components",
+        ),
+        (lambda: Fixed("top", 0.0), "displacement: given 0.0; accepted: a list of 2 components"),
+        (
+            lambda: Fixed("top", ["w", 0.0]),
+            r"^Fixed on 'top': displacement\.0: .w.: unknown name w; accepted",
+        ),
+        (lambda: Load("top", pressure=True), "pressure: True is neither a number nor a formula"),
         (lambda: Friction(0.3), r"accepted: Friction\(mu=0.3\)"),
         (lambda: Friction(mu=0.3, tresca=1.0), "accepted: one of coefficient, tresca, mu and law"),
         (lambda: field(ufl.Identity(2)), "UFL of shape"),

@@ -1,0 +1,356 @@
+"""Supports, loads, electrodes and bolts of a body: made in Python, or read from a case file."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import model_validator
+
+from contact.arguments import OfTime, one_of
+from contact.model.fields import (
+    Amplitude,
+    Field,
+    FreeVector,
+    GivenAmplitude,
+    GivenTimed,
+    Moving,
+    Scalar,
+    Static,
+    Vector,
+    amplitude_of,
+    knows_time,
+)
+from contact.model.formula import Expression
+from contact.model.messages import Words, fault
+from contact.model.section import (
+    Described,
+    FactorOfTime,
+    Few,
+    Free,
+    NonNegativeValue,
+    Part,
+    Placeless,
+    Timed,
+    Value,
+    Values,
+    as_given,
+)
+from contact.settings import SPATIAL, Accepted, Switch
+
+#: For scripts that are older than the meaning of the word.
+CHANGED = (
+    "Load(force=...) is the resultant, spread evenly over the part; the force per area, which it "
+    "was in scripts from before the first release, is traction=..."
+)
+
+ZERO = Expression(0.0)
+
+
+class Fixed(Described):
+    """`[[fixed]]`: prescribed displacement or potential on a part.
+
+    Examples
+    --------
+    >>> Fixed("left", [0.0, "free"]).on
+    'left'
+    """
+
+    on: Part
+    """Part of the boundary, or a list of parts."""
+    displacement: (
+        Annotated[
+            Few[Free],
+            SPATIAL,
+            Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula or "free"'),
+        ]
+        | None
+    ) = None
+    """Displacement of the part; "free" for a component that is not fixed."""
+    symmetry: Literal["x", "y", "z"] | None = None
+    """Instead of a displacement: the part lies in a plane of symmetry across this axis; its
+    displacement along the axis is 0."""
+    normal: Value | None = None
+    """Instead of a displacement: that along the outward normal of the part; 0 for rollers. The part
+    may be inclined or curved, and is free to move along itself."""
+    potential: Value | None = None
+    """Electric potential of the part."""
+    amplitude: FactorOfTime | None = None
+    """Factor of all that is prescribed as a function of time, see `[evolution]`."""
+
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        displacement: FreeVector | None = None,
+        potential: Scalar | None = None,
+        amplitude: GivenAmplitude | None = None,
+        *,
+        normal: Scalar | None = None,
+        symmetry: Literal["x", "y", "z"] | None = None,
+    ) -> None:
+        super().__init__(
+            on=on,
+            displacement=displacement,
+            symmetry=symmetry,
+            normal=normal,
+            potential=potential,
+            amplitude=amplitude,
+        )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        keys = ("symmetry", "normal", "displacement")
+        one = [key for key in keys if getattr(self, key) is not None]
+        if len(one) > 1:
+            accepted = f"one of {' and '.join(one)}, and for more another entry"
+            raise fault(one[0], as_given(getattr(self, one[0])), accepted, "one-condition")
+        if all(value is None for value in self.given.values()):
+            given = as_given(self.displacement) or Words("missing")
+            accepted = "a component that is fixed, normal, symmetry or a potential"
+            raise fault("displacement", given, accepted, "supports")
+        return self
+
+    @property
+    def is_clamped(self) -> bool:
+        """True if every component of the displacement is prescribed."""
+        return self.displacement is not None and "free" not in self.displacement
+
+    @property
+    def components(self) -> dict[int, Field | Moving]:
+        """The components of the displacement that are prescribed."""
+        if self.symmetry is not None:
+            return {"xyz".index(self.symmetry): ZERO}
+        given = enumerate(self.displacement or ())
+        return {k: value for k, value in given if not isinstance(value, str)}
+
+    @property
+    def given(self) -> dict[str, Field | Moving]:
+        """All that is prescribed, by key."""
+        found: dict[str, Field | Moving | None] = {
+            f"displacement.{k}": value for k, value in self.components.items()
+        }
+        found |= {"normal": self.normal, "potential": self.potential}
+        return {key: value for key, value in found.items() if value is not None}
+
+    @property
+    def factor(self) -> Amplitude:
+        """The amplitude, also where none is given."""
+        return amplitude_of(self.amplitude, knows_time([*self.given.values()]))
+
+
+class Elastic(Described):
+    """`[[elastic]]`: an elastic support, a traction against the displacement of a part."""
+
+    on: Part
+    """Part of the boundary, or a list of parts, beside the contact part."""
+    stiffness: (
+        Annotated[
+            Few[NonNegativeValue],
+            SPATIAL,
+            Accepted("a list of 2 numbers >= 0 or formulas in 2-D, 3 in 3-D"),
+        ]
+        | None
+    ) = None
+    """Force per area and displacement along each axis: traction -k u."""
+    normal: NonNegativeValue | None = None
+    """The same along the normal of the part alone, which is free to move along itself."""
+
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        stiffness: Vector | None = None,
+        normal: Static | None = None,
+    ) -> None:
+        super().__init__(on=on, stiffness=stiffness, normal=normal)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.stiffness is None and self.normal is None:
+            raise fault("stiffness", Words("missing"), "stiffness, normal, or both", "elastic")
+        return self
+
+
+#: Keys of a load on a part, and of one in the whole body.
+SURFACE, VOLUME = ("traction", "force", "pressure", "charge"), ("body_force", "body_charge")
+
+
+class Load(Described):
+    """`[[load]]`: forces and charges on a part, or in the whole body."""
+
+    hints = dict.fromkeys(
+        ("resultant", "forces"),
+        "force is the resultant on the part, traction is per area, body_force per volume",
+    )
+
+    on: Part | None = None
+    """Part of the boundary, or a list of parts, beside the contact part. This or `everywhere`."""
+    everywhere: Switch = False
+    """`true`: in the whole body."""
+    traction: Values | None = None
+    """Force per area of the part."""
+    force: (
+        Annotated[
+            Few[Placeless],
+            SPATIAL,
+            Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
+        ]
+        | None
+    ) = None
+    """Resultant force on the part, spread evenly over it; in 2-D of a unit of depth, of a body of
+    revolution that of the full turn. A part that is to move as a rigid body is `[[rigid]]`."""
+    pressure: Value | None = None
+    """Normal pressure p on the part: traction -p along the outward normal."""
+    charge: Value | None = None
+    """Charge per area of the part."""
+    body_force: Values | None = None
+    """Force per volume."""
+    body_charge: Value | None = None
+    """Charge per volume."""
+    amplitude: FactorOfTime | None = None
+    """Factor of all of these as a function of time, see `[evolution]`."""
+
+    def __init__(
+        self,
+        on: str | Sequence[str] | None = None,
+        density: Vector | None = None,
+        pressure: Scalar | None = None,
+        charge: Scalar | None = None,
+        amplitude: GivenAmplitude | None = None,
+        traction: Vector | None = None,
+        body_force: Vector | None = None,
+        body_charge: Scalar | None = None,
+        *,
+        force: Vector | None = None,
+    ) -> None:
+        if on is None:
+            body_force = one_of("Load", density=density, body_force=body_force)
+            charge, body_charge = None, one_of("Load", charge=charge, body_charge=body_charge)
+        else:
+            traction = one_of("Load", density=density, traction=traction)
+        super().__init__(
+            on=on,
+            everywhere=on is None,
+            traction=traction,
+            force=force,
+            pressure=pressure,
+            charge=charge,
+            body_force=body_force,
+            body_charge=body_charge,
+            amplitude=amplitude,
+        )
+        if force is not None:
+            warnings.warn(CHANGED, FutureWarning, stacklevel=2)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.on is None) == (not self.everywhere):
+            given = "neither" if self.on is None else "both"
+            raise fault("on", Words(given), "one of on and everywhere = true", "exclusive-keys")
+        right, wrong = (VOLUME, SURFACE) if self.everywhere else (SURFACE, VOLUME)
+        place = "in the whole body" if self.everywhere else "on a part"
+        for key in wrong:
+            if getattr(self, key) is not None:
+                accepted = f"{place}: {', '.join(right)}"
+                raise fault(key, Words(f"given {place}"), accepted, "exclusive-keys")
+        if not self.named:
+            accepted = f"at least one of {', '.join(right)}"
+            raise fault(right[0], Words("missing"), accepted, "load-values")
+        return self
+
+    @property
+    def density(self) -> tuple[Field | Moving, ...] | None:
+        """The force per area of a part, or per volume."""
+        return self.traction if self.body_force is None else self.body_force
+
+    @property
+    def named(self) -> dict[str, Field | Moving]:
+        """All that is given, by the keys that the case file has for it."""
+        given: dict[str, Field | Moving | None] = {}
+        for key in ("body_force", "traction", "force"):
+            given |= {f"{key}.{i}": value for i, value in enumerate(getattr(self, key) or ())}
+        for key in ("pressure", "charge", "body_charge"):
+            given[key] = getattr(self, key)
+        return {name: field for name, field in given.items() if field is not None}
+
+    @property
+    def factor(self) -> Amplitude:
+        """The amplitude, also where none is given."""
+        return amplitude_of(self.amplitude, knows_time([*self.named.values()]))
+
+
+class Electrode(Described):
+    """`[[electrode]]`: a part with one unknown potential, whose charge is given.
+
+    Examples
+    --------
+    >>> Electrode(["left", "right"], charge=1e-6).on
+    'left+right'
+    """
+
+    name: ClassVar[str] = "electrode"
+    values: ClassVar[tuple[None]] = (None,)
+
+    on: Part
+    """Part of the boundary, or a list of parts."""
+    charge: Timed = ZERO
+    """Its charge; 0: open circuit. In 2-D of a unit of depth, of a body of revolution that of the
+    full turn."""
+    amplitude: FactorOfTime | None = None
+    """Factor of the charge as a function of time, see `[evolution]`."""
+
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        charge: GivenTimed = 0.0,
+        amplitude: GivenAmplitude | None = None,
+    ) -> None:
+        super().__init__(on=on, charge=charge, amplitude=amplitude)
+
+    @property
+    def forces(self) -> tuple[Expression | OfTime | None, ...]:
+        """The charge."""
+        return (self.charge,)
+
+
+class Bolt(Described):
+    """`[[bolt]]`: a cut through a body whose sides are drawn together: a bolt that is tightened."""
+
+    name: ClassVar[str] = "bolt"
+
+    on: Part
+    """A part inside of the body, all facets of a plane section: a group of a mesh file, or one of
+    `[mesh.inside]`."""
+    force: Timed | None = None
+    """Section force, tension > 0; in 2-D of a unit of depth, of a body of revolution that of the
+    full turn. This or `shortening`."""
+    shortening: Timed | None = None
+    """Length by which the sides are drawn together; a tightened bolt keeps it under later loads."""
+    amplitude: FactorOfTime | None = None
+    """Factor of it as a function of time, see `[evolution]`."""
+
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        force: GivenTimed | None = None,
+        shortening: GivenTimed | None = None,
+        amplitude: GivenAmplitude | None = None,
+    ) -> None:
+        super().__init__(on=on, force=force, shortening=shortening, amplitude=amplitude)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.force is None) == (self.shortening is None):
+            given = "neither" if self.force is None else "both"
+            raise fault("force", Words(given), "one of force and shortening", "bolt")
+        return self
+
+    @property
+    def values(self) -> tuple[Expression | OfTime | None, ...]:
+        """The shortening."""
+        return (self.shortening,)
+
+    @property
+    def forces(self) -> tuple[Expression | OfTime | None, ...]:
+        """The section force."""
+        return (self.force,)

@@ -1,0 +1,361 @@
+"""Formulas such as ``"-10*x"`` as functions of the coordinates and the time.
+
+Python's parser reads a formula; the nodes of its syntax tree that are listed here are compiled, to
+calls of `forms.ops`, which take NumPy arrays and UFL alike. All others are refused.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache, reduce
+from types import CodeType
+from typing import TYPE_CHECKING, Any
+
+import basix.ufl
+import numpy as np
+import ufl
+from numpy.typing import ArrayLike, NDArray
+from ufl.constantvalue import ScalarValue, Zero
+from ufl.corealg.traversal import traverse_unique_terminals
+
+from contact.arguments import OfTime, Returned
+from contact.errors import InputError, counted, shown
+from contact.tolerances import HUGE
+from forms import ops
+
+if TYPE_CHECKING:
+    from dolfinx import fem
+    from ufl.core.expr import Expr
+
+#: Contents of a formula, for messages and the reference page.
+ACCEPTED = (
+    "numbers, x, y, z, t, pi, + - * / **, comparisons, and sin, cos, tan, exp, log, sqrt, abs, "
+    "min, max, where(condition, a, b)"
+)
+
+#: Longest formula (characters) and deepest nesting: far beyond any load, and small enough for
+#: every recursion over the tree, in Python's compiler and in UFL.
+MAX_LENGTH = 1000
+MAX_DEPTH = 100
+
+NOT_FINITE = "a constant in it is not finite; accepted: finite numbers"
+
+#: The coordinates and the time.
+VARIABLES = ("x", "y", "z", "t")
+
+ARITHMETIC = ast.Add | ast.Sub | ast.Mult | ast.Div | ast.Pow
+COMPARISONS: Mapping[str, Callable[[Any, Any], Any]] = {
+    "Lt": ops.less,
+    "LtE": ops.less_equal,
+    "Gt": lambda a, b: ops.less(b, a),
+    "GtE": lambda a, b: ops.less_equal(b, a),
+    "Eq": ops.equal,
+    "NotEq": ops.not_equal,
+}
+
+
+def _comparison(sign: str, a: Any, b: Any) -> Any:
+    """Return 1 where a comparison holds, and 0 elsewhere."""
+    holds = COMPARISONS[sign](a, b)
+    return float(holds) if isinstance(holds, np.bool_) else ops.where(holds, 1.0, 0.0)
+
+
+def _chain(signs: str, *sides: Any) -> Any:
+    """Return 1 where each link of ``a < b < c`` holds."""
+    return math.prod(map(_comparison, signs.split(), sides, sides[1:]))
+
+
+def _where(condition: Any, a: Any, b: Any) -> Any:
+    if isinstance(condition, float):
+        return a if condition else b
+    return ops.where(ops.not_equal(condition, 0.0), a, b)
+
+
+#: The functions, with the least and the largest number of their arguments.
+FUNCTIONS: Mapping[str, tuple[Callable[..., Any], int, float]] = {
+    "sin": (ops.sin, 1, 1),
+    "cos": (ops.cos, 1, 1),
+    "tan": (ops.tan, 1, 1),
+    "exp": (ops.exp, 1, 1),
+    "log": (ops.log, 1, 1),
+    "sqrt": (ops.sqrt, 1, 1),
+    "abs": (ops.absolute, 1, 1),
+    "min": (lambda *several: reduce(ops.minimum, several), 2, math.inf),
+    "max": (lambda *several: reduce(ops.maximum, several), 2, math.inf),
+    "where": (_where, 3, 3),
+}
+_NAMES = {name: function for name, (function, _, _) in FUNCTIONS.items()} | {
+    "__builtins__": {},
+    "pi": math.pi,
+    "_chain": _chain,
+}
+
+
+class Expression:
+    """A scalar function of the coordinates and the time, given as a number or a formula.
+
+    Formulas have NumPy's meaning: ``log`` is natural, angles are in radians, ``min`` and
+    ``max`` take two arguments or more, and a comparison counts as 1 or 0.
+
+    Parameters
+    ----------
+    source
+        A finite number or a formula in x, y, z and t.
+
+    Raises
+    ------
+    InputError
+        If the source is anything else; the message names the source and the accepted ones.
+    """
+
+    def __init__(self, source: float | str) -> None:
+        self.source = source
+        if isinstance(source, str):
+            _read(source)
+            return
+        if isinstance(source, bool) or not isinstance(source, int | float):
+            raise InputError(f"{source!r} is neither a number nor a formula", "formula")
+        try:
+            self.source = _finite(source)
+        except InputError:
+            raise InputError(
+                f"{shown(source)} is not finite; accepted: finite numbers", "not-finite"
+            ) from None
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Coordinates that the formula uses, and "t" if it uses the time."""
+        return _read(self.source)[1] if isinstance(self.source, str) else frozenset()
+
+    @property
+    def is_constant(self) -> bool:
+        """True if the value is the same everywhere at all times."""
+        return not isinstance(self.source, str) or _read(self.source)[2] is not None
+
+    @property
+    def value(self) -> float:
+        """The value of a constant expression; of others a ValueError."""
+        value = _read(self.source)[2] if isinstance(self.source, str) else self.source
+        if value is None:
+            raise ValueError(f"{self} depends on the coordinates or the time")
+        return value
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it is nothing."""
+        return self.is_constant and self.value == 0
+
+    def number(self, time: float) -> float:
+        """Return the value of an expression that depends on the time alone."""
+        return float(self.numpy(np.zeros((1, 3)), time)[0])
+
+    def numpy(self, points: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
+        """Evaluate at points.
+
+        Parameters
+        ----------
+        points
+            Coordinates, shape (n, 2) or (n, 3).
+        time
+            The time, for a formula in t.
+
+        Returns
+        -------
+        Values, shape (n,).
+
+        Raises
+        ------
+        InputError
+            If a value is not finite or its square overflows, or z is used in 2-D.
+        """
+        points = np.asarray(points, dtype=np.float64)
+        # An array, since numbers are taken for constants of the formula.
+        moment = None if time is None else np.full(1, time, dtype=np.float64)
+        result = self._evaluate(points.T, points.shape[1], moment)
+        values = np.array(np.broadcast_to(result, points.shape[:1]), dtype=np.float64)
+        bad = np.flatnonzero(~(np.abs(values) <= HUGE))
+        if bad.size:
+            place = ", ".join(f"{c:g}" for c in points[bad[0]])
+            if np.isfinite(values[bad[0]]):
+                raise Returned(
+                    f"{self} is {values[bad[0]]:.3g} at ({place}), which leads to numbers that "
+                    f"overflow; accepted: sizes below {HUGE:g}",
+                    "overflow",
+                )
+            raise Returned(
+                f"{self} is not finite at ({place}); accepted: a formula that is", "not-finite"
+            )
+        return values
+
+    def ufl(self, x: Expr, time: float | fem.Constant | None = None) -> Expr:
+        """Return the scalar UFL expression at ``x``, a vector of length 2 or 3, and a time."""
+        (dimension,) = x.ufl_shape
+        return ops.symbolic(self._evaluate(x, dimension, time))
+
+    def _evaluate(self, x: Any, dimension: int, time: Any) -> Any:
+        if self.is_constant:
+            return self.value
+        assert isinstance(self.source, str)
+        if dimension < 3 and "z" in self.names:
+            raise InputError(
+                f"{self} uses z in a plane problem; accepted there: x and y", "formula-variable"
+            )
+        if time is None and "t" in self.names:
+            raise InputError(
+                f"{self} uses t; accepted in a static problem: formulas without", "formula-variable"
+            )
+        coordinates = (x[i] for i in range(dimension))
+        variables = dict(zip(VARIABLES, coordinates, strict=False)) | {"t": time}
+        with np.errstate(all="ignore"):
+            return eval(_read(self.source)[0], _NAMES, variables)
+
+    def __repr__(self) -> str:
+        """Return the call that makes this expression."""
+        return f"Expression({self.source!r})"
+
+    def __str__(self) -> str:
+        """Return the source as in the case file."""
+        return shown(self.source)
+
+    def __eq__(self, other: object) -> bool:
+        """Compare the sources."""
+        return isinstance(other, Expression) and self.source == other.source
+
+    def __hash__(self) -> int:
+        """Hash the source."""
+        return hash(self.source)
+
+
+@dataclass(frozen=True)
+class AtTime:
+    """A formula in t as a function of position: at a number, or a constant of a form."""
+
+    expression: Expression
+    time: float | fem.Constant
+
+    def ufl(self, x: Expr) -> Expr:
+        """Return the formula as a UFL expression of the coordinates."""
+        return self.expression.ufl(x, self.time)
+
+    def numpy(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Return the values at points of shape (n, d)."""
+        assert isinstance(self.time, float)
+        return self.expression.numpy(points, self.time)
+
+
+class InTime(Expression):
+    """A formula in t as a function of position and time."""
+
+    def at(self, time: float | fem.Constant) -> AtTime:
+        """Return the function of position at a time."""
+        return AtTime(self, time)
+
+
+def of_time(given: Any) -> Any:
+    """Return a given value, if it is no formula of the coordinates."""
+    if isinstance(given, Expression) and given.names - {"t"}:
+        raise InputError(
+            f"{given} depends on the place; accepted: a number or a formula in t",
+            "formula-variable",
+        )
+    return given
+
+
+def as_number(given: Expression | OfTime, unit: float = 1.0) -> float | OfTime:
+    """Return a formula without coordinates as a number, or as a function of the time."""
+    if isinstance(given, OfTime) and unit == 1.0:
+        return given
+    if isinstance(given, Expression) and given.is_constant:
+        return unit * given.value
+    return OfTime(lambda time: unit * given.number(time), str(given))
+
+
+@lru_cache(maxsize=1000)
+def _read(source: str) -> tuple[CodeType, frozenset[str], float | None]:
+    """Return the code of a formula, the names of its variables, and the value of a constant."""
+    if len(source) > MAX_LENGTH:
+        raise InputError(
+            f"{shown(source)} has {len(source)} characters; accepted: at most {MAX_LENGTH}",
+            "long-formula",
+        )
+    try:
+        body = ast.parse(source.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        # Python reports some malformed or deeply nested texts by the last three.
+        raise InputError(
+            f"{shown(source)} is not a formula; accepted: {ACCEPTED}", "formula"
+        ) from error
+    level: list[ast.AST] = [body]
+    for _ in range(MAX_DEPTH):
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+    if level:
+        raise InputError(
+            f"{shown(source)} is nested too deeply; accepted: {MAX_DEPTH} levels", "long-formula"
+        )
+    try:
+        tree = ast.fix_missing_locations(ast.Expression(_translated(body)))
+        code = compile(tree, "formula", "eval")
+        # UFL evaluates the constant parts, 1/(0*x) too.
+        symbol = ufl.Constant(ufl.Mesh(basix.ufl.element("P", "tetrahedron", 1, shape=(3,))))
+        with np.errstate(all="ignore"):
+            found = ufl.as_ufl(eval(code, _NAMES, dict.fromkeys(VARIABLES, symbol)))
+        for part in traverse_unique_terminals(found):
+            if isinstance(part, ScalarValue):
+                _finite(part.value())
+    except InputError as error:
+        raise error.within(f"{shown(source)}: ") from None
+    except (ValueError, ArithmeticError):
+        raise InputError(f"{shown(source)}: {NOT_FINITE}", "not-finite") from None
+    if isinstance(found, ScalarValue | Zero):
+        return code, frozenset(), float(found)
+    names = {node.id for node in ast.walk(body) if isinstance(node, ast.Name)}
+    return code, frozenset(names & {*VARIABLES}), None
+
+
+def _finite(value: Any) -> float:
+    try:
+        number = float(value)
+    except (OverflowError, TypeError):  # a whole number of many digits, a complex one
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(NOT_FINITE, "not-finite")
+    return number
+
+
+def _translated(node: ast.expr) -> ast.expr:
+    """Return an accepted node with floats for numbers, and calls for comparisons."""
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            return ast.Constant(_finite(value))
+        case ast.Name(id=name):
+            if name in (*VARIABLES, "pi"):
+                return node
+            raise InputError(f"unknown name {name}; accepted: {ACCEPTED}", "formula")
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=operand):
+            return ast.UnaryOp(sign, _translated(operand))
+        case ast.BinOp(op=ast.BitXor()):
+            raise InputError("^ is not accepted; a power is written **", "formula")
+        case ast.BinOp(left=left, op=op, right=right) if isinstance(op, ARITHMETIC):
+            return ast.BinOp(_translated(left), op, _translated(right))
+        case ast.Compare(left=left, ops=signs, comparators=others):
+            links = [type(sign).__name__ for sign in signs]
+            if {*links} <= {*COMPARISONS}:
+                sides = map(_translated, (left, *others))
+                return ast.Call(
+                    ast.Name("_chain", ast.Load()), [ast.Constant(" ".join(links)), *sides], []
+                )
+        case ast.Call(func=ast.Name(id=name) as function, args=args, keywords=[]):
+            if name not in FUNCTIONS:
+                raise InputError(f"unknown function {name}; accepted: {ACCEPTED}", "formula")
+            translated, (_, least, most) = [*map(_translated, args)], FUNCTIONS[name]
+            if not least <= len(args) <= most:
+                more = "" if least == most else " or more"
+                raise InputError(
+                    f"{name} is given {counted(len(args), 'argument')}; accepted: {least}{more}",
+                    "formula",
+                )
+            return ast.Call(function, translated, [])
+    raise InputError(f"{ast.unparse(node)[:40]} is not accepted; accepted: {ACCEPTED}", "formula")

@@ -1,0 +1,258 @@
+"""Rigid parts and foundations: how they move, and their forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PrivateAttr, model_validator
+
+from contact.arguments import OfTime, expect, fill
+from contact.mesh.together import part
+from contact.model.body import ZERO
+from contact.model.fields import Amplitude, GivenAmplitude, GivenTimed, amplitude_of
+from contact.model.formula import Expression, as_number
+from contact.model.messages import Words, fault
+from contact.model.section import (
+    Described,
+    Either,
+    FactorOfTime,
+    FewTimed,
+    FreeTimed,
+    Part,
+    Timed,
+    Vector,
+    as_given,
+)
+from contact.settings import SPATIAL, Accepted
+from contact.typing import Array
+
+#: A component as it is given.
+GivenFree: TypeAlias = GivenTimed | Literal["free"] | None
+
+#: Components as they are given, or one.
+Given: TypeAlias = GivenFree | Sequence[GivenFree] | Array
+
+Components: TypeAlias = Annotated[
+    FewTimed[FreeTimed],
+    SPATIAL,
+    Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula in t or "free"'),
+]
+Forces: TypeAlias = Annotated[
+    FewTimed[Timed],
+    SPATIAL,
+    Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
+]
+Rotation: TypeAlias = Annotated[
+    Either[FreeTimed, Components],
+    Accepted('in 2-D an angle, a formula in t or "free", in 3-D a list of 3 of these'),
+]
+Moment: TypeAlias = Annotated[
+    Either[Timed, Forces],
+    Accepted("in 2-D a number or a formula in t, in 3-D a list of 3 of these"),
+]
+
+
+class Motion(Described):
+    """`[contact.rigid]`: the foundation moves as a rigid body. Absent: it is fixed.
+
+    Each component is given, or free under a given force. A plate that sinks in under a force, and
+    does not turn, is ``Motion([0.0, "free"], force=[0.0, -3.0])``; one that tilts about (1, 1) as
+    well ``Motion([0.0, "free"], "free", force=[0.0, -3.0], centre=[1.0, 1.0])``.
+    """
+
+    displacement: Components | None = None
+    """Displacement; `"free"` for a component that its force determines. Default: 0."""
+    force: Forces | None = None
+    """Force on the free components of the displacement. Default: 0."""
+    rotation: Rotation = ZERO
+    """Rotation about `centre` (degrees, in Python radians; small), or `"free"`."""
+    moment: Moment = ZERO
+    """Moment about `centre` on a free rotation."""
+    centre: Vector | None = None
+    """Centre of rotation. Required where something turns."""
+    amplitude: FactorOfTime | None = None
+    """Factor of all of these as a function of time, see `[evolution]`."""
+
+    _angle: float = PrivateAttr(np.pi / 180)
+
+    def __init__(
+        self,
+        displacement: Sequence[GivenFree] | Array = (),
+        rotation: Given = (),
+        force: Sequence[GivenTimed] | Array = (),
+        moment: GivenTimed | Sequence[GivenTimed] | Array = (),
+        centre: Sequence[float] | Array = (),
+        amplitude: GivenAmplitude | None = None,
+    ) -> None:
+        keys: dict[str, Any] = {
+            "displacement": displacement,
+            "rotation": "free" if rotation is None else rotation,
+            "force": force,
+            "moment": moment,
+            "centre": centre,
+        }
+        lists = list | tuple | np.ndarray
+        given = {k: v for k, v in keys.items() if not isinstance(v, lists) or len(v)}
+        for key in {"rotation", "moment"} & {*given}:  # in 2-D of one component
+            value = given[key]
+            given[key] = value[0] if isinstance(value, lists) and len(value) == 1 else value
+        super().__init__(**given, amplitude=amplitude)
+        self._angle = 1.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        moves = {"force": self.displacement or (), "moment": self.turns}
+        acting = {"force": self.force or (), "moment": self.moments}
+        for key, forces in acting.items():
+            for k, force in enumerate(forces):
+                if force != ZERO and moves[key][k : k + 1] != ("free",):
+                    path = f"{key}.{k}" if len(forces) > 1 else key
+                    name = "rotation" if key == "moment" else "displacement"
+                    raise fault(path, as_given(force), f'a {key} where the {name} is "free"')
+        vectors = (self.displacement, self.force, self.centre)
+        if 2 in {len(vector) for vector in vectors if vector is not None}:
+            self.check_dimension(2)
+        if self.centre is None and any(turn != ZERO for turn in self.turns):
+            raise fault("centre", Words("missing"), "a point about which it turns")
+        return self
+
+    @property
+    def turns(self) -> tuple[Expression | OfTime | str, ...]:
+        """The rotation, as a list."""
+        return self.rotation if isinstance(self.rotation, tuple) else (self.rotation,)
+
+    @property
+    def moments(self) -> tuple[Expression | OfTime, ...]:
+        """The moment, as a list."""
+        return self.moment if isinstance(self.moment, tuple) else (self.moment,)
+
+    def check_dimension(self, dimension: int, path: str = "") -> None:
+        """Raise a fault if a rotation is none of the space; `path` is that of the motion."""
+        for key in ("rotation", "moment"):
+            value = getattr(self, key)
+            fits = isinstance(value, tuple) == (dimension == 3) or value == ZERO
+            if not fits or (isinstance(value, tuple) and len(value) != 3):
+                accepted = "one angle or moment in 2-D, a list of 3 in 3-D"
+                raise fault(f"{path}{key}", as_given(value), accepted)
+
+    @property
+    def off_axis(self) -> str | None:
+        """The first key by which it leaves the axis of a body of revolution; None if it stays."""
+        if (self.displacement or (ZERO,))[0] != ZERO:
+            return "displacement.0"
+        return "rotation" if any(turn != ZERO for turn in self.turns) else None
+
+    def filled(self, dim: int) -> Motion:
+        """Return the motion with all components of a body in 2-D or 3-D."""
+
+        def every(given: tuple[Any, ...], size: int) -> tuple[Any, ...]:
+            return (*given, *[ZERO] * (size - len(given)))
+
+        turns = 2 * dim - 3
+        components = {
+            "displacement": every(self.displacement or (), dim),
+            "rotation": every(self.turns, turns),
+            "force": every(self.force or (), dim),
+            "moment": every(self.moments, turns),
+            "centre": self.centre or (0.0,) * dim,
+        }
+        return self.model_copy(update=components)
+
+    @property
+    def values(self) -> tuple[float | OfTime | None, ...]:
+        """Displacement and rotation in radians, None for free components."""
+        units = [*[1.0] * len(self.displacement or ()), *[self._angle] * len(self.turns)]
+        given = (*(self.displacement or ()), *self.turns)
+        return tuple(
+            None if isinstance(value, str) else as_number(value, unit)
+            for value, unit in zip(given, units, strict=True)
+        )
+
+
+class RigidPart(Motion):
+    """`[[rigid]]`: a part that moves as a rigid body, such as a plate that loads the body."""
+
+    on: Part
+    """Part of the boundary, or a list of parts."""
+
+
+def numbers_at(
+    values: Sequence[float | OfTime | Expression | None], given: Amplitude | str | None, time: float
+) -> Array:
+    """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it."""
+    known = any("t" in getattr(value, "names", ()) for value in values)
+    numbers = [
+        value.number(time) if isinstance(value, Expression | OfTime) else value or 0.0
+        for value in values
+    ]
+    return amplitude_of(given, known)(time) * np.array(numbers)
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """A part that moves as a rigid body, or a list of parts, or a foundation in front of it.
+
+    A plate on the top of a body, under a force:
+
+    >>> plate = Rigid("top", Motion([0.0, None], force=[0.0, -3.0]))
+
+    It is given to the body by ``Body(law, fixed, rigid=plate)``; ``Rigid("bottom", motion,
+    foundation=True)`` is the foundation in front of the contact part ``bottom``.
+
+    Parameters
+    ----------
+    on
+        Name of the part, or a list of names.
+    motion
+        How it moves.
+    foundation
+        Whether it is the foundation in front of the part, and not the part itself.
+
+    Raises
+    ------
+    InputError
+        If `on` is no name, or `motion` none.
+    """
+
+    on: str
+    motion: Motion
+    foundation: bool
+
+    def __init__(self, on: str | Sequence[str], motion: Motion, foundation: bool = False) -> None:
+        fill(self, on=part(on), motion=motion, foundation=foundation)
+        expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
+
+    name = "rigid"
+
+    @property
+    def values(self) -> tuple[float | OfTime | None, ...]:
+        """Displacement and rotation."""
+        return self.motion.values
+
+    @property
+    def forces(self) -> tuple[Expression | OfTime, ...]:
+        """Force and moment."""
+        return (*(self.motion.force or ()), *self.motion.moments)
+
+    @property
+    def amplitude(self) -> Amplitude | str | None:
+        """That of the motion."""
+        return self.motion.amplitude
+
+
+def rigid_motions(points: NDArray[np.floating], revolved: bool = False) -> Array:
+    """Return the rigid motions at points of shape (n, d): shape (n, d, 3 or 6).
+
+    Translations come first, then rotations: about z in 2-D, about x, y and z in 3-D.
+    A body of revolution has one, along its axis: shape (n, 2, 1).
+    """
+    n, d = points.shape
+    motions = np.zeros((n, d, 3 if d == 2 else 6))
+    motions[:, np.arange(d), np.arange(d)] = 1.0
+    for k, (i, j) in enumerate([(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]):
+        motions[:, i, d + k], motions[:, j, d + k] = -points[:, j], points[:, i]
+    return motions[:, :, 1:2] if revolved else motions

@@ -1,0 +1,45 @@
+"""Motions of rigid parts: the same from Python and from a case file."""
+
+import numpy as np
+import pytest
+
+from contact import Motion
+from contact.case.file import parse_case
+from contact.model.rigid import numbers_at
+from tests.problems.bar import changed
+
+TIMES = {"times": [0.0, 1.0], "steps": [4]}
+
+
+def section(**keys):
+    """Return the motion of `[[rigid]]` with some keys, of a case with load steps."""
+    rigid = [{"on": "right", **keys}]
+    return parse_case(changed(rigid=rigid, evolution=TIMES, load=None)).rigid[0]
+
+
+@pytest.mark.parametrize("time", [0.25, 1.0])
+def test_degrees_of_a_case_file_are_radians_in_python(time):
+    read = section(displacement=["0.1*t", "free"], rotation=90.0, centre=[1.0, 2.0], force=[0, -3])
+    for drop in ("0.1*t", lambda t: 0.1 * t):
+        made = Motion([drop, None], np.pi / 2, [0.0, -3.0], centre=[1.0, 2.0])
+        for motion in (made.filled(2), read.filled(2)):
+            assert [value is None for value in motion.values] == [False, True, False]
+            values = numbers_at(motion.values, None, time)
+            np.testing.assert_allclose(values, [0.1 * time, 0.0, np.pi / 2])
+            forces = numbers_at((*motion.force, *motion.moments), None, 1.0)
+            np.testing.assert_allclose(forces, [0.0, -3.0, 0.0])
+            assert motion.centre == (1.0, 2.0)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_what_is_not_given_is_zero(dim):
+    for motion in (Motion(), section(), Motion([0.0] * dim, [0.0] * 3 if dim == 3 else 0.0)):
+        filled = motion.filled(dim)
+        assert numbers_at(filled.values, None, 1.0).tolist() == [0.0] * (dim + 2 * dim - 3)
+        assert filled.centre == (0.0,) * dim
+
+
+def test_a_free_rotation():
+    turning = Motion([0.0, "free"], None, moment="2*t", centre=[0.0, 0.0])
+    assert turning.filled(2).values[1:] == (None, None)
+    assert numbers_at(turning.moments, None, 0.5).tolist() == [1.0]
