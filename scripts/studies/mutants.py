@@ -250,7 +250,7 @@ MUTANTS = (
         "restart-without-history",
         "the history of a checkpoint",
         "contact/io/checkpoint.py",
-        "initial.replaced({name: values[HISTORY + name] for name in asked})",
+        "initial.replaced({name: own[HISTORY + name] for name in initial.arrays()})",
         "initial",
         ("tests/io/test_resume.py",),
     ),
