@@ -21,6 +21,22 @@ from contact.typing import Array
 
 
 @dataclass(frozen=True)
+class Proximal:
+    """An elastic bed along the tangents, about an earlier iterate.
+
+    Attributes
+    ----------
+    stiffness
+        Of the bed (stress/length).
+    about
+        Tangential displacement of the iterate, shape (n, d).
+    """
+
+    stiffness: float
+    about: Array
+
+
+@dataclass(frozen=True)
 class Interface:
     """Unilateral contact, friction, layer and current at the owned contact nodes.
 
@@ -47,6 +63,8 @@ class Interface:
     component, components
         The connected component of the mesh that each contact node belongs to, shape (n,), and how
         many there are (`contact.body.component_norms`).
+    proximal
+        The term of a proximal-point method; None for the problem itself.
     """
 
     jump: ContactNodes
@@ -58,6 +76,7 @@ class Interface:
     elongation: float
     component: NDArray[np.intp]
     components: int
+    proximal: Proximal | None = None
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -199,6 +218,9 @@ class Interface:
         jump.transpose(jump.weight[:, None] * forces.vectors(jump), residual)
         for law, nodal, pressure in self.acting(x, forces):
             law.jump.transpose(law.jump.weight[:, None] * law.force(nodal, pressure), residual)
+        if self.proximal is not None:
+            away = jump.tangential_component(jump.apply(x)) - self.proximal.about
+            jump.transpose(self.proximal.stiffness * jump.weight[:, None] * away, residual)
 
     def add_current(self, residual: Array, x: Array, change: Array, forces: Multipliers) -> None:
         """Add the change of the current with local unknowns, psi frozen, to owned values."""
@@ -224,6 +246,9 @@ class Interface:
         x
             Local unknowns.
         """
+        if self.proximal is not None:
+            blocks = blocks.copy()
+            blocks[:, : self.dim, : self.dim] += self.proximal.stiffness * self.jump.tangent
         weighted = self.jump.weight[:, None, None] * blocks
         if self.held is None:
             return weighted

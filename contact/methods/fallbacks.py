@@ -12,9 +12,11 @@ more in turn (`working_set`). If neither is a solution these follow, in this ord
    bound updated outside, and Newton's last steps from there (`interior_point`). A converged
    solution in which contact has moved a body to where nothing constrains it, although friction
    could, gives way to that of a fallback if there is one;
-4. the condensed body, where it has so many contact nodes that it was not condensed before.
+4. where friction has to hold a motion that the supports do not, proximal points: an elastic bed
+   about the last iterate, which becomes softer (`proximal_points`);
+5. the condensed body, where it has so many contact nodes that it was not condensed before.
 
-The notes of the history name the first three. A condensed contact problem has fallbacks 1 to 3 of
+The notes of the history name the first four. A condensed contact problem has fallbacks 1 to 4 of
 its own.
 
 References
@@ -25,6 +27,7 @@ programs, Math. Program. 27 (1983).
 Nocedal and Wright, Numerical Optimization, Springer (2006), chapter 16: working sets.
 Haslinger, Approximation of the Signorini problem with friction, obeying the Coulomb law, Math.
 Methods Appl. Sci. 5 (1983).
+Rockafellar, Monotone operators and the proximal point algorithm, SIAM J. Control Optim. 14 (1976).
 """
 
 from __future__ import annotations
@@ -38,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contact.errors import SingularError
-from contact.interface.interface import Interface
+from contact.interface.interface import Interface, Proximal
 from contact.methods.interior_point import interior_point
 from contact.methods.report import Outcome
 from contact.methods.semismooth import SemismoothNewton
@@ -55,8 +58,8 @@ logger = logging.getLogger("contact.solver")
 #: Solves the whole problem from a state on by another way.
 LastFallback: TypeAlias = Callable[[State], tuple[State, Outcome]]
 
-#: Notes of the steps of the working set and of the continuation in the history.
-WORKING_SET, CONTINUATION = "working set", "continuation"
+#: Notes of the steps in the history.
+WORKING_SET, CONTINUATION, PROXIMAL_POINT = "working set", "continuation", "proximal point"
 
 #: Factor by which the conductivity grows: the first, and the least one that is tried.
 FACTOR, LEAST_FACTOR = 1e3, 1.2
@@ -67,6 +70,13 @@ FIRST_PART = FACTOR**-3
 #: Stagnation limit in a continuation: condensed steps cost little beside another value of the
 #: parameter, and Example 8.4 with ten times its conductivity needs them.
 CONTINUATION_LIMIT = 20
+
+#: First stiffness of the proximal term over c, its factors after a problem that is solved and after
+#: one that is not, and most problems.
+PROXIMAL_STIFFNESS, SOFTER, STIFFER, PROXIMAL_PROBLEMS = 1e-2, 0.2, 4.0, 40
+
+#: Residual of the problem without the term below which its own solution is tried.
+NEARLY_BALANCED = 0.03
 
 
 def solve_contact(
@@ -170,6 +180,11 @@ def fall_back(
             newton.step.renew()
             singular = error
         newton.reserved = 0
+    held_by_friction = problem.interface.friction.acts and not newton.modes.constrained_by_supports
+    if held_by_friction and not outcome.converged and newton.left > 0:
+        found = proximal_points(newton)
+        if found is not None:
+            return found
     if last is not None and not (outcome.converged or outcome.overloaded) and newton.left > 0:
         logger.info("%s; going on with the condensed body", outcome.ended)
         found = last(problem.start())
@@ -304,3 +319,37 @@ def _in_the_conductivity(
         return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
 
     return continuation(solve, problem.start())
+
+
+def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
+    """Return a solution by a proximal-point method; None where it finds none. Collective.
+
+    For belts, leaf springs, wedges: bodies that friction alone holds along a motion. Newton's
+    steps and the updates of a friction bound leave these where the friction of the present
+    pressures does not hold them. An elastic bed along the tangents of the contact nodes, about the
+    last iterate, holds them meanwhile: k (u_tau - u_tau of the last problem). Its stiffness falls
+    after each problem that is solved, and rises after one that is not. Where the bed bears
+    little, its forces are left out, and Newton's method takes the last steps.
+    """
+    problem, interface = newton.problem, newton.problem.interface
+    nodes, state = interface.jump, problem.start()
+    stiffness = PROXIMAL_STIFFNESS * newton.step.parameters.c
+    for number in range(PROXIMAL_PROBLEMS):
+        term = Proximal(stiffness, nodes.tangential_component(nodes.apply(state.x)))
+        method = newton.on(problem.with_interface(replace(interface, proximal=term)))
+        try:
+            held, outcome = method.iterate(state, note=PROXIMAL_POINT)
+        except SingularError:  # the bodies have parted: nothing resists along the normals
+            newton.step.renew()
+            return None
+        if outcome.converged:
+            state, stiffness = held, SOFTER * stiffness
+            if evaluate(problem, state).significant <= NEARLY_BALANCED:
+                found = newton.iterate(newton.started(state), note=PROXIMAL_POINT)
+                if found[1].converged:
+                    return found
+        elif number == 0 or newton.left <= 0:
+            return None
+        else:
+            stiffness = STIFFER * stiffness
+    return None

@@ -41,6 +41,7 @@ from contact.linear.operator import Counters
 from contact.methods.complementarity_parameters import complementarity_parameters
 from contact.methods.fallbacks import (
     CONTINUATION,
+    PROXIMAL_POINT,
     RIGID_MOTION,
     WORKING_SET,
     completed,
@@ -69,7 +70,7 @@ CONTACT_PART = 1e-3
 UNSOLVED = 0.05
 
 #: Notes of fallbacks that a record of the whole problem repeats.
-FALLBACKS = WORKING_SET, CONTINUATION, RIGID_MOTION, INTERIOR_POINT
+FALLBACKS = WORKING_SET, CONTINUATION, RIGID_MOTION, INTERIOR_POINT, PROXIMAL_POINT
 
 #: Why the loop over the material ends where a condensed problem has no solution.
 NOT_CONDENSED = "the condensed contact problem is not solved"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, parse_case, solve
+from contact import Solution, build_problem, parse_case, solve
 from contact.mesh.domain import Domain
 from contact.mesh.grid import rectangle
 
@@ -54,3 +54,84 @@ def test_a_strap_around_a_drum(cells, ratio, mu, degree, thickness):
     # The drum bears both pulls, and the moment of friction their difference.
     force = -solution.contact_force
     assert force[1] == pytest.approx(PULL * thickness * (1 + 1 / ratio), rel=1e-9)
+
+
+def belt(angle: float, mu: float, share: float, cells: int = 24) -> tuple[Solution, float]:
+    """Pull a belt around a part of a drum of radius 1 with a share of the limit of Eytelwein.
+
+    Nothing but friction holds it. The tensions act in the middle of its thickness.
+    """
+    thickness, tension = 0.02, 1e-7
+    domain = rectangle(MPI.COMM_WORLD, [0.0, 0.0], [angle, thickness], [cells, 1])
+    x = domain.mesh.geometry.x
+    at, radius = x[:, 0].copy(), 1 + x[:, 1]
+    x[:, 0], x[:, 1] = -radius * np.cos(at), radius * np.sin(at)
+    ratio = 1 + share * (np.exp(mu * angle) * (1 - thickness) - 1)
+    pull = [float(c) for c in ratio * tension * np.array([np.sin(angle), np.cos(angle)])]
+    case = {
+        "mesh": {"generator": "rectangle", "size": [angle, thickness], "cells": [cells, 1]},
+        "space": {"kinematics": "plane_stress"},
+        "material": {"young": YOUNG, "poisson": 0.0},
+        "load": [{"on": "left", "force": [0.0, -tension]}, {"on": "right", "force": pull}],
+        "contact": {
+            **{"on": "bottom", "overlap": "press"},
+            "foundation": {"shape": "sphere", "centre": [0.0, 0.0], "radius": 1.0},
+        },
+        "friction": {"law": "coulomb", "mu": mu},
+    }
+    solution = solve(build_problem(parse_case(case), MPI.COMM_WORLD, domain=domain))
+    return solution, float(np.hypot(*(np.array(pull) - [0.0, tension])))
+
+
+@pytest.mark.core
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("degrees", "mu", "share"), [(180, 0.3, 0.95), (270, 0.15, 0.9), (100, 0.5, 0.95)]
+)
+def test_a_belt_that_friction_alone_holds(degrees, mu, share):
+    """Up to 5 % below exp(mu theta); the last friction bounds were said not to hold it."""
+    solution, force = belt(np.deg2rad(degrees), mu, share)
+    assert solution.converged, solution.outcome.reason
+    assert np.linalg.norm(solution.contact_force) == pytest.approx(force, rel=1e-6)
+    assert not any("not-held" in warning for warning in solution.warnings)
+
+
+def test_a_belt_that_slips_is_said_to():
+    """At 1.1 times the limit no friction holds it."""
+    solution, _ = belt(np.pi, 0.3, 1.1)
+    assert not solution.converged
+    assert any("not-held" in warning for warning in solution.warnings)
+
+
+def test_a_leaf_spring_between_two_plates_is_twice_its_half():
+    """Its ends rest on one plate, its crown bears the other: friction alone holds it."""
+    long, rise, thick, mu, cells = 100.0, 5.0, 1.0, 0.1, 20
+    radius = (long**2 / 4 + rise**2) / (2 * rise)
+    half = float(np.arcsin(long / 2 / radius))
+
+    def pressed(begin: float, number: int, force: float, fixed: list) -> Solution:
+        domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [half - begin, thick], [number, 2])
+        x = domain.mesh.geometry.x
+        at, r = x[:, 0] + begin, radius + x[:, 1]
+        x[:, 0], x[:, 1] = r * np.sin(at), rise - radius + r * np.cos(at)
+        lid = {"displacement": [0.0, "free"], "force": [0.0, -force]}
+        plates = [([0.0, float(x[:, 1].min())], [0.0, 1.0]), ([0.0, rise + thick], [0.0, -1.0])]
+        low, high = ({"shape": "plane", "point": p, "normal": n} for p, n in plates)
+        case = {
+            "mesh": {"generator": "rectangle", "size": [half - begin, thick], "cells": [number, 2]},
+            "space": {"degree": 2, "kinematics": "plane_stress"},
+            "material": {"young": 200e3, "poisson": 0.0},
+            "fixed": fixed,
+            "contact": [
+                {"on": "bottom", "foundation": low},
+                {"on": "top", "foundation": high, "rigid": lid},
+            ],
+            "friction": {"law": "coulomb", "mu": mu},
+        }
+        return solve(build_problem(parse_case(case), MPI.COMM_SELF, domain=domain))
+
+    whole = pressed(-half, 2 * cells, 6.0, [])
+    right = pressed(0.0, cells, 3.0, [{"on": "left", "displacement": [0.0, "free"]}])
+    assert whole.converged and right.converged, whole.outcome.reason
+    sinks = [s.movements["rigid"]["displacement"][1] for s in (whole, right)]
+    assert sinks[0] == pytest.approx(sinks[1], rel=1e-3)
