@@ -120,6 +120,11 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
     exact = facets.degree == 1 and not facets.refined
     known = np.einsum("nd,nd->n", lumped.deviation, normal)
+    explained = np.maximum(known, known - lumped.least)
+    if facets.refined and facets.order == 1:
+        # The last edges of a part are halves of one chord, which tell nothing of the curve.
+        most = comm.allreduce(float(explained.max(initial=0.0)), op=MPI.MAX)
+        explained = np.full_like(explained, most)
     return Candidates(
         lumped.nodes,
         nodes,
@@ -127,7 +132,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
         np.where(light, 0.0, lumped.weight),
         normal,
         points + lumped.deviation,
-        np.maximum(known, known - lumped.least),
+        explained,
         comm.allreduce(0.0 if exact else facets.unknown_deviation, op=MPI.MAX),
         facets.owners,
         lumped.mixing,

@@ -113,7 +113,7 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
                 "touches: its ends count as corners, and pressures may be many times those of a "
                 "curve; take more edges, or curved cells (mesh.order = 2)"
             )
-        if scatter > DEVIATION * pressed:
+        if pressed > 0 and scatter > DEVIATION * pressed:
             yield (
                 f"straight edges tell a curved contact surface to about {unknown:.2g}, and "
                 f"nodal pressures scatter by about {scatter:.2g}, {scatter / pressed:.0%} of the "

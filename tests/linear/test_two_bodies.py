@@ -54,7 +54,7 @@ def test_it_converges_as_fast_as_for_one_body(held, monkeypatch):
     )
     state, outcome = method.solve()
     assert outcome.converged
-    assert method.whole.operator._inner.ksp.getPC().getMGLevels() > 1
+    assert method.whole.step.operator._inner.ksp.getPC().getMGLevels() > 1
     assert counters.linear_iterations <= 6.5 * counters.linear_solves
     direct, exact = Newton(problem, NewtonOptions(tolerance=1e-8)).solve()
     assert exact.converged

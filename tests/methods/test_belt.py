@@ -56,7 +56,7 @@ def test_a_strap_around_a_drum(cells, ratio, mu, degree, thickness):
     assert force[1] == pytest.approx(PULL * thickness * (1 + 1 / ratio), rel=1e-9)
 
 
-def belt(angle: float, mu: float, share: float, cells: int = 24) -> tuple[Solution, float]:
+def belt(angle: float, mu: float, share: float, cells: int = 16) -> tuple[Solution, float]:
     """Pull a belt around a part of a drum of radius 1 with a share of the limit of Eytelwein.
 
     Nothing but friction holds it. The tensions act in the middle of its thickness.
@@ -83,7 +83,7 @@ def belt(angle: float, mu: float, share: float, cells: int = 24) -> tuple[Soluti
     return solution, float(np.hypot(*(np.array(pull) - [0.0, tension])))
 
 
-@pytest.mark.core
+@pytest.mark.core("180-0.3-0.95")
 @pytest.mark.parallel
 @pytest.mark.parametrize(
     ("degrees", "mu", "share"), [(180, 0.3, 0.95), (270, 0.15, 0.9), (100, 0.5, 0.95)]

@@ -1,0 +1,154 @@
+"""Bodies that friction alone holds: belts, leaf springs and strips near their limit.
+
+`python3 -m scripts.studies.held_by_friction [--out DIR] [--coarse]`, on one rank. Belts around
+60 to 300 degrees of a drum are pulled with up to 5 % less than exp(mu theta) allows, arched leaf
+springs are pressed between two plates, and strips that lie on a plane are pulled with up to 99 % of
+their friction, in 2-D and 3-D. The table says how many are solved, by which fallback, in how many
+linear solves; all are drawn with a fixed seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import Solution, build_problem, parse_case, solve
+from contact.mesh.domain import Domain
+from contact.mesh.grid import rectangle
+from contact.typing import Array
+from scripts.reporting import Report, append, parser
+
+SEED, COUNT, COARSE_COUNT = 11, 200, 12
+
+#: Notes of fallbacks, the last one tried first.
+WAYS = ("proximal point", "interior point", "working set")
+
+Rng = np.random.Generator
+Tables = dict[str, Any]
+
+
+def bent(size: Array, cells: tuple[int, int], place: Any) -> Domain:
+    """Return a rectangle whose points are moved by a function of both coordinates."""
+    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], size, cells)
+    x = domain.mesh.geometry.x
+    x[:, 0], x[:, 1] = place(x[:, 0].copy(), x[:, 1].copy())
+    return domain
+
+
+def belt(rng: Rng) -> tuple[Tables, Domain]:
+    """Draw a belt around a drum of radius 1, whose tension acts in the middle of its thickness."""
+    angle, mu = np.deg2rad(rng.uniform(60, 300)), float(rng.uniform(0.1, 0.5))
+    thick, cells = float(rng.uniform(0.01, 0.05)), int(rng.integers(12, 50))
+    degree, share = int(rng.choice([1, 1, 2])), float(rng.choice([0.5, 0.8, 0.9, 0.95]))
+    ratio = 1 + share * (np.exp(mu * angle) * (1 - thick) - 1)
+    layers, tension = int(rng.integers(1, 3)), thick * float(10 ** rng.uniform(-6, -4))
+    domain = bent(
+        np.array([angle, thick]),
+        (cells, layers),
+        lambda a, r: (-(1 + r) * np.cos(a), (1 + r) * np.sin(a)),
+    )
+    pull = [float(c) for c in ratio * tension * np.array([np.sin(angle), np.cos(angle)])]
+    drum = {"shape": "sphere", "centre": [0.0, 0.0], "radius": 1.0}
+    return {
+        "space": {"degree": degree, "kinematics": "plane_stress"},
+        "material": {"young": 1.0, "poisson": 0.0},
+        "load": [{"on": "left", "force": [0.0, -tension]}, {"on": "right", "force": pull}],
+        "contact": {"on": "bottom", "overlap": "press", "foundation": drum},
+        "friction": {"law": "coulomb", "mu": mu},
+    }, domain
+
+
+def leaf(rng: Rng) -> tuple[Tables, Domain]:
+    """Draw an arched leaf spring between two plates, the upper of which is pressed down."""
+    long, rise, thick = 100.0, float(rng.uniform(2, 10)), float(rng.uniform(0.5, 2))
+    cells, mu = int(rng.integers(16, 60)), float(rng.choice([0.05, 0.1, 0.3, 0.6]))
+    radius = (long**2 / 4 + rise**2) / (2 * rise)
+    half = np.arcsin(long / 2 / radius)
+    domain = bent(
+        np.array([2 * half, thick]),
+        (cells, 2),
+        lambda a, r: (
+            (radius + r) * np.sin(a - half),
+            rise - radius + (radius + r) * np.cos(a - half),
+        ),
+    )
+    low = float(domain.mesh.geometry.x[:, 1].min())
+    # Share of the force that would press a beam of the same length flat.
+    force = 48 * 200e3 * thick**3 / 12 / long**3 * rise * float(rng.choice([0.1, 0.3, 0.6, 0.9]))
+    below = {"shape": "plane", "point": [0.0, low], "normal": [0.0, 1.0]}
+    above = {"shape": "plane", "point": [0.0, rise + thick], "normal": [0.0, -1.0]}
+    lid = {"displacement": [0.0, "free"], "force": [0.0, -force]}
+    return {
+        "space": {"degree": 2, "kinematics": "plane_stress"},
+        "material": {"young": 200e3, "poisson": 0.0},
+        "friction": {"law": "coulomb", "mu": mu},
+        "contact": [
+            {"on": "bottom", "foundation": below},
+            {"on": "top", "foundation": above, "rigid": lid},
+        ],
+    }, domain
+
+
+def strip(rng: Rng) -> tuple[Tables, None]:
+    """Draw a strip on a plane, pressed, and pulled at one end."""
+    mu, cells = float(rng.uniform(0.1, 0.6)), int(rng.integers(20, 80))
+    share = float(rng.choice([0.6, 0.9, 0.97, 0.99]))
+    press, solid = float(10 ** rng.uniform(-7, -4)), rng.random() < 1 / 3
+    long = float(cells // 5) if solid else cells / 2
+    aside = [0.0] if solid else []
+    grid = {"size": [long, *[1.0] * len(aside), 1.0], "cells": [cells, 2]}
+    grid |= {"generator": "box", "cells": [cells // 5, 1, 1]} if solid else {}
+    return {
+        "mesh": {"generator": "rectangle", **grid},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "load": [
+            {"on": "top", "traction": [0.0, *aside, -press]},
+            {"on": "right", "traction": [share * mu * long * press, *aside, 0.0]},
+        ],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": mu},
+    }, None
+
+
+FAMILIES = (belt, belt, leaf, strip)
+
+
+def solved(number: int) -> tuple[str, Solution]:
+    """Solve a problem; return its family too."""
+    family = FAMILIES[number % len(FAMILIES)]
+    tables, domain = family(np.random.default_rng([SEED, number]))
+    if domain is not None:
+        given = {"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1]}
+        case = parse_case({"mesh": given, **tables})
+        return family.__name__, solve(build_problem(case, MPI.COMM_SELF, domain=domain))
+    return family.__name__, solve(build_problem(parse_case(tables), MPI.COMM_SELF))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Solve all, and count by family and fallback."""
+    given = parser(__doc__, "held_by_friction").parse_args(arguments)
+    found: dict[tuple[str, str], list[tuple[bool, int]]] = {}
+    for number in range(COARSE_COUNT if given.coarse else COUNT):
+        family, solution = solved(number)
+        notes = " ".join(record.note for record in solution.history.records)
+        way = next((way for way in WAYS if way in notes), "none")
+        counters = solution.counters
+        solves = counters.contact_solves + counters.linear_solves
+        found.setdefault((family, way), []).append((solution.converged, solves))
+        if not solution.converged:
+            print(family, number, solution.outcome.reason, flush=True)
+    keys = ("family", "last fallback", "problems", "solved", "median solves", "most solves")
+    rows: dict[str, list[Any]] = {key: [] for key in keys}
+    for (family, way), runs in sorted(found.items()):
+        converged, solves = zip(*runs, strict=True)
+        counts = len(runs), sum(converged), int(np.median(solves)), max(solves)
+        append(rows, family, way, *counts)
+    caption = "Bodies that friction alone holds: problems solved, by the last fallback"
+    Report(given.out).table("held-by-friction", caption, rows)
+
+
+if __name__ == "__main__":
+    main()
