@@ -182,8 +182,6 @@ def _take(
         if "ELSET" in options:
             found.sets.setdefault(found.name(options["ELSET"]), []).extend(values[::count])
     elif keyword in ("NSET", "ELSET"):
-        if keyword not in options:
-            raise ValueError(f"*{keyword} without a name")
         into = found.nodes if keyword == "NSET" else found.sets
         instance = options.get("INSTANCE", "")
         key = found.name(options[keyword])
@@ -201,8 +199,6 @@ def _take(
         instance = options.get("INSTANCE", "")
         rows = [(found.member(line[0], instance), (*line, "")[1].upper()) for line in lines]
         kind = options.get("TYPE", "ELEMENT").upper()
-        if "NAME" not in options:
-            raise ValueError("*SURFACE without a name")
         if "COMBINE" in options:
             word = f"*SURFACE, COMBINE={options['COMBINE']}"
             raise ValueError(f"{word}: no surfaces are made of others; accepted: faces of elements")
@@ -252,14 +248,14 @@ def _deck(found: Scope) -> Contents:
         raise ValueError(f"*ELEMENT: element {number} is there twice; accepted: once")
     deck, names = Contents(points, blocks), found.shown()
     for key in found.sets:
-        members = _members(found.sets, key, ())
+        members = _members(found.sets, key)
         deck.groups[names[key]] = _by_block(members, elements)
     for key, sets in found.nodes_of.items():
-        chosen = [number for name in sets for number in _members(found.sets, name, ())]
+        chosen = [number for name in sets for number in _members(found.sets, name)]
         for block, within in _by_block(chosen, elements).items():
             found.nodes[key] += map(int, tags[np.unique(blocks[block][1][within])])
     for key in found.nodes:
-        numbers = _members(found.nodes, key, ())
+        numbers = _members(found.nodes, key)
         deck.nodes[names[key]] = np.flatnonzero(np.isin(tags, numbers))
     dim, twice = max((kind.dim for kind in deck.kinds), default=0), []
     for key, (sort, lines) in found.surfaces.items():
@@ -283,22 +279,18 @@ def _deck(found: Scope) -> Contents:
     return deck
 
 
-def _members(sets: dict[str, list[Member]], key: str, above: tuple[str, ...]) -> list[int]:
+def _members(sets: dict[str, list[Member]], key: str) -> list[int]:
     """Return the numbers of a set, those of sets in it too."""
-    if key in above:
-        raise ValueError(f"the set {key} holds itself")
     if key not in sets:
         raise ValueError(f"there is no set {key}")
-    return _named(sets, sets[key], (*above, key))
+    return _named(sets, sets[key])
 
 
-def _named(
-    sets: dict[str, list[Member]], given: Sequence[Member], above: tuple[str, ...] = ()
-) -> list[int]:
+def _named(sets: dict[str, list[Member]], given: Sequence[Member]) -> list[int]:
     """Return the numbers of members, each a number or a set."""
     numbers: list[int] = []
     for member in given:
-        numbers += [member] if isinstance(member, int) else _members(sets, member, above)
+        numbers += [member] if isinstance(member, int) else _members(sets, member)
     return numbers
 
 

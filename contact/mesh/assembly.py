@@ -77,10 +77,7 @@ class Scope:
         home, own = ("", given) if given.isdigit() and not instance else self._home(given, instance)
         if not own.lstrip("+-").isdigit():
             return self.name(given, instance)
-        number = int(own)
-        if abs(number) >= STRIDE // 2:
-            raise ValueError(f"number {number}; accepted: less than {STRIDE // 2}")
-        return number + self.instances[home.upper()] if home else number
+        return int(own) + self.instances[home.upper()] if home else int(own)
 
     def number(self, given: str, instance: str = "") -> int:
         """Return the number that a word stands for."""
@@ -146,20 +143,7 @@ class Motion:
 
     @classmethod
     def of(cls, instance: str, lines: Sequence[Sequence[str]]) -> Motion:
-        """Return the motion of an instance by its data lines.
-
-        Parameters
-        ----------
-        instance
-            Its name.
-        lines
-            The components of the translation; two points a, b of the axis and the angle (degrees).
-
-        Raises
-        ------
-        ValueError
-            If these are no such lines.
-        """
+        """Return the motion of an instance by its data lines."""
         rows = [[real(value) for value in line] for line in lines]
         shift, about = (*rows, [], [])[:2]
         axis = np.array(about[3:6]) - about[:3] if len(about) == 7 else np.zeros(3)
@@ -181,15 +165,16 @@ class Motion:
 
 @dataclass
 class Assembly:
-    """The parts of a file and their assembly, and the scope of the next keyword in it."""
+    """The parts of a file and their assembly, and the scope of the next keyword in it.
+
+    A part or an instance ends where its END stands, the next one begins, or the file ends.
+    """
 
     whole: Scope = field(default_factory=Scope)
     parts: dict[str, Scope] = field(default_factory=dict)
-    opened: str = ""
-    name: str = ""
     here: Scope = field(init=False)
-    _nowhere: dict[str, str] = field(default_factory=dict)
-    _placed: tuple[str, Motion] = field(init=False)
+    _unused: dict[str, str] = field(default_factory=dict)
+    _placed: tuple[str, str, Motion] | None = None
 
     def __post_init__(self) -> None:
         """Begin outside of parts."""
@@ -199,43 +184,36 @@ class Assembly:
         self, keyword: str, options: Mapping[str, str], lines: Sequence[Sequence[str]]
     ) -> None:
         """Begin or end a part or an instance."""
-        if keyword != f"END {self.opened}":
-            self._ended()
-        if not self.opened and keyword.startswith("END"):
-            raise ValueError(f"*{keyword} without *{keyword.removeprefix('END ')}")
-        if keyword == "END INSTANCE":
-            part, motion = self._placed
-            self.whole.instances[self.name.upper()] = STRIDE * (len(self.whole.instances) + 1)
-            self._nowhere.pop(part, None)
-            for own in (self.parts[part], self.here):
-                self.whole.place(own, self.name, motion)
+        self._end()
         if keyword.startswith("END"):
-            self.opened, self.here = "", self.whole
             return
-        name, part = (options.get(key, "").strip('"') for key in ("NAME", "PART"))
-        if not name:
-            raise ValueError(f"*{keyword} without a name")
+        name = options["NAME"].strip('"')
         if name.upper() in (self.parts if keyword == "PART" else self.whole.instances):
             raise ValueError(f"*{keyword}, NAME={name}: it is there twice; accepted: once")
-        self.opened, self.name, self.here = keyword, name, Scope()
+        self.here = Scope()
         if keyword == "PART":
             self.parts[name.upper()] = self.here
-            self._nowhere[name.upper()] = name
-        elif part.upper() in self.parts:
-            self._placed = part.upper(), Motion.of(name, lines)
+            self._unused[name.upper()] = name
         else:
-            word = f"*INSTANCE, NAME={name}: there is no part {part!r}"
-            raise ValueError(f"{word}; accepted: those that stand above it")
+            part = options["PART"].strip('"')
+            if part.upper() not in self.parts:
+                word = f"*INSTANCE, NAME={name}: there is no part {part!r}"
+                raise ValueError(f"{word}; accepted: those that stand above it")
+            self._placed = name, part.upper(), Motion.of(name, lines)
 
     def flat(self) -> Scope:
         """Return the assembly; parts without an instance are left out."""
-        self._ended()
-        nowhere = (f"PART, NAME={name} without an instance" for name in self._nowhere.values())
-        self.whole.other[:0] = nowhere
+        self._end()
+        unused = (f"PART, NAME={name} without an instance" for name in self._unused.values())
+        self.whole.other[:0] = unused
         return self.whole
 
-    def _ended(self) -> None:
-        """Raise unless the last part or instance has ended."""
-        if self.opened:
-            word = f"*{self.opened}, NAME={self.name}"
-            raise ValueError(f"{word}: there is no *END {self.opened}")
+    def _end(self) -> None:
+        """Place the instance that ends here, if one does."""
+        if self._placed is not None:
+            name, part, motion = self._placed
+            self.whole.instances[name.upper()] = STRIDE * (len(self.whole.instances) + 1)
+            self._unused.pop(part, None)
+            for own in (self.parts[part], self.here):
+                self.whole.place(own, name, motion)
+        self._placed, self.here = None, self.whole
