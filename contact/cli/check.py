@@ -145,28 +145,17 @@ def _locking(problem: ContactProblem) -> list[str]:
     ]
 
 
-def mean_ratio(corners: Array) -> Array:
-    """Return the quality of simplices, corners (n, d + 1, d): 1 for regular, 0 for flat ones."""
-    d = corners.shape[2]
-    edges = corners[:, 1:] - corners[:, :1]
-    volume = np.abs(np.linalg.det(edges)) / (2 if d == 2 else 6)
-    first, second = np.triu_indices(d + 1, 1)
-    squares = ((corners[:, first] - corners[:, second]) ** 2).sum(axis=(1, 2))
-    if d == 2:
-        return np.asarray(4 * np.sqrt(3) * volume / squares)
-    return np.asarray(12 * (3 * volume) ** (2 / 3) / squares)
-
-
 def quality(shape: Shape, corners: Array) -> Array:
-    """Return the mean ratio of cells, of other cells than simplices the least at their corners.
+    """Return the mean ratio of cells, the least at their corners: 1 if regular, 0 if flat.
 
-    There it is that of the edges, 1 where these are of one length and at right angles (Knupp, SIAM
-    J. Sci. Comput. 23, 2001).
+    It is d det(A)^(2/d) / |A|^2, A the map from the regular cell of the shape (Knupp, SIAM J. Sci.
+    Comput. 23, 2001).
     """
-    if shape.simplex:
-        return mean_ratio(corners[:, : shape.corners])
-    d, jacobian = shape.dim, jacobians(shape, corners, shape.nodes(1))
-    size = np.maximum(determinant(jacobian), 0.0) ** (2 / d)
+    d, jacobian = shape.dim, jacobians(shape, corners[:, : shape.corners], shape.nodes(1))
+    if shape.simplex:  # its edges from one corner: W^T W = (1 + I) / 2
+        regular = np.linalg.cholesky((1 + np.eye(d)) / 2).T
+        jacobian = jacobian @ np.linalg.inv(regular)
+    size = np.abs(determinant(jacobian)) ** (2 / d)
     return np.asarray((d * size / np.sum(jacobian**2, axis=(2, 3))).min(axis=1))
 
 

@@ -8,21 +8,16 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.rollers import SMOOTH
 from contact.errors import counted
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cells_at
-from contact.mesh.geometry import facet_normals, geometry_nodes, measures, outward, volumes
+from contact.mesh.geometry import geometry_nodes, measures, outward, volumes
 from contact.typing import Array
 
 #: Length of the mean of a part's normals from which on the part counts as flat, and below which
 #: they cancel.
 FLAT, CLOSED = 1 - 1e-6, 1e-6
-
-#: Most directions of plane faces, as of a polyhedron with edges, and at smaller angles, if each of
-#: them has so many facets.
-MOST, FACES, FACETS = 12, 3, 4
 
 
 def parts(domain: Domain) -> list[str]:
@@ -34,14 +29,11 @@ def parts(domain: Domain) -> list[str]:
             rows.append([name, counted(count, "facet"), "on the axis", "", ""])
             continue
         length = float(np.linalg.norm(mean))
-        faces = 1 if length >= FLAT else plane_faces(domain, name, count)
         across = f"normal {vector(mean)}"
         if length < CLOSED:
-            across = "normals that cancel"
+            across = "not plane, normals that cancel"
         elif length < FLAT:
-            across = f"mean normal {vector(mean / length)}"
-        if faces != 1:
-            across = f"{f'plane faces in {faces} directions' if faces else 'curved'}, {across}"
+            across = f"not plane, mean normal {vector(mean / length)}"
         rows.append([*_row(domain, name, count, area, centroid), across])
     for name in sorted(domain.inside):
         count, area, centroid, _ = _sizes(domain, domain.inside[name])
@@ -75,29 +67,6 @@ def _sizes(domain: Domain, facets: Indices) -> tuple[int, float, Array, Array]:
     count, area, *sums = domain.comm.allreduce(local, op=MPI.SUM)
     centroid, mean = np.reshape(sums, (2, domain.dim)) / (area if area > 0 else 1.0)
     return round(count), float(area), centroid, mean
-
-
-def plane_faces(domain: Domain, part: str, count: int) -> int:
-    """Return how many directions the plane faces of a part have, 0 if it is curved. Collective.
-
-    Between plane faces are edges. At most `FACES` may also meet at smaller angles, for they have
-    several facets each: a curved part has as many directions as facets, or as rows of these.
-
-    Parameters
-    ----------
-    domain, part
-        The mesh, and a part of its boundary.
-    count
-        How many facets it has.
-    """
-    normal = facet_normals(domain, part, domain.order)[2].reshape(-1, domain.dim)
-    unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    own = np.unique(np.round(unit, 6) + 0.0, axis=0)[: MOST + 1]
-    every = np.unique(np.concatenate(domain.comm.allgather(own)), axis=0)
-    apart = every @ every.T - 2 * np.eye(len(every))
-    edges = len(every) <= MOST and apart.max(initial=-1.0) < SMOOTH
-    few = len(every) <= FACES and count >= FACETS * len(every)
-    return len(every) if edges or few else 0
 
 
 def regions(domain: Domain) -> list[str]:

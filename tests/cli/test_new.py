@@ -8,10 +8,10 @@ import pytest
 from mpi4py import MPI
 
 from contact.case.file import load_case
-from contact.cli.check import mean_ratio, quality
+from contact.cli.check import quality
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.cli.new import case_text
-from contact.mesh.cells import HEXAHEDRON, QUADRILATERAL
+from contact.mesh.cells import HEXAHEDRON, QUADRILATERAL, TETRAHEDRON, TRIANGLE
 from meshes import write
 from scripts.cases import CASES
 from tests.problems.overlapping import layers
@@ -167,8 +167,13 @@ def test_shapes_of_cells() -> None:
     triangle = 3.0 * np.array([[[0, 0], [1, 0], [0.5, np.sqrt(0.75)]]])
     tetrahedron = 0.2 * np.array([[[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]])
     right = np.array([[[0, 0], [1, 0], [0, 1.0]]])
-    for corners, ratio in ((triangle, 1.0), (tetrahedron, 1.0), (right, np.sqrt(3) / 2)):
-        assert mean_ratio(corners) == pytest.approx([ratio], rel=1e-12)
+    for shape, corners, ratio in (
+        (TRIANGLE, triangle, 1.0),
+        (TETRAHEDRON, tetrahedron, 1.0),
+        (TRIANGLE, right, np.sqrt(3) / 2),
+        (TRIANGLE, right[:, [0, 2, 1]], np.sqrt(3) / 2),
+    ):
+        assert quality(shape, corners) == pytest.approx([ratio], rel=1e-12)
 
 
 def test_shapes_of_quadrilaterals_and_hexahedra() -> None:
