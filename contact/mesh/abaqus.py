@@ -74,13 +74,7 @@ FROM_FILES = {"NODE", "ELEMENT"}
 
 
 def read(file: Path) -> Contents:
-    """Read an input file, and those that it includes.
-
-    Raises
-    ------
-    ValueError
-        If something is missing, or no number where one belongs; the message names it.
-    """
+    """Read an input file, and those that it includes; raise errors of any kind if it is wrong."""
     found = Assembly()
     for keyword, options, lines in _blocks(file):
         if keyword in NESTING:
@@ -91,13 +85,7 @@ def read(file: Path) -> Contents:
 
 
 def included(file: Path) -> list[Path]:
-    """Return an input file and those that it includes, each once.
-
-    Raises
-    ------
-    ValueError
-        If one of them is missing.
-    """
+    """Return an input file and those that it includes, each once; a ValueError without one."""
     return [*dict.fromkeys([file, *(inner for inner, _ in _lines(file))])]
 
 

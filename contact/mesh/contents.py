@@ -144,10 +144,7 @@ def letters(given: bytes) -> str:
 
 
 def _by_number(key: str, arrays: Sequence[Array]) -> Iterator[tuple[str, int, Ints]]:
-    """Yield groups that arrays of whole numbers mark, and their members block by block; 0 is none.
-
-    The name of a group is its number, behind that of the arrays unless that is one for tags.
-    """
+    """Yield groups that whole numbers mark, 0 none: name, block and members."""
     whole = [np.asarray(array) for array in arrays]
     if key in INNER or any(v.dtype.kind not in "iub" or v.ndim != 1 for v in whole):
         return
@@ -155,7 +152,7 @@ def _by_number(key: str, arrays: Sequence[Array]) -> Iterator[tuple[str, int, In
     if len(several) > 1 and max(v.max(initial=0) for v in whole) == len(several) - 1:
         # Sets that meshio has written as one array: their names, and -1 for none.
         names, whole = dict(enumerate(several, 1)), [v + 1 for v in whole]
-    before = "" if key in TAGS else f"{key} "
+    before = "" if key in TAGS else f"{key} "  # in front of the number
     for block, values in enumerate(whole):
         for number in map(int, np.unique(values[values > 0])):
             yield names.get(number, f"{before}{number}"), block, np.flatnonzero(values == number)

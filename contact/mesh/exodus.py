@@ -57,15 +57,7 @@ SHELLS = {"triangle": ((0, 1, 2), (0, 2, 1)), "quad": ((0, 1, 2, 3), (0, 3, 2, 1
 
 
 def read(file: Path) -> Contents:
-    """Read an Exodus file.
-
-    Raises
-    ------
-    ValueError
-        If it has elements that are not known.
-    Exception
-        Of any kind, if it is damaged.
-    """
+    """Read an Exodus file; raise errors of any kind if it is damaged."""
     import netCDF4
 
     with netCDF4.Dataset(str(file)) as data:

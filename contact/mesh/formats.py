@@ -30,28 +30,14 @@ def program(file: Path) -> str:
 
 
 def read(file: Path) -> Contents:
-    """Read a mesh file.
-
-    Raises
-    ------
-    Exception
-        Of any kind, if it is damaged.
-    """
+    """Read a mesh file; raise errors of any kind if it is damaged."""
     readers = {"Abaqus": abaqus.read, "MED": med.read, "Exodus": exodus.read, "VTK": _vtu}
     readers |= {"Gmsh": gmsh_model.read, "XDMF": xdmf.read}
     return readers[program(file)](file)
 
 
 def files(file: Path) -> list[Path]:
-    """Return the files of which a mesh consists: its mesh file, and those that it refers to.
-
-    Raises
-    ------
-    OSError
-        If one cannot be read.
-    ValueError
-        If an input file of Abaqus includes one that is missing.
-    """
+    """Return the files of a mesh: its own, and those that it names; an error if one is missing."""
     if program(file) == "Abaqus":
         return abaqus.included(file)
     return [file, *(xdmf.heavy(file) if program(file) == "XDMF" else ())]

@@ -19,15 +19,7 @@ KINDS |= {"HE": "hexahedron", "H": "hexahedron", "PE": "wedge", "P": "wedge", "P
 
 
 def read(file: Path) -> Contents:
-    """Read a MED file.
-
-    Raises
-    ------
-    ValueError
-        If it has no mesh, or several, or elements that are not known.
-    Exception
-        Of any kind, if it is damaged.
-    """
+    """Read a MED file of one mesh; raise errors of any kind if it is damaged."""
     import h5py
 
     with h5py.File(file, "r") as data:

@@ -208,11 +208,7 @@ def _check_kinds(kinds: Sequence[Kind], dim: int) -> Shape:
 def _parts(
     contents: Contents, shape: Shape, corners: Ints
 ) -> tuple[dict[str, Ints], list[str], list[str]]:
-    """Return the facets of parts by their corners, and the names of sets that are left out.
-
-    These are sets of nodes whose name a surface of other facets has, and those without a facet of
-    the boundary. ``corners`` are those of all cells, (m, corners), no two the same.
-    """
+    """Return parts by corners, and names that a surface has too, or without facets."""
     of, left, without = shape.facet.corners, list[str](), list[str]()
     none = np.zeros((0, of), dtype=np.int64)
     parts = {name: v if v.shape[1] == of else none for name, v in contents.surfaces.items()}
@@ -306,32 +302,16 @@ def _first(wrong: npt.NDArray[np.bool_], corners: Array) -> str:
 
 
 def _may_fold(shape: Shape, x: Array) -> npt.NDArray[np.bool_]:
-    """Return which straight cells may be folded inside though they are not at their corners.
-
-    The Jacobian matrix is affine along each coordinate of the reference cell: everywhere it is a
-    mean of those at the corners. Where these are nearer to that in the middle than it is to a
-    singular one, none between is singular.
-
-    Parameters
-    ----------
-    shape, x
-        Of the cells, and their corners, shape (m, corners, d).
-    """
+    """Return which straight cells, (m, corners, d), may be folded though not at corners."""
+    # The Jacobian matrix is affine along each coordinate: a mean of those at the corners. Where
+    # these are nearer to that in the middle than it is to a singular one, none is singular.
     middle = inverse(jacobians(shape, x, shape.middle))
     change = middle @ jacobians(shape, x, shape.nodes(1)) - np.eye(shape.dim)
     return np.asarray(~(np.linalg.norm(change, axis=(2, 3)).max(axis=1) < 1))
 
 
 def _least_volume(shape: Shape, nodes: Array, at: Array) -> Array:
-    """Return the least Jacobian of cells over its sign at the first corner, shape (m,).
-
-    Parameters
-    ----------
-    shape, nodes
-        Of the cells, and their nodes, shape (m, k, d).
-    at
-        Points of the reference cell, the first corner first, shape (q, d).
-    """
+    """Return the least Jacobian at points, by the sign at the first one, shape (m,)."""
     each = (determinant(jacobians(shape, nodes, point[None]))[:, 0] for point in at)
     first = next(each)  # one at a time, for all at once take kilobytes a cell
     return reduce(np.minimum, (volume * np.sign(first) for volume in each), np.abs(first))
@@ -340,24 +320,7 @@ def _least_volume(shape: Shape, nodes: Array, at: Array) -> Array:
 def _check_cells(
     shape: Shape, points: Array, cells: Ints, parts: Mapping[str, Ints]
 ) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Check cells, and which groups of facets cannot be parts of the boundary.
-
-    Parameters
-    ----------
-    shape, points, cells
-        Of the cells, coordinates, shape (n, d), and nodes, shape (m, k), corners first.
-    parts
-        Name -> corners of facets, -1 for a node of no cell.
-
-    Returns
-    -------
-    Name of each group that cannot be a part -> the reason; and those inside of the body.
-
-    Raises
-    ------
-    InputError
-        For cells without volume or that overlap.
-    """
+    """Return names that cannot be parts -> why, and those inside; refuse wrong cells."""
     # Without a unit of length, so that no volume overflows or vanishes.
     unit = np.ptp(points, axis=0).max() or 1.0
     nodes, cells = points[cells] / unit, cells[:, : shape.corners]

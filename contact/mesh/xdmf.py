@@ -75,13 +75,7 @@ ACCEPTED = "accepted: one mesh, and tags of its cells and facets on the nodes of
 
 
 def read(file: Path) -> Contents:
-    """Read an XDMF file: one mesh, and tags.
-
-    Raises
-    ------
-    Exception
-        For anything else, of any kind if it is damaged.
-    """
+    """Read an XDMF file of one mesh with tags; raise errors of any kind if it is damaged."""
     root = ElementTree.parse(file).getroot()
     grids = [grid for grid in root.iter("Grid") if grid.find("Topology/DataItem") is not None]
     given = [item for grid in grids if (item := grid.find("Geometry/DataItem")) is not None]
