@@ -1,13 +1,13 @@
 # Every target works on a fresh machine: scripts/fx finds FEniCSx or makes a place for it, once.
 FX := scripts/fx
-SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py) scripts/examples/explore_forms.py scripts/gallery.py \
+SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py scripts/*/*/[a-z]*.py) scripts/examples/explore_forms.py scripts/gallery.py \
 	scripts/golden.py scripts/pictures.py
 NAMES := $(notdir $(basename $(SCRIPTS)))
 # a test that hangs on some ranks is ended, and fails
 MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
 	python3 -m mpi4py -m pytest $(TESTS) $(SHORT) -m 'parallel and $(MARKS)' -q --color=no -p no:cacheprovider
 
-.PHONY: help demo test test-rest test-all test-serial messages lint format docs release clean $(NAMES)
+.PHONY: help demo test test-rest test-all test-serial messages lint format docs release clean robustness $(NAMES)
 .DEFAULT_GOAL := help
 
 help:
@@ -77,6 +77,9 @@ release:
 clean:
 	rm -rf results build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+robustness:
+	$(FX) python3 -m scripts.studies.robustness $(ARGS)
 
 # tables, figures, benchmarks, ...
 $(NAMES):

@@ -25,7 +25,7 @@ from scripts.benchmarks.bench_one import block
 from scripts.cases import bar
 from scripts.studies.cantilevers import UNIFORM as PUSHED
 from scripts.studies.cantilevers import cantilever
-from scripts.studies.sweep import on_cells, problems
+from scripts.studies.robustness.problems import problems
 from tests.methods.test_nothing_touches import CASE as BLOCKS
 from tests.methods.test_overload import wall
 from tests.methods.test_slender import TIP, UNIFORM, beam
@@ -44,12 +44,12 @@ def of_case(case: dict[str, Any], *options: NewtonOptions, **given: Any) -> Call
     return lambda: solve(parse_case(case), *options, comm=SELF, **given)
 
 
-def drawn(name: str, hard: bool = True, cell: str | None = None) -> Callable[[], Solution]:
-    """Return the solution of a problem of the sweep."""
+def drawn(name: str, kind: str = "hard", **mesh: str) -> Callable[[], Solution]:
+    """Return the solution of a random problem."""
 
     def solution() -> Solution:
-        ((_, case),) = problems(False, name, hard)
-        case = case if cell is None else on_cells(case, cell)
+        tables = next(problems(kind, name)).tables
+        case = parse_case({**tables, "mesh": tables["mesh"] | mesh})
         return solve(build_problem(case, SELF), NewtonOptions())
 
     return solution
@@ -101,7 +101,7 @@ SEEN: dict[str, tuple[Callable[[], Solution], tuple[int, int, int]]] = {
     "beam pressed along the ground": (drawn("lifted-4"), (7, 7, 0)),
     "far in the plastic range": (drawn("yielding-0"), (10, 6, 24)),
     "farther in the plastic range": (drawn("yielding-1"), (15, 10, 44)),
-    "falling friction": (drawn("bar-67", False, "quadrilateral"), (2, 1, 16)),
+    "falling friction": (drawn("bar-67", "plain", cell="quadrilateral"), (2, 1, 16)),
     "blocks that approach each other": (of_case(evolution()), (2, 1, 2)),
     "blocks that part": (
         of_case(

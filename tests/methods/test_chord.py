@@ -15,7 +15,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from forms.hencky import Log
 from forms.laws import ConstantCoefficient
-from scripts.studies.sweep import problems
+from scripts.studies.robustness.problems import problems
 from tests.problems import mechanics
 
 SELF = MPI.COMM_SELF
@@ -98,7 +98,7 @@ def test_a_step_that_makes_things_worse_is_taken_back():
 @pytest.mark.parametrize("name", ["yielding-0", "yielding-1"])
 def test_steps_far_in_the_plastic_range_are_taken_whole(name):
     """Strains of 8, and of 3e4; the method on the whole body agrees."""
-    ((_, case),) = problems(False, name, True)
+    case = next(problems("hard", name)).case
     problem = build_problem(case, SELF)
     solution = solve(problem, NewtonOptions(tolerance=1e-10))
     assert solution.converged, solution.outcome.reason

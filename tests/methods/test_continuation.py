@@ -8,7 +8,7 @@ from mpi4py import MPI
 from contact import build_problem, solve
 from contact.methods.fallbacks import FIRST_PART, continuation
 from contact.methods.options import NewtonOptions
-from scripts.studies.sweep import problems
+from scripts.studies.robustness.problems import problems
 
 
 class Loops:
@@ -48,7 +48,7 @@ def test_it_ends_where_no_step_is_short_enough():
 @pytest.mark.parallel
 def test_a_bimorph_in_front_of_a_good_conductor():
     """Its nodes hover where the ramp of psi begins; Newton's loop alone goes to and fro."""
-    ((_, case),) = problems(False, "bimorph-8", True)
+    case = next(problems("hard", "bimorph-8")).case
     comm = MPI.COMM_WORLD
     solution = solve(build_problem(case, comm=comm), NewtonOptions())
     assert solution.converged, solution.outcome.reason

@@ -13,8 +13,8 @@ from contact.case.file import parse_case
 from contact.methods.unconstrained_modes import UnconstrainedModes, _least_distance
 from contact.problem.rigid_modes import groups
 from contact.solving import solve
-from scripts.studies.fresh_check import write_msh
-from scripts.studies.fresh_families import Bodies
+from scripts.studies.robustness.bodies import Bodies
+from scripts.studies.robustness.check import write_msh
 from tests.problems.rings import between_plates, squeezed
 
 COMM = MPI.COMM_WORLD

@@ -8,9 +8,9 @@ from contact import build_problem, solve
 from contact.case.file import parse_case
 from contact.results.uniqueness import uniqueness
 from contact.problem.residuals import evaluate
-from scripts.studies.fresh_check import Mesh, write_msh
-from scripts.studies.fresh_families import Bodies
-from scripts.studies.sweep import problems
+from scripts.studies.robustness.check import Mesh, write_msh
+from scripts.studies.robustness.bodies import Bodies
+from scripts.studies.robustness.problems import problems
 from tests.problems.rings import between_plates, squeezed
 
 SAID = "several solutions may exist"
@@ -113,11 +113,11 @@ def test_critical_friction_beside_a_body_that_slides(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hard", [False, True])
-def test_single_solutions_are_not_warned_of(hard):
-    """Problems of the sweeps at mu up to 0.5."""
+@pytest.mark.parametrize("kind", ["plain", "hard"])
+def test_single_solutions_are_not_warned_of(kind):
+    """Random problems at mu up to 0.5."""
     seen = 0
-    for _, case in problems(True, None, hard):
+    for case in (problem.case for problem in problems(kind, coarse=True)):
         problem = build_problem(case, MPI.COMM_SELF)
         law = problem.interface.friction.law
         if law is None or np.max(law.maximum) > 0.5 or problem.piezoelectric:
@@ -194,13 +194,13 @@ def test_critical_friction_does_not_depend_on_the_axes(yaw, method, tmp_path):
 
 def test_no_critical_friction_where_supports_let_no_node_slide():
     """A single node of 15 touches, at the corner of a clamped side."""
-    ((_, case),) = problems(False, "few-5", True)
+    case = next(problems("hard", "few-5")).case
     solution = solve(case, comm=MPI.COMM_SELF)
     assert solution.converged and solution.critical_factor == np.inf
 
 
 def test_a_critical_friction_that_is_not_looked_for_is_told(monkeypatch):
-    ((_, case),) = problems(False, "few-5", True)
+    case = next(problems("hard", "few-5")).case
     for module in ("uniqueness", "remarks"):
         monkeypatch.setattr(f"contact.results.{module}.MOST", 3)
     solution = solve(case, comm=MPI.COMM_SELF)

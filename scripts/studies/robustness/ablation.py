@@ -1,11 +1,10 @@
 """Which problems need each device of solver and linear algebra: one of them off at a time.
 
-`python3 -m scripts.studies.ablation [--out DIR] [--coarse] [--every K] [--devices NAME ..]
-[--only NAME]`. Problems are those of both sweeps, Example 8.4 with a steep ramp, and an approach
-whose solution touches nothing; --coarse takes a tenth of the sweeps, --every K one of K. A device
-whose row shows no problem, neither failed nor slow, is to go (CONTRIBUTING.md). Some have a
-problem of their own. Slow is twice as long; on a problem of its own a device of linear algebra is
-needed where it saves a tenth.
+`make ablation ARGS="[--out DIR] [--coarse] [--every K] [--devices NAME ..] [--only NAME]"`.
+Problems are the plain and the hard ones, and Example 8.4 with a steep ramp; --coarse takes a tenth,
+--every K one of K. A device whose row shows no problem, neither failed nor slow, is to go
+(CONTRIBUTING.md). Some have a problem of their own. Slow is twice as long; on a problem of its own
+a device of linear algebra is needed where it saves a tenth.
 """
 
 from __future__ import annotations
@@ -41,7 +40,8 @@ from contact.problem.residuals import evaluate
 from scripts.benchmarks import bench_one
 from scripts.cases import CASES
 from scripts.reporting import Report, append, parser
-from scripts.studies import cantilevers, sweep
+from scripts.studies import cantilevers
+from scripts.studies.robustness.problems import problems
 from scripts.thesis.tables_compliance import case_of
 
 #: Times as long as with the device, and seconds more, from which on a problem counts as slow.
@@ -229,12 +229,12 @@ def _plane() -> Case:
 
 
 def _finer(name: str, cells: tuple[int, ...]) -> Callable[[], Case]:
-    """Return how a problem of the sweep is made on a finer mesh."""
+    """Return how a plain problem is made on a finer mesh."""
 
     def make() -> Case:
-        case = next(case for _, case in sweep.problems(False, name, hard=False))
-        mesh = case.mesh.model_copy(update={"cells": cells})
-        return _named(case.model_copy(update={"mesh": mesh}), f"{name} on a finer mesh")
+        tables = next(problems("plain", name)).tables
+        mesh = tables["mesh"] | {"cells": [*cells]}
+        return parse_case({**tables, "mesh": mesh}, source=f"{name} on a finer mesh")
 
     return make
 
@@ -300,8 +300,8 @@ LINEAR = (
 
 def cases(coarse: bool, every: int, only: str | None) -> Iterator[Case]:
     """Give the problems."""
-    for hard in (False, True):
-        found = (case for _, case in sweep.problems(coarse, only, hard))
+    for kind in ("plain", "hard"):
+        found = (problem.case for problem in problems(kind, only, coarse))
         yield from islice(found, 0, None, every)
     if only is None:
         changes = "solver.method=newton", "electric.k_e=0.6", "electric.delta=83.3333"
@@ -330,11 +330,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for device in (*DEVICES, *LINEAR)
         if not given.devices or any(name in device.name for name in given.devices)
     ]
-    problems = list(cases(given.coarse, given.every, given.only))
+    common = list(cases(given.coarse, given.every, given.only))
     own = {device.name: device.problem() for device in chosen if device.problem is not None}
     for case in own.values():
         run(case, NewtonOptions())  # loads its forms
-    whole = {case.source: run(case, NewtonOptions()) for case in [*problems, *own.values()]}
+    whole = {case.source: run(case, NewtonOptions()) for case in [*common, *own.values()]}
     keys = ("device", "lines", "failed", "slow", "seconds", "problems that need it", "literature")
     rows: dict[str, list[Any]] = {key: [] for key in keys}
     for device in chosen:
@@ -342,7 +342,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         with device.off() as options:
             alone = own.get(device.name)
             slower = SLOW_LINEAR if alone is not None and device in LINEAR else SLOW
-            for case in problems if alone is None else [alone]:
+            for case in common if alone is None else [alone]:
                 (solution, least), (found, seconds) = whole[case.source], run(case, options)
                 total += seconds
                 if solution.converged and not found.converged:
@@ -355,7 +355,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(device.name, *counts, needed, flush=True)
     total = sum(seconds for _, seconds in whole.values())
     unsolved = [name for name, (solution, _) in whole.items() if not solution.converged]
-    note = f"{len(problems)} problems, {total:.1f} s with all devices; not solved: {unsolved}"
+    note = f"{len(common)} problems, {total:.1f} s with all devices; not solved: {unsolved}"
     Report(given.out).table("ablation", "Devices of solver and linear algebra, one off", rows, note)
 
 

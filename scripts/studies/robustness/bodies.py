@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from scripts.studies.fresh_check import Array, Mesh, write_msh
-
-SEED = 37
-
-Rng = np.random.Generator
-Tables = dict[str, Any]
+from scripts.studies.robustness.check import Array, Mesh
+from scripts.studies.robustness.one_body import Rng, Tables, coulomb, one
 
 
 class Bodies:
@@ -47,18 +42,14 @@ class Bodies:
         number = np.arange(rows * columns).reshape(rows, columns)
         if closed:
             number = np.concatenate([number, number[:, :1]], axis=1)
-        a, b, c, d = (
-            part.ravel()
-            for part in (number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:])
-        )
-        turned = self.rng.random(a.size) < self.rng.choice([0.0, 0.5, 1.0])
+        quads = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
+        a, b, c, d = (part.ravel() for part in quads)
+        turned = self.rng.random(a.size) < one(self.rng, 0.0, 0.5, 1.0)
         first = np.where(turned[:, None], np.stack([a, b, c], 1), np.stack([a, b, d], 1))
         other = np.where(turned[:, None], np.stack([b, d, c], 1), np.stack([a, d, c], 1))
         lines = [number[0], number[-1], number[:, 0], number[:, -1]]
-        edges = {
-            side: np.stack([line[:-1], line[1:]], 1)
-            for side, line in zip(sides, lines, strict=False)
-        }
+        pairs = zip(sides, lines, strict=False)
+        edges = {side: np.stack([line[:-1], line[1:]], 1) for side, line in pairs}
         self.add(name, place.reshape(-1, 2), np.concatenate([first, other]), edges)
 
     def block(self, name: str, corners: Any, h: float) -> None:
@@ -101,9 +92,8 @@ class Bodies:
         number = np.arange(len(places))
         pairs = np.stack([number, np.roll(number, -1)], 1)
         names = np.array(sides)[which]
-        self.add(
-            name, points, triangles, {side: pairs[names == side] for side in dict.fromkeys(sides)}
-        )
+        edges = {side: pairs[names == side] for side in dict.fromkeys(sides)}
+        self.add(name, points, triangles, edges)
 
     def ring(self, name: str, centre: Any, radii: tuple[float, float], h: float) -> None:
         """Add a ring, its nodes turned by some angle."""
@@ -130,22 +120,20 @@ class Bodies:
         rng, found = self.rng, []
         for name in self._names:
             young = float(10 ** rng.uniform(-spread, spread))
-            one = {"on": name, "young": young, "poisson": float(rng.uniform(0.0, 0.45))}
+            found.append({"on": name, "young": young, "poisson": float(rng.uniform(0.0, 0.45))})
             if rng.random() < 0.35:
-                one |= {"law": "log", "yield_strain": float(10 ** rng.uniform(-3, -1))}
-            found.append(one)
+                found[-1] |= {"law": "log", "yield_strain": float(10 ** rng.uniform(-3, -1))}
         return found
 
 
 def friction(rng: Rng) -> Tables:
     """Draw mu from 0 to 1."""
-    mu = float(rng.choice([0.0, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, rng.random()]))
-    return {"friction": {"law": "coulomb", "mu": mu}} if mu > 0 else {"friction": {"law": "none"}}
+    return {"friction": coulomb(rng, 0.0, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, rng.random())}
 
 
-def _pair(rng: Rng, one: str, other: str, once: bool = False) -> Tables:
-    """Draw which side is which; the first is `on` where the other one has several contacts."""
-    on, against = (one, other) if once or rng.random() < 0.5 else (other, one)
+def _pair(rng: Rng, first: str, other: str, once: bool = False) -> Tables:
+    """Draw which side is the slave; the first is where the other one has several contacts."""
+    on, against = (first, other) if once or rng.random() < 0.5 else (other, first)
     return {"on": on, "against": against, **friction(rng)}
 
 
@@ -165,13 +153,12 @@ def rings(rng: Rng, b: Bodies) -> Tables:
     h = rng.uniform(0.2, 0.35)
     b.ring("ring", (0.0, 1.0), (rng.uniform(0.4, 0.8), 1.0), h)
     low, high = (float(end(b._points[0][:, 1])) for end in (np.min, np.max))
-    gap = float(rng.choice([0.0, 0.0, 0.002]))
-    b.block(
-        "plate", _box(rng.uniform(-0.1, 0.1), low - 0.5 - gap, 2.0, 0.5), rng.uniform(0.15, 0.4)
-    )
+    gap = one(rng, 0.0, 0.0, 0.002)
+    below = _box(rng.uniform(-0.1, 0.1), low - 0.5 - gap, 2.0, 0.5)
+    b.block("plate", below, rng.uniform(0.15, 0.4))
     b.block("lid", _box(rng.uniform(-0.1, 0.1), high, 2.0, 0.5), rng.uniform(0.15, 0.4))
     way = -float(10 ** rng.uniform(-3, -1.5))
-    push = float(rng.choice([0.0, 0.3, -1.0])) * way
+    push = one(rng, 0.0, 0.3, -1.0) * way
     return {
         "fixed": [_clamp("plate_bottom"), _clamp("lid_top", push, way)],
         "contact": [
@@ -187,13 +174,13 @@ def stacks(rng: Rng, b: Bodies) -> Tables:
     for k in range(count):
         wide, high = rng.uniform(0.8, 2.0), rng.uniform(0.2, 0.8)
         b.block(f"b{k}", _box(rng.uniform(-0.2, 0.2), y, wide, high), rng.uniform(0.15, 0.3))
-        y += high + float(rng.choice([0.0, 0.0, 0.001]))
+        y += high + one(rng, 0.0, 0.0, 0.001)
     way = float(10 ** rng.uniform(-3, -1.5))
     pairs = [_pair(rng, f"b{k}_top", f"b{k + 1}_bottom") for k in range(count - 1)]
     return {
         "fixed": [
             _clamp("b0_bottom"),
-            _clamp(f"b{count - 1}_top", float(rng.choice([0, 1, -2])) * way, -way),
+            _clamp(f"b{count - 1}_top", one(rng, 0, 1, -2) * way, -way),
         ],
         "contact": pairs,
     }  # fmt: skip
@@ -204,24 +191,24 @@ def wedges(rng: Rng, b: Bodies) -> Tables:
     half, narrow = np.deg2rad(rng.uniform(3, 50)), rng.uniform(0.2, 0.6)
     spread = narrow + np.tan(half)
     b.block("wedge", [[-narrow, 0], [narrow, 0], [spread, 1], [-spread, 1]], rng.uniform(0.12, 0.3))
-    gap = float(rng.choice([0.0, 0.003]))
+    gap = one(rng, 0.0, 0.003)
     contacts = []
     for side, x in (("right", narrow), ("left", -narrow)):
-        angle = half + np.deg2rad(float(rng.choice([0.0, 1.0, -1.0])) * (gap > 0))
+        angle = half + np.deg2rad(one(rng, 0.0, 1.0, -1.0) * (gap > 0))
         sign = np.sign(x)
         normal = [float(-sign * np.cos(angle)), float(np.sin(angle))]
         point = [float(x + sign * (gap + 0.03 * (gap > 0))), 0.0]
         shape = {"shape": "plane", "point": point, "normal": normal}
         contacts.append({"on": f"wedge_{side}", "foundation": shape, **friction(rng)})
     way = float(10 ** rng.uniform(-2.5, -1.2))
-    aside = float(rng.choice([0.0, 0.4])) * way
+    aside = one(rng, 0.0, 0.4) * way
     return {"fixed": [_clamp("wedge_top", aside, -way - gap)], "contact": contacts}
 
 
 def driven_wedges(rng: Rng, b: Bodies) -> Tables:
     """Draw an elastic wedge between two elastic cheeks."""
     half, narrow, h = np.deg2rad(rng.uniform(5, 40)), 0.3, rng.uniform(0.15, 0.3)
-    spread, gap = narrow + np.tan(half), float(rng.choice([0.0, 0.002]))
+    spread, gap = narrow + np.tan(half), one(rng, 0.0, 0.002)
     b.block("wedge", [[-narrow, 0], [narrow, 0], [spread, 1], [-spread, 1]], h)
     far = spread + 0.7
     b.block("l", [[-far, 0], [-narrow - gap, 0], [-spread - gap, 1], [-far, 1]], 0.8 * h)
@@ -230,7 +217,7 @@ def driven_wedges(rng: Rng, b: Bodies) -> Tables:
     return {
         "fixed": [
             _clamp("l_left"), _clamp("r_right"),
-            _clamp("wedge_top", float(rng.choice([0.0, 0.5])) * way, -way),
+            _clamp("wedge_top", one(rng, 0.0, 0.5) * way, -way),
         ],
         "contact": [
             _pair(rng, "wedge_left", "l_right"), _pair(rng, "wedge_right", "r_left"),
@@ -258,23 +245,19 @@ def snap_fits(rng: Rng, b: Bodies) -> Tables:
 def lifted_off(rng: Rng, b: Bodies) -> Tables:
     """Draw two bodies that are pressed, sheared, lifted off and pressed again, in steps."""
     b.block("a", _box(0, -0.6, 1.8, 0.6), rng.uniform(0.15, 0.35))
-    kind = rng.choice(["block", "disc", "tilted"])
-    gap = float(rng.choice([0.0, 0.02]))
+    kind = one(rng, "block", "disc", "tilted")
+    gap = one(rng, 0.0, 0.02)
     if kind == "disc":
         n = int(rng.integers(12, 24))
         angle = np.pi * (1 + np.arange(n + 1) / n)
-        b.cloud(
-            "b",
-            np.stack([np.cos(angle), 1.0 + gap + np.sin(angle)], 1),
-            0.2,
-            ["bottom"] * n + ["top"],
-        )
+        half = np.stack([np.cos(angle), 1.0 + gap + np.sin(angle)], 1)
+        b.cloud("b", half, 0.2, ["bottom"] * n + ["top"])
     else:
         turn = 0.0 if kind == "block" else np.deg2rad(rng.uniform(0.2, 4))
         corners = _box(0, gap + 0.5 * np.sin(turn), 1.0, 0.6, turn)
         b.block("b", corners, rng.uniform(0.15, 0.35))
     down, aside = gap + float(10 ** rng.uniform(-2.5, -1.7)), float(10 ** rng.uniform(-3, -2))
-    up = float(rng.choice([-0.01, 0.01, 0.1]))
+    up = one(rng, -0.01, 0.01, 0.1)
     lift = "max(0, min(t - 2, 4 - t))"
     way = f"{-down!r}*min(t, 1) + {down + up!r}*{lift}"
     push = f"{aside!r}*max(0, min(1, t - 1))"
@@ -290,36 +273,24 @@ def indenters(rng: Rng, b: Bodies) -> Tables:
     b.block("block", _box(0, -1, 2.4, 1), rng.uniform(0.12, 0.25))
     way = -float(10 ** rng.uniform(-3, -1.5))
     tilt = np.deg2rad(rng.uniform(-6, 6))
-    kind = rng.choice(["plane", "sphere", "punch", "cone", "formula"])
+    kind = one(rng, "plane", "sphere", "punch", "cone", "formula")
     axis = [float(np.sin(tilt)), float(np.cos(tilt))]
-    more: Tables = {}
+    shape: Tables = {"shape": kind}
+    more: Tables = {"direction": "axis", "axis": [0.0, 1.0]} if kind in ("punch", "cone") else {}
     if kind == "plane":
-        high = abs(1.2 * np.tan(tilt))
-        shape = {"shape": "plane", "point": [0.0, high], "normal": [axis[0], -axis[1]]}
+        shape |= {"point": [0.0, abs(1.2 * np.tan(tilt))], "normal": [axis[0], -axis[1]]}
     elif kind == "sphere":
         radius = rng.uniform(0.5, 4.0)
-        shape = {"shape": "sphere", "centre": [rng.uniform(-0.3, 0.3), radius], "radius": radius}
+        shape |= {"centre": [rng.uniform(-0.3, 0.3), radius], "radius": radius}
     elif kind == "punch":
         size = rng.uniform(0.3, 0.8)
-        shape = {
-            "shape": "punch",
-            "centre": [0.0, size * abs(axis[0])],
-            "axis": axis,
-            "radius": size,
-        }
-        shape["edge_radius"] = float(rng.choice([0.05, 0.15]))
-        more = {"direction": "axis", "axis": [0.0, 1.0]}
+        shape |= {"centre": [0.0, size * abs(axis[0])], "axis": axis, "radius": size}
+        shape["edge_radius"] = one(rng, 0.05, 0.15)
     elif kind == "cone":
-        shape = {
-            "shape": "cone",
-            "apex": [0.05, 0.0],
-            "axis": axis,
-            "half_angle": rng.uniform(60, 82),
-        }
-        more = {"direction": "axis", "axis": [0.0, 1.0]}
+        shape |= {"apex": [0.05, 0.0], "axis": axis, "half_angle": rng.uniform(60, 82)}
     else:
         shape = {"shape": "distance", "distance": f"{rng.uniform(0.3, 2)!r}*(x - 0.1)**2 - y"}
-    rigid: Tables = {"displacement": [float(rng.choice([0.0, 0.5])) * way, way]}
+    rigid: Tables = {"displacement": [one(rng, 0.0, 0.5) * way, way]}
     if rng.random() < 0.3:
         rigid = {"displacement": [0.0, "free"], "force": [0.0, way]}
     elif rng.random() < 0.5:
@@ -330,7 +301,7 @@ def indenters(rng: Rng, b: Bodies) -> Tables:
 
 def tilted_blocks(rng: Rng, b: Bodies) -> Tables:
     """Draw an elastic block that meets another one with its corner, or its flat side."""
-    turn = np.deg2rad(rng.choice([0.3, 2.0, 10.0, 45.0]) * rng.choice([-1, 1]))
+    turn = np.deg2rad(one(rng, 0.3, 2.0, 10.0, 45.0) * one(rng, -1, 1))
     b.block("a", _box(0, -0.8, 2.4, 0.8), rng.uniform(0.12, 0.25))
     corners = _box(0, 0, 0.9, 0.9, turn)
     corners[:, 1] -= corners[:, 1].min()
@@ -339,7 +310,7 @@ def tilted_blocks(rng: Rng, b: Bodies) -> Tables:
     way = float(10 ** rng.uniform(-3, -1.7))
     return {
         "fixed": [
-            _clamp("a_bottom"), _clamp("b_top", float(rng.choice([0.0, 1.0, -0.3])) * way, -way),
+            _clamp("a_bottom"), _clamp("b_top", one(rng, 0.0, 1.0, -0.3) * way, -way),
         ],
         "contact": [{"on": on, "against": "a_top", **friction(rng)}],
     }  # fmt: skip
@@ -351,14 +322,12 @@ def clouds(rng: Rng, b: Bodies) -> Tables:
     lean = rng.uniform(-0.3, 0.3, 2)
     polygon = [[0, 0], [wide, 0], [wide + lean[0], high], [lean[1], high]]
     b.cloud("body", polygon, rng.uniform(0.12, 0.25), ["bottom", "right", "top", "left"])
-    gap = str(rng.choice(["0", "0.002", "0.004*x**2", "0.003*(1+sin(9*x))", "0.01*abs(x-0.6)"]))
+    gap = one(rng, "0", "0.002", "0.004*x**2", "0.003*(1+sin(9*x))", "0.01*abs(x-0.6)")
     size = float(10 ** rng.uniform(-3, -1.5))
-    loads = [
-        {"on": "top", "traction": [float(rng.uniform(-1, 1)) * size, -size]},
-        {"on": "right", "traction": [float(rng.uniform(-1, 0.5)) * size, 0.0]},
+    loads: list[Tables] = [
+        {"on": "body_top", "traction": [float(rng.uniform(-1, 1)) * size, -size]},
+        {"on": "body_right", "traction": [float(rng.uniform(-1, 0.5)) * size, 0.0]},
     ]
-    for load in loads:
-        load["on"] = f"body_{load['on']}"
     if rng.random() < 0.3:
         loads.append({"everywhere": True, "body_force": [0.0, -size]})
     contact = {"on": "body_bottom", "gap": gap, **friction(rng)}
@@ -368,15 +337,15 @@ def clouds(rng: Rng, b: Bodies) -> Tables:
 def layers(rng: Rng, b: Bodies) -> Tables:
     """Draw a body on a compliant layer, in front of a rigid part or not."""
     b.block("body", _box(0, 0, rng.uniform(1, 3), 1.0), rng.uniform(0.12, 0.25))
-    deep = float(rng.choice([0.01, 0.05]))
+    deep = one(rng, 0.01, 0.05)
     layer = {
-        "law": "compliance", "gap": deep + float(rng.choice([0.0, 0.002])), "layer": deep,
+        "law": "compliance", "gap": deep + one(rng, 0.0, 0.002), "layer": deep,
         "stiffness": float(10 ** rng.uniform(-2, 4)), "potential_factor": 1.0,
-        "limit": float(rng.choice([0.002, 1.0])),
+        "limit": one(rng, 0.002, 1.0),
     }  # fmt: skip
     way = float(10 ** rng.uniform(-2.5, -1.2))
     return {
-        "fixed": [_clamp("body_top", float(rng.choice([0, 1])) * way, -way)],
+        "fixed": [_clamp("body_top", one(rng, 0, 1) * way, -way)],
         "contact": [{"on": "body_bottom", **layer, **friction(rng)}],
     }
 
@@ -384,44 +353,33 @@ def layers(rng: Rng, b: Bodies) -> Tables:
 def small_bodies(rng: Rng, b: Bodies) -> Tables:
     """Draw a small disc or block between two cheeks that are not parallel: two contacts on it."""
     radius, tilt = rng.uniform(0.15, 0.4), np.deg2rad(rng.uniform(-8, 8))
-    one, other = "small_rim", "small_rim"
+    under, over = "small_rim", "small_rim"
     disc = rng.random() < 0.7
     if disc:
         b.disc("small", (0.0, radius), radius, int(rng.integers(8, 24)))
     else:
         b.block("small", _box(0, 0, 2 * radius, 2 * radius), rng.uniform(0.4, 0.9) * radius)
-        one, other = "small_bottom", "small_top"
+        under, over = "small_bottom", "small_top"
     points = b._points[0]
     low, direction = points[:, 1].min(), np.array([-np.sin(tilt), np.cos(tilt)])
     high = (points @ direction).max()
     b.block("below", _box(0, low - 0.6, 1.6, 0.6), rng.uniform(0.1, 0.3))
     b.block("above", _box(*(high * direction), 1.6, 0.6, tilt), rng.uniform(0.1, 0.3))
     way = float(10 ** rng.uniform(-3, -1.7))
-    move = -way * direction + float(rng.choice([0.0, 0.3])) * way * np.array([1.0, 0.0])
+    move = -way * direction + one(rng, 0.0, 0.3) * way * np.array([1.0, 0.0])
     return {
         "fixed": [_clamp("below_bottom"), _clamp("above_top", *move.tolist())],
         "contact": [
-            _pair(rng, "below_top", one, disc), _pair(rng, "above_bottom", other, disc),
+            _pair(rng, "below_top", under, disc), _pair(rng, "above_bottom", over, disc),
         ],
     }  # fmt: skip
 
 
-#: Family -> how many of them.
-FAMILIES: dict[Callable[[Rng, Bodies], Tables], int] = {
-    rings: 50, stacks: 50, wedges: 45, driven_wedges: 35, snap_fits: 40, lifted_off: 50,
-    indenters: 55, tilted_blocks: 40, clouds: 50, layers: 35, small_bodies: 50,
+#: Family -> how a problem is drawn, and how many there are.
+BODIES: dict[str, tuple[Callable[[Rng, Bodies], Tables], int]] = {
+    "rings": (rings, 50), "stacks": (stacks, 50), "wedges": (wedges, 45),
+    "driven_wedges": (driven_wedges, 35), "snap_fits": (snap_fits, 40),
+    "lifted_off": (lifted_off, 50), "indenters": (indenters, 55),
+    "tilted_blocks": (tilted_blocks, 40), "clouds": (clouds, 50), "layers": (layers, 35),
+    "small_bodies": (small_bodies, 50),
 }  # fmt: skip
-
-
-def draw(family: Callable[[Rng, Bodies], Tables], number: int, folder: Path) -> tuple[Mesh, Tables]:
-    """Draw a problem, and write its mesh into a folder."""
-    rng = np.random.default_rng([SEED, list(FAMILIES).index(family), number])
-    bodies = Bodies(rng)
-    tables = family(rng, bodies)
-    mesh = bodies.mesh()
-    write_msh(mesh, folder / "body.msh")
-    return mesh, {
-        "mesh": {"file": str(folder / "body.msh")},
-        "material": bodies.materials(),
-        **tables,
-    }

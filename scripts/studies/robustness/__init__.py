@@ -1,0 +1,1 @@
+"""Robustness: random problems of many families, an independent check, and the ablation."""

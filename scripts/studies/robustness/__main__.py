@@ -1,0 +1,162 @@
+"""Random problems: how many are solved, by which method, at which cost, and whether they are right.
+
+`python3 -m scripts.studies.robustness KIND [--out DIR] [--coarse] [--methods newton uzawa]
+[--only NAME] [--seed N]`. Kinds: plain (300 problems like those of the thesis), hard (340 that
+bend, stick, stretch and harden), cells (200 on cells of all shapes and degrees), bodies (500 of
+several bodies, checked by an independent assembly). All but the last also run under mpirun.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import InputError, Solution, build_problem, solve
+from contact.case.text import to_toml
+from contact.methods.options import OPTIONS, with_method
+from contact.writing import write_outputs
+from scripts.reporting import Report, append, parser
+from scripts.studies.robustness.check import recheck
+from scripts.studies.robustness.problems import KINDS, Problem, problems
+
+METHODS = ("newton", "uzawa")
+#: Largest errors of the check by their names, and of all others.
+ALLOWED, SMALL = {"normal turned": 0.3, "status": 0.5}, 1e-6
+#: Largest component of friction along the normal, over the largest pressure.
+ALONG = 1e-14
+#: Difference of the displacements from which on two methods do not agree.
+AGREE = 1e-7
+#: Notes on steps of Newton's method itself.
+OWN = "chord step", "tangent", "rejected", "initial guess"
+COLUMNS = "problem", "method", "end", "solves", "dense", "seconds", "why", "difference", "critical"
+NOTE = (
+    "Problems are drawn with a fixed seed: loads, friction, cells, degrees and geometries. A "
+    "fallback is any method that Newton's method takes beside its own steps; solves are linear "
+    "ones. The difference is that of displacements to those of the first method, over the largest "
+    "displacement."
+)
+
+
+def along_normal(solution: Solution) -> float:
+    """Return the largest normal component of friction over the largest stress."""
+    nodes, forces = solution.problem.nodes, solution.forces
+    # Of bodies that touch nothing both are rounding; their squares may underflow.
+    scale = max(np.abs(f).max(initial=0.0) for f in (forces.pressure, forces.friction))
+    largest = np.abs(nodes.normal_component(forces.friction)).max(initial=0.0)
+    return float(largest / max(scale, 1e-300))
+
+
+def judge(problem: Problem, solution: Solution, folder: Path) -> dict[str, float]:
+    """Write the results of a solution, and return the errors that are more than allowed."""
+    assert problem.mesh is not None
+    write_outputs(solution, folder)
+    found = recheck(problem.mesh, problem.tables, folder)
+    wrong = {name: value for name, value in found.items() if not value <= ALLOWED.get(name, SMALL)}
+    off = along_normal(solution)
+    return wrong if off <= ALONG else wrong | {"along the normal": off}
+
+
+def solved(problem: Problem, method: str, first: Solution | None, folder: Path) -> list[Any]:
+    """Solve a problem; return its row from the end on, and the solution. Collective."""
+    begin, case = time.perf_counter(), problem.case
+    comm = MPI.COMM_WORLD if problem.mesh is None else MPI.COMM_SELF
+    try:
+        given = case if case.evolution else build_problem(case, comm)
+        solution = solve(given, with_method(case.solver, OPTIONS[method]), comm=comm)
+    except InputError as error:
+        return ["refused", 0, 0, round(time.perf_counter() - begin, 2), str(error), 0.0, 0.0, None]
+    steps, counters = max(1, len(solution.steps)), solution.counters
+    end, why = "right", ", ".join(sorted(_fallbacks(solution)))
+    if not solution.converged:
+        end, why = "not converged", solution.outcome.reason
+    elif problem.mesh and (wrong := judge(problem, solution, folder)):
+        end, why = "false", ", ".join(f"{k} {v:.1e}" for k, v in wrong.items())
+    return [
+        end, -(-counters.linear_solves // steps), -(-counters.contact_solves // steps),
+        round(time.perf_counter() - begin, 2), why, _difference(solution, first or solution),
+        solution.critical_factor, solution,
+    ]  # fmt: skip
+
+
+def _fallbacks(solution: Solution) -> set[str]:
+    notes = {record.note for record in solution.history.records}
+    for word in OWN:
+        notes = {note.replace(word, "").strip(" ,") for note in notes}
+    return notes - {""}
+
+
+def _difference(solution: Solution, other: Solution) -> float:
+    """Return the largest difference of displacements over the largest one. Collective."""
+    u, v = solution.displacement.x.array, other.displacement.x.array
+    sizes = np.array([np.abs(u - v).max(initial=0.0), np.abs(v).max(initial=0.0)])
+    solution.problem.comm.Allreduce(MPI.IN_PLACE, sizes, op=MPI.MAX)
+    return float(sizes[0] / (sizes[1] or 1.0))
+
+
+def table(rows: Mapping[str, list[Any]], methods: Sequence[str]) -> dict[str, list[Any]]:
+    """Count by family and method."""
+    other = [end for end in ("refused", "false") if end in rows["end"]]
+    names = "family", "method", "problems", "converged", "without fallback", *other
+    made: dict[str, list[Any]] = {
+        name: [] for name in (*names, "median solves", "most solves", "largest difference")
+    }
+    family = np.array([name.rsplit("-", 1)[0] for name in rows["problem"]])
+    method, end, why = (np.array(rows[name]) for name in ("method", "end", "why"))
+    solves, difference = np.array(rows["solves"]), np.array(rows["difference"])
+    for name in dict.fromkeys(family.tolist()):
+        for way in methods:
+            chosen = (family == name) & (method == way)
+            right = chosen & (end == "right")
+            counts = chosen.sum(), right.sum(), (right & (why == "")).sum()
+            counts += tuple((end[chosen] == word).sum() for word in other)
+            most = solves[chosen].max(), difference[right].max(initial=0.0)
+            append(made, name, way, *counts, int(np.median(solves[chosen])), *most)
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Solve problems by some methods and write the results."""
+    command = parser(__doc__, "robustness")
+    command.add_argument("kind", choices=KINDS)
+    command.add_argument("--methods", nargs="+", default=["newton"], choices=METHODS)
+    command.add_argument("--only", help="a family, or one problem such as bar-7")
+    command.add_argument("--seed", type=int, help="of the drawn problems")
+    given = command.parse_args(arguments)
+    rows: dict[str, list[Any]] = {key: [] for key in COLUMNS}
+    with tempfile.TemporaryDirectory() as scratch:
+        drawn = problems(given.kind, given.only, given.coarse, given.seed, Path(scratch))
+        for problem in drawn:
+            first: Solution | None = None
+            for method in given.methods:
+                *row, solution = solved(problem, method, first, Path(scratch, problem.name))
+                first = first or solution
+                append(rows, problem.name, method, *row)
+                end, why, difference, critical = row[0], row[4], row[5], row[6]
+                if end != "right" or why or not difference <= AGREE or critical <= 1:
+                    if MPI.COMM_WORLD.rank == 0:
+                        print(problem.name, method, *row, flush=True)
+                if end != "right" and problem.mesh:
+                    _keep(problem, Path(scratch, "body.msh"), given.out / problem.name)
+    report = Report(given.out)
+    report.numbers(f"sweep-{given.kind}", rows)
+    counts = table(rows, given.methods)
+    report.table(f"sweep-{given.kind}-summary", "Robustness sweep", counts, NOTE)
+    return 1 if "false" in rows["end"] else 0
+
+
+def _keep(problem: Problem, mesh: Path, folder: Path) -> None:
+    """Keep the files of a problem that is not solved."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "body.msh").write_bytes(mesh.read_bytes())
+    (folder / "case.toml").write_text(to_toml(problem.case).replace(str(mesh), "body.msh"))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,451 @@
+"""Families of random problems of one or two bodies on the package's own meshes.
+
+Each function draws the tables of a case. `PLAIN` are problems like those of the thesis, `HARD`
+those that bend, stick, stretch and harden, `CELLS` those on cells of each shape and degree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+Tables = dict[str, Any]
+Rng = np.random.Generator
+Draw = Callable[[Rng], Tables]
+
+PZT = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
+SHARP = {"young": 58.7102, "poisson": 0.3912, "piezo": PZT}
+
+
+def one(rng: Rng, *values: Any) -> Any:
+    """Draw one of some values."""
+    return values[int(rng.integers(len(values)))]
+
+
+def grid(size: list[float], cells: list[int], **more: Any) -> Tables:
+    """Return the mesh of a rectangle or a box."""
+    kind = "rectangle" if len(size) == 2 else "box"
+    return {"generator": kind, "size": size, "cells": cells, **more}
+
+
+def clamp(*sides: str, dim: int = 2) -> list[Tables]:
+    """Return supports of sides in all directions."""
+    return [{"on": side, "displacement": [0.0] * dim} for side in sides]
+
+
+def coulomb(rng: Rng, *coefficients: float) -> Tables:
+    """Draw a constant coefficient of friction."""
+    mu = one(rng, *coefficients)
+    return {"law": "coulomb", "mu": mu} if mu > 0 else {"law": "none"}
+
+
+#: Coefficients of friction, and rates at which they fall with the slip.
+MU, RATES = (0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0), (0.0, 1e2, 1e4, 1e5, 1e6, 6e7)
+
+
+def slip_weakening(
+    rng: Rng,
+    length: float = 1.0,
+    radius: float = 0.0,
+    mus: tuple[float, ...] = MU,
+    rates: tuple[float, ...] = RATES,
+) -> Tables:
+    """Draw friction that is constant or falls with the slip, in units of a length."""
+    mu = one(rng, *mus)
+    if mu == 0.0:
+        return {"law": "none"}
+    rho = one(rng, *rates) / length
+    law = {"law": "slip", "a": mu * 5 / 6, "b": mu / 3, "rho": rho}
+    return {"law": "coulomb", "mu": law if rho > 0 else mu, "radius": radius}
+
+
+def bar(rng: Rng) -> Tables:
+    """Draw Example 7.2: loads 1 to 10 times the printed ones, P1 and P2, gaps."""
+    n = one(rng, 8, 16, 32)
+    mesh = grid([4.0, 1.0], [4 * n, n], rotation=one(rng, 0.0, 0.0, 30.0))
+    mesh["parts"] = {"loaded": {"side": "top", "from": 2.0, "to": 4.0}}
+    load = -0.005 * one(rng, 1.0, 3.0, 10.0)
+    direction = one(rng, "body", "foundation")
+    angle = np.deg2rad(mesh["rotation"])
+    gap = one(rng, 0.0, 0.0, 0.002)
+    normal = [float(-np.sin(angle)), float(np.cos(angle))]
+    plane = {"shape": "plane", "point": [-gap * n for n in normal], "normal": normal}
+    return {
+        "mesh": mesh,
+        "space": {"degree": one(rng, 1, 1, 2)},
+        "material": {
+            "law": one(rng, "log", "log", "linear"), "young": 1.0,
+            "poisson": one(rng, 0.1, 0.3, 0.45), "yield_strain": 0.05,
+        },
+        "fixed": clamp("left"),
+        "load": [{"on": "loaded", "traction": [load * n for n in normal]}],
+        "contact": {"on": "bottom", "foundation": plane, "direction": direction},
+        "friction": slip_weakening(rng, radius=one(rng, 0.0, 0.0, 0.1)),
+    }  # fmt: skip
+
+
+def piezo(rng: Rng) -> Tables:
+    """Draw Examples 8.1 and 8.2: k_e 0 to 10, phi_F 0 to 32, loads to 15 x."""
+    n = one(rng, 8, 16)
+    case = {
+        "mesh": grid([8.0, 4.0], [2 * n, n]),
+        "space": {"degree": one(rng, 1, 1, 2)},
+        "material": {"law": one(rng, "linear", "log"), "yield_strain": 1.8, **SHARP},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0], "potential": 0.0}],
+        "load": [{"on": "top", "traction": [0.0, f"{-one(rng, 5.0, 10.0, 15.0)}*x"]}],
+        "contact": {"on": "bottom"},
+        "friction": slip_weakening(rng, 1e4),
+    }
+    k_e = one(rng, 0.0, 1e-3, 1e-1, 1.0, 10.0)
+    if k_e > 0:
+        case["electric"] = {"law": "shifted", "k_e": k_e, "phi_f": one(rng, 0.0, 8.0, 32.0)}
+    return case
+
+
+def layer(rng: Rng) -> Tables:
+    """Draw Examples 8.3 and 8.4: a compliant layer or none, mu = k_e from 0 to 0.6."""
+    n = one(rng, 8, 16)
+    small = one(rng, 0.0, 1e-6, 1e-4, 1e-2, 0.2, 0.6)
+    ends = [{"side": "top"}, {"side": "bottom", "to": 2.0}, {"side": "bottom", "from": 10.0}]
+    parts = {"foundation": {"side": "bottom", "from": 2.0, "to": 10.0}, "grounded": ends}
+    case = {
+        "mesh": grid([12.0, 2.0], [6 * n, n], parts=parts),
+        "material": {"law": "log", "yield_strain": 1.8, **SHARP},
+        "fixed": [*clamp("left", "right"), {"on": "grounded", "potential": 0.0}],
+        "load": [{"on": "grounded", "traction": [0.0, -one(rng, 3.0, 5.0, 8.0)]}],
+        "contact": {
+            "on": "foundation", "law": "compliance", "gap": one(rng, 0.3, 0.5),
+            "layer": one(rng, 0.0, 0.1), "stiffness": one(rng, 1.0, 10.0, 100.0), "limit": 0.1,
+            "potential_factor": one(rng, 1.0, 2.0),
+        },
+        "friction": {"law": "coulomb", "mu": small} if small > 0 else {"law": "none"},
+    }  # fmt: skip
+    if small > 0:
+        case["electric"] = {"law": "shifted", "k_e": small, "phi_f": 32.0}
+    return case
+
+
+def hertz(rng: Rng) -> Tables:
+    """Draw Example 7.1: both contact directions, loads 160 to 1600, mu 0 to 1."""
+    load = one(rng, 160.0, 800.0, 1600.0) / 16
+    plane = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    return {
+        "mesh": {"generator": "quarter_disc", "radius": 8.0, "contact_size": one(rng, 0.1, 0.2)},
+        "material": {"law": "linear", "young": 2000.0, "poisson": one(rng, 0.1, 0.3, 0.45)},
+        "fixed": [{"on": "symmetry", "displacement": [0.0, "free"]}],
+        "load": [{"on": "top", "traction": [0.0, -load]}],
+        "contact": {
+            "on": "contact", "foundation": plane, "direction": one(rng, "foundation", "body"),
+        },
+        "friction": slip_weakening(rng),
+    }  # fmt: skip
+
+
+def block(rng: Rng) -> Tables:
+    """Draw a block in 3-D, clamped on one side, pressed and pushed aside on top."""
+    n = one(rng, 4, 6)
+    push, press = 0.005 * one(rng, 0.0, 1.0, 2.0), -0.01 * one(rng, 1.0, 3.0)
+    return {
+        "mesh": grid([2.0, 1.0, 1.0], [2 * n, n, n]),
+        "space": {"degree": one(rng, 1, 1, 1, 2) if n == 4 else 1},
+        "material": {
+            "law": one(rng, "linear", "log"), "young": 1.0, "poisson": one(rng, 0.1, 0.3, 0.45),
+            "yield_strain": 0.02,
+        },
+        "fixed": clamp("left", dim=3),
+        "load": [{"on": "top", "traction": [0.0, push, press]}],
+        "contact": {"on": "bottom", "gap": one(rng, 0.0, 0.0, 0.005)},
+        "friction": slip_weakening(rng),
+    }  # fmt: skip
+
+
+def _beam(rng: Rng, slender: float, *supports: str) -> Tables:
+    """Return a beam of height 1, clamped at some ends, without load and gap."""
+    high = one(rng, 1, 2, 4)
+    return {
+        "mesh": grid([slender, 1.0], [int(min(slender * high, 400)), high]),
+        "space": {"degree": one(rng, 1, 1, 2)},
+        "material": {"young": 1.0, "poisson": one(rng, 0.0, 0.3, 0.45)},
+        "fixed": clamp(*supports),
+        "contact": {"on": "bottom"},
+        "friction": coulomb(rng, 0.0, 0.3, 0.8),
+    }
+
+
+def cantilever(rng: Rng) -> Tables:
+    """Draw a cantilever over a stop: loads that bend its tip to 1.5 to 30 times the gap."""
+    slender = one(rng, 10.0, 30.0, 100.0, 300.0, 1000.0)
+    case = _beam(rng, slender, "left")
+    gap = one(rng, 1e-3, 0.1, 0.5, 2.0, 10.0)
+    bend = gap * one(rng, 1.5, 5.0, 30.0)
+    stiffness = 1.0 / 12.0
+    side, traction = {
+        "tip": ("right", [0.0, -(3 * stiffness * bend / slender**3)]),
+        "uniform": ("top", [0.0, -8 * stiffness * bend / slender**4]),
+        "moment": ("right", [f"{12 * (2 * stiffness * bend / slender**2)}*(y-0.5)", 0.0]),
+    }[one(rng, "tip", "uniform", "moment")]
+    case["load"], case["contact"]["gap"] = [{"on": side, "traction": traction}], gap
+    return case
+
+
+def clamped(rng: Rng) -> Tables:
+    """Draw a beam clamped at both ends over a gap, pressed down."""
+    slender = one(rng, 10.0, 40.0, 100.0, 300.0)
+    case = _beam(rng, slender, "left", "right")
+    gap = one(rng, 1e-2, 0.3, 1.0)
+    load = 384 * (gap * one(rng, 1.2, 5.0, 50.0)) / 12 / slender**4
+    case["load"], case["contact"]["gap"] = [{"on": "top", "traction": [0.0, -load]}], gap
+    return case
+
+
+def lifted(rng: Rng) -> Tables:
+    """Draw a long beam, unloaded, half loaded, lifted at its end, pushed or sheared."""
+    slender = one(rng, 20.0, 100.0, 600.0)
+    case = _beam(rng, slender, "left")
+    side, traction = one(
+        rng,
+        ("top", [0.0, 0.0]),
+        ("top", [0.0, f"-1e-4*where(x > {slender / 2}, 1, 0)"]),
+        ("right", [0.0, 1e-4 / slender**2]),
+        ("right", [-1e-4, 0.0]),
+        ("top", [1e-5, -1e-5]),
+    )
+    return case | {"load": [{"on": side, "traction": traction}]}
+
+
+def bimorph(rng: Rng) -> Tables:
+    """Draw a piezoelectric beam that its voltage bends onto a conductive foundation."""
+    slender = one(rng, 10.0, 40.0)
+    case = _beam(rng, slender, "left") | {"space": {"degree": 1}, "material": SHARP}
+    case["fixed"].append({"on": "top", "potential": one(rng, 0.1, 0.3)})
+    case["load"] = [{"on": "right", "traction": [0.0, -58.7 * 0.2 / slender**3]}]
+    case["contact"]["gap"] = one(rng, 0.01, 0.1)
+    case["electric"] = {"k_e": one(rng, 1e-9, 1e-3, 1.0, 1e3), "phi_f": 0.0, "delta": 10.0}
+    return case
+
+
+def plate(rng: Rng) -> Tables:
+    """Draw a plate in 3-D, clamped on one or two sides, over a gap."""
+    wide, n, gap = one(rng, 10.0, 30.0), one(rng, 8, 12), one(rng, 0.05, 0.5)
+    sides = one(rng, ("left",), ("left", "right"))
+    factor = 8.0 if len(sides) == 1 else 384.0
+    load = factor * gap * one(rng, 1.5, 10.0) / 12 / wide**4
+    return {
+        "mesh": grid([wide, wide, 1.0], [n, n, 1]),
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": clamp(*sides, dim=3),
+        "load": [{"on": "top", "traction": [0.0, 0.0, -load]}],
+        "contact": {"on": "bottom", "gap": gap},
+        "friction": coulomb(rng, 0.0, 0.3),
+    }
+
+
+def _block(
+    rng: Rng, cells: tuple[int, int] = (32, 8), size: tuple[float, float] = (4.0, 1.0)
+) -> Tables:
+    """Return a block, clamped on the left, pressed and pushed aside on top."""
+    return {
+        "mesh": grid([*size], [*cells]),
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": clamp("left"),
+        "load": [{"on": "top", "traction": [2e-3, f"-0.01*(1+x/{size[0]})"]}],
+        "contact": {"on": "bottom"},
+        "friction": coulomb(rng, 0.0, 0.3, 0.6),
+    }
+
+
+def stretched(rng: Rng) -> Tables:
+    """Draw a block whose cells are stretched along the normal or the tangent."""
+    ratio = one(rng, 30.0, 100.0, 300.0, 1000.0)
+    if one(rng, True, False):  # narrow cells: many nodes along Gamma_3
+        return _block(rng, (200, 4), (4.0, 4.0 * 4 * ratio / 200))
+    return _block(rng, (20, 10), (4.0, 4.0 / 20 * 10 / ratio))
+
+
+def stiff(rng: Rng) -> Tables:
+    """Draw a nearly incompressible block."""
+    case = _block(rng)
+    case["material"]["poisson"] = one(rng, 0.49, 0.499)
+    return case | {"space": {"degree": one(rng, 1, 2)}}
+
+
+def rough(rng: Rng) -> Tables:
+    """Draw a block with friction beyond 1."""
+    return _block(rng) | {"friction": coulomb(rng, 1.0, 2.0, 5.0, 50.0)}
+
+
+def few(rng: Rng) -> Tables:
+    """Draw a disc that touches at single nodes, or at none."""
+    plane = {"shape": "plane", "point": [0.0, -0.01], "normal": [0.0, 1.0]}
+    return {
+        "mesh": {"generator": "quarter_disc", "radius": 8.0, "contact_size": 0.8},
+        "material": {"young": 2000.0, "poisson": 0.3},
+        "fixed": [{"on": "symmetry", "displacement": [0.0, "free"]}],
+        "load": [{"on": "top", "traction": [0.0, -one(rng, 1e-3, 1e-1, 1.0, 10.0)]}],
+        "contact": {"on": "contact", "foundation": plane},
+        "friction": coulomb(rng, 0.0, 0.5),
+    }
+
+
+def units(rng: Rng) -> Tables:
+    """Draw a block, or a cantilever, in other units of length and stress."""
+    stress, length = one(rng, 1e-12, 1.0, 1e12), one(rng, 1e-9, 1.0, 1e6)
+    case = one(rng, cantilever, rough)(rng)
+    case["mesh"]["size"] = [length * side for side in case["mesh"]["size"]]
+    case["material"]["young"] = stress
+    scaled = []
+    for component in case["load"][0]["traction"]:
+        text = component if isinstance(component, str) else repr(float(component))
+        for name in "xy":
+            text = text.replace(name, f"({name}/{length!r})")
+        scaled.append(f"{stress!r}*({text})")
+    case["load"][0]["traction"] = scaled
+    case["contact"]["gap"] = length * case["contact"].get("gap", 0.0)
+    return case
+
+
+def layers(rng: Rng) -> Tables:
+    """Draw a block on a layer much softer to much stiffer than itself."""
+    case = _block(rng)
+    case["contact"] |= {
+        "law": "compliance", "gap": 0.02, "layer": one(rng, 0.02, 0.03),
+        "stiffness": one(rng, 1e-3, 1.0, 1e3, 1e6), "limit": one(rng, 1e-3, 0.1),
+        "potential_factor": 1.0,
+    }  # fmt: skip
+    return case
+
+
+def yielding(rng: Rng) -> Tables:
+    """Draw a bar far beyond its yield strain."""
+    case = _block(rng)
+    case["material"] |= {"law": "log", "yield_strain": 0.01}
+    case["load"][0]["traction"] = [0.0, -one(rng, 0.05, 0.1, 0.3)]
+    return case
+
+
+def corners(rng: Rng) -> Tables:
+    """Draw a block or a beam over a foundation with a step, an edge or a groove."""
+    case = one(rng, _block(rng, (64, 8)), _block(rng, (160, 4), (40.0, 1.0)))
+    long = case["mesh"]["size"][0]
+    depth = one(rng, 1e-3, 1e-2) * long
+    case["contact"]["gap"] = one(
+        rng,
+        f"where(x > {0.6 * long}, {depth}, 0)",
+        f"{depth / long}*abs(x-{0.6 * long})",
+        f"where(x > {0.3 * long}, where(x < {0.7 * long}, {depth}, 0), 0)",
+    )
+    if long > 10:
+        case["load"][0]["traction"] = [0.0, -one(rng, 1e-5, 1e-4)]
+    return case
+
+
+def unsupported(rng: Rng) -> Tables:
+    """Draw a block that contact alone holds up; its top, or a side, is guided."""
+    case = _block(rng, (one(rng, 32, 64), 8))
+    case["fixed"] = [{"on": one(rng, "top", "left"), "displacement": [0.0, "free"]}]
+    push = one(rng, 0.0, 1e-3, -1e-3)
+    case["load"] = [
+        {"on": "top", "traction": [0.0, f"-0.01*(1+x/{one(rng, 4.0, 40.0)})"]},
+        {"on": "right", "traction": [push, 0.0]},
+    ]
+    case["contact"]["gap"] = one(rng, 0.0, 1e-2)
+    return case
+
+
+#: Friction of the problems on cells of all shapes.
+_friction = partial(slip_weakening, mus=(0.0, 0.1, 0.3, 0.6, 1.0), rates=(0.0, 1e2, 1e4, 6e7))
+
+
+def round_body(rng: Rng, dim: int) -> Tables:
+    """Draw half a disc or a quarter of half a ball, pressed on a plane or a rigid cylinder."""
+    size = one(rng, 0.8, 1.6) if dim == 2 else 3.0
+    mesh = {"generator": "quarter_disc" if dim == 2 else "sphere", "radius": 8.0, "size": 3.0}
+    mesh |= {"contact_size": size, "order": one(rng, 1, 2)}
+    up = [0.0] * (dim - 1)
+    ground = one(
+        rng,
+        {"shape": "plane", "point": [*up, 0.0], "normal": [*up, 1.0]},
+        {"shape": "sphere", "centre": [*up, -12.0], "radius": 12.0},
+    )
+    load, law = -one(rng, 1.0, 10.0, 100.0), one(rng, "linear", "log")
+    sides = ["symmetry"] if dim == 2 else ["symmetry_x", "symmetry_y"]
+    return {
+        "mesh": mesh,
+        "space": {"degree": one(rng, 1, 2)},
+        "material": {"law": law, "young": 2000.0, "poisson": one(rng, 0.1, 0.3, 0.45)}
+        | ({"yield_strain": 0.02} if law == "log" else {}),
+        "fixed": [
+            {"on": side, "displacement": [0.0 if i == k else "free" for i in range(dim)]}
+            for k, side in enumerate(sides)
+        ],
+        "load": [{"on": "top", "traction": [*up, load]}],
+        "contact": {
+            "on": "contact", "foundation": ground, "direction": one(rng, "foundation", "body"),
+        },
+        "friction": _friction(rng),
+    }  # fmt: skip
+
+
+def pair(rng: Rng, dim: int) -> Tables:
+    """Draw two bodies whose meshes do not match: blocks, or in 2-D a cylinder on a block."""
+    degree, push = one(rng, 1, 2), one(rng, 0.0, 0.3, -1.0)
+    if dim == 2 and one(rng, True, False):
+        mesh = {"generator": "cylinder_on_block", "radius": 8.0, "width": 8.0, "height": 6.0}
+        mesh |= {"size": 3.0, "contact_size": 0.8, "order": one(rng, 1, 2)}
+        way, sides, bodies = -one(rng, 0.01, 0.1), ("arc", "block_top"), ("cylinder", "block")
+        fixed = [
+            {"on": "symmetry", "displacement": [0.0, "free"]},
+            {"on": "block_bottom", "displacement": ["free", 0.0]},
+            {"on": "top", "displacement": ["free", way]},
+        ]
+    else:
+        mesh = {"generator": "two_blocks"}
+        if dim == 3:
+            mesh = {"generator": "two_boxes", "lower_size": 0.8, "upper_size": 0.6}
+        way, sides = -one(rng, 0.001, 0.01), ("upper_bottom", "lower_top")
+        bodies = ("lower", "upper")
+        aside = [-push * way] + [0.0] * (dim - 2)
+        fixed = clamp("lower_bottom", dim=dim)
+        fixed.append({"on": "upper_top", "displacement": [*aside, way]})
+    on, against = sides[::-1] if one(rng, True, False) else sides
+    return {
+        "mesh": mesh,
+        "space": {"degree": degree},
+        "material": [
+            {"on": body, "young": one(rng, 0.2, 1.0, 5.0), "poisson": one(rng, 0.0, 0.3, 0.45)}
+            for body in bodies
+        ],
+        "fixed": fixed,
+        "contact": [{"on": on, "against": against, "friction": _friction(rng)}],
+    }
+
+
+def _on_cells(rng: Rng, draws: tuple[Draw, ...], cell: str) -> Tables:
+    """Draw one of some problems, on cells of a shape and of degree 1 or 2."""
+    case: Tables = one(rng, *draws)(rng)
+    case["mesh"]["cell"] = cell
+    case.setdefault("space", {"degree": one(rng, 1, 2)})
+    return case
+
+
+_FLAT = (bar, piezo, layer, partial(round_body, dim=2), partial(pair, dim=2))
+_SOLID = (block, partial(round_body, dim=3), partial(pair, dim=3))
+
+#: Family -> how a problem is drawn, and how many there are.
+PLAIN = {"bar": (bar, 120), "piezo": (piezo, 60), "layer": (layer, 40), "hertz": (hertz, 30),
+         "block": (block, 50)}  # fmt: skip
+HARD = {
+    "cantilever": (cantilever, 70), "clamped": (clamped, 30), "lifted": (lifted, 30),
+    "bimorph": (bimorph, 20), "plate": (plate, 20), "stretched": (stretched, 40),
+    "stiff": (stiff, 15), "rough": (rough, 15), "few": (few, 10), "units": (units, 20),
+    "layers": (layers, 20), "yielding": (yielding, 10), "corners": (corners, 20),
+    "unsupported": (unsupported, 20),
+}  # fmt: skip
+CELLS = {
+    cell: (partial(_on_cells, draws=draws, cell=cell), 50)
+    for cell, draws in (("triangle", _FLAT), ("quadrilateral", _FLAT),
+                        ("tetrahedron", _SOLID), ("hexahedron", _SOLID))
+}  # fmt: skip
