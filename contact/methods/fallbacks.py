@@ -324,7 +324,7 @@ def _in_the_conductivity(
 def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
     """Return a solution by a proximal-point method; None where it finds none. Collective.
 
-    For belts, leaf springs, wedges: bodies that friction alone holds along a motion. Newton's
+    For belts, arched leaves, wedges: bodies that friction alone holds along a motion. Newton's
     steps and the updates of a friction bound leave these where the friction of the present
     pressures does not hold them. An elastic bed along the tangents of the contact nodes, about the
     last iterate, holds them meanwhile: k (u_tau - u_tau of the last problem). Its stiffness falls

@@ -1,8 +1,8 @@
-"""Bodies that friction alone holds: belts, leaf springs and strips near their limit.
+"""Bodies that friction alone holds: belts, arched leaves and strips near their limit.
 
 `python3 -m scripts.studies.held_by_friction [--out DIR] [--coarse]`, on one rank. Belts around
-60 to 300 degrees of a drum are pulled with up to 5 % less than exp(mu theta) allows, arched leaf
-springs are pressed between two plates, and strips that lie on a plane are pulled with up to 99 % of
+60 to 300 degrees of a drum are pulled with up to 5 % less than exp(mu theta) allows, arched leaves
+are pressed between two plates, and strips that lie on a plane are pulled with up to 99 % of
 their friction, in 2-D and 3-D. The table says how many are solved, by which fallback, in how many
 linear solves; all are drawn with a fixed seed.
 """
@@ -62,7 +62,7 @@ def belt(rng: Rng) -> tuple[Tables, Domain]:
 
 
 def leaf(rng: Rng) -> tuple[Tables, Domain]:
-    """Draw an arched leaf spring between two plates, the upper of which is pressed down."""
+    """Draw an arched leaf between two plates, the upper of which is pressed down."""
     long, rise, thick = 100.0, float(rng.uniform(2, 10)), float(rng.uniform(0.5, 2))
     cells, mu = int(rng.integers(16, 60)), float(rng.choice([0.05, 0.1, 0.3, 0.6]))
     radius = (long**2 / 4 + rise**2) / (2 * rise)
