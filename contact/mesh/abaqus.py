@@ -81,7 +81,10 @@ def read(file: Path) -> Contents:
             found.nest(keyword, options, lines)
         else:
             _take(found.here, keyword, options, lines)
-    return _deck(found.flat())
+    try:
+        return _deck(found.flat())
+    except RecursionError:
+        raise ValueError("a set holds itself") from None
 
 
 def included(file: Path) -> list[Path]:

@@ -368,7 +368,7 @@ def test_damaged_files_end_in_one_line(name, share, tmp_path, capsys):
         (" 7, 1, 2, 5, 4", " 7, 1, 2, 5", "9 numbers, 5 an element"),
         ("right, 7", "left, 7", "there is no set LEFT"),
         ("Eall, S3", "Eall, S9", "elements Eall have no face 'S9'"),
-        ("right, 7", "both", "maximum recursion depth exceeded"),
+        ("right, 7", "both", "a set holds itself"),
         ("*STATIC", "*INCLUDE, INPUT=away.inp", "there is no file 'away.inp' beside plate.inp"),
         ("*STATIC", "*INCLUDE, INPUT=plate.inp", "plate.inp includes itself"),
         ("NSET=Nall", "INPUT=away.inp", "NODE: there is no file 'away.inp' beside plate.inp"),
