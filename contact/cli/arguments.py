@@ -255,6 +255,10 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
             ),
             "--ylim": _value("A,B", "likewise y (z); in 3-D of the contact alone"),
             "--mirror": _flag("show both halves of a body of revolution"),
+            "--view": _value(
+                "X,Y,Z",
+                "direction from a body in 3-D to the eye; without it one that sees the contact",
+            ),
             "--step": _value(
                 "N",
                 "draw the results at the end of a step of an evolution, from 1, as "

@@ -33,12 +33,13 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 "figure-option",
             )
     width = None if options.width is None else inches(options.width)
-    limits = [limits_of(option, getattr(options, option)) for option in ("xlim", "ylim")]
-    look, folder = Look(width, options.mirror, *limits), Path(options.folder)
+    xlim, ylim = (limits_of(option, getattr(options, option)) for option in ("xlim", "ylim"))
+    view = None if options.view is None else direction(options.view)
+    look, folder = Look(width, options.mirror, xlim, ylim, view), Path(options.folder)
 
     def draw() -> list[Path]:
         if (folder / TABLE).is_file() and not (folder / "summary.json").exists():
-            for option in ("xlim", "ylim", "mirror", "animate", "step"):
+            for option in ("xlim", "ylim", "mirror", "view", "animate", "step"):
                 if getattr(options, option) not in (None, False):
                     raise InputError(
                         f"--{option}: the figure of a sweep shows no places; accepted: --field, "
@@ -71,6 +72,20 @@ def inches(text: str) -> float:
             f"--width {text}; accepted: a length such as 85mm, from 40mm to 1000mm", "figure-option"
         )
     return length
+
+
+def direction(text: str) -> tuple[float, float, float]:
+    """Return a direction that is given as "1,-1,0.5", or raise an InputError."""
+    try:
+        x, y, z = map(float, text.split(","))
+    except ValueError:
+        x = y = z = 0.0
+    if not 0 < math.hypot(x, y, z) < math.inf:
+        raise InputError(
+            f"--view {text}; accepted: three numbers that are not all 0, such as 1,-1,0.5",
+            "figure-option",
+        )
+    return x, y, z
 
 
 def limits_of(option: str, text: str | None) -> tuple[float, float] | None:

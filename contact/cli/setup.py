@@ -21,7 +21,7 @@ from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets, paths
 from contact.mesh.geometry import facet_normals
 from contact.model.fields import Field, Moving, at_time
-from contact.plot.body import rendered
+from contact.plot.space import Camera, rendered
 from contact.plot.style import BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, YELLOW, heading
 from contact.problem.problem import ContactProblem
 from contact.results.options import Units
@@ -328,11 +328,12 @@ def _draw_space(
             plotter.add_points(surface, color=FOUNDATION, point_size=5.0)
 
     seen = np.concatenate([points, surface.reshape(-1, 3), *(start for start, _ in arrows)])
-    image = rendered(add, (1.0, -1.6, 0.5), np.array([seen.min(axis=0), seen.max(axis=0)]))
+    camera = Camera.of(np.array([1.0, -1.6, 0.5]), seen)
+    images = rendered(add, [camera])
     figure = Figure(figsize=(6.9, 6.0))
     ax = figure.subplots()
     ax.axis("off")
-    if image is not None:
+    for image in images:
         ax.imshow(image)
     sides = r" $\times$ ".join(f"{side:.4g}" for side in extent)
     ax.set_title(f"{sides} {units.length or ''}".rstrip(), y=-0.02, fontsize=8)

@@ -1,17 +1,14 @@
-"""Pictures of deformed bodies, coloured by a field: grids of pyvista, which draws them in 3-D."""
+"""Pictures of deformed bodies, coloured by a field."""
 
 from __future__ import annotations
 
-import logging
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
 import matplotlib
 import numpy as np
-import pyvista
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
@@ -25,6 +22,7 @@ from contact.errors import InputError
 from contact.mesh.cells import LINEAR
 from contact.plot.foundation import HATCHED, magnification, profiles
 from contact.plot.run import Run
+from contact.plot.space import Scene, Zone, show_body
 from contact.plot.style import (
     NARROW,
     PAGE,
@@ -37,8 +35,6 @@ from contact.plot.style import (
     smooth,
 )
 from contact.typing import Array
-
-logger = logging.getLogger("contact.plots")
 
 #: The field whose values are regions.
 REGION = "region"
@@ -97,8 +93,8 @@ class Picture:
     ----------
     run
         The run.
-    skin
-        The surface of the body as it is drawn, a mesh of pyvista with ``values``.
+    body, skin
+        The deformed body and its surface, meshes of pyvista with ``values``.
     norm, label
         Range and label of the colours.
     scale, box
@@ -112,6 +108,7 @@ class Picture:
     """
 
     run: Run
+    body: Any
     skin: Any
     norm: Normalize
     label: str
@@ -158,7 +155,7 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
     values, in_cells = scalar(run, field)
     near = None
     if scale is None:
-        near = vicinity(run)
+        near = vicinity(run) if run.plane else None
         scale = magnification(run, box=near)
     body = run.body.warp_by_vector("displacement", factor=scale)
     (body.cell_data if in_cells else body.point_data)["values"] = values
@@ -171,16 +168,17 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
             whole[0, 0], box[0, 0] = -whole[1, 0], -box[1, 0]
         for k, (low, high) in enumerate(whole.T):
             box[:, k] = look.ends(k, low, high, "the body") or box[:, k]
-    if np.any(box[0] > whole[0]) or np.any(box[1] < whole[1]):
+    if run.plane and (np.any(box[0] > whole[0]) or np.any(box[1] < whole[1])):
         values = _inside(skin, box, sides, values)
     label = named(field, run.units)[1]
     if field != REGION:
-        return Picture(run, skin, *colour_range(values, label), scale, box, look, near)
+        return Picture(run, body, skin, *colour_range(values, label), scale, box, look, near)
     found = np.unique(values)
-    skin["values"] = np.searchsorted(found, skin["values"])
+    for mesh in (body, skin):
+        mesh["values"] = np.searchsorted(found, mesh["values"])
     names = [run.regions[k] for k in found]
     classes = Normalize(-0.5, len(names) - 0.5)
-    return Picture(run, skin, classes, label, scale, box, look, near, names)
+    return Picture(run, body, skin, classes, label, scale, box, look, near, names)
 
 
 def _inside(skin: Any, box: Array, sides: Sequence[int], values: Array) -> Array:
@@ -286,59 +284,14 @@ def _colour(ax: Axes, picture: Picture, side: int) -> None:
 
 
 def draw_space(picture: Picture) -> Figure | None:
-    """Draw the surface of a body in 3-D, from above and from below; None without a display."""
-    skin, norm = picture.skin, picture.norm
-
-    def add(plotter: Any) -> None:
-        plotter.add_mesh(
-            skin, scalars="values", cmap=picture.colours, clim=[norm.vmin, norm.vmax],
-            show_edges=skin.n_cells < 5000, line_width=0.5, edge_opacity=0.3, ambient=0.6,
-            diffuse=0.4, show_scalar_bar=False,
-        )  # fmt: skip
-
-    images = [rendered(add, (1.0, -1.6, height), picture.box) for height in (0.8, -0.8)]
-    narrow = page_width() < NARROW
-    figure = sheet(1.9 if narrow else 0.6)
+    """Draw a body in 3-D from where its contact is seen; None without a display."""
+    run, norm, look = picture.run, picture.norm, picture.look
+    figure = sheet(0.9 if page_width() < NARROW else 0.75)
     figure.set_layout_engine("compressed")
-    axes = figure.subplots(*((2, 1) if narrow else (1, 2)))
-    for ax, name, image in zip(axes, ("from above", "from below"), images, strict=True):
-        if image is None:
-            return None
-        ax.imshow(image)
-        ax.set_title(name, fontsize="medium")
-        ax.axis("off")
+    colours = {"scalars": "values", "cmap": picture.colours, "clim": [norm.vmin, norm.vmax]}
+    ax, scene = figure.subplots(), Scene(picture.body, colours, Zone.of(run))
+    if show_body(ax, run, scene, look.view, picture.box) is None:
+        return None
     _bar(figure, picture)
-    figure.suptitle(picture.title, fontsize="large")
+    ax.set_title(picture.title, fontsize="medium")
     return figure
-
-
-def rendered(
-    add: Callable[[Any], None], view: tuple[float, float, float], box: Array
-) -> Array | None:
-    """Return an image of a 3-D scene by pyvista, without a window; None without a display.
-
-    Parameters
-    ----------
-    add
-        Adds the meshes of the scene to a ``pyvista.Plotter``.
-    view
-        Direction from the scene to the eye.
-    box
-        Lower and upper corner of the scene, shape (2, 3).
-    """
-    if not os.environ.get("DISPLAY") and pyvista.vtk_version_info < (9, 4):
-        try:
-            pyvista.start_xvfb()
-        except OSError:
-            logger.warning("the body is not drawn: VTK before 9.4 needs a display or Xvfb")
-            return None
-    plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 1000))
-    plotter.set_background("white")
-    plotter.enable_parallel_projection()
-    add(plotter)
-    plotter.add_axes(viewport=(0.0, 0.0, 0.2, 0.2))
-    plotter.view_vector(view)
-    plotter.reset_camera(bounds=box.T.ravel())
-    image = plotter.screenshot(return_img=True)
-    plotter.close()
-    return np.asarray(image)

@@ -1,21 +1,16 @@
-"""The contact figure: stresses on Gamma_3, friction bound, stick and slip, in 2-D and in 3-D."""
+"""The contact figure in 2-D: stresses on Gamma_3, friction bound, stick and slip."""
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
@@ -28,13 +23,10 @@ from contact.plot.style import (
     ORANGE,
     ZONES,
     Look,
-    fitted,
     page_width,
     sheet,
-    smooth,
 )
 from contact.results.grid import Table
-from contact.results.quantity import STATUS
 from contact.typing import Array
 
 #: Names of the zones without friction.
@@ -221,14 +213,6 @@ def window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[A
     return places.min(axis=0) - room, places.max(axis=0) + room
 
 
-def contact_figure(run: Run, look: Look) -> Figure:
-    """Draw the contact part: along Gamma_3 in 2-D, along the contact direction in 3-D."""
-    figure = draw_line(run, look) if run.plane else draw_surface(run, look)
-    if run.title:
-        figure.suptitle(fitted(run.title), fontsize="large")
-    return figure
-
-
 def draw_line(run: Run, look: Look) -> Figure:
     """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane."""
     touching = [part["status"] != "open" for part in run.contacts]
@@ -333,129 +317,3 @@ def _focus(ax: Axes, values: Array, low: float) -> None:
     if top < largest:
         text = f"peak {largest:.3g}, cut off"
         ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7)
-
-
-def draw_surface(run: Run, look: Look) -> Figure:
-    """Draw pressure, status and friction arrows on Gamma_3 in 3-D, along the contact direction."""
-    surface = run.surface
-    touching = surface["status"] > STATUS["open"]
-    mean = np.nanmean(surface["normal"][touching if touching.any() else slice(None)], axis=0)
-    view = sorted(int(k) for k in np.argsort(np.abs(mean))[:2])  # the axes most across it
-    sides = [(surface, "contact pressure"), (run.opposite, "on the other side")]
-    panels = [(side, name) for side, name in sides if side is not None]
-    frictional = bool(np.any(run.table["bound"] > 0))
-    panels.append((surface, "status, friction (arrows)" if frictional else "status"))
-    places = surface.points[:, view]
-    low, high = window(places, touching, 0.13)  # room for the arrows
-    limits = [
-        look.ends(k, np.min(v), np.max(v), "the contact part") if k < 2 else None
-        for k, v in zip(view, places.T, strict=True)
-    ]
-    for k, ends in enumerate(limits):
-        if ends is not None:
-            low[k], high[k] = np.clip(ends, places[:, k].min(), places[:, k].max())
-    if None in limits and limits != [None, None]:
-        _balance(low, high, places, limits.index(None))
-    stacked = page_width() < NARROW
-    rows, columns = (len(panels), 1) if stacked else (1, len(panels))
-    tall = (high - low)[1] / (high - low)[0]
-    aspect = float(np.clip(tall, 0.25, 0.8 if stacked else 1.25))
-    figure = sheet(rows * (aspect / columns + 0.02) + (2.0 if stacked else 1.5) / page_width())
-    figure.set_layout_engine("compressed")
-    *lefts, right = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
-    shown = ScalarMappable(Normalize(0.0, _highest(surface, view, low, high) or 1.0), "viridis")
-    letters = 150 / float(matplotlib.rcParams["font.size"]) * page_width() / columns
-    letters = int(max(8.0, 0.8 * letters * min(1.0, aspect / tall)))
-    x, y = (run.units.label(f"${'xyz'[k]}$", "length") for k in view)
-    for ax, (side, name) in zip((*lefts, right), panels, strict=True):
-        # Of degree 2 four pieces each.
-        skin = side.extract_surface(nonlinear_subdivision=1).triangulate()
-        flat, facets = np.asarray(skin.points)[:, view], np.asarray(skin.regular_faces)
-        if ax is right:
-            _draw_status(ax, flat, facets, skin["status"])
-            _draw_friction(ax, skin, view, low, high)
-        else:
-            known = np.isfinite(skin["pressure"][facets]).all(axis=1)
-            drawn = facets[known] if known.any() else facets
-            below: dict[str, Any] = {"facecolor": ZONES["open"][0], "lw": 0, "zorder": -2}
-            ax.add_collection(PolyCollection(list(flat[facets]), **below))
-            if touching.any():
-                mesh = Triangulation(*flat.T, drawn)
-                smooth(ax, mesh, np.nan_to_num(skin["pressure"]), shown.norm, shown.cmap)
-        ax.set_aspect("equal")
-        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=x, ylabel=y)
-        ax.set_title(textwrap.fill(name, letters), fontsize="medium")
-        ax.label_outer()
-    if not touching.any():
-        _tell_open(lefts[0])
-    else:
-        label = run.units.label(r"$-\sigma_\nu$", "stress")
-        bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
-        figure.colorbar(shown, ax=[*lefts, right], **bar)
-    figure.legend(handles=patches(frictional), ncols=3, loc="outside lower center")
-    return figure
-
-
-def _balance(low: Array, high: Array, places: Array, k: int) -> None:
-    """Let an axis whose ends are not asked for show about as much as the other one does.
-
-    About its middle, and within the part; the panels would be slivers otherwise.
-    """
-    asked = high[1 - k] - low[1 - k]
-    middle, span = (low[k] + high[k]) / 2, float(np.clip(high[k] - low[k], asked / 3, 3 * asked))
-    ends = np.array([middle - span / 2, middle + span / 2])
-    low[k], high[k] = np.clip(ends, places[:, k].min(), places[:, k].max())
-
-
-def _highest(surface: Any, view: list[int], low: Array, high: Array) -> float:
-    """Return the largest pressure that is shown, where facets are cut too."""
-    part = surface.extract_surface(nonlinear_subdivision=1)
-    for k, *ends in zip(view, low, high, strict=True):
-        for above, end in enumerate(ends):
-            if part.n_cells:
-                part = part.clip("xyz"[k], origin=np.eye(3)[k] * end, invert=above == 1)
-    return float(np.nanmax(part["pressure"], initial=0.0)) if part.n_cells else 0.0
-
-
-def _draw_status(ax: Axes, flat: Array, facets: NDArray[np.int64], status: Array) -> None:
-    """Colour the share of each node of triangles by its status, as `zones`."""
-    corners = flat[facets]
-    middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
-    after, before = (np.roll(corners, k, axis=1) for k in (-1, 1))
-    quads = np.stack([corners, (corners + after) / 2, middle, (corners + before) / 2], axis=2)
-    known = status[facets] >= STATUS["open"]  # nodes that are held are no contact nodes
-    if not known.any():
-        return
-    order = np.argsort([STATUS[zone] for zone in ZONES])
-    halves = 4 * np.arange(known.sum())[:, None, None] + [[0, 1, 2], [0, 2, 3]]
-    ax.tripcolor(
-        *quads[known].reshape(-1, 2).T,
-        halves.reshape(-1, 3),
-        np.repeat(order[status[facets][known]], 4),
-        shading="gouraud",
-        cmap=ListedColormap([colour for colour, _ in ZONES.values()]),
-        vmin=-0.5,
-        vmax=len(ZONES) - 0.5,
-    )
-
-
-def _draw_friction(ax: Axes, skin: Any, view: list[int], low: Array, high: Array) -> None:
-    """Draw friction as arrows between two corners."""
-    flat = np.asarray(skin.points)[:, view]
-    traction, normal = np.nan_to_num(skin["traction"]), np.nan_to_num(skin["normal"])
-    along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
-    friction = along[:, view]
-    size = np.linalg.norm(friction, axis=1)
-    least = 1e-6 * (high - low)  # less is rounding of the places
-    size[np.any((flat < low - least) | (flat > high + least), axis=1)] = 0.0
-    # Rounding of the pressures is no friction.
-    rounding = 1e-9 * np.linalg.norm(traction, axis=1).max(initial=0.0)
-    acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
-    if acting.size:
-        # The first of each cell of a grid of 16 x 16 cells.
-        places = flat[acting] - flat[acting].min(axis=0)
-        cells = np.floor(16 * places / (places.max() or 1.0))
-        chosen = acting[np.unique(cells, axis=0, return_index=True)[1]]
-        longest = 0.1 * (high - low).max()
-        exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / longest}
-        ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)

@@ -18,11 +18,12 @@ from PIL import Image
 from contact.errors import InputError
 from contact.io.folder import added, result_folder
 from contact.plot.body import body_figure, picture
-from contact.plot.contact import contact_figure
+from contact.plot.contact import draw_line
 from contact.plot.foundation import magnification
 from contact.plot.run import Run, read_run, read_step, read_steps
+from contact.plot.space import contact_figure
 from contact.plot.steps import steps_figures
-from contact.plot.style import DEFORMED, PAGE, STYLE, Look, named
+from contact.plot.style import DEFORMED, PAGE, STYLE, Look, fitted, named
 from contact.ranks import refused
 
 #: Endings of files that figures may have.
@@ -60,8 +61,8 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
     """Return the figures of a run by name.
 
     In 2-D the contact figure shows the stresses along Gamma_3 with the friction bound and the zones
-    of stick and slip, as Figure 7.4 of the thesis does. In 3-D the contact nodes are seen along the
-    mean contact direction, and the deformed surface from the side.
+    of stick and slip, as Figure 7.4 of the thesis does. In 3-D it shows the body from where its
+    contact is seen, and pressure, status and friction along the mean normal of the contact.
 
     Parameters
     ----------
@@ -74,7 +75,11 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
     found = Gallery()
     with matplotlib.rc_context(look.style):
         if not fields:
-            found["contact"] = contact_figure(run, look)
+            contact = draw_line(run, look) if run.plane else contact_figure(run, look)
+            if contact is not None:
+                found["contact"] = contact
+                if run.title:
+                    contact.suptitle(fitted(run.title), fontsize="large")
             if run.steps is not None:
                 found |= steps_figures(run, look)
         for field in fields or [field for field in DEFORMED if field in run.body.point_data]:

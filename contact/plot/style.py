@@ -73,12 +73,15 @@ class Look:
         Whether both halves of a body of revolution are drawn.
     xlim, ylim
         Ends of the coordinates x (r) and y (z) of the mesh; None for those that suit the figure.
+    view
+        Direction from a body in 3-D to the eye; None for one that sees the contact.
     """
 
     width: float | None = None
     mirror: bool = False
     xlim: tuple[float, float] | None = None
     ylim: tuple[float, float] | None = None
+    view: tuple[float, float, float] | None = None
 
     @property
     def style(self) -> dict[str, Any]:

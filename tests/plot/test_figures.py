@@ -11,21 +11,19 @@ from matplotlib import colormaps, rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.quiver import Quiver
 from matplotlib.tri import Triangulation
 from scipy.spatial import KDTree
 
 from contact.cli.arguments import parse
 from contact.errors import InputError
 from contact.plot.body import draw_plane, picture
-from contact.plot.contact import draw_line, draw_surface
+from contact.plot.contact import draw_line
 from contact.plot.figures import draw
 from contact.plot.run import Run
 from contact.plot.steps import draw_loop
 from contact.plot.style import Look, smooth
 from contact.plot.sweep import Swept
 from contact.results.options import OutputOptions, Units
-from contact.results.quantity import STATUS
 from contact.results.solution import Solution
 from contact.solving import solve
 from contact.writing import write_outputs
@@ -372,8 +370,6 @@ def test_words_are_within_the_figure(dim: int, inches: float) -> None:
     assert figures is not None
     with rc_context(Look(inches).style):
         for name, figure in figures.items():
-            if dim == 3 and name != "contact":
-                continue
             canvas = FigureCanvasAgg(figure)
             canvas.draw()
             box, tolerance = figure.get_tightbbox(canvas.get_renderer()), 0.02  # inches
@@ -426,56 +422,3 @@ def test_a_foundation_far_away_does_not_shrink_the_body() -> None:
     run = run_of(solve(block(2, contact={"on": "bottom", "gap": 5.0})))
     low, high = draw_plane(picture(run, "von_mises", 10.0)).axes[0].get_ylim()
     assert high - low < 2 * run.diameter
-
-
-@pytest.mark.parametrize(
-    ("look", "shown"),
-    [
-        (Look(xlim=(-0.5, 3.0)), [(0.0, 2.0), (0.0, 1.0)]),
-        (Look(xlim=(1.2, 1.3)), [(1.2, 1.3), (0.35, 0.65)]),
-        (Look(ylim=(0.6, 0.9)), [(0.55, 1.45), (0.6, 0.9)]),
-        (Look(xlim=(0.3, 0.4), ylim=(0.1, 0.2)), [(0.3, 0.4), (0.1, 0.2)]),
-    ],
-)
-def test_a_crop_in_3d_is_full(look: Look, shown: list[tuple[float, float]]) -> None:
-    """No empty patch beside the part, nor between nodes; colours end where the crop does."""
-    run = run_of(solve(block(3)))
-    surface = run.surface.copy()
-    surface["pressure"] = surface.points[:, 0]
-    pressure, status, *_ = draw_surface(replace(run, surface=surface), look).axes
-    for ax in (pressure, status):
-        assert ax.get_xlim() == pytest.approx(shown[0])
-        assert ax.get_ylim() == pytest.approx(shown[1])
-    colours = pressure.collections[-1].norm
-    assert (colours.vmin, colours.vmax) == pytest.approx((0.0, shown[0][1]))
-    # The shares of the nodes cover the part that is shown.
-    middle = np.mean(shown, axis=1)
-    shares = status.collections[0]
-    found = [k for k, p in enumerate(shares.get_paths()) if p.contains_point(middle, radius=1e-9)]
-    node = np.argmin(np.linalg.norm(surface.points[:, :2] - middle, axis=1))
-    words, codes = (
-        ["stick", "slip", "open"],
-        shares.get_array()[::2],
-    )  # two halves have four corners
-    assert found and surface["status"][node] in [STATUS[words[int(codes[k])]] for k in found]
-
-
-@pytest.mark.parametrize("mu", [0.0, 0.3])
-def test_panels_in_3d_name_what_they_show(mu: float) -> None:
-    """Without friction nothing slides; titles stay beside each other in slim panels too."""
-    run = run_of(solve(block(3, friction={"law": "coulomb", "mu": mu} if mu else {"law": "none"})))
-    look = Look(6.3, xlim=(1.0, 1.2))
-    with rc_context(look.style):
-        figure = draw_surface(run, look)
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        titles = [ax.title.get_window_extent(canvas.get_renderer()) for ax in figure.axes[:2]]
-    assert titles[0].x1 < titles[1].x0
-    words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert words == (["sticking", "sliding", "open"] if mu else ["in contact", "open"])
-    arrows = [each for each in figure.axes[1].collections if isinstance(each, Quiver)]
-    assert len(arrows) == (mu > 0)
-    assert len(figure.axes) == 3  # the last one of the colours
-    surface = run.surface.copy()
-    surface["status"] = np.full(surface.n_points, STATUS["open"])
-    assert len(draw_surface(replace(run, surface=surface), look).axes) == 2
