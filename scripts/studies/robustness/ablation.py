@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from typing import Any
 from unittest.mock import patch
@@ -112,120 +113,82 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
     return plain
 
 
-def _large(name: str, *changes: str) -> Callable[[], Case]:
-    """Return how a case on a finer mesh is made."""
-    return lambda: load_case(CASES / f"{name}.toml", changes)
+ELASTIC, COULOMB = {"young": 1.0, "poisson": 0.3}, {"law": "coulomb", "mu": 0.3}
 
+_STOP = cantilevers.cantilever(cantilevers.TIP, [1600, 16], 1, 0.3, 0.5)
+_STRIP = cantilevers.cantilever({}, [1600, 16], 1, 0.3, 0.0)
+_PIEZO = {"e31": -0.3, "e33": 0.8, "e15": 0.6, "beta11": 1.0, "beta33": 0.9}
 
-def _named(case: Case, name: str) -> Case:
-    case._source = name
-    return case
-
-
-def _block() -> Case:
-    return _named(bench_one.block(16), "block-16")
-
-
-def _stop() -> Case:
-    """Return a cantilever whose tip touches a stop, on one mesh alone, as of a file."""
-    tables = cantilevers.cantilever(cantilevers.TIP, [1600, 16], 1, 0.3, 0.5)
-    return _named(parse_case({**tables, "solver": {"nested": False}}), "stop")
-
-
-def _lying() -> Case:
-    """Return a cantilever most of which lies on the ground, and that is condensed."""
-    load = cantilevers.UNIFORM
-    return _named(parse_case(cantilevers.cantilever(load, [500, 20], 2, 0.0, 0.5)), "lying")
-
-
-def _pulled() -> Case:
-    """Return a pressed strip, clamped at one end and pulled at the other: half of it slides."""
-    loads = [{"on": "top", "traction": [0.0, -1e-3]}, {"on": "right", "traction": [0.015, 0.0]}]
-    tables = cantilevers.cantilever({}, [1600, 16], 1, 0.3, 0.0)
-    return _named(parse_case({**tables, "load": loads}), "pulled-strip")
-
-
-def _dragged() -> Case:
-    """Return a long strip that friction alone holds, pulled with 99 % of the friction."""
-    tables = {
+#: Tables of problems that a device alone solves, or solves in time.
+OWN: dict[str, dict[str, Any]] = {
+    # A cantilever whose tip touches a stop, on one mesh alone, as of a file.
+    "stop": {**_STOP, "solver": {"nested": False}},
+    # A cantilever most of which lies on the ground, and that is condensed.
+    "lying": cantilevers.cantilever(cantilevers.UNIFORM, [500, 20], 2, 0.0, 0.5),
+    # A pressed strip, clamped at one end and pulled at the other: half of it slides.
+    "pulled-strip": {
+        **_STRIP,
+        "load": [{"on": "top", "traction": [0.0, -1e-3]},
+                 {"on": "right", "traction": [0.015, 0.0]}],
+    },
+    # A long strip that friction alone holds, pulled with 99 % of the friction.
+    "dragged-strip": {
         "mesh": {"generator": "rectangle", "size": [50.0, 1.0], "cells": [50, 2]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "load": [
-            {"on": "top", "traction": [0.0, -1e-6]},
-            {"on": "right", "traction": [0.99 * 0.2 * 50e-6, 0.0]},
-        ],
+        "material": ELASTIC,
+        "load": [{"on": "top", "traction": [0.0, -1e-6]},
+                 {"on": "right", "traction": [0.99 * 0.2 * 50e-6, 0.0]}],
         "contact": {"on": "bottom"},
-        "friction": {"law": "coulomb", "mu": 0.2},
-    }
-    return _named(parse_case(tables), "dragged-strip")
-
-
-def _spheres() -> Case:
-    """Return a ball that another one alone holds, pushed aside; solved by multigrid."""
-    tables = {
-        "mesh": {
-            **{"generator": "two_spheres", "quarters": 2, "size": 25.0},
-            **{"contact_size": 1.25, "contact_width": 5.0},
-        },
+        "friction": COULOMB | {"mu": 0.2},
+    },
+    # A ball that another one alone holds, pushed aside; solved by multigrid.
+    "two-spheres": {
+        "mesh": {"generator": "two_spheres", "quarters": 2, "size": 25.0, "contact_size": 1.25,
+                 "contact_width": 5.0},
         "material": {"young": 20e3, "poisson": 0.3},
-        "fixed": [
-            {"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},
-            {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
-        ],
+        "fixed": [{"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},
+                  {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]}],
         "load": [{"on": "upper_cut", "traction": [0.5, 0.0, -8.0]}],
         "contact": {"on": "upper_round", "against": "lower_round"},
-        "friction": {"law": "coulomb", "mu": 0.3},
+        "friction": COULOMB,
         "solver": {"linear": "iterative"},
-    }
-    return _named(parse_case(tables), "two-spheres")
-
-
-def _pair() -> Case:
-    """Return two piezoelectric bodies below a plate, with a current across both contacts."""
-    piezo = {"e31": -0.3, "e33": 0.8, "e15": 0.6, "beta11": 1.0, "beta33": 0.9}
-    upper = {
-        **{"on": "upper_bottom", "against": "lower_top"},
-        "friction": {"law": "coulomb", "mu": 0.3},
-        "electric": {"k_e": 2.0, "delta": 5.0},
-    }
-    lower = {
-        "on": "lower_bottom",
-        "friction": {"law": "coulomb", "mu": 0.1},
-        "electric": {"k_e": 1.0, "delta": 5.0},
-    }
-    tables = {
+    },
+    # Two piezoelectric bodies below a plate, with a current across both contacts.
+    "piezoelectric-pair": {
         "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.22},
-        "material": {"young": 1.0, "poisson": 0.3, "piezo": piezo},
+        "material": {**ELASTIC, "piezo": _PIEZO},
         "fixed": [{"on": "lower_left", "displacement": [0.0, "free"]}],
         "rigid": [{"on": "upper_top", "displacement": [0.002, "free"], "force": [0.0, -0.02]}],
         "electrode": [{"on": "upper_top", "charge": 0.003}],
-        "contact": [upper, lower],
+        "contact": [
+            {"on": "upper_bottom", "against": "lower_top", "friction": COULOMB,
+             "electric": {"k_e": 2.0, "delta": 5.0}},
+            {"on": "lower_bottom", "friction": COULOMB | {"mu": 0.1},
+             "electric": {"k_e": 1.0, "delta": 5.0}},
+        ],
         "solver": {"linear": "iterative", "tolerance": 1e-9},
-    }
-    return _named(parse_case(tables), "piezoelectric-pair")
-
-
-def _conducting() -> Case:
-    changes = "solver.method=newton", "electric.k_e=6.0", "electric.delta=8.3333"
-    return _named(case_of("compliance-8-4", (48, 8), *changes), "compliance-8-4 with k_e = 6")
-
-
-def _unloaded() -> Case:
-    """Return two blocks that are pressed, pushed aside, and moved back by supports."""
-    push = {"on": "upper_top", "displacement": ["0.0003*t*(1 - t)", "-0.001*t*(1 - t)"]}
-    tables = {
+    },
+    # Two blocks that are pressed, pushed aside, and moved back by supports.
+    "two-blocks-unloaded": {
         "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.3},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "lower_bottom", "displacement": [0.0, 0.0]}, push],
+        "material": ELASTIC,
+        "fixed": [{"on": "lower_bottom", "displacement": [0.0, 0.0]},
+                  {"on": "upper_top", "displacement": ["0.0003*t*(1 - t)", "-0.001*t*(1 - t)"]}],
         "contact": {"on": "upper_bottom", "against": "lower_top"},
-        "friction": {"law": "coulomb", "mu": 0.3},
+        "friction": COULOMB,
         "evolution": {"times": [0.0, 1.0], "steps": [10]},
-    }
-    return _named(parse_case(tables), "two-blocks-unloaded")
+    },
+}  # fmt: skip
 
 
-def _plane() -> Case:
-    return _named(bench_one.problem_case(2, 256, "solver.nested=false"), "plane-256")
+def _own(name: str) -> Callable[[], Case]:
+    """Return how a problem of `OWN` is made."""
+    return lambda: parse_case(OWN[name], source=name)
+
+
+def _steep(cells: tuple[int, int], k_e: str, delta: str) -> Case:
+    """Return Example 8.4 with a steep ramp of the conductivity."""
+    changes = "solver.method=newton", f"electric.k_e={k_e}", f"electric.delta={delta}"
+    return case_of("compliance-8-4", cells, *changes)
 
 
 def _finer(name: str, cells: tuple[int, ...]) -> Callable[[], Case]:
@@ -239,22 +202,38 @@ def _finer(name: str, cells: tuple[int, ...]) -> Callable[[], Case]:
     return make
 
 
+def _renamed(name: str, make: Callable[..., Case], *arguments: Any) -> Callable[[], Case]:
+    """Return how a case of another script is made under a name of its own."""
+
+    def made() -> Case:
+        case = make(*arguments)
+        case._source = name
+        return case
+
+    return made
+
+
+_block = _renamed("block-16", bench_one.block, 16)
+_plane = _renamed("plane-256", bench_one.problem_case, 2, 256, "solver.nested=false")
+_conducting = _renamed("compliance-8-4 with k_e = 6", _steep, (48, 8), "6.0", "8.3333")
+
 DEVICES = (
     Device("interior point", (interior_point,), "Mehrotra 1992; Nesterov and Todd 1998",
            ((fallbacks, "interior_point", _no_fallback),)),
     Device("updates of the friction bound", (), "Haslinger 1983",
            ((interior_point, "UPDATES", 1),)),
     Device("sticking start where friction alone restrains", (UnconstrainedModes.stuck_bound,), "-",
-           ((UnconstrainedModes, "stuck_bound", _nothing),), (), _dragged),
+           ((UnconstrainedModes, "stuck_bound", _nothing),), (), _own("dragged-strip")),
     Device("continuation in the conductivity", (fallbacks.continuation,), "Allgower and Georg 2003",
            ((fallbacks, "_in_the_conductivity", _nothing),)),
     Device("estimate of the stiffness from the first step",
            (complementarity_parameters.overestimates_stiffness,), "-",
-           ((semismooth, "overestimates_stiffness", lambda *_: False),), (), _stop),
+           ((semismooth, "overestimates_stiffness", lambda *_: False),), (), _own("stop")),
     Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
-           ((newton_step, "REGULARISATION", 0.0),), (), _spheres),
+           ((newton_step, "REGULARISATION", 0.0),), (), _own("two-spheres")),
     Device("forcing term that tightens", (newton_step.NewtonStep._forcing_term,),
-           "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "STAGNANT", 10**9),), (), _pair),
+           "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "STAGNANT", 10**9),), (),
+           _own("piezoelectric-pair")),
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
     Device("limited softening", (), "-", (), (("softening", float("inf")),),
@@ -267,26 +246,27 @@ DEVICES = (
     Device("stagnation limit of the continuation", (), "-",
            ((fallbacks, "CONTINUATION_LIMIT", None),), (), _conducting),
     Device("zero displacement where nothing acts", (step_control.undeformed_equilibrium,), "-",
-           ((semismooth.Iteration, "_loss_of_contact", _nothing),), (), _unloaded),
+           ((semismooth.Iteration, "_loss_of_contact", _nothing),), (),
+           _own("two-blocks-unloaded")),
     Device("working set of contact nodes, from all open",
            (fallbacks.from_open, fallbacks.working_set), "Goldfarb and Idnani 1983",
-           ((fallbacks, "from_open", lambda _: (None, None)),), (), _stop),
+           ((fallbacks, "from_open", lambda _: (None, None)),), (), _own("stop")),
 )  # fmt: skip
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
 LINEAR = (
     Device("nested iteration", (nesting,), "Bornemann and Deuflhard 1996", (),
-           (("nested", False),), _pulled),
+           (("nested", False),), _own("pulled-strip")),
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
            _block),
     Device("chord steps", (step_control.Chord,), "Kelley 1995", (), (("keep", "never"),), _plane),
     Device("static condensation", (Newton._condensed_steps,), "Guyan 1965", (),
            (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
-           ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _lying),
+           ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _own("lying")),
     Device("elimination of unknowns without contact", (), "Golub and Van Loan 2013",
            ((dense, "_cholesky", lambda _, rows: (np.zeros((0, 0)), int(rows.size > 0))),), (),
-           _lying),
+           _own("lying")),
     Device("coarse levels kept from step to step", (multigrid.Hierarchy,),
            "Karlin, Manasse, Rudolph and Sleator 1988", ((multigrid, "PRICE", 0),), (), _block),
     Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",
@@ -294,7 +274,7 @@ LINEAR = (
             (multigrid.StiffNodes, "jump", lambda _, rhs: rhs.duplicate())), (), _block),
     Device("piezoelectric block preconditioner", (block,), "Silvester and Wathen 1994",
            ((multigrid, "LARGE", {**multigrid.LARGE, (3, True): 10**9}),), (),
-           _large("piezo-column", "mesh.cells=[20, 20, 40]")),
+           partial(load_case, CASES / "piezo-column.toml", ["mesh.cells=[20, 20, 40]"])),
 )  # fmt: skip
 
 
@@ -304,8 +284,7 @@ def cases(coarse: bool, every: int, only: str | None) -> Iterator[Case]:
         found = (problem.case for problem in problems(kind, only, coarse))
         yield from islice(found, 0, None, every)
     if only is None:
-        changes = "solver.method=newton", "electric.k_e=0.6", "electric.delta=83.3333"
-        yield case_of("compliance-8-4", (96, 16), *changes)
+        yield _steep((96, 16), "0.6", "83.3333")
 
 
 def run(case: Case, options: NewtonOptions) -> tuple[Solution, float]:
