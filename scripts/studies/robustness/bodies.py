@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from scripts.studies.robustness.check import Array, Mesh
-from scripts.studies.robustness.one_body import Rng, Tables, coulomb, one
+from scripts.studies.robustness.one_body import Families, Rng, Tables, coulomb, one
 
 
 class Bodies:
@@ -376,10 +376,7 @@ def small_bodies(rng: Rng, b: Bodies) -> Tables:
 
 
 #: Family -> how a problem is drawn, and how many there are.
-BODIES: dict[str, tuple[Callable[[Rng, Bodies], Tables], int]] = {
-    "rings": (rings, 50), "stacks": (stacks, 50), "wedges": (wedges, 45),
-    "driven_wedges": (driven_wedges, 35), "snap_fits": (snap_fits, 40),
-    "lifted_off": (lifted_off, 50), "indenters": (indenters, 55),
-    "tilted_blocks": (tilted_blocks, 40), "clouds": (clouds, 50), "layers": (layers, 35),
-    "small_bodies": (small_bodies, 50),
-}  # fmt: skip
+BODIES: Families = {draw.__name__: (draw, count) for draw, count in (
+    (rings, 50), (stacks, 50), (wedges, 45), (driven_wedges, 35), (snap_fits, 40), (lifted_off, 50),
+    (indenters, 55), (tilted_blocks, 40), (clouds, 50), (layers, 35), (small_bodies, 50),
+)}  # fmt: skip

@@ -22,9 +22,6 @@ from scipy.spatial import cKDTree
 Array = NDArray[np.float64]
 Tables = Mapping[str, Any]
 
-#: Names that the formulas of a case may use, beside t.
-NAMES = {"min": min, "max": max, "abs": abs}
-
 
 @dataclass(frozen=True)
 class Mesh:
@@ -61,20 +58,18 @@ class Mesh:
 
 def write_msh(mesh: Mesh, path: Path) -> None:
     """Write a file of Gmsh's format 2.2."""
-    groups = [(1, name, mesh.parts[name]) for name in mesh.parts]
-    groups += [
-        (2, name, mesh.triangles[mesh.region == number]) for number, name in enumerate(mesh.names)
-    ]
+    groups = [(1, name, edges) for name, edges in mesh.parts.items()]
+    groups += [(2, name, mesh.triangles[mesh.region == k]) for k, name in enumerate(mesh.names)]
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(groups))]
     lines += [f'{dim} {tag} "{name}"' for tag, (dim, name, _) in enumerate(groups, 1)]
     lines += ["$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
     lines += [f"{k} {x!r} {y!r} 0" for k, (x, y) in enumerate(mesh.points.tolist(), 1)]
     lines += ["$EndNodes", "$Elements", str(sum(len(cells) for _, _, cells in groups))]
-    number = 0
-    for tag, (dim, _, cells) in enumerate(groups, 1):
-        for cell in (cells + 1).tolist():
-            number += 1
-            lines.append(f"{number} {dim} 2 {tag} {tag} {' '.join(map(str, cell))}")
+    every = (
+        (tag, dim, cell) for tag, (dim, _, cells) in enumerate(groups, 1) for cell in cells + 1
+    )
+    for number, (tag, dim, cell) in enumerate(every, 1):
+        lines.append(f"{number} {dim} 2 {tag} {tag} {' '.join(map(str, cell.tolist()))}")
     path.write_text("\n".join([*lines, "$EndElements", ""]))
 
 
@@ -144,13 +139,10 @@ def _displacement(mesh: Mesh, path: Path) -> Array:
     points, u = grid.points[:, :2], np.asarray(grid.point_data["displacement"])[:, :2]
     middles = mesh.points[mesh.triangles].mean(axis=1)
     distance, order = cKDTree(points[cells].mean(axis=1)).query(middles)
-    theirs = cells[order]
-    apart = np.linalg.norm(
-        points[theirs][:, None] - mesh.points[mesh.triangles][:, :, None], axis=3
-    )
+    theirs, own = cells[order], mesh.points[mesh.triangles]
+    apart = np.linalg.norm(points[theirs][:, None] - own[:, :, None], axis=3)
     corner = np.argmin(apart, axis=2)
-    size = np.ptp(mesh.points)
-    if max(distance.max(), apart.min(axis=2).max()) > 1e-9 * size:
+    if max(distance.max(), apart.min(axis=2).max()) > 1e-9 * np.ptp(mesh.points):
         raise ValueError(f"{path} has other cells")
     found = np.zeros_like(mesh.points)
     found[mesh.triangles] = u[np.take_along_axis(theirs, corner, axis=1)]
@@ -185,7 +177,7 @@ def recheck(mesh: Mesh, tables: Tables, folder: Path) -> dict[str, float]:
         found = _laws(tables, rows, before, float(np.ptp(mesh.points)), least)
         before = _column(rows, "u_t")
         if path == steps[-1][1] or not any("against" in entry for entry in tables["contact"]):
-            found |= _balance(mesh, tables, folder, rows, path, least, path == steps[-1][1])
+            found |= _balance(mesh, tables, folder, rows, path, least)
         worst = {name: max(value, worst.get(name, 0.0)) for name, value in found.items()}
     return worst
 
@@ -194,9 +186,8 @@ def _laws(
     tables: Tables, rows: Sequence[Tables], before: Array, size: float, least: float
 ) -> dict[str, float]:
     """Return the errors of Signorini's and Coulomb's laws."""
-    pressure, tau, bound, gap, u_n, u_t = _column(
-        rows, "pressure", "tau", "bound", "gap", "u_n", "u_t"
-    ).T
+    names = "pressure", "tau", "bound", "gap", "u_n", "u_t"
+    pressure, tau, bound, gap, u_n, u_t = _column(rows, *names).T
     status = np.array([row["status"] for row in rows])
     entries = {_listed(entry["on"])[0]: entry for entry in tables["contact"]}
     entry = [entries[row["on"]] if "on" in row else tables["contact"][0] for row in rows]
@@ -215,26 +206,19 @@ def _laws(
     back = np.where(slides, np.minimum(slip * np.sign(tau), 0.0) * (mu * pressure > 0), slip)
     back = np.where(pressure > 1e-6 * scale, back, 0.0)
     wrong = (status == "open") & (pressure > 1e-6 * scale) & (layer == 0)
+    over = max(np.max(np.abs(tau) - mu * pressure), np.max(np.abs(bound - mu * pressure)), 0.0)
     return {
         "tension": -min(rigid.min(), 0.0) / scale,
         "penetration": c * max((u_n - gap).max(), 0.0) / scale,
         "apart": np.max(np.minimum(np.abs(rigid), c * np.abs(gap - u_n))) / scale,
-        "bound": max(
-            np.max(np.abs(tau) - mu * pressure), np.max(np.abs(bound - mu * pressure)), 0.0
-        ) / scale,
+        "bound": over / scale,
         "slip": c * np.abs(back).max() / scale,
         "status": float(wrong.any()),
-    }  # fmt: skip
+    }
 
 
 def _balance(
-    mesh: Mesh,
-    tables: Tables,
-    folder: Path,
-    rows: Sequence[Tables],
-    path: Path,
-    least: float,
-    last: bool,
+    mesh: Mesh, tables: Tables, folder: Path, rows: Sequence[Tables], path: Path, least: float
 ) -> dict[str, float]:
     """Return the errors of nodal forces, of action and reaction, and of the reactions."""
     internal = internal_forces(mesh, tables["material"], _displacement(mesh, path))
@@ -270,11 +254,9 @@ def _balance(
     if against.exists():
         for row in _rows(against):
             nodes = mesh.nodes(row["on"])
-            place = np.array([float(row["x"]), float(row["y"])])
-            node = nodes[np.argmin(np.linalg.norm(mesh.points[nodes] - place, axis=1))]
-            force = float(row["weight"]) * np.array(
-                [float(row["traction_x"]), float(row["traction_y"])]
-            )
+            far = mesh.points[nodes] - _column([row], "x", "y")
+            node = nodes[np.argmin(np.linalg.norm(far, axis=1))]
+            force = float(row["weight"]) * _column([row], "traction_x", "traction_y")[0]
             answered += force
             action[node] -= force
     residual += action
@@ -295,6 +277,7 @@ def _balance(
     np.maximum.at(sizes, body, np.abs(acting).max(axis=(0, 2)))
     sizes = np.maximum(sizes, least)
     given = np.sum([*map(np.array, summary["reactions"].values())], axis=0)
+    last = path == _steps(folder)[-1][1]  # whose reactions these are
     size = max(np.abs(acting).max(), least)
     return {
         "equilibrium": float((np.abs(left).max(axis=1) / sizes[body]).max()),

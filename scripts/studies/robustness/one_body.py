@@ -14,7 +14,8 @@ import numpy as np
 
 Tables = dict[str, Any]
 Rng = np.random.Generator
-Draw = Callable[[Rng], Tables]
+Draw = Callable[..., Tables]
+Families = dict[str, tuple[Draw, int]]
 
 PZT = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
 SHARP = {"young": 58.7102, "poisson": 0.3912, "piezo": PZT}
@@ -435,16 +436,15 @@ _FLAT = (bar, piezo, layer, partial(round_body, dim=2), partial(pair, dim=2))
 _SOLID = (block, partial(round_body, dim=3), partial(pair, dim=3))
 
 #: Family -> how a problem is drawn, and how many there are.
-PLAIN = {"bar": (bar, 120), "piezo": (piezo, 60), "layer": (layer, 40), "hertz": (hertz, 30),
-         "block": (block, 50)}  # fmt: skip
-HARD = {
-    "cantilever": (cantilever, 70), "clamped": (clamped, 30), "lifted": (lifted, 30),
-    "bimorph": (bimorph, 20), "plate": (plate, 20), "stretched": (stretched, 40),
-    "stiff": (stiff, 15), "rough": (rough, 15), "few": (few, 10), "units": (units, 20),
-    "layers": (layers, 20), "yielding": (yielding, 10), "corners": (corners, 20),
-    "unsupported": (unsupported, 20),
-}  # fmt: skip
-CELLS = {
+PLAIN: Families = {draw.__name__: (draw, count) for draw, count in (
+    (bar, 120), (piezo, 60), (layer, 40), (hertz, 30), (block, 50),
+)}  # fmt: skip
+HARD: Families = {draw.__name__: (draw, count) for draw, count in (
+    (cantilever, 70), (clamped, 30), (lifted, 30), (bimorph, 20), (plate, 20), (stretched, 40),
+    (stiff, 15), (rough, 15), (few, 10), (units, 20), (layers, 20), (yielding, 10), (corners, 20),
+    (unsupported, 20),
+)}  # fmt: skip
+CELLS: Families = {
     cell: (partial(_on_cells, draws=draws, cell=cell), 50)
     for cell, draws in (("triangle", _FLAT), ("quadrilateral", _FLAT),
                         ("tetrahedron", _SOLID), ("hexahedron", _SOLID))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from contact.case.file import Case, parse_case
 from scripts.studies.robustness.bodies import BODIES, Bodies
 from scripts.studies.robustness.check import Mesh, write_msh
-from scripts.studies.robustness.one_body import CELLS, HARD, PLAIN
+from scripts.studies.robustness.one_body import CELLS, HARD, PLAIN, Families
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,6 @@ class Problem:
     case: Case
     mesh: Mesh | None = None
 
-
-Families = Mapping[str, tuple[Callable[..., dict[str, Any]], int]]
 
 #: Kind -> its families, and the seed, which the number of the family follows.
 KINDS: dict[str, tuple[Families, tuple[int, ...]]] = {
