@@ -159,8 +159,9 @@ def discard(folder: Path) -> None:
     """Remove the checkpoints of a run that has come to its end. On one rank."""
     with suppress(InputError):
         files_of(folder)  # else they are of somebody else
-        for path in sorted((folder / FOLDER).glob(STEPS)):
-            path.unlink()
+        for pattern in (STEPS, f".{STEPS}.part"):  # of `write_whole` in a run that was killed
+            for path in sorted((folder / FOLDER).glob(pattern)):
+                path.unlink()
     with suppress(OSError):  # it is not there, or not empty
         (folder / FOLDER).rmdir()
 
