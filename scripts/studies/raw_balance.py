@@ -67,8 +67,7 @@ def imbalance(solution: Solution) -> Imbalance:
     for fixed in problem.body.fixed:
         facets = problem.domain.facets(fixed.on)
         nodes = fem.locate_dofs_topological(body.space, d - 1, facets)
-        for i, value in enumerate(fixed.displacement or ()):
-            free[nodes, i] &= value is None
+        free[np.ix_(nodes, [*fixed.components])] = False
         floating[nodes] &= fixed.potential is None
     # Nodes that a support holds conduct as well, but are no contact nodes: they have no row.
     for contact in problem.contacts:

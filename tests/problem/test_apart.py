@@ -118,7 +118,7 @@ def test_what_is_left_of_a_body_that_is_no_longer_loaded(method, linear):
     """Nothing acts on it any more: what a solver leaves of its displacements is not its scale."""
     given = pressed(blocks(MPI.COMM_SELF), 0.01, 0.01, gap=0.001)
     first, second = given.body.loads
-    loads = (first, replace(second, amplitude=lambda t: float(t == 1)))
+    loads = (first, second.model_copy(update={"amplitude": lambda t: float(t == 1)}))
     body = replace(given.body, loads=loads)
     problem = ContactProblem(given.domain, body, given.contacts)
     found = solve(problem, METHODS[method](linear=linear), times=[1.0, 2.0], comm=MPI.COMM_SELF)
@@ -130,7 +130,7 @@ def test_forces_that_are_rounding_do_not_press():
     """Nodes with pressures of 6e-30 stuck, and 3.1 of all forces were out of balance."""
     given = pressed(blocks(MPI.COMM_SELF), -0.01, 0.01)
     first, second = given.body.loads
-    loads = (first, replace(second, amplitude=lambda t: 1.0 if t <= 1 else 0.0))
+    loads = (first, second.model_copy(update={"amplitude": lambda t: 1.0 if t <= 1 else 0.0}))
     problem = ContactProblem(given.domain, replace(given.body, loads=loads), given.contacts)
     found = solve(problem, times=[1.0, 2.0], comm=MPI.COMM_SELF)
     rng, nodes = np.random.default_rng(1), found.problem.nodes
@@ -154,7 +154,7 @@ def test_what_presses_no_longer_is_not_unknown(method, remaining, gap):
     """Multipliers of 1e-25 and less on open nodes: contact forces were "known to 400 of them"."""
     given = pressed(blocks(MPI.COMM_SELF), 0.01, 0.01, mu=0.0, gap=gap)
     first, second = given.body.loads
-    loads = (first, replace(second, amplitude=lambda t: 1.0 if t <= 1 else remaining))
+    loads = (first, second.model_copy(update={"amplitude": lambda t: 1.0 if t <= 1 else remaining}))
     problem = ContactProblem(given.domain, replace(given.body, loads=loads), given.contacts)
     for linear in ("lu", "iterative"):
         options = method(linear=linear)

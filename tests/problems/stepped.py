@@ -77,8 +77,8 @@ class SteppedBlock:
         fixed = []
         for k, given in enumerate(every[0].body.fixed):
             moving = [
-                None
-                if component is None
+                component
+                if isinstance(component, str)
                 else Between(
                     {
                         time: problem.body.fixed[k].displacement[i]
@@ -87,7 +87,7 @@ class SteppedBlock:
                 )
                 for i, component in enumerate(given.displacement)
             ]
-            fixed.append(replace(given, displacement=moving))
+            fixed.append(given.model_copy(update={"displacement": tuple(moving)}))
         first = every[0]
         return ContactProblem(
             first.domain,
