@@ -16,7 +16,6 @@ from contact.derivatives.differences import Parameter as Parameter
 from contact.derivatives.identification import Identified as Identified
 from contact.derivatives.identification import identify as identify
 from contact.errors import InputError as InputError
-from contact.interface.friction import Friction as Friction
 from contact.interface.law import Conductor as Conductor
 from contact.interface.layer import Layer as Layer
 from contact.interface.obstacle import Cone as Cone
@@ -41,6 +40,7 @@ from contact.model.body import Elastic as Elastic
 from contact.model.body import Electrode as Electrode
 from contact.model.body import Fixed as Fixed
 from contact.model.body import Load as Load
+from contact.model.friction import Friction as Friction
 from contact.model.rigid import Motion as Motion
 from contact.model.rigid import Rigid as Rigid
 from contact.problem.contact import Contact as Contact

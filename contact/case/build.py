@@ -17,6 +17,7 @@ from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain, revolved
 from contact.model.body import Bolt, Electrode, Fixed, Load
+from contact.model.friction import Friction
 from contact.model.rigid import Motion, Rigid
 from contact.problem.checks import check_problem, check_supports
 from contact.problem.contact import Contact
@@ -180,13 +181,15 @@ def _contacts(
     made = []
     for key, contact in case.contacts:
         friction = case.friction_of(key, contact)[1]
+        if coefficient is not None or law is not None:
+            friction = Friction(coefficient, radius=friction.radius, law=law)
         electric = case.electric_of(key, contact)[1]
         made.append(
             Contact(
                 contact.on,
                 contact.obstacle() if foundation is None else foundation,
                 contact.compliant_layer() if layer is None else layer,
-                friction.build(coefficient, law),
+                friction,
                 None if electric is None else electric.build(case, domain, contact.on),
                 contact.overlap == "press",
                 contact.against,

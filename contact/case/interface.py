@@ -9,12 +9,12 @@ from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from contact.arguments import expect, naming
 from contact.case.data import read_data
 from contact.errors import InputError
-from contact.interface import friction, obstacle
+from contact.interface import obstacle
 from contact.interface.law import Conductor
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction, Obstacle, Shape
@@ -24,6 +24,7 @@ from contact.mesh.geometry import area, volume
 from contact.mesh.together import meet
 from contact.model.fields import steady
 from contact.model.formula import Expression, as_number
+from contact.model.friction import Friction
 from contact.model.messages import Words, fault
 from contact.model.rigid import Motion
 from contact.model.section import (
@@ -32,11 +33,9 @@ from contact.model.section import (
     File,
     Formula,
     FromTable,
-    NonNegativeFormula,
     Part,
     Section,
     TimeFormula,
-    formula_or_law,
 )
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
@@ -197,61 +196,6 @@ INFINITE: dict[str, Any] = {
     "allow_inf_nan": True,
     "json_schema_extra": {"type": ["number", "null"]},
 }
-
-
-class SlipLaw(Section):
-    """`mu = { law = "slip", ... }`: coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
-
-    law: Literal["slip"]
-    """The slip-dependent law."""
-    a: NonNegative = 0.5
-    """Coefficient at large slip."""
-    b: NonNegative = 0.2
-    """Twice the excess without slip."""
-    rho: NonNegative
-    """Decay rate (1/length)."""
-
-    def friction(self) -> laws.Coulomb:
-        """Return Coulomb's law with this coefficient."""
-        return laws.Coulomb(laws.SlipCoefficient(self.a, self.b, self.rho))
-
-
-#: A coefficient of friction. A further law is a section like that above, and a line here with its
-#: `law`.
-Mu: TypeAlias = Annotated[
-    Annotated[NonNegativeFormula, Tag("formula")] | Annotated[SlipLaw, Tag("slip")],
-    formula_or_law,
-]
-
-
-class Friction(Section):
-    """`[friction]`: friction on the contact parts that have none of their own. Absent: none."""
-
-    law: Literal["none", "tresca", "coulomb"] = "none"
-    """`tresca`: fixed bound; `coulomb`: mu times the smoothed pressure."""
-    bound: Annotated[NonNegativeFormula | None, ReadWith("law", "tresca", required=True)] = None
-    """Bound S of the tangential stress."""
-    mu: Annotated[Mu | None, ReadWith("law", "coulomb", required=True)] = None
-    """Coefficient of friction."""
-    radius: Annotated[NonNegative, ReadWith("law", "coulomb")] = 0.0
-    """Radius of the smoothing operator R; 0: the pressure itself."""
-
-    def build(
-        self,
-        coefficient: laws.FrictionCoefficient | None = None,
-        law: laws.FrictionLaw | None = None,
-    ) -> friction.Friction:
-        """Return the friction itself; a law or a coefficient may replace the section's."""
-        if coefficient is not None or law is not None:
-            return friction.Friction(coefficient, radius=self.radius, law=law)
-        if self.law == "tresca":
-            return friction.Friction(tresca=self.bound)
-        if isinstance(self.mu, Section):
-            return friction.Friction(law=self.mu.friction(), radius=self.radius)
-        if self.mu is not None and self.mu.is_constant:
-            constant = laws.ConstantCoefficient(self.mu.value)
-            return friction.Friction(constant, radius=self.radius)
-        return friction.Friction(mu=self.mu, radius=self.radius)
 
 
 class Electric(Section):

@@ -21,7 +21,7 @@ from scipy import sparse
 
 from contact.arguments import naming, real
 from contact.errors import InputError
-from contact.interface.friction import Friction, NodalFriction
+from contact.interface.friction import NodalFriction, law_at
 from contact.interface.law import Conductor, InterfaceLaw
 from contact.interface.layer import Layer
 from contact.interface.mortar.coupling import Coupling
@@ -31,6 +31,7 @@ from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoothing
 from contact.linear.layout import Inclined, projectors
+from contact.model.friction import Friction
 from contact.typing import Array
 from forms.laws import (
     Compliance,
@@ -282,11 +283,11 @@ def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFrict
     """Return friction at the nodes of all entries, joined before. Collective."""
     bounds = _bounds(entries)
     smoothing = tuple(Smoothing(entry.nodes, entry.friction.radius) for entry in entries)
-    laws = [entry.friction.law_at(entry.nodes) for entry in entries]
+    laws = [law_at(entry.friction, entry.nodes) for entry in entries]
     law = None
     if any(laws):
         every = tuple(NO_FRICTION if own is None else own for own in laws)
-        own = any(entry.friction.law is not None for entry in entries)
+        own = any(hasattr(entry.friction.mu, "by_slip") for entry in entries)
         law = _grouped(every, bounds, "Friction: law" if own else "Friction: mu")
     return NodalFriction(law, _grouped(smoothing, bounds), SlipHistory.rest(nodes))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -15,7 +15,6 @@ from contact.arguments import (
     check_finite,
     check_slope,
     expect,
-    fill,
     naming,
     real,
     sampled,
@@ -24,130 +23,58 @@ from contact.errors import InputError
 from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoother
-from contact.model.fields import Field, Moving, Scalar, field, values_at
+from contact.model.fields import Field, Moving, values_at
+from contact.model.formula import Expression
+from contact.model.friction import Friction, SlipLaw
 from contact.ranks import on_all_ranks
 from contact.tolerances import EPS
 from contact.typing import Array
-from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, FrictionLaw, Tresca
-
-#: Attributes of a coefficient, and of a law of friction.
-COEFFICIENT = ("maximum", "lipschitz", "__call__", "derivative")
-LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
+from forms.laws import ConstantCoefficient, Coulomb, FrictionLaw, Tresca
 
 
-@dataclass(frozen=True)
-class Friction:
-    """Friction on a contact part, by one of `mu`, `coefficient`, `tresca` and `law`; or none.
-
-    Parameters
-    ----------
-    coefficient
-        Coulomb's mu(|u_tau|) (no unit), for instance `SlipCoefficient`.
-    tresca
-        A fixed bound S (stress), used instead of mu times the pressure: a number, a function of
-        x, UFL (`ufl.core.expr.Expr`) or a `dolfinx.fem.Function`.
-    radius
-        Radius of the smoothing operator R (length); 0 for R = identity.
-    mu
-        Coulomb's mu, a number or function of position likewise; or a `coefficient`, which it then
-        becomes.
-    law
-        Another law s(|u_tau|, p), for instance with a coefficient that depends on the pressure.
+def law_at(friction: Friction, nodes: ContactNodes) -> FrictionLaw | None:
+    """Return the law at contact nodes; None where no bound is ever above 0. Collective.
 
     Raises
     ------
     InputError
-        If several are given, or something else, or the radius is none.
-
-    Examples
-    --------
-    >>> Friction(mu=0.3).given
-    True
+        If a bound or coefficient is negative or no number at a node, or a coefficient of the
+        slip where nothing slips, or a derivative, the maximum or the Lipschitz constant is not
+        that of its law.
     """
-
-    coefficient: FrictionCoefficient | None
-    tresca: Field | Moving | None
-    radius: float
-    mu: Field | Moving | None
-    law: FrictionLaw | None
-
-    def __init__(
-        self,
-        coefficient: FrictionCoefficient | None = None,
-        tresca: Scalar | None = None,
-        radius: float = 0.0,
-        mu: Scalar | FrictionCoefficient | None = None,
-        law: FrictionLaw | None = None,
-    ) -> None:
-        if isinstance(coefficient, int | float):
-            raise InputError(
-                f"Friction({coefficient}): accepted: Friction(mu={coefficient}), a "
-                "coefficient, or Friction(tresca=...), a bound",
-                "no-such-name",
-            )
-        size = isinstance(radius, int | float | np.number) and 0 <= radius < np.inf
-        expect("Friction: radius", radius, "a length >= 0", size)
-        if sum(one is not None for one in (coefficient, tresca, mu, law)) > 1:
-            raise InputError("Friction: accepted: one of coefficient, tresca, mu and law", "value")
-        # A coefficient that lacks something is no function of position.
-        if any(hasattr(mu, name) for name in COEFFICIENT if name != "__call__"):
-            coefficient, mu = cast(FrictionCoefficient, mu), None
-        for name, given, methods in (("coefficient", coefficient, COEFFICIENT), ("law", law, LAW)):
-            fits = given is None or all(hasattr(given, method) for method in methods)
-            words = f"an object with {', '.join(methods)}"
-            expect(f"Friction: {name}", given, words, fits)
-        fill(self, coefficient=coefficient, tresca=field(tresca, "Friction: tresca"), radius=radius)
-        fill(self, mu=field(cast(Scalar | None, mu), "Friction: mu"), law=law)
-
-    @property
-    def _laws(self) -> tuple[object, ...]:
-        return self.coefficient, self.tresca, self.mu, self.law
-
-    @property
-    def given(self) -> bool:
-        """Whether there is any."""
-        return any(law is not None for law in self._laws)
-
-    def law_at(self, nodes: ContactNodes) -> FrictionLaw | None:
-        """Return the law at contact nodes; None where no bound is ever above 0. Collective.
-
-        Raises
-        ------
-        InputError
-            If a bound or coefficient is negative or no number at a node, or a coefficient of the
-            slip where nothing slips, or a derivative, the maximum or the Lipschitz constant is not
-            that of its law.
-        """
-        if self.tresca is not None:
-            bound = _at("friction.bound", self.tresca, nodes)
-            return Tresca(bound) if nodes.maximum(bound) > 0 else None
-        if self.mu is not None:
-            mu = _at("friction.mu", self.mu, nodes)
-            return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
-        if self.coefficient is None:
-            with on_all_ranks(nodes.comm):
-                _check_law(self.law)
-            return self.law
-        # Ranks without nodes ask too: mistakes are found by all.
-        rest, words = np.zeros(3), "one number for each slip"
-        with on_all_ranks(nodes.comm), naming("Friction: mu"):
-            resists = real(self.coefficient(rest), rest.shape, words)
-        with on_all_ranks(nodes.comm), naming("Friction: mu: derivative"):
-            slope = real(self.coefficient.derivative(rest), rest.shape, words)
-            check_finite(slope, lambda _: "without slip")
+    given: Any = friction.mu.coefficient if isinstance(friction.mu, SlipLaw) else friction.mu
+    if friction.law == "none":
+        return None
+    if friction.law == "tresca":
+        assert friction.bound is not None  # required
+        bound = _at("friction.bound", friction.bound, nodes)
+        return Tresca(bound) if nodes.maximum(bound) > 0 else None
+    if hasattr(given, "by_slip"):
         with on_all_ranks(nodes.comm):
-            given = self.coefficient
-            check_slope("Friction: mu: derivative", given, given.derivative, SAMPLES)
-            _check_constants("Friction: mu", "mu", Coulomb(given))
-        _check("Friction: coefficient without slip", resists, nodes)
-        most = nodes.comm.allreduce(self.coefficient.maximum, op=MPI.MAX)
-        return Coulomb(self.coefficient) if most > 0 else None
+            _check_law(given)
+        return cast(FrictionLaw, given)
+    if isinstance(given, Expression) and given.is_constant:
+        return Coulomb(ConstantCoefficient(given.value)) if given.value > 0 else None
+    if not hasattr(given, "derivative"):
+        mu = _at("friction.mu", given, nodes)
+        return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
+    # Ranks without nodes ask too: mistakes are found by all.
+    rest, words = np.zeros(3), "one number for each slip"
+    with on_all_ranks(nodes.comm), naming("Friction: mu"):
+        resists = real(given(rest), rest.shape, words)
+    with on_all_ranks(nodes.comm), naming("Friction: mu: derivative"):
+        slope = real(given.derivative(rest), rest.shape, words)
+        check_finite(slope, lambda _: "without slip")
+    with on_all_ranks(nodes.comm):
+        check_slope("Friction: mu: derivative", given, given.derivative, SAMPLES)
+        _check_constants("Friction: mu", "mu", Coulomb(given))
+    _check("Friction: coefficient without slip", resists, nodes)
+    most = nodes.comm.allreduce(given.maximum, op=MPI.MAX)
+    return Coulomb(given) if most > 0 else None
 
 
-def _check_law(law: FrictionLaw | None) -> None:
+def _check_law(law: FrictionLaw) -> None:
     """Refuse a law whose derivatives, or constants, are not its own."""
-    if law is None:
-        return
     slip, pressure = np.tile(SAMPLES, PRESSURES.size), np.repeat(PRESSURES, SAMPLES.size)
     for name, bound, slope, at in (
         ("by_slip", lambda s: law(s, pressure), lambda s: law.by_slip(s, pressure), slip),

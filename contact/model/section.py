@@ -327,13 +327,8 @@ def _part(given: Any) -> str:
         raise PydanticCustomError("part", "part") from None
 
 
-#: Tell a list, "many", from a single value, "one"; and a law, by its name, from a formula.
+#: Tell a list, "many", from a single value, "one".
 one_or_many = Discriminator(lambda given: "many" if isinstance(given, list | tuple) else "one")
-formula_or_law = Discriminator(
-    lambda given: (
-        given.get("law") if isinstance(given, Mapping) else getattr(given, "law", "formula")
-    )
-)
 
 
 def _components(given: Any) -> Any:
@@ -424,12 +419,6 @@ Formula: TypeAlias = Annotated[
     _as_source,
     Accepted("a number or a formula"),
     WithJsonSchema(_FORMULA),
-]
-NonNegativeFormula: TypeAlias = Annotated[
-    Formula,
-    AfterValidator(_not_negative),
-    Accepted("a number >= 0 or a formula"),
-    WithJsonSchema({**_FORMULA, "minimum": 0}),
 ]
 TimeFormula: TypeAlias = Annotated[
     Formula, AfterValidator(of_time), Accepted("a number or a formula in t")

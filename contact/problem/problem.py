@@ -27,7 +27,6 @@ from contact.interface.entries import (
     joined_law,
     joined_nodes,
 )
-from contact.interface.friction import Friction
 from contact.interface.interface import Interface
 from contact.interface.law import Conductor
 from contact.interface.multipliers import Multipliers, SlipHistory
@@ -39,6 +38,7 @@ from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
 from contact.mesh.geometry import area, volume
+from contact.model.friction import Friction
 from contact.problem.contact import Contact, check_laws
 from contact.problem.protocols import Scales
 from contact.problem.state import State
@@ -270,7 +270,7 @@ class ContactProblem:
         if body.cuts is None:
             return
         acting = [nodes.normal]
-        if any(entry.friction.given for entry in self.entries):
+        if any(entry.friction.acts for entry in self.entries):
             acting += list(np.moveaxis(nodes.tangent, 2, 0))
         along = np.zeros((len(body.free), self.dim, len(acting)))
         for k, vectors in enumerate(acting):
@@ -289,7 +289,7 @@ class ContactProblem:
         body, given = self.equilibrium, (contact.foundation, key, contact.press)
         laws = contact.friction, contact.layer, contact.conductor
         if contact.against is not None:
-            rough = contact.friction.given
+            rough = contact.friction.acts
             nodes, coupling = find_pair(body, contact.on, contact.against, *given, friction=rough)
             return Entry(contact.on, nodes, *laws, coupling=coupling)
         nodes, found = find_nodes(body, contact.on, *given)

@@ -30,10 +30,10 @@ from contact import solve
 from contact._compat import destinations
 from contact.body.description import Body
 from contact.interface import pairing
-from contact.interface.friction import Friction
 from contact.mesh.domain import Domain, from_mesh
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
+from contact.model.friction import Friction
 from contact.nesting import prolong
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

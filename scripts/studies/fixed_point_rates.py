@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact import NotConvergedError, build_problem
-from contact.case.interface import Friction
 from contact.history import BodyState
 from contact.methods.options import FixedPointOptions, Options, PenaltyOptions
+from contact.model.friction import Friction
 from contact.results.fields import DerivedFields
 from contact.typing import Array
 from scripts.cases import bar

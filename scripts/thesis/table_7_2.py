@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact import Case, NotConvergedError, build_problem, solve
-from contact.case.interface import Friction
+from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.results.solution import Solution
 from scripts.cases import bar

@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import ComplementarityParameters, at_bound, linearise
-from contact.interface.friction import Friction
 from contact.interface.multipliers import Multipliers
+from contact.model.friction import Friction
 from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
 from tests.problems import mechanics
 

@@ -10,12 +10,12 @@ from mpi4py import MPI
 
 from contact import solve as solve_case
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.interface.layer import Layer
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint

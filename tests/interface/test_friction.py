@@ -39,16 +39,16 @@ class Negative(ConstantCoefficient):
 @pytest.mark.parametrize(
     ("friction", "said"),
     [
-        (lambda: Friction(mu=-1e-3), "mu is -0.001 at a node"),
+        (lambda: Friction(mu=-1e-3), "mu: -0.001 is negative"),
         (lambda: Friction(mu=np.nan), "mu: nan is not finite"),
         (lambda: Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu: not finite at "),
         (lambda: Friction(tresca=lambda x: 1.0 - x[0]), "bound is -.* at a node"),
-        (lambda: Friction(tresca=np.inf), "tresca: inf is not finite"),
+        (lambda: Friction(tresca=np.inf), "bound: inf is not finite"),
         (lambda: Friction(Negative()), "coefficient without slip is -0.2 at a node"),
     ],
 )
 def test_what_resists_is_not_negative(friction, said):
-    with pytest.raises(InputError, match=rf"riction(: |\.){said}.*; accepted: .*finite"):
+    with pytest.raises(InputError, match=rf"riction(: |\.){said}.*; accepted: .*(finite|>= 0)"):
         problem(Contact("bottom", friction=friction()))
 
 
@@ -63,7 +63,7 @@ def test_a_coefficient_of_the_slip_is_a_number_and_not_negative(given):
 
 @pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])
 def test_a_radius_is_a_length(radius):
-    with pytest.raises(InputError, match=f"radius: given {radius}; accepted: a length >= 0"):
+    with pytest.raises(InputError, match=f"radius: given {radius}; accepted: a number >= 0"):
         Friction(mu=0.3, radius=radius)
 
 

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

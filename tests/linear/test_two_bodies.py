@@ -6,12 +6,12 @@ from mpi4py import MPI
 
 from contact import build_problem, parse_case, solve
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.linear import multigrid
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -7,10 +7,10 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, solve
-from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.step_control import Chord
+from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from forms.hencky import Log

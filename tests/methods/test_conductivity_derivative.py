@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.step_control import ConductivityDerivative
+from contact.model.friction import Friction
 from contact.thesis.fixed_point import FixedPoint
 from forms.laws import SlipCoefficient
 from tests.problems.piezo import example, potential

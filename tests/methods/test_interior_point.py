@@ -11,13 +11,13 @@ from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
 from contact.errors import InputError, SingularError
-from contact.interface.friction import Friction
 from contact.methods.cones import Cones
 from contact.methods.interior_point import interior_point
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome, Record
 from contact.methods.signals import Interrupted
+from contact.model.friction import Friction
 from contact.model.rigid import rigid_motions
 from contact.problem.residuals import Residuals, evaluate
 from contact.solving import solve

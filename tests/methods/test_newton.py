@@ -10,10 +10,10 @@ from mpi4py import MPI
 from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.errors import InputError
-from contact.interface.friction import Friction
 from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.model.friction import Friction
 from contact.nesting import coarser_cases
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -5,12 +5,12 @@ from mpi4py import MPI
 
 from contact import evolve
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
 from contact.methods.load_stepping import LoadStepping
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Load
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.interface.friction import Friction
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.methods.step_control import Best, Stagnation
+from contact.model.friction import Friction
 from contact.problem.residuals import evaluate
 from contact.thesis.fixed_point import FixedPoint
 from contact.thesis.penalty import Penalty

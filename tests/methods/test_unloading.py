@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed, Load
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -8,9 +8,9 @@ from mpi4py import MPI
 
 from contact import build_problem, parse_case
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.options import FixedPointOptions
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -9,11 +9,11 @@ from mpi4py import MPI
 
 from contact._compat import geometry_dofmap
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle
 from contact.model.body import Fixed, Load
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Log

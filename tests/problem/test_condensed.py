@@ -6,11 +6,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact.history import BodyState
-from contact.interface.friction import Friction
 from contact.linear.operator import Counters, SparseOperator
 from contact.linear.schur import SchurComplement
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
+from contact.model.friction import Friction
 from contact.problem import condensed
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate

@@ -7,10 +7,10 @@ from mpi4py import MPI
 from contact import build_problem, parse_case
 from contact.body.description import Body
 from contact.errors import InputError
-from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
+from contact.model.friction import Friction
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

@@ -6,9 +6,9 @@ from mpi4py import MPI
 
 from contact.case.material import Material
 from contact.errors import InputError
-from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.model.friction import Friction
 from contact.results.resultants import charge_balance
 from contact.thesis.fixed_point import FixedPoint
 from forms.laws import (

@@ -8,9 +8,9 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.case.file import parse_case
-from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed, Load
+from contact.model.friction import Friction
 from contact.problem import residuals
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

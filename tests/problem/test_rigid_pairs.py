@@ -5,10 +5,10 @@ import pytest
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Fixed
+from contact.model.friction import Friction
 from contact.model.rigid import Motion, Rigid
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact

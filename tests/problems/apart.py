@@ -9,9 +9,9 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.mesh.domain import Domain, from_mesh
 from contact.model.body import Fixed, Load
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -4,13 +4,13 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.mesh.grid import rectangle
 from contact.methods.load_stepping import LoadStep, LoadStepping
 from contact.methods.method import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Fixed
+from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -10,7 +10,7 @@ from contact import parse_case
 from contact import solve as solve_case
 from contact.model.body import Load
 from contact.errors import InputError
-from contact.interface.friction import Friction
+from contact.model.friction import Friction
 from contact.methods.options import FixedPointOptions
 from contact.thesis.fixed_point import FixedPoint
 from contact.results.resultants import charge_balance, mean_potential, sensor

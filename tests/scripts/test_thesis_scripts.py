@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contact import build_problem, solve
-from contact.case.interface import Friction
+from contact.model.friction import Friction
 from scripts.cases import bar
 from scripts.reporting import Report
 from scripts.studies import corner, pressure_convergence, refinement_8, sensitivity

@@ -8,9 +8,9 @@ import pytest
 from mpi4py import MPI
 
 from contact import InputError, Solution, build_problem, load_case, solve
-from contact.interface.friction import Friction
 from contact.interface.layer import Layer
 from contact.model.formula import Expression
+from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.results.surface import contact_table
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.interface.friction import Friction
 from contact.linear.operator import SparseOperator
 from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.options import FixedPointOptions
+from contact.model.friction import Friction
 from contact.problem.residuals import residual_forces
 from contact.results.resultants import charge_balance
 from contact.thesis.fixed_point import FixedPoint
