@@ -116,10 +116,11 @@ SEEN: dict[str, tuple[Callable[[], Solution], tuple[int, int, int]]] = {
     "block on a block": (of_case(pairs.case()), (1, 1, 3)),
     # From 16 to 231 in 170 runs with moduli that differ by rounding.
     "ring between plates": (ring, (2, 1, 231)),
-    # From 47 to 381 in 120 runs with moduli that differ by 1e-12: all nodes slide.
+    # From 47 to 381 in 120 runs with moduli that differ by 1e-12: all nodes slide. Proximal points,
+    # tried after that, take as many.
     "block that friction cannot hold": (
         lambda: solve(wall(2, 1.01), comm=SELF),
-        (1, 1, 381),
+        (1, 1, 844),
     ),
     "indenter under a force": (
         lambda: solve(indented(2, 10, displacement=[0.0, "free"], force=[0.0, -0.01]), comm=SELF),
@@ -187,7 +188,7 @@ def test_a_coarser_mesh_that_does_not_fit_the_case_is_left_out(
     beam["friction"] = {"law": "coulomb", "mu": "0.05 * sqrt(abs(x - 200)) - 0.0005"}
     found = solve(parse_case(beam))
     assert (found.start, found.converged) == ("the zero initial guess", True)
-    with pytest.raises(InputError, match=r"mu: .* at a node"):
+    with pytest.raises(InputError, match=r"mu.* at a node"):
         solve(parse_case({**beam, "solver": {"nested": True}}))
 
 

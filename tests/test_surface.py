@@ -90,8 +90,12 @@ def functions(made: Any) -> Iterator[tuple[str, Callable[..., Any]]]:
     if inspect.isfunction(made):
         yield "", made
         return
+    seen: set[str] = set()
     for base in inspect.getmro(made):
         for name, member in [*vars(base).items()]:  # pydantic adds some when they are asked for
+            if name in seen:  # a class of its own has taken its place
+                continue
+            seen.add(name)
             if isinstance(member, staticmethod | classmethod):
                 member = member.__func__
             member = getattr(member, "fget", getattr(member, "func", member))

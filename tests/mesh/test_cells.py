@@ -40,7 +40,12 @@ NAMES = [shape.name for shape in SHAPES]
 #: Where names of shapes stand: with their definition, in formats of files and input, and for the
 #: pieces into which facets are cut.
 FORMATS = ("cells", "grid", "shared", "abaqus", "exodus", "med", "xdmf", "contents")
-NAMING = [*(f"mesh/{name}" for name in FORMATS), "case/mesh", "interface/mortar/segments"]
+NAMING = [
+    *(f"mesh/{name}" for name in FORMATS),
+    "case/mesh",
+    "interface/mortar/segments",
+    "model/formula",
+]
 
 
 def test_nothing_else_asks_for_a_shape_by_its_name() -> None:
