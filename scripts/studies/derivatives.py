@@ -1,11 +1,8 @@
 """Derivatives by every parameter of random problems, against central differences of solutions.
 
-`python3 -m scripts.studies.derivatives [--out DIR] [--count N] [--each N] [--coarse]`, also under
-mpirun.
+`python3 -m scripts.studies.derivatives [--out DIR] [--coarse]`.
 """
 
-import csv
-import time
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +28,7 @@ from contact.problem.linearised import active_set
 from contact.results.differentiable import named_quantities
 from contact.results.solution import Solution
 from contact.typing import Array
-from scripts.reporting import Report, append, parser
+from scripts.reporting import Report, append, options
 
 #: Relative changes of a parameter in the central differences: the first without a kink between.
 STEPS = (2e-5, 5e-6, 1e-6)
@@ -427,65 +424,37 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Compare the problems, and tabulate those of all numbers of ranks in the folder."""
-    made = parser(__doc__, "derivatives")
-    made.add_argument("--count", type=int, default=ALL, help="number of problems")
-    made.add_argument(
-        "--each", type=int, default=COUNT, help="problems with differences by each parameter"
-    )
-    given, comm = made.parse_args(arguments), MPI.COMM_WORLD
+    """Compare the problems, and tabulate them by family."""
+    given = options(__doc__, "derivatives", arguments)
     report = Report(given.out)
-    rows: dict[str, list[Any]] = {name: [] for name in ("ranks", *Compared.__annotations__)}
-    for seed in range(len(FAMILIES) if given.coarse else given.count):  # one of each
-        begin, each = time.perf_counter(), seed % COUNT < given.each and not given.coarse
-        one = compared(seed, comm, each)
-        append(rows, comm.size, *vars(one).values())
-        if comm.rank == 0:
-            print(seed, *vars(one).values(), f"{time.perf_counter() - begin:.1f} s", flush=True)
-        report.numbers(f"problems-{comm.size}", rows)  # an interrupted run has those so far
-    if comm.rank == 0:
-        tabulate(report)
+    rows: dict[str, list[Any]] = {name: [] for name in Compared.__annotations__}
+    for seed in range(len(FAMILIES) if given.coarse else ALL):  # one of each
+        append(rows, *vars(compared(seed, MPI.COMM_WORLD, each=not given.coarse)).values())
+        print(seed, *(column[-1] for column in rows.values()), flush=True)
+    report.numbers("problems-all", rows)
+    tabulate(report, rows)
 
 
-def tabulate(report: Report) -> None:
-    """Tabulate the problems of all runs in the folder by family."""
-    names = (
-        "family",
-        "ranks",
-        "problems",
-        "derivatives",
-        "adjoint",
-        "differences",
-        "apart",
-        "kinks",
-    )
+def tabulate(report: Report, rows: Mapping[str, Sequence[Any]]) -> None:
+    """Tabulate the problems by family."""
+    names = "family", "problems", "derivatives", "adjoint", "differences", "apart", "kinks"
     columns: dict[str, list[Any]] = {name: [] for name in names}
-    for path in sorted(report.out.glob("problems-*.csv")):
-        with path.open(newline="") as stream:
-            every = list(csv.DictReader(stream))
-        for family in (*FAMILIES, *FURTHER):
-            own = [row for row in every if row["family"] == family]
-            if not own:
-                continue
-            apart, adjoint = (max(float(row[name]) for row in own) for name in ("apart", "adjoint"))
-            by, along = (
-                sum(int(row[name]) * int(row["results"]) for row in own)
-                for name in ("parameters", "ways")
-            )
-            kinks = sum(len(row["kinks"].split(";")) for row in own if row["kinks"])
-            ranks = every[0]["ranks"]
-            append(columns, family, ranks, len(own), by, adjoint, along, apart, kinks)
+    every = [dict(zip(rows, row, strict=True)) for row in zip(*rows.values(), strict=True)]
+    for family in dict.fromkeys(rows["family"]):
+        own = [row for row in every if row["family"] == family]
+        apart, adjoint = (max(row[name] for row in own) for name in ("apart", "adjoint"))
+        by, along = (sum(r[name] * r["results"] for r in own) for name in ("parameters", "ways"))
+        kinks = sum(len(row["kinks"].split(";")) for row in own if row["kinks"])
+        append(columns, family, len(own), by, adjoint, along, apart, kinks)
     report.table(
         "problems",
         "Derivatives of random problems by all their parameters",
         columns,
         "Largest relative difference of the tangent to the adjoint, and to central differences of "
-        "solutions (apart). Differences are by each parameter, or, where they are fewer than the "
-        "derivatives, along one random direction of all parameters. Derivatives are compared "
-        "relative to themselves, but to not less than the result (adjoint), or a hundredth of the "
-        "result (apart), over the parameter. Kinks: differences between whose ends a node begins "
-        "to touch, stick or slip; they were taken over a smaller part of the way. problems-1.csv "
-        "names their parameters.",
+        "solutions by each parameter (apart). Derivatives are compared relative to themselves, but "
+        "to not less than the result (adjoint), or a hundredth of the result (apart), over the "
+        "parameter. Kinks: differences between whose ends a node begins to touch, stick or slip; "
+        "they were taken over a smaller part of the way. problems-all.csv names their parameters.",
     )
 
 
