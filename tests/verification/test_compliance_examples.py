@@ -199,7 +199,7 @@ def test_other_friction_laws_on_a_layer(law):
     layer = problem.interface.law.layer_pressure(solution.nodal)
     total = solution.forces.pressure + layer
     slip = np.linalg.norm(solution.slip, axis=1)
-    bound = 0.5 if law == "tresca" else laws[law].coefficient(slip) * total
+    bound = 0.5 if law == "tresca" else laws[law].mu(slip) * total
     assert np.allclose(size[slips], np.broadcast_to(bound, slip.shape)[slips], rtol=1e-6)
 
 
