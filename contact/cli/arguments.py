@@ -48,6 +48,7 @@ ONE = {
     "new": "mesh file",
     "mesh": "mesh file and the name of the new one",
     "plot": "folder with results",
+    "view": "folder with results",
     "materials": 'name of a material, in quotes where it has spaces: "PZT-4 Clevite"',
 }
 
@@ -111,7 +112,7 @@ def _parser() -> Parser:
     commands = parser.add_subparsers(
         dest="command",
         required=True,
-        metavar="demo|new|mesh|check|solve|sweep|plot|identify|materials|schema",
+        metavar="demo|new|mesh|check|solve|sweep|plot|view|identify|materials|schema",
     )
     for usage, text, epilog, arguments in offered():
         command = commands.add_parser(
@@ -265,8 +266,22 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
                 "figure-NAME-step-N",
                 type=int,
             ),
+            "--html": _flag(
+                "write figure-view.html instead, a body in 3-D to turn in a browser (needs trame)"
+            ),
             "--animate": _flag(
                 "draw animation-FIELD.gif instead, the deformed body over the steps of an evolution"
+            ),
+        },
+    )
+    yield (
+        "view DIR [options]",
+        "show the body of a run in 3-D and its contact in a window, to turn it",
+        None,
+        {
+            "folder": _value("DIR", "folder with the results of a run"),
+            "--field": _value(
+                "NAME", "colour the body by this field, as contact plot; else contact pressure"
             ),
         },
     )

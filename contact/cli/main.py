@@ -44,6 +44,7 @@ COMMANDS = {
     "solve": "contact.cli.solve",
     "sweep": "contact.cli.solve",
     "plot": "contact.cli.plot",
+    "view": "contact.cli.plot",
     "identify": "contact.cli.identify",
     "materials": "contact.cli.materials",
     "demo": "contact.cli.solve",

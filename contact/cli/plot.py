@@ -1,4 +1,4 @@
-"""``contact plot DIR``: the figures of a run once more, from its files."""
+"""``contact plot DIR`` and ``contact view DIR``: figures of a run, from its files."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import math
 import re
 from pathlib import Path
 
+import pyvista
 from mpi4py import MPI
 
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.methods.signals import signals_held
-from contact.plot.figures import FORMATS, animate, plot
+from contact.plot.figures import FORMATS, animate, export, plot, window
+from contact.plot.run import read_run
 from contact.plot.style import Look
 from contact.plot.sweep import plot_sweep
 from contact.ranks import on_root
@@ -23,7 +25,10 @@ _INCHES = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0}
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
-    """Draw the figures on rank 0 and name their files."""
+    """Draw the figures on rank 0 and name their files, or open a window."""
+    if options.command == "view":
+        on_root(comm, lambda: show(Path(options.folder), options.field))
+        return CONVERGED
     formats = [text.strip() for text in options.format.split(",")]
     for text in formats:
         if text not in FORMATS:
@@ -39,7 +44,7 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
     def draw() -> list[Path]:
         if (folder / TABLE).is_file() and not (folder / "summary.json").exists():
-            for option in ("xlim", "ylim", "mirror", "view", "animate", "step"):
+            for option in ("xlim", "ylim", "mirror", "view", "html", "animate", "step"):
                 if getattr(options, option) not in (None, False):
                     raise InputError(
                         f"--{option}: the figure of a sweep shows no places; accepted: --field, "
@@ -52,6 +57,8 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 "--step: an animation shows all steps; accepted: --step or --animate",
                 "figure-of-steps",
             )
+        if options.html:
+            return export(folder, options.field)
         if options.animate:
             return animate(folder, options.field, look)
         return plot(folder, options.field, formats, look, options.step)
@@ -61,6 +68,19 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if comm.rank == 0:
         print(*files, sep="\n")
     return CONVERGED
+
+
+def show(folder: Path, field: str | None) -> None:
+    """Show the body of a run in 3-D in a window, until that is closed."""
+    opened = window(read_run(folder), field)
+    if pyvista.OFF_SCREEN:
+        opened.close()
+        raise InputError(
+            "contact view: no display for a window; accepted: a session with a display, contact "
+            "plot --view X,Y,Z, or contact plot --html",
+            "figure-option",
+        )
+    opened.show()
 
 
 def inches(text: str) -> float:

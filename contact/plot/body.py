@@ -126,6 +126,13 @@ class Picture:
         return fitted(f"{self.run.title} ({times})" if self.run.title else times)
 
     @property
+    def scene(self) -> Scene:
+        """The body in 3-D."""
+        ends = [self.norm.vmin, self.norm.vmax]
+        colours = {"scalars": "values", "cmap": self.colours, "clim": ends}
+        return Scene(self.body, colours, Zone.of(self.run))
+
+    @property
     def colours(self) -> Any:
         """The colours by name, or one for each class."""
         continuous = matplotlib.colormaps["viridis"]
@@ -285,12 +292,11 @@ def _colour(ax: Axes, picture: Picture, side: int) -> None:
 
 def draw_space(picture: Picture) -> Figure | None:
     """Draw a body in 3-D from where its contact is seen; None without a display."""
-    run, norm, look = picture.run, picture.norm, picture.look
+    run, look = picture.run, picture.look
     figure = sheet(0.9 if page_width() < NARROW else 0.75)
     figure.set_layout_engine("compressed")
-    colours = {"scalars": "values", "cmap": picture.colours, "clim": [norm.vmin, norm.vmax]}
-    ax, scene = figure.subplots(), Scene(picture.body, colours, Zone.of(run))
-    if show_body(ax, run, scene, look.view, picture.box) is None:
+    ax = figure.subplots()
+    if show_body(ax, run, picture.scene, look.view, picture.box) is None:
         return None
     _bar(figure, picture)
     ax.set_title(picture.title, fontsize="medium")

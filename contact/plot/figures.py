@@ -6,7 +6,9 @@ import base64
 import io
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -21,7 +23,7 @@ from contact.plot.body import body_figure, picture
 from contact.plot.contact import draw_line
 from contact.plot.foundation import magnification
 from contact.plot.run import Run, read_run, read_step, read_steps
-from contact.plot.space import contact_figure
+from contact.plot.space import Scene, contact_figure
 from contact.plot.steps import steps_figures
 from contact.plot.style import DEFORMED, PAGE, STYLE, Look, fitted, named
 from contact.ranks import refused
@@ -128,6 +130,59 @@ def plot(
         return read_run(folder) if step is None else read_step(folder, step)
 
     return _added(folder, lambda new: draw(read(), new, fields, formats, look))
+
+
+def window(run: Run, field: str | None = None) -> Any:
+    """Return the plotter of pyvista that shows a body in 3-D, to be turned.
+
+    Parameters
+    ----------
+    run
+        The run.
+    field
+        To colour the body by; by default the contact pressure is drawn on it.
+
+    Raises
+    ------
+    InputError
+        If the body is plane, or has no such field.
+    """
+    if run.plane:
+        raise InputError(
+            "a plane body is not turned; accepted: a run in 3-D, or contact plot", "figure-option"
+        )
+    if field is None:
+        return Scene.of(run).window("contact pressure")
+    made = picture(run, field)
+    return made.scene.window(field)
+
+
+def export(folder: Path, fields: Sequence[str] = ()) -> list[Path]:
+    """Write ``figure-view.html``, or ``figure-view-FIELD.html``, to be turned in a browser.
+
+    On one rank.
+
+    Raises
+    ------
+    InputError
+        As `plot` and `window`, and if the packages are not there by which pyvista writes it.
+    """
+    missing = [name for name in ("trame", "trame_vtk", "trame_vuetify") if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"--html: no package {', '.join(missing)}; accepted: pip install trame trame-vtk "
+            "trame-vuetify first, or contact view",
+            "figure-option",
+        )
+
+    def draw(new: Path) -> list[Path]:
+        run, files = read_run(folder), []
+        for field in fields or (None,):
+            files.append(new / f"figure-view{f'-{field}' if field else ''}.html")
+            window(run, field).export_html(files[-1])
+        return files
+
+    return _added(folder, draw)
 
 
 def animate(folder: Path, fields: Sequence[str] = (), look: Look = PAGE) -> list[Path]:

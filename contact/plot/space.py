@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -259,16 +259,34 @@ class Scene:
     colours
         Arguments of ``add_mesh`` for its colours.
     zone, painted
-        The contact zone, and the deformed contact part with its pressure to be seen on the body.
-    shades
-        Arguments of ``add_mesh`` for the contact part.
+        The contact zone, and what touches of the deformed contact part, to be drawn on the body.
+    norm
+        The range of the pressures on that.
     """
 
     body: Any
     colours: dict[str, Any]
     zone: Zone
     painted: Any = None
-    shades: dict[str, Any] | None = None
+    norm: Normalize = field(default_factory=Normalize)
+
+    @staticmethod
+    def of(run: Run) -> Scene:
+        """Return a plain body with its contact pressure, whose range is that of all nodes."""
+        scale = magnification(run)
+        part = linear(run.surface.warp_by_vector("displacement", factor=scale))
+        touched = (part["status"] > STATUS["open"])[part.regular_faces].any(axis=1)
+        painted = pyvista.PolyData.from_regular_faces(part.points, part.regular_faces[touched])
+        painted["pressure"] = np.nan_to_num(part["pressure"])
+        body = run.body.warp_by_vector("displacement", factor=scale)
+        norm = Normalize(0.0, float(np.max(run.table["pressure"], initial=0.0)) or 1.0)
+        return Scene(body, {"color": PLAIN}, Zone.of(run), painted if touched.any() else None, norm)
+
+    @property
+    def shades(self) -> dict[str, Any]:
+        """Arguments of ``add_mesh`` for the pressure."""
+        ends = [self.norm.vmin, self.norm.vmax]
+        return {"scalars": "pressure", "cmap": "viridis", "clim": ends, "lighting": False}
 
     def add(self, plotter: Any, view: Array | None = None, cut: bool = False) -> None:
         """Add the body to a plotter, cut open across the direction to the eye."""
@@ -287,7 +305,17 @@ class Scene:
             size = float(np.linalg.norm(np.ptp(skin.points, axis=0)))
             away = self.zone.normal if view is None else view
             lifted = self.painted.translate(2e-3 * size * away)
-            plotter.add_mesh(lifted, lighting=False, show_scalar_bar=False, **(self.shades or {}))
+            plotter.add_mesh(lifted, show_scalar_bar=False, **self.shades)
+
+    def window(self, label: str) -> Any:
+        """Return a plotter that shows the scene in a window to turn it in, or in a notebook."""
+        plotter = pyvista.Plotter(title="contact")
+        plotter.set_background("white")
+        self.add(plotter)
+        plotter.add_scalar_bar(label, color="black", n_labels=5)
+        plotter.add_axes(color="black")
+        Camera.of(self.zone.normal + USUAL, np.asarray(self.body.points)).aim(plotter)
+        return plotter
 
 
 def show_body(ax: Axes, run: Run, scene: Scene, view: Any, box: Array) -> Camera | None:
@@ -338,21 +366,12 @@ def _scale_bar(ax: Axes, camera: Camera, run: Run) -> None:
 
 def contact_figure(run: Run, look: Look) -> Figure | None:
     """Draw the body where it is in contact, pressure, status and friction; None undrawn."""
-    zone, table = Zone.of(run), run.table
+    scene, table = Scene.of(run), run.table
+    zone, norm, shades = scene.zone, scene.norm, scene.shades
     sides = [(run.surface, side) for side in zone.sides]
     cameras = [close_camera(run, zone, look, side) for side in zone.sides]
     touching = bool(np.any(table["status"] != "open"))
-    # Of all nodes, seen or not.
-    norm = Normalize(0.0, float(np.max(table["pressure"], initial=0.0)) or 1.0)
-    shades = {"scalars": "pressure", "cmap": "viridis", "clim": [norm.vmin, norm.vmax]}
-    scale = magnification(run)
-    part = linear(run.surface.warp_by_vector("displacement", factor=scale))
-    touched = (part["status"] > STATUS["open"])[part.regular_faces].any(axis=1)
-    painted = pyvista.PolyData.from_regular_faces(part.points, part.regular_faces[touched])
-    painted["pressure"] = np.nan_to_num(part["pressure"])
-    body = run.body.warp_by_vector("displacement", factor=scale)
-    box = np.reshape(body.bounds, (3, 2)).T
-    scene = Scene(body, {"color": PLAIN}, zone, painted if touching else None, shades)
+    box = np.reshape(scene.body.bounds, (3, 2)).T
     frictional, narrow = bool(np.any(table["bound"] > 0)), page_width() < NARROW
     others = [] if run.opposite is None else [run.opposite]
     rows, columns = 2 + len(others), len(sides)
@@ -480,7 +499,7 @@ def _shown(ax: Axes, camera: Camera, mesh: Any, **colours: Any) -> None:
 
     def add(plotter: Any) -> None:
         if mesh.n_cells:
-            plotter.add_mesh(mesh, lighting=False, show_scalar_bar=False, **colours)
+            plotter.add_mesh(mesh, show_scalar_bar=False, **{"lighting": False, **colours})
 
     (image,) = rendered(add, [camera], 800)
     ax.imshow(image, extent=camera.extent, interpolation="antialiased")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from dolfinx import fem
@@ -275,6 +275,19 @@ class Solution(Solved):
 
         run = self.written()
         return None if run is None else figures_of(run, fields, Look(width, self.output.mirror))
+
+    def view(self, field: str | None = None) -> Any:
+        """Show a body in 3-D in a window or a notebook, on rank 0. Collective.
+
+        Parameters
+        ----------
+        field
+            To colour the body by, as `plot` takes it; by default the contact pressure.
+        """
+        from contact.plot.figures import window  # which takes a while to load
+
+        run = self.written()
+        return None if run is None else window(run, field).show()
 
     def written(self) -> Run | None:
         """Return the results in the files as figures read them; None but on rank 0. Collective."""

@@ -13,13 +13,15 @@ from matplotlib.quiver import Quiver
 
 from contact.cli.main import main
 from contact.errors import InputError
+from contact.plot import figures
 from contact.plot.body import picture
-from contact.plot.figures import figures_of
+from contact.plot.figures import figures_of, window
 from contact.plot.run import Run
 from contact.plot.space import Front, Scene, Zone, chosen_view, close_camera, contact_figure, linear
 from contact.plot.style import Look
 from contact.results.quantity import STATUS
 from contact.solving import solve
+from contact.writing import write_outputs
 from tests.problems.written import block
 
 AXES = {"left": -1, "right": 1, "front": -2, "back": 2, "bottom": -3, "top": 3}
@@ -171,3 +173,42 @@ def test_a_view_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 def test_ends_beside_the_part_are_refused() -> None:
     with pytest.raises(InputError, match="--xlim 5,6: beside the contact part"):
         contact_figure(pressed(), Look(xlim=(5.0, 6.0)))
+
+
+def test_a_window_shows_the_contact_or_a_field(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its bar of colours; without a display, or in the plane, one message."""
+    run = pressed()
+    cases = (None, "pressure", run.table["pressure"].max()), ("von_mises", "values", 0.0)
+    for field, name, peak in cases:
+        plotter = window(run, field)
+        drawn = [mesh for mesh in plotter.meshes if mesh.active_scalars_name == name]
+        assert drawn and len(plotter.scalar_bars) == 1
+        assert plotter.mapper.scalar_range[1] >= peak
+        plotter.close()
+    monkeypatch.setattr(pyvista, "OFF_SCREEN", True)
+    write_outputs(solve(block(3)), tmp_path)
+    write_outputs(solve(block(2)), tmp_path / "plane")
+    for arguments, words in (
+        (["view", str(tmp_path)], "no display for a window; accepted"),
+        (["view", str(tmp_path), "--field", "heat"], "--field heat: no such field"),
+        (["view", str(tmp_path / "plane")], "a plane body is not turned"),
+    ):
+        assert main(arguments) == 2
+        assert words in capsys.readouterr().err
+
+
+def test_a_page_needs_its_packages(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "find_spec", lambda name: None)
+    assert main(["plot", str(tmp_path), "--html"]) == 2
+    assert "--html: no package trame, trame_vtk, trame_vuetify; accepted" in capsys.readouterr().err
+    # With them pyvista is asked for the file.
+    write_outputs(solve(block(3)), tmp_path)
+    monkeypatch.setattr(figures, "find_spec", lambda name: name)
+    write = lambda self, path: Path(path).write_text("page")  # noqa: E731
+    monkeypatch.setattr(pyvista.Plotter, "export_html", write)
+    assert main(["plot", str(tmp_path), "--html"]) == 0
+    assert (tmp_path / "figure-view.html").read_text() == "page"
