@@ -19,6 +19,7 @@ import contact
 #: Arguments and attributes that take any value, and why no type says more.
 ANYTHING = {
     "parse_case: data": "tables of a file, whose values are checked one by one, with a message",
+    "Solution.view: return": "what pyvista shows in a notebook; nothing after a window",
     "make_material: keys": "keys of a table, in which there are lists and tables",
 }
 

@@ -100,14 +100,28 @@ def result_folder(
         result stands under the name of one.
     """
     path = Path(path)
-    with ExitStack() as held:
-        on_root(comm, lambda: _take(held, path, overwrite))
-        yield ResultFolder(path, comm)
-    comm.barrier()  # no rank finds the lock, which rank 0 has removed
+    held, together = ExitStack(), False
+    on_root(comm, lambda: _take(held, path, overwrite))
+    try:
+        with held:
+            yield ResultFolder(path, comm)
+        together = True
+    except InputError:  # wrong input is so on all ranks
+        together = True
+        raise
+    finally:
+        if together:  # no rank finds the lock or the folder, which rank 0 removes
+            comm.barrier()
 
 
 def _take(held: ExitStack, path: Path, overwrite: bool) -> None:
-    """Make, lock and check a folder until the stack is left."""
+    """Make, lock and check a folder until the stack is left, or at once where that fails."""
+    with ExitStack() as making:
+        _lock_and_check(making, path, overwrite)
+        held.push(making.pop_all())
+
+
+def _lock_and_check(held: ExitStack, path: Path, overwrite: bool) -> None:
     try:
         for place in [p for p in (path, *path.parents) if not p.exists()][::-1]:
             place.mkdir()
