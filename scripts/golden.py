@@ -215,8 +215,10 @@ def _of_summary(summary: Mapping[str, Any], scales: Mapping[str, float]) -> dict
 
 
 def _of_fields(solution: Solution) -> dict[str, Value]:
-    """Return norms of displacement and stress, and the displacement near a point. Collective."""
+    """Return energy, norms of displacement and stress, a displacement at a point. Collective."""
     import numpy as np
+
+    from contact.problem.energy import stored
 
     comm, u, stress = solution.problem.comm, solution.displacement, solution.stress
     space = u.function_space
@@ -233,7 +235,10 @@ def _of_fields(solution: Solution) -> dict[str, Value]:
     nearest = rows[np.argmin(np.linalg.norm(points - place, axis=1))]
     size, largest = np.linalg.norm(rows), np.linalg.norm(rows, axis=1).max()
     total = math.sqrt(sum(squares for *_, squares in found))
-    return {
+    energy = stored(solution.problem, solution.state)
+    # Laws with history need not state one.
+    known = {} if math.isnan(energy) else {"stored energy": Value(energy, abs(energy))}
+    return known | {
         "displacement, norm": Value(float(size), float(size)),
         "stress, norm": Value(total, total),
         **{f"displacement {axis} at a point": Value(float(value), float(largest))
