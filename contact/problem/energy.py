@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
@@ -99,11 +100,17 @@ def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]
     return external - foundation + body.reactions(residual), internal
 
 
-def dissipated(problem: ContactProblem, state: State) -> float:
-    """Return the energy that friction takes during the step of a state. Collective."""
+def dissipated(
+    problem: ContactProblem, state: State, nodes: NDArray[np.bool_] | None = None
+) -> float:
+    """Return the energy that friction takes during the step of a state. Collective.
+
+    At some of the owned contact nodes, shape (n,); at all by default.
+    """
     interface = problem.interface
     slip = interface.slip(problem.nodal(state))
-    return interface.jump.sum(np.einsum("ni,ni->n", state.forces.friction, slip))
+    work = np.einsum("ni,ni->n", state.forces.friction, slip)
+    return interface.jump.sum(work if nodes is None else np.where(nodes, work, 0.0))
 
 
 def stored(problem: ContactProblem, state: State) -> float:

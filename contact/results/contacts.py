@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.problem.energy import dissipated
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.resultants import resultant
@@ -56,9 +57,7 @@ def contact_shares(
     """
     nodes, nodal = problem.nodes, problem.nodal(state)
     pressure = problem.interface.pressure(nodal, state.forces)
-    stress, slip = problem.interface.stress(nodal, state.forces), problem.interface.slip(nodal)
-    forces = nodes.weight[:, None] * stress
-    work = np.einsum("ni,ni->n", state.forces.friction, slip)
+    forces = nodes.weight[:, None] * problem.interface.stress(nodal, state.forces)
     found = {}
     for number, contact in enumerate(problem.contacts):
         own = problem.entry_numbers == number
@@ -73,7 +72,7 @@ def contact_shares(
             nodes.sum(np.where(own, pressure, 0.0)) / area if area > 0 else 0.0,
             stick / area if area > 0 else 0.0,
             slides / area if area > 0 else 0.0,
-            nodes.sum(np.where(own, work, 0.0)),
+            dissipated(problem, state, own),
         )
     return found
 
@@ -81,7 +80,7 @@ def contact_shares(
 def contact_columns(shares: Mapping[str, ContactShare]) -> dict[str, float]:
     """Return the results of each of several contacts as columns: ``contact_force_x_NAME``."""
     found: dict[str, float] = {}
-    for name, share in shares.items() if len(shares) > 1 else ():
+    for name, share in shares.items():
         found |= {f"contact_force_{x}_{name}": float(f) for x, f in zip("xyz", share.force)}
         if share.moment.size == 1:
             found[f"contact_moment_{name}"] = float(share.moment[0])

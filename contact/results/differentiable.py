@@ -359,9 +359,7 @@ def _of_rigid(problem: ContactProblem, index: int, end: str) -> dict[str, Quanti
 
 def _rubbed(problem: ContactProblem, state: State, contact: int) -> float:
     """Return the energy that friction of one contact takes in the step of a state. Collective."""
-    slip = problem.interface.slip(problem.nodal(state))
-    work = np.einsum("ni,ni->n", state.forces.friction, slip)
-    return problem.nodes.sum(np.where(_of_contact(problem, contact), work, 0.0))
+    return dissipated(problem, state, _of_contact(problem, contact))
 
 
 def _lost(problem: ContactProblem, state: State) -> float:

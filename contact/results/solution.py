@@ -38,7 +38,7 @@ from contact.results.resultants import (
     supports,
 )
 from contact.results.solved import ContactResult, Solved, contact_result
-from contact.problem.energy import Balance, StepEnd, balance, step_end
+from contact.problem.energy import Balance, StepEnd, balance, dissipated, step_end
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -359,7 +359,7 @@ class Solution(Solved):
     @property
     def contact_columns(self) -> dict[str, float]:
         """Results of each of several contacts by their columns. Collective."""
-        return contact_columns(self.contacts)
+        return contact_columns(self.contacts) if len(self.problem.contacts) > 1 else {}
 
     @property
     def contact_area(self) -> float:
@@ -461,8 +461,7 @@ class Solution(Solved):
         """The energy that friction has dissipated, in all steps of an evolution. Collective."""
         if self.steps:
             return sum(float(step.row["dissipation"]) for step in self.steps)
-        slip = self.problem.interface.slip(self.nodal)
-        return self.problem.nodes.sum(np.einsum("ni,ni->n", self.friction, slip))
+        return dissipated(self.problem, self.state)
 
     @property
     def conduction_ramp(self) -> float | None:
