@@ -352,7 +352,6 @@ def run_schedule(
         start=BEFORE if records else ZERO if start is None else schedule.guess,
         seconds={"setup": setup, "solve": solved, "output": 0.0},
         steps=records,
-        extra_steps=sum(record.state.time not in schedule.times for record in records),
         critical_factor=critical,
         jammed=jammed,
     )

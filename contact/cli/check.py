@@ -27,8 +27,8 @@ from contact.problem.checks import meeting_supports
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.results import environment
-from contact.results.bodies import passing
-from contact.results.foundations import fitting, without_heights
+from contact.results.bodies import apart
+from contact.results.discretisation import own_shape, without_heights
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 
@@ -113,10 +113,10 @@ def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> li
     warnings = [
         f"# warning: {text} [{identifier}]"
         for identifier, remarks in {
-            "own-shape": fitting(problem),
-            "no-heights": without_heights(problem),
+            "own-shape": own_shape(problem),
+            "part-end": without_heights(problem),
             "meeting-supports": meeting_supports(problem, times),
-            "passing-bodies": passing(problem),
+            "two-bodies": apart(problem),
         }.items()
         for text in remarks
     ]

@@ -1,4 +1,7 @@
-"""Remarks on bodies in contact: sides, components, and rigid motions that hardly are resisted."""
+"""Remarks on bodies in contact: sides, components, supports, rigid-body modes.
+
+A rigid-body mode that the supports leave free is constrained by contact alone.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,6 @@ from scipy import linalg
 from contact.errors import counted
 from contact.mesh.entities import cells_at, owned_among
 from contact.mesh.owners import Owners
-from contact.results.solution import Note, Remark, Solution
 from contact.problem.limit_analysis import Overload, UnilateralSupport
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
@@ -24,13 +26,14 @@ from contact.problem.rigid_modes import (
     null_space,
 )
 from contact.problem.state import State
+from contact.results.solution import Note, Remark, Solution
 from contact.tolerances import EPS
 from contact.typing import Array
 
-#: How many times finer or softer the other side may be before there is a warning.
+#: How many times finer or softer the master side may be without a warning.
 FINER, SOFTER = 2.0, 5.0
 
-#: Share of a node's area that should face the other side.
+#: Share of a node's area that should face the master side.
 HALF = 0.5
 
 #: Share of the largest pressure from which on a node counts as pressed.
@@ -39,18 +42,18 @@ PRESSED = 1e-3
 #: Share of the largest displacement by which the residual of the forces may move a body.
 MOVED = 1e-3
 
-#: Share of a motion's square from which on contact holds it: normals of a mesh are off by more than
-#: the root of it, and resist motions that the true surface does not.
-HELD = 1e-8
+#: Relative stiffness above which contact constrains a rigid-body mode: normals of a mesh are off by
+#: more than the root of it.
+CONSTRAINED = 1e-8
 
 #: Largest pressure at the end of a step, over that of all steps, that is rounding of none.
 NOTHING = 1e-12
 
 
-def choices(solution: Solution) -> Iterator[Remark]:
-    """Say where the sides of two bodies had better change places, or face each other in part.
+def sides(solution: Solution) -> Iterator[Remark]:
+    """Warn of slave sides that are coarser or stiffer, uncovered in part, or have slid too far.
 
-    Multipliers live on the side `on`: it should be the finer and the softer one, else it
+    Multipliers live on the slave side: it should be the finer and the softer one, else it
     penetrates the finer side, or carries pressures that the softer side cannot follow.
     """
     problem = solution.problem
@@ -63,11 +66,9 @@ def choices(solution: Solution) -> Iterator[Remark]:
         )
         better = "accuracy is better with on and against exchanged"
         if size > FINER * other_size:
-            facets = f"facets of {other_size:.3g} against {size:.3g}"
-            finer = f"{size / other_size:.3g} times finer ({facets})"
-            yield f"{sides}: the other side is {finer}: {better}"
+            yield f"{sides}: the other side is {size / other_size:.3g} times finer, {better}"
         elif young > SOFTER * other_young and size >= other_size:
-            yield f"{sides}: the other side is {young / other_young:.3g} times softer: {better}"
+            yield f"{sides}: the other side is {young / other_young:.3g} times softer, {better}"
         # Beyond the rim of the other side pressures end, far from where they act.
         nodes, covered = entry.coupling.nodes, entry.coupling.covered
         partly = _pressed(problem, solution.state, nodes[covered < HALF])
@@ -75,8 +76,7 @@ def choices(solution: Solution) -> Iterator[Remark]:
         if count:
             yield (
                 f"{sides}: {counted(count, 'node')} in contact, of whose area less than half faces "
-                "the other side: the pressure there is a mean over the rest; facets that end where "
-                "the other side does avoid that"
+                "the other side: the pressure there is a mean over the rest"
             )
         states = [record.state for record in solution.steps] or [solution.state]
         slips = [_slip(problem, state, nodes) for state in states]
@@ -86,8 +86,7 @@ def choices(solution: Solution) -> Iterator[Remark]:
             yield (
                 f"{sides}: points in contact are {largest:.3g} along the surface from the points "
                 f"they faced{when}, and facets are {facet:.3g} long: in linear kinematics each "
-                "stays opposite the point it faced in the beginning; where surfaces are curved, or "
-                "end, the result is of another contact"
+                "stays opposite the point it faced in the beginning"
             )
 
 
@@ -123,16 +122,8 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
     return float(total[0] / total[1]), float(least)
 
 
-def regions(solution: Solution) -> Iterator[Remark]:
-    """Say where regions of the mesh, which somebody has named, have one material."""
-    names, materials = solution.problem.domain.regions, solution.problem.body.materials
-    if len(names) > 1 and len(materials) == 1:
-        words = f"the regions {', '.join(names)} have one material"
-        yield Note(f"{words}; [[material]] with `on` gives each its own")
-
-
-def passing(problem: ContactProblem) -> Iterator[Remark]:
-    """Warn where components of the mesh are in no contact, so that nothing keeps them apart."""
+def apart(problem: ContactProblem) -> Iterator[Remark]:
+    """Warn of connected components of the mesh that no contact keeps apart. Collective."""
     piece, count = problem.equilibrium.components
     if count == 1:
         return
@@ -147,13 +138,32 @@ def passing(problem: ContactProblem) -> Iterator[Remark]:
     if alone:
         yield (
             f"the mesh has {count} connected components, and {alone} of them can pass through the "
-            "others: contact between two is asked for by [[contact]] with `on` one and `against` "
-            "the other"
+            "others; accepted: [[contact]] with `on` one and `against` the other"
+        )
+
+
+def held_along(solution: Solution) -> Iterator[Remark]:
+    """Tell of supports that hold touching nodes along the contact, so that friction does not act there.
+
+    Aslant to the contact direction, or moved along another body that is free there.
+    """
+    problem, nodes, d = solution.problem, solution.problem.nodes, solution.problem.dim
+    rubs = solution.friction_bound > 0
+    aslant = np.where(rubs, np.linalg.norm(nodes.lift - nodes.normal, axis=1), 0.0)
+    jump = problem.nodal(solution.state)[:, :d]
+    along = jump - nodes.normal_component(jump)[:, None] * nodes.normal
+    held = np.linalg.norm(along - nodes.tangential_component(jump), axis=1)
+    moves = np.linalg.norm(problem.equilibrium.nodal(solution.state.x)[nodes.nodes, :d], axis=1)
+    moved = nodes.maximum(np.where(rubs, held, 0.0)) > 0.1 * nodes.maximum(moves)
+    if nodes.maximum(aslant) > 0.1 or moved:
+        yield Note(
+            "supports hold contact nodes aslant to the contact direction, or move them along "
+            "another body: no friction acts at these nodes along the directions that supports hold"
         )
 
 
 def unresisted_motions(solution: Solution) -> Iterator[Remark]:
-    """Warn of rigid motions that supports leave free and contact hardly resists. Collective.
+    """Warn of rigid-body modes that the supports leave free and contact hardly resists. Collective.
 
     A cylinder without friction rolls in its place against next to nothing, and wherever it has
     rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas:
@@ -161,42 +171,51 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     friction where it slips.
     """
     problem, body = solution.problem, solution.problem.equilibrium
+    yield from _released(solution)
     if not solution.converged:
         return
-    motions_left = [(group, null_space(group.supports)) for group in groups(problem)]
-    unheld = [(group, free) for group, free in motions_left if free.shape[1] > 0]
-    if not unheld:
+    modes = [(group, null_space(group.supports)) for group in groups(problem)]
+    modes = [(group, free) for group, free in modes if free.shape[1] > 0]
+    if not modes:
         return
     residual = body.unbalanced(residual_forces(problem, solution.state))
     left = float(np.linalg.norm(body.norms(residual)[0]))
     whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
-    largest, kkt = solution.max_displacement, solution.outcome.kkt
-    for group, free in unheld:
-        shares, motions = _least_held(solution, group, free, solution.status != "open")
+    largest = solution.max_displacement
+    for group, free in modes:
+        shares, motions = _least_constrained(solution, group, free, solution.status != "open")
         share, motion = shares[0], motions[:, 0]
         # All that cost nothing, or the one that costs least.
         motions = linalg.orth(motions[:, : max(1, np.count_nonzero(shares < EPS))])
         words, name = described(motions, group.names), _named(group, motions)
         if share < EPS:
-            several = motions.shape[1] > 1
+            which = "rigid motions" if motions.shape[1] > 1 else "a rigid motion"
             yield (
-                f"nothing holds {name} against "
-                f"{f'rigid motions ({words})' if several else f'a rigid motion ({words})'}, which "
-                f"{'cost' if several else 'costs'} nothing: "
-                "of all places the one with the least displacements is given; "
-                f"friction, or supports against {'those motions' if several else 'that motion'}, "
-                "hold it"
+                f"nothing holds {name} against {which} ({words}): of all places the one with the "
+                "least displacements is given; accepted: friction, or supports"
             )
             return
         moved = left * _reach(group, motion) / (whole * share)
-        if share < HELD or moved > MOVED * largest:
+        if share < CONSTRAINED or moved > MOVED * largest:
             yield (
-                f"contact resists a rigid motion of {name} ({words}) by next to nothing: the "
-                f"mesh decides how far it goes, and the residual forces, {kkt.equilibrium:.1e} of "
-                f"all, may move that body by up to {moved:.2g}, where displacements reach "
-                f"{largest:.2g}; friction, or a support against that motion, hold it"
+                f"contact resists a rigid motion of {name} ({words}) by next to nothing: the mesh "
+                f"decides how far it goes, and residual forces may move it by up to {moved:.2g}, "
+                f"where displacements reach {largest:.2g}; accepted: friction, or a support"
             )
             return
+
+
+def _released(solution: Solution) -> Iterator[Remark]:
+    """Warn of earlier steps in which nothing holds a body any more. Collective."""
+    pressures = np.array([record.row["max_pressure"] for record in solution.steps])
+    pressed = pressures > NOTHING * pressures.max(initial=0.0)
+    # Before it has been pressed it has not moved.
+    free = np.flatnonzero(~pressed[:-1] & np.logical_or.accumulate(pressed)[:-1])
+    if free.size > 0 and not constrained_by_supports(solution.problem):
+        yield (
+            f"at t = {solution.steps[free[0]].row['t']:g} nothing presses any more, and no support "
+            "holds the body: it is then in one of many places, and so it is later"
+        )
 
 
 def _named(group: Group, motions: Array) -> str:
@@ -217,77 +236,40 @@ def _named(group: Group, motions: Array) -> str:
 
 
 def not_held(solution: Solution) -> Iterator[Remark]:
-    """Say which bodies contact has not held where a method fails. Collective.
+    """Warn of loads that by limit analysis are more than contact bears, where a method fails.
 
     A block between two jaws that touch it aslant gets out of their way and falls: no solution.
+    Collective.
     """
+    problem, time = solution.problem, solution.state.time
     if solution.converged:
         return
-    contact = "friction" if solution.problem.frictional else "contact"
-    for group in groups(solution.problem):
-        lost = _lost(solution, group)
-        if lost is None:
+    contact = "friction" if problem.frictional else "contact"
+    for group in groups(problem):
+        if solution.outcome.overloaded:
+            bound = problem.nodes.weight * solution.friction_bound
+            overload = Overload.of(group, time, bound)
+            motion = None if overload is None else overload.motion
+            why = "friction bounded by the pressures that were found does not balance"
+        else:
+            support = UnilateralSupport.of(group)
+            motion, why = None if support is None else support.lost(time), "no contact force balances"
+        if motion is None:
             continue
-        motion, why = lost
         large = np.abs(motion) > 0.1 * np.abs(motion).max()
         words = ", ".join(dict.fromkeys(np.array(group.names)[large].tolist()))
         yield (
-            f"{contact} cannot hold {_named(group, motion[:, None])} ({words}) where the method "
-            f"has left it: {why}; supports, more friction, or a load that presses it where it "
-            "touches hold it"
+            f"{contact} cannot hold {_named(group, motion[:, None])} ({words}): {why} its loads; "
+            "accepted: supports, more friction, or a load that presses it"
         )
 
 
-def _lost(solution: Solution, group: Group) -> tuple[Array, str] | None:
-    """Return the rigid motion on which contact has not held bodies, and how. Collective."""
-    problem, time = solution.problem, solution.state.time
-    if solution.outcome.overloaded:
-        friction = problem.nodes.weight * solution.friction_bound
-        overload = Overload.of(group, time, friction)
-        words = "friction bounded by the pressures there does not balance its loads"
-        return None if overload is None else (overload.motion, words)
-    support = UnilateralSupport.of(group, solution.status != "open")
-    if support is None:
-        return None
-    if (motion := support.lost(time)) is not None:
-        words = "the nodes that touch at last, pressed by whatever force, do not balance its loads"
-        return motion, words
-    motion = _drift(group, support.free, solution.state)
-    if _reach(group, motion) <= problem.domain.size:
-        return None
-    return motion, "it has moved by more than the size of the bodies"
-
-
-def _drift(group: Group, free: Array, state: State) -> Array:
-    """Return the free motion nearest to the displacements of a state, shape (m,). Collective."""
-    body, comm = group.problem.equilibrium, group.problem.comm
-    rows = group.moved[: body.owned] @ free
-    x = state.x[: body.owned]
-    gram, side = (comm.allreduce(rows.T @ of, op=MPI.SUM) for of in (rows, x))
-    return np.asarray(free @ np.linalg.lstsq(gram, side, rcond=EPS)[0])
-
-
-def adrift(solution: Solution) -> Iterator[Remark]:
-    """Say that nothing held a body any more before the last step. Collective."""
-    pressures = np.array([record.row["max_pressure"] for record in solution.steps])
-    pressed = pressures > NOTHING * pressures.max(initial=0.0)
-    # Before it has been pressed it has not moved.
-    free = np.flatnonzero(~pressed[:-1] & np.logical_or.accumulate(pressed)[:-1])
-    if free.size == 0 or constrained_by_supports(solution.problem):
-        return
-    yield (
-        f"at t = {solution.steps[free[0]].row['t']:g} nothing presses any more, and no support "
-        "holds the body: it is then in one of many places, and so it is later; a "
-        "load that goes on pressing it, or a support, holds it"
-    )
-
-
-def _least_held(
+def _least_constrained(
     solution: Solution, group: Group, free: Array, touches: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Return how far contact holds free motions, ascending, and the motions. Collective.
+    """Return relative stiffnesses of contact along free motions, ascending, and these. Collective.
 
-    That is the share of their squares at all contact nodes that is where they are held; the
+    That is the share of their squares at all contact nodes that is where they are resisted; the
     motions, shape (m, k), have mean squares of 1 there.
     """
     nodes = group.problem.nodes

@@ -51,8 +51,10 @@ class Differentiable(Quantity, Protocol):
 
 def _of_contact(problem: ContactProblem, number: int | None) -> NDArray[np.bool_]:
     """Return which owned contact nodes are those of one contact; of all for None."""
-    return np.ones(problem.nodes.weight.size, bool) if number is None else (
-        problem.entry_numbers == number
+    return (
+        np.ones(problem.nodes.weight.size, bool)
+        if number is None
+        else (problem.entry_numbers == number)
     )
 
 

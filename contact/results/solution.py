@@ -173,8 +173,6 @@ class Solution(Solved):
         The files that are written besides the summary and the tables.
     steps
         The steps of an evolution, the last of which this is.
-    extra_steps
-        How many more they are than were asked for: steps that failed were halved.
     """
 
     outcome: Outcome
@@ -204,7 +202,6 @@ class Solution(Solved):
     units: Units = field(default_factory=Units)
     output: OutputOptions = field(default_factory=OutputOptions)
     steps: list[StepRecord] = field(default_factory=list)
-    extra_steps: int = 0
 
     def __repr__(self) -> str:
         """Return the main results; `summary.json` has all."""

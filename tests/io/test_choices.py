@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from contact import parse_case, solve
 from contact.interface.multipliers import Multipliers
-from contact.results.bodies import choices
+from contact.results.bodies import sides
 from tests.problems.pairs import case
 
 
@@ -25,7 +25,7 @@ def test_what_a_method_leaves_at_partly_covered_nodes_is_no_pressure(share, warn
     pressure = np.where(covered < 0.5, share, 1.0) * solution.state.forces.pressure.max()
     forces = Multipliers(pressure, solution.state.forces.friction)
     changed = replace(solution, state=replace(solution.state, forces=forces))
-    words = [text for text in choices(changed) if "less than half" in text]
+    words = [text for text in sides(changed) if "less than half" in text]
     assert bool(words) == warned
 
 
@@ -37,7 +37,7 @@ def test_what_slides_further_than_a_facet_faces_something_else(way, warned):
     del given["load"]
     solution = solve(parse_case(given), comm=MPI.COMM_SELF)
     assert solution.converged
-    words = [text for text in choices(solution) if "along the surface" in text]
+    words = [text for text in sides(solution) if "along the surface" in text]
     assert bool(words) == warned
 
 
@@ -49,5 +49,5 @@ def test_what_slides_there_and_back_faced_something_else_in_between():
     given["evolution"] = {"times": [0.0, 2.0], "steps": [2]}
     solution = solve(parse_case(given), comm=MPI.COMM_SELF)
     assert solution.converged and np.abs(solution.slip).max() < 0.1
-    (words,) = [text for text in choices(solution) if "along the surface" in text]
+    (words,) = [text for text in sides(solution) if "along the surface" in text]
     assert "at t = 1," in words

@@ -31,7 +31,7 @@ def test_the_least_of_all_places():
     assert solution.outcome.reason.startswith("all residuals <= 1e-08")
     (said,) = [text for text in solution.warnings if "nothing holds" in text]
     motions = "translation along x, translation along y, rotation"
-    assert f"nothing holds ring against rigid motions ({motions}), which cost nothing" in said
+    assert f"nothing holds ring against rigid motions ({motions})" in said
 
     modes, body = UnconstrainedModes(problem), problem.equilibrium
     found = modes.free_motion(problem, state)

@@ -357,11 +357,6 @@ def test_a_force_that_nothing_bears_is_refused():
         solve(bar({"force": 0.02}, **held), comm=COMM)
 
 
-def test_a_bolt_is_no_rigid_part_in_words():
-    (said,) = (w for w in solve(bar({"force": 0.02})).warnings if "[no-contact]" in w)
-    assert "rigid" not in said
-
-
 @pytest.mark.parallel
 @pytest.mark.parametrize("kind", ["traction", "body force", "total"])
 def test_loads_beside_a_cut_act_on_its_own_side(kind):

@@ -118,5 +118,5 @@ def test_nodes_that_slide_over_free_ones_are_told(way):
         "top": [way, 0.0, -0.005],
     }
     solution = moved(Blocks(3).domain(COMM), Contact("over", against="under"), supports)
-    notes = [note for note in solution.notes if "[held-along]" in note]
+    notes = [note for note in solution.notes if "[meeting-supports]" in note]
     assert len(notes) == (way > 0)

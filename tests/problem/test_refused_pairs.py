@@ -142,8 +142,3 @@ def test_bodies_that_may_pass_through_each_other_are_named():
     )
     apart = solve(parse_case(case()))
     assert not any("pass through" in w for w in (*apart.warnings, *expectations(apart.problem)))
-
-
-def test_regions_of_one_material_are_named():
-    notes = solve(parse_case(case())).notes
-    assert any("the regions lower, upper have one material" in note for note in notes)

@@ -23,9 +23,8 @@ def said(texts: list[str], words: str) -> str:
 def test_an_auxetic_material_is_not_strongly_monotone():
     """With nu = -0.5, mu_1 = 1 is above (d/2) k_0 = 1/6."""
     solution = reviewed("bar", "mesh.cells=[16, 4]", "material.poisson=-0.5")
-    warning = said(solution.warnings, "strong monotonicity is not met")
-    assert "g_0 = 1 <= g <= 1, (d/2) k_0 = 0.1667" in warning
-    assert "below 0.125" in warning
+    note = said(solution.notes, "strong monotonicity is not met")
+    assert "g_0 = 1 <= g <= 1, (d/2) k_0 = 0.1667" in note
     good = reviewed("bar", "mesh.cells=[16, 4]")
     assert "g_0 = 0.3846" in said(good.notes, "strong monotonicity is met")
 
@@ -38,16 +37,11 @@ def test_a_material_of_ones_own_fits_its_constants(shear, warns):
     assert any(words in warning for warning in solution.warnings) == warns
 
 
-@pytest.mark.parametrize(
-    ("law", "good", "words"),
-    [
-        ("ramp", False, "k_e has no effect"),
-        ("perfect", False, "the charge jumps"),
-    ],
-)
-def test_what_a_conductivity_gives_up_is_said(law, good, words):
+@pytest.mark.parametrize("law", ["ramp", "perfect"])
+def test_what_a_conductivity_gives_up_is_said(law):
     solution = reviewed("piezo-8-1-conductive", "mesh.cells=[16, 8]", f"electric.law={law}")
-    assert said(solution.notes if good else solution.warnings, words)
+    words = {"ramp": "the foundation never conducts", "perfect": "the charge jumps"}
+    assert said(solution.warnings, words[law]).endswith("[conductivity]")
 
 
 @pytest.mark.parametrize("kinematics", ["axisymmetric", "plane_strain"])
@@ -72,15 +66,12 @@ def test_contact_that_is_too_coarse_is_warned_of(kinematics):
 
 
 @pytest.mark.parametrize(
-    ("motion", "warned", "anywhere"),
-    [([0.0, 0.01], True, False), ([0.0, "free"], True, True), ([0.0, -0.01], False, False)],
+    ("motion", "warned"), [([0.0, 0.01], True), ([0.0, "free"], True), ([0.0, -0.01], False)]
 )
-def test_a_foundation_that_nothing_touches_is_warned_of(motion, warned, anywhere):
+def test_a_foundation_that_nothing_touches_is_warned_of(motion, warned):
     """Also one without a force: it does not know where to be."""
     solution = solve(indented(n=4, displacement=motion))
-    found = [text for text in solution.warnings if "nothing touches" in text]
-    assert len(found) == warned
-    assert any("may be anywhere" in text for text in found) == anywhere
+    assert len([text for text in solution.warnings if "nothing touches" in text]) == warned
 
 
 def test_large_strains_are_warned_of():
