@@ -36,7 +36,7 @@ from contact.methods.load_stepping import LoadStepping, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
-from contact.methods.report import IterationHistory, Monitor, Outcome, tell
+from contact.methods.report import Monitor, Outcome, Record, tell
 from contact.methods.signals import SIGNALLED, stop_on_signal
 from contact.nesting import default_start, nested_start
 from contact.problem.checks import check_potential, check_problem, check_supports
@@ -295,12 +295,12 @@ def evolve(
     check_variables(problem.equilibrium)
     settings = settings or NewtonOptions()
     method = METHODS[settings.method](problem, settings, monitor)
-    for step in LoadStepping(problem, method, start, before).run(ends, begin):
-        if not step.outcome.converged:
+    for state, outcome in LoadStepping(problem, method, start, before).run(ends, begin):
+        if not outcome.converged:
             raise NotConvergedError(
-                f"no step to {step.problem.time:g}: {step.outcome.reason}; the states before remain"
+                f"no step to {state.time:g}: {outcome.reason}; the states before remain"
             )
-        yield step.state
+        yield state
 
 
 def run_schedule(
@@ -331,9 +331,8 @@ def run_schedule(
         if schedule.times:
             here, state, outcome, history = _steps(problem, method, schedule, records)
         else:
-            here, history = problem, IterationHistory()
             state, outcome = solve_step(problem, method, start)
-            history.records += method.history.records
+            here, history = problem, [*outcome.records]
     solved = time.perf_counter() - clock - setup
     counters = method.counters
     body = method.condensation if isinstance(method, Newton) else None
@@ -362,7 +361,7 @@ def run_schedule(
 
 def _steps(
     problem: ContactProblem, method: Method, schedule: Schedule, records: list[StepRecord]
-) -> tuple[ContactProblem, State, Outcome, IterationHistory]:
+) -> tuple[ContactProblem, State, Outcome, list[Record]]:
     """Take load steps, and append the records of those that converge. Collective.
 
     Returns
@@ -371,30 +370,28 @@ def _steps(
     last one, with the time that was reached; and the outer iterations of all.
     """
     recorder = StepRecorder(problem, records[-1] if records else None)
-    history, step, end = IterationHistory(), None, schedule.times[-1]
+    history, outcome, end = list[Record](), None, schedule.times[-1]
     states = [record.state for record in records[-1:-3:-1]]
     tell(logger, 0.0, "steps to t = %g", end)
-    for step in LoadStepping(problem, method, *states).run(schedule.times, schedule.begin):
-        now, taken = step.problem.time, step.history.records
-        history.records += [replace(r, note=f"t = {now:g} {r.note}".strip()) for r in taken]
-        if step.outcome.converged:
-            records.append(recorder.record(step))
+    steps = LoadStepping(problem, method, *states)
+    for state, outcome in steps.run(schedule.times, schedule.begin):
+        now, taken = state.time, outcome.records
+        history += [replace(r, note=f"t = {now:g} {r.note}".strip()) for r in taken]
+        if outcome.converged:
+            records.append(recorder.record(state, outcome))
             if schedule.keep is not None:
                 schedule.keep(records[-1])
             share = (now - schedule.begin) / (end - schedule.begin)
             words = "t = %g of %g: iterations %d, residual %.1e"
-            tell(logger, share, words, now, end, len(taken), step.outcome.kkt.largest)
-    if not records:
-        assert step is not None  # there is one step at least
-        here, state, reached = step.problem, step.state, 0.0
-    else:
+            tell(logger, share, words, now, end, len(taken), outcome.kkt.largest)
+    reached = 0.0
+    if records:
         state, reached = records[-1].state, records[-1].state.time
-        here = problem.at(state.time, state.history)
-    if step is None:  # all were there already
+    here = problem.at(state.time, state.history)
+    if outcome is None:  # all were there already
         return here, state, Outcome(evaluate(here, state), method.options.allowed), history
-    outcome = step.outcome
     if not outcome.converged:
-        words = outcome.ended or outcome.criterion or f"the one to {step.problem.time:g} fails"
+        words = outcome.ended or outcome.criterion or f"the one to {now:g} fails"
         ended = f"the steps end at t = {reached:g} of {end:g}: {words}"
         outcome = replace(outcome, ended=ended)
     return here, state, outcome, history

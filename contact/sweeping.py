@@ -28,7 +28,7 @@ from contact.errors import InputError, counted, nearest
 from contact.io.folder import write_whole
 from contact.io.tables import write_csv
 from contact.mesh.domain import Domain
-from contact.methods.load_stepping import Reached, predicted, solve_step
+from contact.methods.load_stepping import predicted, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
@@ -36,6 +36,7 @@ from contact.methods.signals import Interrupted, stop_on_signal
 from contact.model.messages import listed
 from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 from contact.ranks import on_root
 from contact.results.quantities import quantities, values_of
 from contact.results.quantity import SUMMARY, SWEEP, is_of
@@ -361,7 +362,7 @@ class _Runner:
         self._case: Case | None = None
         self._domain: Domain | None = None
         self._method: Method | None = None
-        self._reached: list[Reached] = []
+        self._ends: list[tuple[ContactProblem, State]] = []
 
     def solve(self, case: Case) -> Solution:
         """Solve a case. Collective."""
@@ -378,7 +379,7 @@ class _Runner:
                 self._method = METHODS[case.solver.method](
                     problem, self._settings(case), self._monitor
                 )
-                self._reached = []
+                self._ends = []
             else:
                 self._method.set_load_step(problem)
             return self._static(problem, case.solver.method, self._method)
@@ -390,18 +391,17 @@ class _Runner:
         return case.solver
 
     def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:
-        counted, ends = replace(method.counters), self._reached
+        counted, ends = replace(method.counters), self._ends
         start = linearised_at = None
         if ends:
-            start, linearised_at = predicted(problem, ends[-1], ends[0] if len(ends) > 1 else None)
+            start, linearised_at = predicted(problem, ends)
         state, outcome = solve_step(problem, method, start, linearised_at)
         if start is not None and not outcome.converged and not outcome.signal:
             state, outcome = solve_step(problem, method, None)
-        end = Reached.of(problem, state)
-        self._reached = [*ends[-1:], end] if outcome.converged else []
+        self._ends = [*ends[-1:], (problem, state)] if outcome.converged else []
         check_potential(problem, state)
         counters = method.counters - counted
-        return Solution(problem, state, outcome, method.history, counters, name, seconds={})
+        return Solution(problem, state, outcome, [*method.history], counters, name, seconds={})
 
 
 def _alike(before: Case, case: Case) -> bool:

@@ -81,7 +81,7 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
         opposite = opposite_surface(solution)
         write_grid(comm, contact_surface(solution), new / SURFACE)
         whole = None if opposite is None else gathered(comm, opposite)
-        table, records = contact_table(solution), solution.history.records
+        table, records = contact_table(solution), solution.history
 
         def write_tables() -> None:
             write_columns(new / NODES, table)

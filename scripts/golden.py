@@ -99,7 +99,7 @@ def measured(solution: Solution) -> dict[str, Value]:
 
 def counted(solution: Solution) -> dict[str, Value]:
     """Return the counts of an algorithm of the thesis."""
-    records, counters = solution.history.records, solution.counters
+    records, counters = solution.history, solution.counters
     return {
         "outer_iterations": Value(sum(record.iteration > 0 for record in records)),
         "inner_iterations": Value(sum(record.inner for record in records)),

@@ -394,7 +394,7 @@ def interior_point() -> dict[str, Value]:
     """Solve a bar whose Newton's method gives up early, by the interior point. Collective."""
     problem = mechanics.bar(COMM, 8, -0.05, friction=Friction(mu=0.5))
     solution = solve(problem, NewtonOptions(tolerance=TIGHT, max_iterations=2, condense=False))
-    notes = {record.note for record in solution.history.records}
+    notes = {record.note for record in solution.history}
     used = any(note.startswith("interior point") for note in notes)
     return {**measured(solution), "interior point": Value(str(used))}
 

@@ -66,7 +66,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
             logging.getLogger("contact").debug(solution.outcome.reason)
         outcome = solution.outcome
         earlier = on_root(comm, (folder.path / SUMMARY).exists)
-        begun = bool(solution.history.records or solution.steps)
+        begun = bool(solution.history or solution.steps)
         if outcome.signal and not begun and earlier:  # which are worth more
             raise Terminated if outcome.signal == signal.SIGTERM else KeyboardInterrupt
         # Results that have taken long to compute are written, signal or not.

@@ -215,7 +215,7 @@ def _separated(
     )
     equilibrium = left / first if first > 0 else 0.0
     residuals = replace(evaluate(problem, state), equilibrium=equilibrium)
-    newton.history.record(residuals, RIGID_MOTION, inner=2)
+    newton.recorder.record(residuals, RIGID_MOTION, inner=2)
     newton.see(state, residuals)
     outcome = Outcome(residuals, newton.options.allowed)
     return (state, outcome) if outcome.converged else None

@@ -195,7 +195,7 @@ class InteriorPoint:
                 taken = False
             kkt, self._internal = evaluate_forces(self.problem, self.state)
             newton.see(self.state, kkt)
-            newton.history.record(kkt, INTERIOR_POINT, 2)
+            newton.recorder.record(kkt, INTERIOR_POINT, 2)
             ended = f"the interior point has not converged in {steps} steps"
             if not taken or not np.isfinite(kkt.significant):
                 ended = f"rounding ends the interior point after {steps} steps"

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from contact.linear.operator import Counters
 from contact.methods.method import Method
-from contact.methods.report import IterationHistory, Outcome
+from contact.methods.report import Outcome
 from contact.methods.signals import Interrupted
 from contact.methods.unconstrained_modes import UnconstrainedModes, with_least_displacements
 from contact.problem.limit_analysis import released, unilateral_supports
@@ -26,49 +25,26 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.solve")
 
-#: How often a step that fails is halved.
+#: Most halvings of a step that fails.
 HALVINGS = 4
 
-#: Stands for residuals until they are measured.
-NOTHING = Residuals(np.inf, np.inf, np.inf)
-
-
-@dataclass(frozen=True)
-class LoadStep:
-    """A load step: its problem, its solution, and the way to it.
-
-    Attributes
-    ----------
-    problem
-        The problem with the loads of the step's end and the history at its beginning.
-    state, outcome
-        Its solution, and how that was found.
-    history
-        The outer iterations.
-    counters
-        Factorisations and solves of this step alone.
-    """
-
-    problem: ContactProblem
-    state: State
-    outcome: Outcome
-    history: IterationHistory
-    counters: Counters
+#: Placeholder of residuals that `evaluated` replaces.
+UNKNOWN = Residuals(np.inf, np.inf, np.inf)
 
 
 class LoadStepping:
-    """Quasi-static load stepping: solves the load steps of a problem one after the other.
+    """Load steps of a problem by one method.
 
     Parameters
     ----------
     problem
-        The problem; its history is where friction begins.
+        The problem; friction begins with its history.
     method
-        Solves one step after the other.
+        Solver of the steps.
     start
-        State to go on from: that of an earlier step. The reference configuration by default.
+        State at the end of an earlier step; the reference configuration by default.
     before
-        The state of the step before it, for the prediction.
+        State at the end of the step before `start`, for the extrapolation.
     """
 
     def __init__(
@@ -81,73 +57,58 @@ class LoadStepping:
         self.problem, self.method = problem, method
         self._last, self._before = start, before
         self._unilateral = unilateral_supports(problem)
-        # How supports constrain bodies is the same in all steps.
+        # Supports are the same in all steps.
         self._modes = UnconstrainedModes(problem)
 
-    def run(self, times: Sequence[float], begin: float = 0.0) -> Iterator[LoadStep]:
-        """Take the steps; the last one given has not converged if that has ended them. Collective.
+    def run(self, times: Sequence[float], begin: float = 0.0) -> Iterator[tuple[State, Outcome]]:
+        """Yield state and outcome of each step; a step that fails is the last one. Collective.
 
         Parameters
         ----------
         times
-            Ends of the steps, increasing. Those that the start has passed are left out.
+            Ends of the steps, increasing; those before the time of the start are left out.
         begin
             Time of the reference configuration.
         """
         for k, end in enumerate(times):
             whole = end - (times[k - 1] if k > 0 else begin)
             while (now := begin if self._last is None else self._last.time) < end:
-                step = self._step(now, end, whole)
-                if step.outcome.converged:
-                    self._before, self._last = self._last, step.state
-                yield step
-                if not step.outcome.converged:
+                state, outcome = self._step(now, end, whole)
+                if outcome.converged:
+                    self._before, self._last = self._last, state
+                yield state, outcome
+                if not outcome.converged:
                     return
 
-    def _step(self, now: float, end: float, whole: float) -> LoadStep:
-        """Take a step: all of the way to its end, or a half, a quarter ... of it.
-
-        Where contact alone holds the body, loads that let it go are not tried.
-        """
+    def _step(self, now: float, end: float, whole: float) -> tuple[State, Outcome]:
+        """Step to a time, or halve the step; loads that release a body are not tried."""
         left = end - now
         sizes = [whole / 2**k for k in range(HALVINGS + 1)]
         for size in [size for size in sizes if size <= left * (1 + 1e-9)] or [left]:
             time = end if size >= left * (1 - 1e-9) else now + size
-            lost = released(self._unilateral, now, time)
-            step = self._lost(time, lost) if lost else self._solve(time)
-            if step.outcome.converged or step.outcome.signal:
+            state, outcome = self._solve(time, released(self._unilateral, now, time))
+            if outcome.converged or outcome.signal:
                 break
-            logger.info("no step to %g: %s", time, step.outcome.reason)
-        return step
+            logger.info("no step to %g: %s", time, outcome.reason)
+        return state, outcome
 
-    def _lost(self, time: float, why: str) -> LoadStep:
-        """Return a step that is not taken: the last state under the loads of its end."""
-        problem = self._at(time)
-        start = problem.start() if self._last is None else self._last
-        state, outcome = measured(
-            problem, start, Outcome(NOTHING, self.method.options.allowed, why)
-        )
-        return LoadStep(problem, state, outcome, IterationHistory(), Counters())
-
-    def _at(self, time: float) -> ContactProblem:
-        """Return the problem of a step that ends at a time, with the history of the last one."""
-        problem, last = self.problem, self._last
+    def _solve(self, time: float, released: str) -> tuple[State, Outcome]:
+        """Solve the step to a time; where a body is released, leave the last state."""
+        problem, last, before = self.problem, self._last, self._before
         if last is None:
-            return problem.at(time)
-        return problem.at(time, problem.commit(last), since=last.time)
-
-    def _solve(self, time: float) -> LoadStep:
-        last, method = self._last, self.method
-        problem = self._at(time)
-        method.set_load_step(problem)
-        counted = replace(method.counters)
+            problem = problem.at(time)
+        else:
+            problem = problem.at(time, problem.commit(last), since=last.time)
+        if released:
+            outcome = Outcome(UNKNOWN, self.method.options.allowed, released)
+            return evaluated(problem, problem.start() if last is None else last, outcome)
+        self.method.set_load_step(problem)
         start = linearised_at = None
         if last is not None:
-            before = None if self._before is None else Reached.of(problem, self._before)
-            start, linearised_at = predicted(problem, Reached.of(problem, last), before)
+            ends = [(problem, state) for state in (before, last) if state is not None]
+            start, linearised_at = predicted(problem, ends)
         self._modes.problem = problem
-        state, outcome = solve_step(problem, method, start, linearised_at, self._modes)
-        return LoadStep(problem, state, outcome, method.history, method.counters - counted)
+        return solve_step(problem, self.method, start, linearised_at, self._modes)
 
 
 def solve_step(
@@ -157,24 +118,28 @@ def solve_step(
     linearised_at: Array | None = None,
     modes: UnconstrainedModes | None = None,
 ) -> tuple[State, Outcome]:
-    """Solve by a method, and evaluate the residuals once more. Collective.
+    """Solve by a method, and evaluate the residuals from scratch. Collective.
 
-    Of solutions that differ by a free rigid motion the one with the least displacements is taken.
+    Of solutions that differ by a free rigid motion, that of least norm is taken.
     """
+    counted = replace(method.counters)
     try:
         state, outcome = method.solve(start, linearised_at)
     except Interrupted as interrupt:
         state = method.state
-        outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
-    found = measured(problem, state, replace(outcome, allowed=method.options.allowed))
+        outcome = Outcome(UNKNOWN, UNKNOWN, str(interrupt), interrupt.number)
+    outcome = replace(
+        outcome,
+        allowed=method.options.allowed,
+        records=tuple(method.history),
+        counters=method.counters - counted,
+    )
+    found = evaluated(problem, state, outcome)
     return with_least_displacements(modes or UnconstrainedModes(problem), *found)
 
 
-def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:
-    """Evaluate the residuals of a method's state, as one of the problem. Collective.
-
-    From scratch and at the whole load, whatever the method says and wherever it has stopped.
-    """
+def evaluated(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:
+    """Evaluate the residuals of a state at the time and history of a problem. Collective."""
     x = problem.equilibrium.prescribe(state.x, problem.time)
     state = replace(state, x=x, time=problem.time, history=problem.history)
     return state, replace(outcome, kkt=evaluate(problem, state))
@@ -184,56 +149,37 @@ def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[S
 FARTHEST = 2.0
 
 
-@dataclass(frozen=True)
-class Reached:
-    """A solution, with the loads and prescribed values that belong to it.
-
-    Attributes
-    ----------
-    state
-        The solution.
-    given
-        The owned loads and prescribed values.
-    """
-
-    state: State
-    given: tuple[Array, Array]
-
-    @staticmethod
-    def of(problem: ContactProblem, state: State) -> Reached:
-        """Return the solution of a problem, at its time. Collective."""
-        return Reached(state, _given(problem, state.time))
-
-
 def predicted(
-    problem: ContactProblem, last: Reached, before: Reached | None
+    problem: ContactProblem, ends: Sequence[tuple[ContactProblem, State]]
 ) -> tuple[State, Array | None]:
-    """Return the initial guess of a step, by extrapolation of the last two. Collective.
+    """Extrapolate the last two solutions: initial guess, place of the first secant. Collective.
 
-    Where loads turn round there is nothing to extrapolate. The material is then linearised at the
-    last solution first, with the change of the prescribed values as an increment: set at once, they
-    would strain the elements beside them alone.
+    Where the loads turn round the last solution is taken. The material is then linearised there,
+    with the change of the prescribed values as an increment: set at once, they would strain the
+    elements beside them alone.
 
     Parameters
     ----------
     problem
         The problem.
-    last, before
-        The solution that it follows, and the one before that; None where there is none.
+    ends
+        The last solution, behind the one before it if there is one, with their problems.
     """
-    x, body, factor = last.state.x, problem.equilibrium, 0.0
-    if before is not None:
-        factor = _extrapolation(problem, last, before)
-        x = x + factor * (x - before.state.x)
-    start = State(body.prescribe(x, problem.time), last.state.forces, problem.time, problem.history)
+    last, body, factor = ends[-1][1], problem.equilibrium, 0.0
+    x = last.x
+    if len(ends) > 1:
+        factor = _extrapolation(problem, ends)
+        x = x + factor * (x - ends[-2][1].x)
+    start = State(body.prescribe(x, problem.time), last.forces, problem.time, problem.history)
     return start, None if factor > 0 else x
 
 
-def _extrapolation(problem: ContactProblem, last: Reached, before: Reached) -> float:
-    """Return the increment of the loads over the last one, along that. Collective."""
+def _extrapolation(problem: ContactProblem, ends: Sequence[tuple[ContactProblem, State]]) -> float:
+    """Return the least of df.df0/df0.df0: increments of loads and prescribed values."""
     product, factors = problem.equilibrium.product, []
+    before, last = (_given(there, state.time) for there, state in ends[-2:])
     now = _given(problem, problem.time)
-    for first, second, third in zip(before.given, last.given, now, strict=True):
+    for first, second, third in zip(before, last, now, strict=True):
         come, going = second - first, third - second
         square = product(come, come)
         if square > 0:
@@ -242,5 +188,6 @@ def _extrapolation(problem: ContactProblem, last: Reached, before: Reached) -> f
 
 
 def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:
+    """Return the owned loads and prescribed values at a time."""
     body = problem.equilibrium
     return body.external(time), body.owned_part(body.prescribe(body.rest(), time))

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from contact.linear.operator import Counters
 from contact.methods.newton import Newton
-from contact.methods.report import IterationHistory, Monitor, Outcome
+from contact.methods.report import Monitor, Outcome, Record
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.thesis.fixed_point import FixedPoint
@@ -29,7 +29,7 @@ class Method(Protocol):
         """Its options; `allowed` among them, the tolerance of each residual."""
 
     @property
-    def history(self) -> IterationHistory:
+    def history(self) -> list[Record]:
         """The outer iterations."""
 
     @property

@@ -35,6 +35,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import time
 from dataclasses import dataclass, field, replace
 
 from contact.linear.operator import Counters
@@ -50,7 +51,7 @@ from contact.methods.fallbacks import (
 from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED
 from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
-from contact.methods.report import IterationHistory, Monitor, Outcome, Record
+from contact.methods.report import Monitor, Outcome, Record, Recorder
 from contact.methods.semismooth import Iteration, SemismoothNewton
 from contact.methods.step_control import MOST_STEPS, Chord
 from contact.methods.unconstrained_modes import UnconstrainedModes
@@ -110,7 +111,7 @@ class Newton:
     def set_load_step(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
         self.problem = self._modes.problem = problem
-        self.history = IterationHistory(self.monitor)
+        self.recorder = Recorder(self.monitor)
         if self._condensation is not None:
             self._condensation.set_load_step(problem)
         self._begin()
@@ -122,13 +123,18 @@ class Newton:
         return NewtonStep(problem, options, self._parameters, counters, underconstrained)
 
     def _begin(self) -> None:
-        whole = self.problem, self.options, self._step, self._modes, self.history
+        whole = self.problem, self.options, self._step, self._modes, self.recorder
         self.whole = SemismoothNewton(*whole)
 
     @property
     def condensation(self) -> Condensation | None:
         """The body condensed onto its contact nodes, where that has been asked for."""
         return self._condensation
+
+    @property
+    def history(self) -> list[Record]:
+        """The steps of the last solves."""
+        return self.recorder.records
 
     @property
     def state(self) -> State:
@@ -149,7 +155,7 @@ class Newton:
             Unknowns at which the material is linearised first; those of the start by default.
         """
         self._begin()
-        self.history.restart()
+        self.recorder.begin = time.perf_counter()
         if self.options.keep != "across":
             self._chord.drop()
         whole, body = self.whole, self.problem.equilibrium
@@ -200,7 +206,10 @@ class Newton:
             enough = 0.1 * options.tolerance
             if not body.linear and not keep:
                 enough = max(enough, CONTACT_PART * min(residuals, 1.0))
-            end, outcome, records = self._solve_condensed(condensed, state, enough)
+            contact = self._on_contact_nodes(condensed, enough)
+            end, outcome = solve_contact(contact, replace(state, x=condensed.equilibrium.at))
+            records = tuple(contact.recorder.records)
+            self.counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
             unsolved = outcome.kkt.significant > max(enough, UNSOLVED * residuals)
             if unsolved and not overloaded:
@@ -225,19 +234,10 @@ class Newton:
                 return state, stalled
         return state, loop.out_of_steps()
 
-    def _solve_condensed(
-        self, problem: CondensedProblem, state: State, tolerance: float
-    ) -> tuple[State, Outcome, tuple[Record, ...]]:
-        """Solve a condensed contact problem from a state of the whole one. Collective."""
-        options = replace(
-            self.options,
-            tolerance=tolerance,
-            max_outer=sys.maxsize,  # each of its stages has a limit
-        )
+    def _on_contact_nodes(self, problem: CondensedProblem, tolerance: float) -> SemismoothNewton:
+        """Return the semismooth Newton method on a condensed problem."""
+        # Each stage has a limit of its own.
+        options = replace(self.options, tolerance=tolerance, max_outer=sys.maxsize)
         step = self._newton_step(problem, options, Counters())
-        history = IterationHistory(lambda _: self.history.poll(), level=logging.DEBUG)
-        contact = SemismoothNewton(problem, options, step, self._modes, history)
-        start = replace(state, x=problem.equilibrium.at)
-        end, outcome = solve_contact(contact, start)
-        self.counters.contact_solves += sum(record.inner for record in history.records)
-        return end, outcome, tuple(history.records)
+        recorder = Recorder(lambda _: self.recorder.poll(), logging.DEBUG)
+        return SemismoothNewton(problem, options, step, self._modes, recorder)

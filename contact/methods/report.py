@@ -11,6 +11,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from contact.errors import counted
+from contact.linear.operator import Counters
 from contact.problem.residuals import Residuals
 
 logger = logging.getLogger("contact.solver")
@@ -73,27 +74,13 @@ class Poll(Protocol):
 
 
 @dataclass
-class IterationHistory:
-    """The outer iterations so far, handed to a monitor as they come.
-
-    Attributes
-    ----------
-    monitor
-        Told of every iteration.
-    records
-        The iterations.
-    level
-        Level at which they are logged.
-    """
+class Recorder:
+    """Keeps the records of a solve, logs them at a level, and calls the monitor with each."""
 
     monitor: Monitor | None = None
-    records: list[Record] = field(default_factory=list)
     level: int = logging.INFO
-    _begin: float = field(default_factory=time.perf_counter)
-
-    def restart(self) -> None:
-        """Count the seconds from now on."""
-        self._begin = time.perf_counter()
+    records: list[Record] = field(default_factory=list)
+    begin: float = field(default_factory=time.perf_counter)
 
     def record(
         self,
@@ -103,13 +90,13 @@ class IterationHistory:
         sizes: tuple[int, int, int] | None = None,
         steps: tuple[Record, ...] = (),
     ) -> None:
-        """Append a record of the next step; see `Record`."""
-        seconds = time.perf_counter() - self._begin
+        """Append the record of the next step."""
+        seconds = time.perf_counter() - self.begin
         number = len(self.records) + 1
         self.add(Record(number, inner, kkt, np.nan, seconds, note, sizes, steps))
 
     def add(self, record: Record) -> None:
-        """Append a record."""
+        """Append a record, log it and call the monitor."""
         self.records.append(record)
         logger.log(
             self.level,
@@ -125,29 +112,33 @@ class IterationHistory:
             self.monitor(record)
 
     def poll(self) -> None:
-        """Let the monitor end the solve between two inner iterations. Collective."""
+        """Let the monitor end the solve within an outer iteration. Collective."""
         if isinstance(self.monitor, Poll):
             self.monitor.poll()
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a solver ended. The residuals decide whether it has converged, and nothing else can.
+    """End of a solve; the residuals alone decide whether it has converged.
 
     Attributes
     ----------
     kkt
-        The final residuals, of the problem at its whole load.
+        Final residuals, of the problem at its whole load.
     allowed
-        How large each of them may be.
+        Tolerance of each residual.
     ended
-        Why the method ended, in words; empty where nothing but convergence ended it.
+        Reason other than convergence, in words.
     signal
         Number of the signal that ended it; 0 for none.
     criterion
-        The method's own criterion, in words, where it ends by another one than the residuals.
+        Criterion of the method itself, in words, where it does not end by the residuals.
     overloaded
-        Whether friction does not balance the loads, so that no other way is worth a try.
+        Whether friction does not balance the loads (limit analysis): no fallback is tried.
+    records
+        The outer iterations.
+    counters
+        Factorisations and linear solves.
     """
 
     kkt: Residuals
@@ -156,6 +147,8 @@ class Outcome:
     signal: int = 0
     criterion: str = ""
     overloaded: bool = False
+    records: tuple[Record, ...] = ()
+    counters: Counters = field(default_factory=Counters)
 
     @property
     def converged(self) -> bool:

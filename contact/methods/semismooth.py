@@ -16,7 +16,7 @@ from contact.interface.multipliers import Multipliers
 from contact.methods.complementarity_parameters import overestimates_stiffness
 from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
-from contact.methods.report import IterationHistory, Outcome, Record
+from contact.methods.report import Outcome, Record, Recorder
 from contact.methods.step_control import PROGRESS, Best, Stagnation, undeformed_equilibrium
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.protocols import Problem
@@ -39,8 +39,8 @@ class SemismoothNewton:
         Takes the steps.
     modes
         Rigid-body modes of the whole problem.
-    history
-        Gets a record a step.
+    recorder
+        Gets a record of each step.
 
     Attributes
     ----------
@@ -56,17 +56,17 @@ class SemismoothNewton:
         options: NewtonOptions,
         step: NewtonStep,
         modes: UnconstrainedModes,
-        history: IterationHistory,
+        recorder: Recorder,
     ) -> None:
         self.problem, self.options, self.step = problem, options, step
-        self.modes, self.history = modes, history
+        self.modes, self.recorder = modes, recorder
         self.at, self.reserved = problem.start(), 0
         self.best: Best[State] = Best()
 
     @property
     def left(self) -> int:
         """Number of steps that are left of the limit."""
-        return self.options.max_outer - self.reserved - len(self.history.records)
+        return self.options.max_outer - self.reserved - len(self.recorder.records)
 
     def see(self, state: State, residuals: Residuals) -> None:
         """Take note of an iterate."""
@@ -75,7 +75,7 @@ class SemismoothNewton:
 
     def on(self, problem: Problem) -> SemismoothNewton:
         """Return the method on the problem with another interface, with the same operator."""
-        other = SemismoothNewton(problem, self.options, self.step, self.modes, self.history)
+        other = SemismoothNewton(problem, self.options, self.step, self.modes, self.recorder)
         other.reserved = self.reserved
         return other
 
@@ -191,7 +191,7 @@ class Iteration:
         self.starts_converged = state.active_set is not None and self.converged
         if self.starts_converged:
             newton.see(state, self.residuals)
-            newton.history.record(self.residuals, f"{note} initial guess".strip(), inner=0)
+            newton.recorder.record(self.residuals, f"{note} initial guess".strip(), inner=0)
 
     @property
     def converged(self) -> bool:
@@ -207,7 +207,7 @@ class Iteration:
         """Append a record of the step to an iterate. Collective."""
         note = " ".join(word for word in (self._note, *words) if word)
         sizes = _node_counts(state, self._problem)
-        self._newton.history.record(self.residuals, note, sizes=sizes, steps=steps)
+        self._newton.recorder.record(self.residuals, note, sizes=sizes, steps=steps)
 
     def ended(self, state: State) -> tuple[State, Outcome] | None:
         """Return the end of a loop that has converged, diverged, or lost contact. Collective."""
@@ -228,7 +228,7 @@ class Iteration:
 
     def out_of_steps(self) -> Outcome:
         """Return the outcome of a loop that has taken all of its steps."""
-        return self.outcome(f"not converged in {len(self._newton.history.records)} steps")
+        return self.outcome(f"not converged in {len(self._newton.recorder.records)} steps")
 
     def outcome(self, ended: str = "") -> Outcome:
         """Return the outcome at the last iterate."""
@@ -257,7 +257,7 @@ class Iteration:
         self.residuals = found[1]
         self._newton.see(undeformed, self.residuals)
         words = f"{self._note} zero displacement".strip()
-        self._newton.history.record(self.residuals, words, inner=0)
+        self._newton.recorder.record(self.residuals, words, inner=0)
         return undeformed, self.outcome()
 
 

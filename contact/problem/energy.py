@@ -33,55 +33,36 @@ _SHARES = np.tile(_WEIGHTS / 32, 16)
 
 
 @dataclass(frozen=True)
-class StepEnd:
-    """Data of the end of a step for the balance.
-
-    Attributes
-    ----------
-    x
-        Local unknowns.
-    given, internal
-        Forces and charges on the owned unknowns: those that do work, and those of the stresses.
-    enthalpy
-        Stored energy, less charges times potentials of a piezoelectric body (all ranks).
-    plastic
-        Energy that the material has dissipated in the step (all ranks).
-    """
-
-    x: Array
-    given: Array
-    internal: Array
-    enthalpy: float
-    plastic: float = 0.0
-
-    @staticmethod
-    def rest(problem: ContactProblem) -> StepEnd:
-        """Return that of a body to which nothing has been done."""
-        body = problem.equilibrium
-        zero = np.zeros_like(body.owned_part(body.rest()))
-        return StepEnd(body.rest(), zero, zero, 0.0)
-
-
-@dataclass(frozen=True)
 class Balance:
-    """Energies of a step (force times length; in the plane by unit thickness).
+    """Energies of a step (force times length; in the plane by unit thickness), and its end.
 
     Attributes
     ----------
-    work
-        Put in during the step.
-    energy
-        Stored at its end.
-    dissipation
-        Taken by friction during the step.
+    work, dissipation
+        Work of the loads, and dissipation by friction, in the step.
     plastic
-        Taken by plastic flow; None for a body without.
+        Plastic dissipation in the step; None without internal variables.
+    energy, enthalpy
+        Stored energy at its end; less charges times potentials of a piezoelectric body.
+    x, given, internal
+        Local unknowns at its end; forces and charges on the owned ones, by loads and by stresses.
     """
 
     work: float
     energy: float
     dissipation: float
-    plastic: float | None = None
+    plastic: float | None
+    enthalpy: float
+    x: Array
+    given: Array
+    internal: Array
+
+    @staticmethod
+    def rest(problem: ContactProblem) -> Balance:
+        """Return that of the reference configuration."""
+        x = problem.equilibrium.rest()
+        zero = np.zeros_like(problem.equilibrium.owned_part(x))
+        return Balance(0.0, 0.0, 0.0, None, 0.0, x, zero, zero)
 
 
 def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]:
@@ -134,11 +115,11 @@ def stored(problem: ContactProblem, state: State) -> float:
     return own - electric
 
 
-def step_end(problem: ContactProblem, state: State, before: StepEnd) -> StepEnd:
-    """Return the data of a step that began at another moment. Collective."""
+def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
+    """Return the energies of a step that follows another one. Collective."""
     body = problem.equilibrium
     given, internal = working_forces(problem, state)
-    moved = body.owned_part(state.x) - body.owned_part(before.x)
+    x, x_before = body.owned_part(state.x), body.owned_part(before.x)
     plastic, stored = body.laws.energies(state)
     forces_at: Callable[[State], Array] = body.internal_forces
     if stored is None:
@@ -152,22 +133,16 @@ def step_end(problem: ContactProblem, state: State, before: StepEnd) -> StepEnd:
     else:
         way = [0.5 * ((1 - s) * before.x + (1 + s) * state.x) for s in _POINTS]
         power = 0.5 * _WEIGHTS @ np.array([forces_at(replace(state, x=x)) for x in way])
-    enthalpy = before.enthalpy + body.product(power, moved) + gained
-    return StepEnd(state.x, given, internal, enthalpy, plastic)
-
-
-def balance(problem: ContactProblem, state: State, before: StepEnd, now: StepEnd) -> Balance:
-    """Return the energies of a step from one moment to another. Collective."""
-    body = problem.equilibrium
-    x, x_before = (body.owned_part(m.x) for m in (now, before))
+    enthalpy = before.enthalpy + body.product(power, x - x_before) + gained
+    mechanical = body.component_norms.mechanical
     # The enthalpy's work is that of charges on changing potentials: potentials move charges.
     work = np.where(
-        body.component_norms.mechanical,
-        0.5 * (now.given + before.given) * (x - x_before),
-        -0.5 * (x + x_before) * (now.given - before.given),
+        mechanical,
+        0.5 * (given + before.given) * (x - x_before),
+        -0.5 * (x + x_before) * (given - before.given),
     )
-    stored = body.product(np.where(body.component_norms.mechanical, 0.0, x), now.internal)
+    charged = body.product(np.where(mechanical, 0.0, x), internal)
     dissipation = dissipated(problem, state)
     done = body.product(work, np.ones_like(work))
-    flows = body.laws.initial is not None
-    return Balance(done, now.enthalpy - stored, dissipation, now.plastic if flows else None)
+    flow = plastic if body.laws.initial is not None else None
+    return Balance(done, enthalpy - charged, dissipation, flow, enthalpy, state.x, given, internal)

@@ -215,11 +215,11 @@ _RUN = (
     ),
     Quantity(
         "outer_iterations", "", "Outer iterations: rows of `history.csv`.",
-        lambda r: len(r.history.records), (SUMMARY, SWEEP),
+        lambda r: len(r.history), (SUMMARY, SWEEP),
     ),
     Quantity(
         "inner_iterations", "", "Linear solves in each of them, a list.",
-        lambda r: [r.inner for r in r.history.records],
+        lambda r: [r.inner for r in r.history],
     ),
     Quantity(
         "linear_solves", "", "Solves with the matrix of the whole body.",

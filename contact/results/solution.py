@@ -17,8 +17,7 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.linear.operator import Counters
-from contact.methods.load_stepping import LoadStep
-from contact.methods.report import IterationHistory, Outcome
+from contact.methods.report import Outcome, Record
 from contact.results.contacts import ContactShare, contact_columns, contact_shares
 from contact.results.error_estimate import Estimate
 from contact.results.fields import Deformation, DerivedFields, unknowns
@@ -38,7 +37,7 @@ from contact.results.resultants import (
     supports,
 )
 from contact.results.solved import ContactResult, Solved, contact_result
-from contact.problem.energy import Balance, StepEnd, balance, dissipated, step_end
+from contact.problem.energy import Balance, balance, dissipated
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -68,7 +67,7 @@ class StepRecord:
     row
         The columns of ``steps.csv``.
     enthalpy
-        Where the energy balance of the next step begins, see `problem.energy.Moment`.
+        Where the energy balance of the next step begins, see `problem.energy.Balance`.
     rounding
         Largest `rounding` of the residuals of a step so far, see `problem.kkt.Residuals`.
     """
@@ -96,28 +95,28 @@ class StepRecorder:
     """
 
     def __init__(self, problem: ContactProblem, last: StepRecord | None = None) -> None:
-        self._before = StepEnd.rest(problem)
+        self._problem, self._before = problem, Balance.rest(problem)
         if last is not None:
             here = problem.at(last.state.time, last.state.history)
-            self._before = step_end(here, last.state, self._before)
+            self._before = balance(here, last.state, self._before)
             self._before = replace(self._before, enthalpy=last.enthalpy)
         self._rounding = 0.0 if last is None else last.rounding
         self._driven = DrivenPart.of(problem)
 
-    def record(self, step: LoadStep) -> StepRecord:
+    def record(self, state: State, outcome: Outcome) -> StepRecord:
         """Return the record of a step that follows the last one. Collective."""
-        problem, state = step.problem, step.state
-        now = step_end(problem, state, self._before)
-        energies = balance(problem, state, self._before, now)
-        self._before = now
-        solution = Solution(problem, state, step.outcome, step.history, step.counters, "", {})
+        problem = self._problem.at(state.time, state.history)
+        self._before = energies = balance(problem, state, self._before)
+        solution = Solution(
+            problem, state, outcome, [*outcome.records], outcome.counters, "", {}
+        )
         solution.energies = energies
         if self._driven is not None:
             way, force = (find(problem, state) for find in (self._driven.way, self._driven.force))
             solution.driven = way, force
         row = values_of(STEPS, solution)
-        self._rounding = max(self._rounding, step.outcome.kkt.rounding)
-        return StepRecord(state, row, now.enthalpy, self._rounding)
+        self._rounding = max(self._rounding, outcome.kkt.rounding)
+        return StepRecord(state, row, energies.enthalpy, self._rounding)
 
 
 @dataclass(repr=False)
@@ -176,7 +175,7 @@ class Solution(Solved):
     """
 
     outcome: Outcome
-    history: IterationHistory
+    history: list[Record]
     counters: Counters
     method: str
     seconds: dict[str, float]

@@ -133,7 +133,7 @@ class FixedPoint(OuterLoop):
             self.r,
             self.options,
             self._norm,
-            self.history.poll,
+            self.recorder.poll,
         )
         # With frozen terms that is left then: their derivatives change the inner problem.
         self._stalled = result.stalled and not self._gap_derivative.included

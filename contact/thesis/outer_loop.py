@@ -16,7 +16,7 @@ import numpy as np
 
 from contact.linear.operator import Counters
 from contact.methods.options import LoopOptions
-from contact.methods.report import IterationHistory, Monitor, Outcome, Record
+from contact.methods.report import Monitor, Outcome, Record, Recorder
 from contact.methods.step_control import Best, Stagnation, undeformed_equilibrium
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate
@@ -67,8 +67,13 @@ class OuterLoop(ABC):
     def set_load_step(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
         self.problem, self.state = problem, problem.start()
-        self.history = IterationHistory(self.monitor)
+        self.recorder = Recorder(self.monitor)
         self.bound: Array = np.zeros(problem.interface.jump.gap.size)
+
+    @property
+    def history(self) -> list[Record]:
+        """The outer iterations of the last solves."""
+        return self.recorder.records
 
     @abstractmethod
     def _step(self, iteration: int) -> tuple[int, str]:
@@ -103,7 +108,7 @@ class OuterLoop(ABC):
             residual = self._measure(residuals)
             best.see((self.state, residuals), residual)
             change, seconds = self._update_bound(iteration), time.perf_counter() - begin
-            self.history.add(Record(iteration, inner, residuals, change, seconds, note))
+            self.recorder.add(Record(iteration, inner, residuals, change, seconds, note))
             if by_thesis and iteration > first and self._thesis_criterion(change, previous):
                 return self._outcome(residuals, criterion="the thesis's criterion is met")
             if not by_thesis and residual <= options.tolerance:

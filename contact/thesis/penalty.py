@@ -328,10 +328,10 @@ class Penalty(OuterLoop):
             )
         solver = self._solvers[symmetric]
         try:
-            return solver.solve(law, self.state, implicit, self.history.poll)
+            return solver.solve(law, self.state, implicit, self.recorder.poll)
         except SingularError:
             taken = solver.snes.getIterationNumber()
-            if taken == 0 and not self.history.records:
+            if taken == 0 and not self.history:
                 raise
             del self._solvers[symmetric]  # MUMPS does not begin anew after that
             return self.state.x, taken, LOST

@@ -85,7 +85,7 @@ def described(solution: Solution) -> dict[str, Any]:
     return {
         "unknowns": unknowns(solution.problem),
         "converged": solution.converged,
-        "outer": len(solution.history.records),
+        "outer": len(solution.history),
         "solves": solution.counters.linear_solves,
         "factorizations": solution.counters.factorizations,
         "linear_iterations": solution.counters.linear_iterations,

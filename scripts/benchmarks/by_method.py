@@ -54,7 +54,7 @@ def measured(case: Case) -> dict[str, Any]:
     counters = solution.counters
     return {
         "converged": solution.converged,
-        "outer": len(solution.history.records),
+        "outer": len(solution.history),
         "solves": counters.linear_solves,
         "factorizations": counters.factorizations,
         "contact solves": counters.contact_solves,

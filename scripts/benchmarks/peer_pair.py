@@ -114,7 +114,7 @@ def compare(mu: float, finer: int) -> dict[str, Any]:
         "apart": apart,
         "GetFEM: steps": int(steps),
         "seconds": seconds,
-        "ours: steps": len(solution.history.records),
+        "ours: steps": len(solution.history),
         "seconds ": own_seconds,
     }
 

@@ -37,9 +37,9 @@ def measured(case: Case, count: int) -> dict[str, Any]:
     problem = build_problem(case)
     method = Newton(problem, case.solver)
     solves, converged = 0, True
-    for step in LoadStepping(problem, method).run([*(np.arange(1, count + 1) / count)]):
-        solves += step.counters.contact_solves
-        converged &= step.outcome.converged
+    for _, outcome in LoadStepping(problem, method).run([*(np.arange(1, count + 1) / count)]):
+        solves += outcome.counters.contact_solves
+        converged &= outcome.converged
     return {
         "unknowns": unknowns(problem),
         "converged": converged,

@@ -133,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     found: dict[tuple[str, str], list[tuple[bool, int]]] = {}
     for number in range(COARSE_COUNT if given.coarse else COUNT):
         family, solution = solved(number)
-        notes = " ".join(record.note for record in solution.history.records)
+        notes = " ".join(record.note for record in solution.history)
         way = next((way for way in WAYS if way in notes), "none")
         counters = solution.counters
         solves = counters.contact_solves + counters.linear_solves

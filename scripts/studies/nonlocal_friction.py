@@ -73,12 +73,12 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         nodes, body, x = solution.problem.nodes, solution.problem.equilibrium, solution.state.x
         relative = errors(body, x, body.function(local.state.x)) / errors(body, x, None)
         status = nodes.gather(solution.status)
-        records = uzawa.history.records
+        records = uzawa.history
         force = solution.contact_force
         append(
             columns,
             label,
-            len(solution.history.records),
+            len(solution.history),
             solution.counters.factorizations,
             len(records),
             sum(r.inner for r in records),

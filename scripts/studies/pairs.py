@@ -65,7 +65,7 @@ def converges(given: Mapping[str, Any], compared: bool) -> tuple[bool, str]:
     """Solve a pair; return whether all is well, and the remarks."""
     case = parse_case({**given, "solver": {"tolerance": 1e-10}})
     solution = solve(case)
-    words = f"{len(solution.history.records)} iterations, {solution.outcome.reason}"
+    words = f"{len(solution.history)} iterations, {solution.outcome.reason}"
     if not solution.converged or not compared:
         return solution.converged, words
     other = solve(case, with_method(case.solver, FixedPointOptions))

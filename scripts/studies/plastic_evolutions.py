@@ -93,7 +93,7 @@ def main(first: int = 0, last: int = 60) -> None:
         case, described = evolution(number)
         solution = solve(case)
         failed += not solution.converged
-        steps, iterations = len(solution.steps), len(solution.history.records)
+        steps, iterations = len(solution.steps), len(solution.history)
         words = " | ".join(map(str, described.values()))
         more = f" ({steps - STAGES * STEPS} more)" if steps > STAGES * STEPS else ""
         end = f"{balance(solution):.1e}" if solution.converged else solution.outcome.reason

@@ -375,7 +375,7 @@ def newton(report: Report) -> None:
     solution = solve(case, NewtonOptions(tolerance=1e-12, keep="never", condense=False))
     assert solution.converged, solution.outcome.reason
     found: dict[str, list[float]] = {}
-    for record in solution.history.records:
+    for record in solution.history:
         step = f"t = {record.note.split()[2]}"
         found.setdefault(step, []).append(record.kkt.largest)
     most = max(map(len, found.values()))
@@ -421,7 +421,7 @@ def cost(report: Report, coarse: bool) -> None:
                     solution = solve(problem, settings, times=times)
                     seconds.append(time.process_time() - begin)
                     assert solution.converged, solution.outcome.reason
-                iterations = len(solution.history.records)
+                iterations = len(solution.history)
                 takes = min(seconds) / iterations
                 hencky_takes = takes if not parameters else hencky_takes
                 ratio = takes / hencky_takes

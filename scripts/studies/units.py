@@ -63,7 +63,7 @@ def numbers(solution: Solution, length: float, stress: float) -> Array:
 def counts(solution: Solution) -> tuple[int, ...]:
     """Return the quantities that must not depend on the units."""
     k = solution.counters
-    return (len(solution.history.records), k.factorizations, k.linear_solves, k.contact_solves)
+    return (len(solution.history), k.factorizations, k.linear_solves, k.contact_solves)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

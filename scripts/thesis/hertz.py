@@ -260,7 +260,7 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
             space.dofmap.index_map.size_global * space.dofmap.index_map_bs,
             *values.values(),
             found.peak / hertz.peak,
-            len(solution.history.records),
+            len(solution.history),
             solution.outcome.kkt.largest,
         )
         for key, value in values.items():

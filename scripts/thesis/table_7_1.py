@@ -67,14 +67,14 @@ def run(n: int, load: float, rho: float, *changes: str) -> Run:
     solution: Solution = solve(problem, case.solver)
     seconds = time.perf_counter() - begin
     # The frictionless start is record 0; a single loop has none.
-    records = [r for r in solution.history.records if r.iteration > 0]
+    records = [r for r in solution.history if r.iteration > 0]
 
     def first(limit: float) -> float:
         return next((r.iteration for r in records if r.change < limit), np.nan)
 
     return Run(
         outer=len(records),
-        inner=sum(r.inner for r in solution.history.records),
+        inner=sum(r.inner for r in solution.history),
         solves=solution.counters.linear_solves,
         factorizations=solution.counters.factorizations,
         residual=solution.outcome.kkt.largest,

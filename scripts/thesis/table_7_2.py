@@ -150,7 +150,7 @@ def checked(solution: Solution) -> Solution:
 
 
 def _counts(solution: Solution) -> tuple[int, int]:
-    records = solution.history.records
+    records = solution.history
     return len(records), sum(record.inner for record in records)
 
 

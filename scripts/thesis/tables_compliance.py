@@ -75,7 +75,7 @@ def run(case: Case, domain: Domain | None = None) -> Solution:
 
 def iterations(solution: Solution) -> tuple[float, float]:
     """Return the numbers of iterations to (3.46) and to residuals of 1e-8, NaN if not met."""
-    records = solution.history.records
+    records = solution.history
     still = [record.iteration for record in records if record.change < EPS_FP]
     if solution.converged and not still:
         # A run ends with its residuals: the next iteration is the first that moves no more.
@@ -111,7 +111,7 @@ def table_8_4(
             thesis,
             lagged[0],
             iterations(solution(*LAGGED, *EXACT, STEEP))[0],
-            literal.history.records[-1].iteration if met else np.nan,
+            literal.history[-1].iteration if met else np.nan,
             literal.outcome.kkt.largest,
             lagged[1],
             iterations(implicit)[1],
@@ -181,7 +181,7 @@ def values(solution: Solution) -> tuple[object, ...]:
     largest = np.max(body.comm.allgather(ends), axis=0)
     return (
         solution.converged,
-        solution.history.records[-1].iteration,
+        solution.history[-1].iteration,
         solution.counters.linear_solves,
         solution.outcome.kkt.largest,
         int(touching.sum()),

@@ -145,7 +145,7 @@ def other_rho(report: Report, cells: tuple[int, int]) -> None:
 def counted(solution: Solution) -> float:
     """Return the iterations until the thesis's criterion is met, NaN if it is not."""
     met = "criterion is met" in solution.outcome.reason
-    return solution.history.records[-1].iteration if met else np.nan
+    return solution.history[-1].iteration if met else np.nan
 
 
 def series(report: Report, number: str, cells: tuple[int, int]) -> None:
@@ -183,7 +183,7 @@ def values(solution: Solution) -> tuple[object, ...]:
     charges = charge_balance(problem, state)
     return (
         solution.converged,
-        solution.history.records[-1].iteration,
+        solution.history[-1].iteration,
         solution.counters.linear_solves,
         solution.outcome.kkt.largest,
         -nodes.maximum(-phi, -np.inf),

@@ -138,15 +138,15 @@ def test_too_little_memory_is_said_in_words(bar, capsys, monkeypatch):
 @pytest.mark.core
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_in_a_solve_keeps_what_there_is(bar, capsys, monkeypatch, number, status):
-    from contact.methods.report import IterationHistory
+    from contact.methods.report import Recorder
 
-    add = IterationHistory.add
+    add = Recorder.add
 
     def press(history, record):
         signal.raise_signal(number)
         add(history, record)
 
-    monkeypatch.setattr(IterationHistory, "add", press)
+    monkeypatch.setattr(Recorder, "add", press)
     out = bar.parent / "out"
     assert main(["solve", str(bar), "--out", str(out), "--quiet"]) == status
     assert json.loads((out / "summary.json").read_text())["converged"] is False

@@ -32,7 +32,7 @@ def test_interrupted_solve_keeps_its_results(shared_tmp_path: Path) -> None:
     solution = interrupt.value.solution
     assert solution.title == "Block"
     assert not solution.converged
-    assert solution.history.records[-1].iteration == 1
+    assert solution.history[-1].iteration == 1
     summary, rows = written(solution, shared_tmp_path)
     assert summary["reason"] == "interrupted (SIGINT)"
     assert len(rows) == 9
@@ -92,4 +92,4 @@ def test_a_solve_stops_between_inner_iterations(
     assert solution.outcome.signal == signal.SIGTERM
     summary, _ = written(solution, shared_tmp_path)
     assert summary["reason"] == "interrupted (SIGTERM)"
-    assert summary["outer_iterations"] == len(solution.history.records)
+    assert summary["outer_iterations"] == len(solution.history)

@@ -47,7 +47,7 @@ def test_fixed_formats(dim: int, degree: int, shared_tmp_path: Path) -> None:
     assert summary["slip_nodes"] == status.count("slip") > 0
     history = list(csv.DictReader((shared_tmp_path / "history.csv").open()))
     assert len(history) == summary["outer_iterations"]
-    records = solution.history.records
+    records = solution.history
     assert [len(row["steps"].split()) for row in history] == [len(r.steps) for r in records]
     known = [[int(n) for n in row["active_set"].split("/") if n] for row in history]
     assert known == [list(record.sizes or ()) for record in records]

@@ -15,7 +15,7 @@ from contact.cli.main import main
 from contact.errors import InputError
 from contact.io.checkpoint import Checkpoints, discard, kept_case, read_steps
 from contact.methods.newton import Newton
-from contact.methods.report import IterationHistory
+from contact.methods.report import Recorder
 from tests.problem.test_plasticity import block
 from tests.results.test_steps import case_of as steps_case
 
@@ -161,7 +161,7 @@ def test_all_steps_were_there(tmp_path):
     again = solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path)
     assert again.converged
     assert again.state.near(whole.state)
-    assert again.history.records == []
+    assert again.history == []
 
 
 def test_steps_of_an_earlier_run_are_not_gone_on_from(tmp_path, ended):
@@ -177,7 +177,7 @@ def test_steps_of_an_earlier_run_are_not_gone_on_from(tmp_path, ended):
         shutil.move(earlier / name, place)
     assert len(read_steps(tmp_path, solve(steps_case(), comm=SELF).problem)) == 2
     solution = solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path)
-    assert solution.converged and len(solution.history.records) > 0
+    assert solution.converged and len(solution.history) > 0
     assert len(read_steps(tmp_path, solution.problem)) == len(list(place.iterdir())) == 5
 
 
@@ -301,14 +301,14 @@ def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monk
         signal.raise_signal(signal.SIGINT)
         turn(self, problem)
 
-    record = IterationHistory.record
+    record = Recorder.record
 
     def nothing(self, *arguments, **named):
         self.poll()
         record(self, *arguments, **named)
 
     monkeypatch.setattr(Newton, "set_load_step", signalled)
-    monkeypatch.setattr(IterationHistory, "record", nothing)
+    monkeypatch.setattr(Recorder, "record", nothing)
     assert on_the_line("solve", case, "--out", out) == 130
     after = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
     assert after == before

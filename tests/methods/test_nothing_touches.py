@@ -34,10 +34,10 @@ def test_an_approach_of_two_blocks_takes_a_solve_a_step():
     problem = build_problem(parse_case(CASE), SELF)
     method = METHODS["newton"](problem, NewtonOptions(), None)
     steps = list(LoadStepping(problem, method).run([*(np.arange(1, 11) / 10)]))
-    assert all(step.outcome.converged for step in steps)
+    assert all(outcome.converged for _, outcome in steps)
     assert method.counters.factorizations == 1
-    assert steps[-1].outcome.reason == "all residuals <= 1e-08"
-    top = problem.equilibrium.nodal(steps[-1].state.x)[:, 1].min()
+    assert steps[-1][1].reason == "all residuals <= 1e-08"
+    top = problem.equilibrium.nodal(steps[-1][0].x)[:, 1].min()
     assert np.isclose(top, -0.001)
 
 
@@ -70,8 +70,8 @@ def test_an_evolution_that_lifts_off_takes_a_solve_a_step():
     problem = build_problem(parse_case(case), SELF)
     method = METHODS["newton"](problem, NewtonOptions(), None)
     steps = list(LoadStepping(problem, method).run([0.3, 0.6, 0.9, 1.2, 1.5, 1.8]))
-    assert all(step.outcome.converged for step in steps)
-    presses = [bool(step.state.forces.pressure.max() > 0) for step in steps]
+    assert all(outcome.converged for _, outcome in steps)
+    presses = [bool(state.forces.pressure.max() > 0) for state, _ in steps]
     assert presses == 3 * [True] + 3 * [False]
     assert method.counters.factorizations == 1
 
@@ -96,9 +96,9 @@ def test_two_blocks_unloaded_to_zero_end_at_zero(loads, condense):
     problem = build_problem(parse_case(case), SELF)
     method = METHODS["newton"](problem, NewtonOptions(condense=condense), None)
     steps = list(LoadStepping(problem, method).run([*(np.arange(1, 11) / 10)]))
-    assert all(step.outcome.converged for step in steps)
-    assert all(step.state.forces.pressure.max() > 0 for step in steps[:-1])
-    assert not steps[-1].state.x.any() and not steps[-1].state.forces.pressure.any()
+    assert all(outcome.converged for _, outcome in steps)
+    assert all(state.forces.pressure.max() > 0 for state, _ in steps[:-1])
+    assert not steps[-1][0].x.any() and not steps[-1][0].forces.pressure.any()
 
 
 def test_leaves_whose_loads_vanish_go_back_to_zero():
@@ -121,7 +121,7 @@ def test_leaves_whose_loads_vanish_go_back_to_zero():
     }
     problem = build_problem(parse_case(case), SELF, domain=leaves)
     method = METHODS["newton"](problem, NewtonOptions(), None)
-    pressed, gone = LoadStepping(problem, method).run([1.0, 2.0])
-    assert pressed.outcome.converged and pressed.state.forces.pressure.max() > 0
-    assert gone.outcome.converged and gone.state.forces.pressure.max() == 0
-    assert np.abs(gone.state.x).max() == 0
+    (pressed, first), (gone, last) = LoadStepping(problem, method).run([1.0, 2.0])
+    assert first.converged and pressed.forces.pressure.max() > 0
+    assert last.converged and gone.forces.pressure.max() == 0
+    assert np.abs(gone.x).max() == 0

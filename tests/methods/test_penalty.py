@@ -68,7 +68,7 @@ def test_without_friction_the_penetration_is_eps_times_the_pressure():
     penalty = Penalty(problem, PenaltyOptions(eps_contact=1e-5))
     state, outcome = penalty.solve()
     assert outcome.converged
-    assert len(penalty.history.records) == 1
+    assert len(penalty.history) == 1
     opening = problem.interface.opening(problem.nodal(state))
     touching = state.forces.pressure > 0
     assert np.allclose(opening[touching], -1e-5 * state.forces.pressure[touching])
@@ -95,7 +95,7 @@ def test_implicit_steps_take_over_early():
         bar(coefficient=SlipCoefficient(0.5, 0.2, 1e3)), PenaltyOptions(eps_contact=1e-7)
     )
     assert penalty.solve()[1].converged
-    assert len(penalty.history.records) <= 25
+    assert len(penalty.history) <= 25
 
 
 def test_small_eps_are_reached_from_larger_ones():
@@ -106,7 +106,7 @@ def test_small_eps_are_reached_from_larger_ones():
     penalty = Penalty(problem, PenaltyOptions(eps_contact=1e-9))
     smaller, outcome = penalty.solve(larger)
     assert outcome.converged, outcome.reason
-    assert len(penalty.history.records) <= 5
+    assert len(penalty.history) <= 5
     limit, outcome = FixedPoint(problem, FixedPointOptions(tolerance=1e-11)).solve(smaller)
     assert outcome.converged
     errors = [relative(problem, state.x, limit.x) for state in (larger, smaller)]
@@ -135,7 +135,7 @@ def test_thesis_stopping_counts_like_table_7_2():
         )
         penalty = Penalty(problem, options)
         assert penalty.solve()[1].converged
-        counts.append(len(penalty.history.records))
+        counts.append(len(penalty.history))
     assert counts == sorted(counts)
     assert 4 <= counts[0] <= 9
 
@@ -248,4 +248,4 @@ def test_rounding_ends_the_inner_iterations():
     assert not outcome.converged
     assert "the residual stalled at" in outcome.reason
     assert "eps_contact" in outcome.reason
-    assert sum(record.inner for record in penalty.history.records) < 500
+    assert sum(record.inner for record in penalty.history) < 500

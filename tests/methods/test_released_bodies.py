@@ -56,14 +56,14 @@ def test_an_evolution_ends_where_loads_let_the_body_go(press, push, when, why):
     """Steps that end beyond are not tried; the last one before is as near as halves come."""
     problem = lying(MPI.COMM_SELF, press, push)
     method = Newton(problem, NewtonOptions())
-    *complete, last = LoadStepping(problem, method).run(TIMES)
-    assert [step.state.time for step in complete[:3]] == [0.5, 1.0, 1.5]
-    assert all(step.outcome.converged for step in complete)
-    assert when - 0.5 / 16 <= complete[-1].state.time <= when * (1 + 1e-6)
-    assert not last.outcome.converged
+    *complete, (_, last) = LoadStepping(problem, method).run(TIMES)
+    assert [state.time for state, _ in complete[:3]] == [0.5, 1.0, 1.5]
+    assert all(outcome.converged for _, outcome in complete)
+    assert when - 0.5 / 16 <= complete[-1][0].time <= when * (1 + 1e-6)
+    assert not last.converged
     assert last.counters.linear_solves == 0
-    assert f"from t = {when:g} on the loads" in last.outcome.reason
-    assert why in last.outcome.reason
+    assert f"from t = {when:g} on the loads" in last.reason
+    assert why in last.reason
 
 
 def test_what_was_complete_remains():

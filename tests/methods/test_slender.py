@@ -51,7 +51,7 @@ def test_a_cantilever_that_touches_a_stop(case, force, nodes, fallback):
     assert solution.converged, solution.outcome.reason
     assert np.allclose(solution.contact_force, force, rtol=0, atol=1e-7 * np.abs(force).max())
     assert np.count_nonzero(solution.status != "open") == nodes
-    assert fallback in solution.history.records[-1].note
+    assert fallback in solution.history[-1].note
 
 
 def test_a_fine_mesh_of_a_long_beam_touches_at_a_working_set():
@@ -60,7 +60,7 @@ def test_a_fine_mesh_of_a_long_beam_touches_at_a_working_set():
     case = beam(1000.0, [400, 1], load, 0.1, 0.8, space={"degree": 2})
     solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
-    assert {record.note for record in solution.history.records} == {"", "working set"}
+    assert {record.note for record in solution.history} == {"", "working set"}
 
 
 @pytest.mark.parallel
@@ -75,7 +75,7 @@ def test_a_bridge_that_touches_at_several_nodes_is_that_of_an_interior_point(mu)
     with patch.object(fallbacks, "working_set", lambda *_: None):
         other = solve(parse_case(case))
     assert found.converged and other.converged
-    notes = [" ".join(r.note for r in s.history.records) for s in (found, other)]
+    notes = [" ".join(r.note for r in s.history) for s in (found, other)]
     assert "working set" in notes[0] and "interior point" not in notes[0]
     assert "interior point" in notes[1]
     touching = np.count_nonzero(found.status != "open")
@@ -101,7 +101,7 @@ def test_a_working_set_with_a_smoothed_pressure():
     case["friction"] = {"law": "coulomb", "mu": 0.3, "radius": 1.0}
     solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
-    assert "working set" in solution.history.records[-1].note
+    assert "working set" in solution.history[-1].note
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
@@ -120,7 +120,7 @@ def test_a_plate_over_a_gap_is_solved_without_its_dense_matrix(mu):
         for kind in ("auto", "iterative")
     )
     assert sparse.converged, sparse.outcome.reason
-    assert any("interior point" in record.note for record in sparse.history.records)
+    assert any("interior point" in record.note for record in sparse.history)
     assert np.count_nonzero(dense.status != "open") > 3
     size = np.abs(dense.contact_force).max()
     assert np.allclose(sparse.contact_force, dense.contact_force, rtol=0, atol=1e-7 * size)
@@ -143,7 +143,7 @@ def test_a_beam_clamped_at_both_ends_is_pressed_to_the_ground():
     case["fixed"].append({"on": "right", "displacement": [0.0, 0.0]})
     solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
-    assert "interior point" in solution.history.records[-1].note
+    assert "interior point" in solution.history[-1].note
     other = solve(parse_case({**case, "solver": {"method": "penalty", "eps_contact": 1e-2}}))
     assert np.allclose(solution.contact_force[1], other.contact_force[1], rtol=2e-2)
 
@@ -249,7 +249,7 @@ def test_half_of_the_steps_remain_for_the_condensed_body(most):
         solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
     assert solution.counters.contact_solves > 0
-    assert len(solution.history.records) <= most
+    assert len(solution.history) <= most
 
 
 @pytest.mark.core
@@ -282,7 +282,7 @@ def test_a_cantilever_takes_the_same_steps_in_any_units(length, stress):
         solution = solve(parse_case(case), comm=SELF)
         assert solution.converged, solution.outcome.reason
         counters = solution.counters
-        return len(solution.history.records), counters.linear_solves, counters.contact_solves
+        return len(solution.history), counters.linear_solves, counters.contact_solves
 
     assert counts(length, stress) == counts(1.0, 1.0)
 

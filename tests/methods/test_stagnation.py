@@ -42,7 +42,7 @@ def test_the_best_iterate_is_left_where_the_last_one_is_worse(
 
     def spoilt(*arguments):
         made = whole(*arguments)
-        if len(solver.history.records) < 3:
+        if len(solver.history) < 3:
             return made
         solver.state = kind(factor * solver.state.x, solver.state.forces)
         return made
@@ -52,7 +52,7 @@ def test_the_best_iterate_is_left_where_the_last_one_is_worse(
     assert not outcome.converged
     # The penalty method solves for equilibrium, and the laws hold as its penalties let them.
     name = "equilibrium" if method is Penalty else "largest"
-    sizes = [getattr(record.kkt, name) for record in solver.history.records]
+    sizes = [getattr(record.kkt, name) for record in solver.history]
     assert not sizes[-1] <= min(sizes[:-1])
     if stopping == "residual":
         assert outcome.kkt == evaluate(problem, state)

@@ -163,7 +163,7 @@ def test_slower_methods_work_at_the_contact_nodes_too():
     method = Newton(problem, NewtonOptions(tolerance=1e-10, max_iterations=2))
     assert method.solve()[1].converged
     assert method.counters.factorizations == 1
-    assert "interior point" in method.history.records[0].note
+    assert "interior point" in method.history[0].note
     assert np.allclose(
         method.state.forces.friction, reference.state.forces.friction, rtol=0, atol=1e-9
     )

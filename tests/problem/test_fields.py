@@ -86,8 +86,7 @@ def test_counts_and_residuals_in_any_units(method, linear):
         for unit, volt in zip(units, volts, strict=True)
     ]
     counts = [
-        (one.counters.linear_solves, one.counters.factorizations, len(one.history.records))
-        for one in found
+        (one.counters.linear_solves, one.counters.factorizations, len(one.history)) for one in found
     ]
     assert all(one.converged for one in found)
     assert len(set(counts)) == 1, counts

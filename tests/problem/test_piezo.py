@@ -130,6 +130,6 @@ def test_lagged_and_implicit_current_agree(k_e):
     for lagged in (False, True):
         problem = example(COMM, (16, 8), k_e=k_e, lagged=lagged)
         solver = solve(problem)
-        found.append((potential(problem, solver.state), len(solver.history.records)))
+        found.append((potential(problem, solver.state), len(solver.history)))
     assert np.allclose(found[0][0], found[1][0], rtol=1e-7, atol=1e-7)
     assert found[0][1] <= found[1][1]

@@ -6,13 +6,14 @@ from mpi4py import MPI
 from contact.body.description import Body
 from contact.interface.obstacle import GapFunction
 from contact.mesh.grid import rectangle
-from contact.methods.load_stepping import LoadStep, LoadStepping
+from contact.methods.load_stepping import LoadStepping
 from contact.methods.method import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Fixed
 from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import constant
@@ -26,12 +27,12 @@ def tabulated(times, values):
     return lambda time: float(np.interp(time, times, values))
 
 
-def steps_of(problem, times, options=TIGHT["newton"], start=None) -> list[LoadStep]:
-    """Return all steps, which have to converge."""
+def steps_of(problem, times, options=TIGHT["newton"], start=None) -> list[State]:
+    """Return the states at the ends of all steps, which have to converge."""
     method = METHODS[options.method](problem, options, None)
     steps = list(LoadStepping(problem, method, start).run(times))
-    assert all(step.outcome.converged for step in steps)
-    return steps
+    assert all(outcome.converged for _, outcome in steps)
+    return [state for state, _ in steps]
 
 
 #: Press, shear to and fro, unload.

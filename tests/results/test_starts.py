@@ -32,7 +32,7 @@ def test_a_solution_is_found_again_at_once(options):
     cold = solve(problem, options)
     warm = solve(problem, options, start=cold.state)
     assert cold.converged and warm.converged
-    assert sum(r.inner for r in warm.history.records) < sum(r.inner for r in cold.history.records)
+    assert sum(r.inner for r in warm.history) < sum(r.inner for r in cold.history)
     assert warm.contact_force == pytest.approx(cold.contact_force, rel=1e-6)
     assert (cold.start, warm.start) == ("the zero initial guess", "the state that was given")
 

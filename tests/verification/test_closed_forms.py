@@ -87,5 +87,5 @@ def test_rotation_changes_nothing(name, dim, axis, degree):
     assert turned.state.forces.pressure == pytest.approx(straight.state.forces.pressure, abs=1e-11)
     friction = turned.state.forces.friction @ turn(dim, 30.0, axis)
     assert np.abs(friction - straight.state.forces.friction).max() < 1e-11
-    inner = [[record.inner for record in loop.history.records] for loop in (turned, straight)]
+    inner = [[record.inner for record in loop.history] for loop in (turned, straight)]
     assert len(inner[0]) == len(inner[1])

@@ -91,7 +91,7 @@ def test_lagged_charge_has_the_same_limit(dim):
     problem = column.problem(COMM, dim, lagged=True)
     solver = solve(problem)
     assert max(errors(solver, column, SCALED)) < 1e-10
-    assert len(solver.history.records) > 3
+    assert len(solver.history) > 3
 
 
 @pytest.mark.core
@@ -113,7 +113,7 @@ def test_units_do_not_matter(name, dim):
         problem = column.problem(COMM, dim, units, mu=0.2)
         solver = solve(problem)
         phi = potential(problem, solver.state) / units.potential
-        steps = [record.inner for record in solver.history.records]
+        steps = [record.inner for record in solver.history]
         runs.append((problem.nodal(solver.state)[:, :dim], phi, steps))
     assert np.allclose(runs[0][0], runs[1][0], rtol=1e-8, atol=1e-8)
     assert np.allclose(runs[0][1], runs[1][1], rtol=1e-8, atol=1e-8)

@@ -119,7 +119,7 @@ def test_units_do_not_matter(law):
             )
         problem = example(COMM, (32, 16), friction=SLIP, law=material, units=units)
         solver = solve(problem)
-        steps = [record.inner for record in solver.history.records]
+        steps = [record.inner for record in solver.history]
         runs.append((solver.state.forces.pressure / units.stress, steps))
         runs[-1] += (potential(problem, solver.state) / units.potential,)
     assert np.allclose(runs[0][0], runs[1][0], rtol=1e-8)

@@ -86,7 +86,7 @@ def solved(problem: Problem, method: str, first: Solution | None, folder: Path) 
 
 
 def _fallbacks(solution: Solution) -> set[str]:
-    notes = {record.note for record in solution.history.records}
+    notes = {record.note for record in solution.history}
     for word in OWN:
         notes = {note.replace(word, "").strip(" ,") for note in notes}
     return notes - {""}
