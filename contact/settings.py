@@ -61,6 +61,11 @@ class Internal:
     """Marks a setting that is for Python alone: the case file does not offer it."""
 
 
+@dataclass(frozen=True)
+class Required:
+    """Marks a setting that the case file requires, where Python has another one for it."""
+
+
 #: Marks a list with as many numbers as space.
 SPATIAL = "spatial"
 

@@ -14,10 +14,10 @@ from contact.body.description import Body, Material
 from contact.case.file import REPLACEABLE, Case
 from contact.errors import InputError
 from contact.interface.layer import Layer
-from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain, revolved
 from contact.model.body import Bolt, Electrode, Fixed, Load
 from contact.model.friction import Friction
+from contact.model.obstacle import Obstacle
 from contact.model.rigid import Motion, Rigid
 from contact.problem.checks import check_problem, check_supports
 from contact.problem.contact import Contact

@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from contact.arguments import expect, naming
-from contact.case.data import read_data
-from contact.errors import InputError
-from contact.interface import obstacle
 from contact.interface.law import Conductor
 from contact.interface.layer import Layer
-from contact.interface.obstacle import GapFunction, Obstacle, Shape
-from contact.interface.obstacle.triangles import read_stl
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import area, volume
 from contact.mesh.together import meet
+from contact.model import obstacle
 from contact.model.fields import steady
 from contact.model.formula import Expression, as_number
 from contact.model.friction import Friction
 from contact.model.messages import Words, fault
+from contact.model.obstacle import GapFunction, Obstacle
 from contact.model.rigid import Motion
 from contact.model.section import (
     AmplitudeName,
     Direction,
-    File,
     Formula,
     FromTable,
     Part,
@@ -38,135 +31,9 @@ from contact.model.section import (
     TimeFormula,
 )
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
-from contact.typing import Array
 from forms import laws
 
-
-class Distance(Section):
-    """`foundation = { shape = "distance", ... }`: any rigid shape by a formula."""
-
-    only: ClassVar[int | None] = None
-
-    shape: Literal["distance"]
-    """A body where a formula is negative."""
-    distance: Formula
-    """Signed distance, positive outside. Where its slope is not 1 it is divided by that."""
-
-    def build(self) -> Shape:
-        """Return the shape itself."""
-        return obstacle.Level(partial(_quiet, self.distance))
-
-
-class Surface(Section):
-    """`foundation = { shape = "surface", ... }`: rigid surface of triangles, in 3-D."""
-
-    only: ClassVar[int | None] = 3
-
-    shape: Literal["surface"]
-    """A surface of an STL file."""
-    file: Annotated[File, Accepted("an STL file")]
-    """STL file, binary or text, its normals towards the body. Relative to the case file."""
-
-    def build(self) -> Shape:
-        """Read the shape."""
-        return obstacle.Triangles(read_stl(self.file))
-
-
-class HeightMap(Section):
-    """`foundation = { shape = "heights", ... }`: a measured surface, by its heights."""
-
-    only: ClassVar[int | None] = None
-
-    shape: Literal["heights"]
-    """A body below heights along the last axis, smooth between them (cubic splines)."""
-    file: Annotated[File, Accepted("a CSV file, or a .npy file with an array of heights")]
-    """CSV file with a row of names and the columns x, y (3-D: x, y, z, at all points of a grid); or
-    a NumPy array of heights, an image for instance. Relative to the case file. A warning tells the
-    share of the contact that lies beyond them, or in a hole."""
-    spacing: Annotated[
-        list[Positive] | None, Accepted("distances > 0, one per direction of the array")
-    ] = None
-    """Distances of the points of an array: along its first axis, which is x, and in 3-D along its
-    second, y. Required for an array."""
-    origin: Annotated[list[float] | None, Accepted("numbers, one per direction of the array")] = (
-        None
-    )
-    """Place of the first point of an array. Default: zeros."""
-    above: Switch = False
-    """Whether the rigid body lies above the heights, and the elastic one below."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        for key in ("spacing", "origin"):
-            if getattr(self, key) is not None and not self._is_array:
-                accepted = "that of a .npy file alone: the rows of a CSV file have their places"
-                raise fault(key, getattr(self, key), accepted)
-        return self
-
-    @property
-    def _is_array(self) -> bool:
-        return self.file.endswith(".npy")
-
-    def build(self) -> Shape:
-        """Read the heights."""
-        places, heights = self._array() if self._is_array else self._columns()
-        with naming(self.file):
-            return obstacle.Heights(places, heights, above=self.above)
-
-    def _array(self) -> tuple[tuple[Array, ...], Array]:
-        try:
-            heights = np.asarray(np.load(self.file), dtype=float)
-        except (OSError, ValueError, EOFError) as error:
-            raise InputError(
-                f"{self.file}: {error}; accepted: a NumPy array of heights", "heights"
-            ) from None
-        spacing, origin = self.spacing or [], self.origin or [0.0] * heights.ndim
-        one = f"{heights.ndim} numbers, one per direction of the array"
-        for key, given in (("spacing", spacing), ("origin", origin)):
-            expect(f"foundation.{key}", given, one, len(given) == heights.ndim)
-        steps = zip(origin, spacing, heights.shape, strict=True)
-        return tuple(first + step * np.arange(n) for first, step, n in steps), heights
-
-    def _columns(self) -> tuple[tuple[Array, ...], Array]:
-        columns = read_data(self.file)
-        names = [name for name in "xyz" if name in columns]
-        accepted = "columns x, y in the plane, x, y, z in 3-D"
-        expect(self.file, f"columns {', '.join(columns)}", accepted, len(names) > 1)
-        *across, heights = (columns[name] for name in names)
-        order = np.lexsort(across[::-1])
-        places = tuple(np.unique(values) for values in across)
-        shape = tuple(axis.size for axis in places)
-        made = f"the grid of {' by '.join(map(str, shape))} points that their coordinates make"
-        if math.prod(shape) > 4 * len(heights):  # scattered points
-            raise InputError(
-                f"{self.file}: {len(heights)} points of {made}; accepted: each point of a grid "
-                "once",
-                "heights",
-            )
-        grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(across))
-        given = np.column_stack(across)[order]
-        if given.shape != grid.shape or np.any(given != grid):
-            known, counts = np.unique(given, axis=0, return_counts=True)
-            twice = known[counts > 1]
-            missing = {*map(tuple, grid.tolist())} - {*map(tuple, known.tolist())}
-            one = twice[0].tolist() if twice.size else min(missing)
-            where = f"({', '.join(f'{x:g}' for x in one)})"
-            said = f"{where} stands twice" if twice.size else f"no height at {where}"
-            raise InputError(
-                f"{self.file}: {said}, of {made}; accepted: each point of a grid once", "heights"
-            )
-        return places, heights[order].reshape(shape)
-
-
-def _quiet(expression: Expression, points: Array) -> Array:
-    """Return values at points of shape (n, d), NaN for none: ranks ask at points of their own."""
-    try:
-        return expression.numpy(points)
-    except InputError:
-        return np.full(len(points), np.nan)
-
-
-#: A further shape is a dataclass in `contact.interface.obstacle` with its name as `shape`.
+#: A further shape is a dataclass in `contact.model.obstacle` with its name as `shape`.
 Foundation: TypeAlias = Annotated[
     Annotated[obstacle.Plane, FromTable]
     | Annotated[obstacle.Sphere, FromTable]
@@ -174,9 +41,9 @@ Foundation: TypeAlias = Annotated[
     | Annotated[obstacle.Cone, FromTable]
     | Annotated[obstacle.Paraboloid, FromTable]
     | Annotated[obstacle.Punch, FromTable]
-    | Distance
-    | HeightMap
-    | Surface,
+    | Annotated[obstacle.Level, FromTable]
+    | Annotated[obstacle.Heights, FromTable]
+    | Annotated[obstacle.Triangles, FromTable],
     Field(discriminator="shape"),
 ]
 
@@ -338,9 +205,7 @@ class Contact(Section):
         if self.foundation is None:
             assert self.gap is not None  # filled in
             return GapFunction.of(self.gap)
-        given = self.foundation
-        shape = given.build() if isinstance(given, Section) else given
-        return replace(shape, direction=self.direction, along=self.axis or ())
+        return replace(self.foundation, direction=self.direction, along=self.axis or ())
 
     def compliant_layer(self) -> Layer | None:
         """Return the layer in front of the rigid foundation; None without one."""

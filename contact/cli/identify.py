@@ -10,13 +10,13 @@ import matplotlib
 import numpy as np
 from mpi4py import MPI
 
-from contact.case.data import read_data
 from contact.case.file import load_case
 from contact.cli.main import CONVERGED
 from contact.cli.progress import progress
 from contact.derivatives.identification import TIME, Identified, identify
 from contact.errors import InputError
 from contact.io.folder import on_root
+from contact.model.data import read_data
 from contact.plot.style import BLUE, GREY, ORANGE, STYLE, sheet
 from contact.typing import Array
 

@@ -16,12 +16,12 @@ from contact.interface.mortar.coupling import Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, contact_directions
-from contact.interface.obstacle import Obstacle
-from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at, components, owned_among
 from contact.mesh.owners import Owners
+from contact.model.obstacle import Obstacle
+from contact.model.obstacle.protocol import measured
 from contact.tolerances import ROUNDING, TOUCHING
 from contact.typing import Array
 

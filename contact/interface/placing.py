@@ -16,11 +16,11 @@ from contact.errors import InputError, counted
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, contact_directions
-from contact.interface.obstacle import Obstacle, Shape
-from contact.interface.obstacle.protocol import measured
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
+from contact.model.obstacle import Obstacle, Shape
+from contact.model.obstacle.protocol import measured
 from contact.ranks import on_all_ranks
 from contact.typing import Array
 

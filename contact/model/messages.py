@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError, PydanticUndefined
 
 from contact.errors import InputError, clipped, nearest, shown
-from contact.settings import Accepted, Internal
+from contact.settings import Accepted, Internal, Required
 
 #: Most characters of a key, a path of keys, and a list of accepted names.
 KEY, PATH, LIST = 60, 100, 300
@@ -105,22 +105,30 @@ def sections_of(annotation: Any) -> dict[str, type]:
 @cache
 def keys_of(section: type) -> Mapping[str, FieldInfo]:
     """Return the keys of a section, or of a class of options, as in the case file."""
+    return {field.alias or name: field for name, field in fields_of(section).items()}
+
+
+@cache
+def fields_of(section: type) -> Mapping[str, FieldInfo]:
+    """Return the same by the names of the attributes."""
     if issubclass(section, BaseModel):
-        return {field.alias or name: field for name, field in section.model_fields.items()}
+        return section.model_fields
     options: Any = section
-    hints, keys = get_type_hints(options, include_extras=True), {}
+    hints, found = get_type_hints(options, include_extras=True), {}
     meanings: dict[str, str] = {}
     for base in reversed(section.__mro__):  # under "Attributes" in their docstrings
         text = inspect.cleandoc(base.__doc__ or "").partition("Attributes\n----------\n")[2]
         for names, said in re.findall(r"^(\w+(?:, \w+)*)\n((?:[ ]+.*\n?|\n)+)", text, re.MULTILINE):
             meanings |= dict.fromkeys(names.split(", "), " ".join(said.split()))
     for field in fields(options):
-        if any(isinstance(mark, Internal) for mark in get_args(hints[field.name])[1:]):
+        marks = get_args(hints[field.name])[1:]
+        if any(isinstance(mark, Internal) for mark in marks):
             continue
-        default = PydanticUndefined if field.default is MISSING else field.default
-        keys[field.name] = FieldInfo.from_annotated_attribute(hints[field.name], default)
-        keys[field.name].description = meanings.get(field.name, "")
-    return keys
+        needed = field.default is MISSING or any(isinstance(mark, Required) for mark in marks)
+        default = PydanticUndefined if needed else field.default
+        found[field.name] = FieldInfo.from_annotated_attribute(hints[field.name], default)
+        found[field.name].description = meanings.get(field.name, "")
+    return found
 
 
 def kinds_of(sections: Iterable[type]) -> tuple[str, dict[str, type]]:

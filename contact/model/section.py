@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import is_dataclass
 from functools import cache
 from pathlib import Path
@@ -56,8 +56,17 @@ from contact.errors import InputError
 from contact.mesh import together
 from contact.model.fields import Amplitude, Field, GivenAmplitude, Moving, field, own_amplitude
 from contact.model.formula import Expression, of_time
-from contact.model.messages import Words, accepted_by, describe, fault, keys_of, shown
+from contact.model.messages import (
+    Words,
+    accepted_by,
+    describe,
+    fault,
+    fields_of,
+    keys_of,
+    shown,
+)
 from contact.settings import SPATIAL, Accepted, Number, ReadWith
+from contact.typing import Array
 
 Table = TypeVar("Table")
 One = TypeVar("One")
@@ -76,6 +85,7 @@ class Section(BaseModel):
         extra="forbid",
         strict=True,
         allow_inf_nan=False,
+        arbitrary_types_allowed=True,  # objects of Python
         populate_by_name=True,
         validate_default=False,
         use_attribute_docstrings=True,
@@ -171,7 +181,11 @@ class FromTable:
         inner = schema["schema"]
         while "fields" not in inner:
             inner = inner["schema"]
-        inner["fields"] = [field for field in inner["fields"] if field["name"] in keys_of(source)]
+        known = fields_of(source)
+        inner["fields"] = [entry for entry in inner["fields"] if entry["name"] in known]
+        for entry in inner["fields"]:
+            if known[entry["name"]].is_required() and entry["schema"]["type"] == "default":
+                entry["schema"] = entry["schema"]["schema"]
         return core_schema.no_info_before_validator_function(_with_tuples, schema)
 
 
@@ -209,10 +223,9 @@ def walk(
 @cache
 def _marked(of: Any) -> tuple[tuple[str, str, tuple[Any, ...]], ...]:
     """Return the fields of a kind of table, their keys, and the marks of their types."""
-    fields = of.model_fields if issubclass(of, BaseModel) else keys_of(of)
     return tuple(
         (name, field.alias or name, (*field.metadata, *_marks(field.annotation)))
-        for name, field in fields.items()
+        for name, field in fields_of(of).items()
     )
 
 
@@ -415,6 +428,14 @@ Axis: TypeAlias = Annotated[
 
 Formula: TypeAlias = Annotated[
     Expression,
+    PlainValidator(_expression),
+    _as_source,
+    Accepted("a number or a formula"),
+    WithJsonSchema(_FORMULA),
+]
+#: The same; in Python a function of points of shape (n, d) too.
+FormulaOrFunction: TypeAlias = Annotated[
+    Expression | Callable[[Array], Array] | str,
     PlainValidator(_expression),
     _as_source,
     Accepted("a number or a formula"),

@@ -10,10 +10,10 @@ import numpy as np
 from contact.arguments import expect, fill
 from contact.interface.law import Conductor
 from contact.interface.layer import Layer
-from contact.interface.obstacle import GapFunction, Obstacle
 from contact.mesh.together import part
 from contact.model.fields import Static
 from contact.model.friction import Friction
+from contact.model.obstacle import GapFunction, Obstacle
 
 
 @dataclass(frozen=True)

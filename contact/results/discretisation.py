@@ -14,7 +14,7 @@ from contact.body.elements import MEAN_DILATATION, unlocked
 from contact.errors import counted
 from contact.interface.mortar.search import nearest
 from contact.interface.mortar.surface import Surface, surface_of
-from contact.interface.obstacle import Heights, Shape
+from contact.model.obstacle import Heights, Shape
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import ALIKE_NORMALS
 from contact.mesh.entities import cells_at, exterior_facets
@@ -223,7 +223,7 @@ def without_heights(
 def _known(shape: Heights) -> str:
     """Return where there are heights, in words."""
     found = []
-    for name, axis, gaps in zip("xy", shape.places, shape.gaps, strict=False):
+    for name, axis, gaps in zip("xy", shape.grid[0], shape.gaps, strict=False):
         holes = [f"{begin:.4g} to {end:.4g}" for begin, end in gaps[1:-1]]
         but = f" but {' and '.join(holes)}" if holes else ""
         found.append(f"{name} from {axis[0]:.4g} to {axis[-1]:.4g}{but}")

@@ -13,10 +13,10 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.body.description import Body, Material
-from contact.interface.obstacle import GapFunction
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.model.body import Fixed, Load
+from contact.model.obstacle import GapFunction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

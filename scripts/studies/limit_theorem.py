@@ -16,7 +16,7 @@ import numpy as np
 
 from contact import Case, NotConvergedError, build_problem, load_case
 from contact.interface.layer import Layer
-from contact.interface.obstacle import GapFunction
+from contact.model.obstacle import GapFunction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.typing import Array

@@ -9,9 +9,9 @@ import pytest
 from contact.case.file import load_case, parse_case
 from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.interface.obstacle import Sphere
 from contact.model.formula import Expression
 from contact.model.friction import SlipLaw
+from contact.model.obstacle import Sphere
 from tests.problems.bar import BAR, changed
 from tests.problems.messages import message_of
 

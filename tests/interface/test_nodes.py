@@ -9,12 +9,12 @@ from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.interface.obstacle import GapFunction, Level, Plane, Sphere
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
 from contact.model.body import Fixed, Load
 from contact.model.friction import Friction
+from contact.model.obstacle import GapFunction, Level, Plane, Sphere
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.resultants import supports

@@ -8,7 +8,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact.body.description import Body
-from contact.interface.obstacle import Plane
 from contact.linear import aggregation
 from contact.linear.aggregation import Aggregation, tentative
 from contact.linear.layout import hidden, options
@@ -16,6 +15,7 @@ from contact.linear.multigrid import DEFAULTS, held_motions
 from contact.linear.operator import SparseOperator
 from contact.mesh.grid import box
 from contact.model.body import Fixed, Load
+from contact.model.obstacle import Plane
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

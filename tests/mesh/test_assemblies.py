@@ -10,12 +10,12 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Material
 from contact.cli.main import BAD_INPUT, main
-from contact.interface.obstacle import GapFunction
 from contact.mesh.domain import Domain
 from contact.mesh.reader import from_file
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
+from contact.model.obstacle import GapFunction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -10,13 +10,13 @@ from contact import solve
 from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.interface.obstacle import GapFunction, Plane
 from contact.interface.penalised import PenalisedLaw, Regularisation
 from contact.mesh import grid as domain
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.model.body import Fixed, Load
 from contact.model.formula import Expression
 from contact.model.friction import Friction
+from contact.model.obstacle import GapFunction, Plane
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint

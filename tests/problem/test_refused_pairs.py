@@ -9,9 +9,9 @@ from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.cli.check import expectations
 from contact.errors import InputError
-from contact.interface.obstacle import GapFunction
 from contact.interface.pairing import find_pair
 from contact.model.body import Fixed
+from contact.model.obstacle import GapFunction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

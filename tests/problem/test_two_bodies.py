@@ -7,12 +7,12 @@ from mpi4py import MPI
 from contact import parse_case, solve
 from contact.body.description import Body, Material
 from contact.errors import InputError, SingularError
-from contact.interface.obstacle import GapFunction
 from contact.linear.operator import SparseOperator
 from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
 from contact.model.body import Fixed, Load
 from contact.model.friction import Friction
+from contact.model.obstacle import GapFunction
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

@@ -9,7 +9,6 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.case.build import build_problem
-from contact.interface.obstacle import GapFunction, Plane
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
@@ -17,6 +16,7 @@ from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
 from contact.model.body import Fixed, Load
 from contact.model.friction import Friction
+from contact.model.obstacle import GapFunction, Plane
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint

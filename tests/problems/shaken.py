@@ -4,13 +4,13 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.interface.obstacle import GapFunction
 from contact.mesh.grid import rectangle
 from contact.methods.load_stepping import LoadStepping
 from contact.methods.method import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Fixed
 from contact.model.friction import Friction
+from contact.model.obstacle import GapFunction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from contact import parse_case, solve
 from contact.body.description import Body
 from contact.model.body import Fixed, Load
-from contact.interface.obstacle import GapFunction
+from contact.model.obstacle import GapFunction
 from contact.methods.options import NewtonOptions
 from contact.plot.figures import figures_of
 from contact.plot.run import read_grid, read_run

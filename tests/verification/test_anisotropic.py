@@ -6,12 +6,12 @@ from mpi4py import MPI
 
 from contact import solve
 from contact.body.description import Body
-from contact.interface.obstacle import Plane
 from contact.library.materials import find
 from contact.mesh.grid import box, rectangle
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
 from contact.model.friction import Friction
+from contact.model.obstacle import Plane
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.crystal import PLANE, about_z

@@ -14,12 +14,12 @@ from mpi4py import MPI
 from contact.body.description import Body
 from contact.errors import InputError
 from contact.interface import pairing
-from contact.interface.obstacle import Sphere
 from contact.mesh.cells import SHAPES, rule, shape_of
 from contact.mesh.geometry import area, geometry_nodes, inverse, jacobians, sizes, volume, volumes
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
+from contact.model.obstacle import Sphere
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated

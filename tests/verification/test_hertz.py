@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("gmsh")
-from contact.interface.obstacle import Sphere
 from contact.methods.options import OPTIONS, with_method
+from contact.model.obstacle import Sphere
 from scripts.thesis import hertz
 
 

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from contact import parse_case, solve
 from contact.errors import InputError
-from contact.interface.obstacle import Heights
+from contact.model.obstacle import Heights
 
 COMM = MPI.COMM_WORLD
 YOUNG, POISSON = 10.0, 0.3
@@ -112,7 +112,7 @@ def test_arrays_and_columns_are_one_surface(tmp_path, file):
             "contact": {"on": "bottom", "foundation": foundation},
         }
     )
-    shape = case.contact.foundation.build()
+    shape = case.contact.foundation
     points = np.random.default_rng(1).uniform([0.5, -1, -1], [2.5, 1, 1], (20, 3))
     known = Heights((x, y), heights).distance(points)
     for one, other in zip(shape.distance(points), known, strict=True):

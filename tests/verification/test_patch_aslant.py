@@ -30,9 +30,9 @@ from contact import (
     solve,
 )
 from contact.derivatives.differences import Parameter
-from contact.interface.obstacle import GapFunction
 from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
+from contact.model.obstacle import GapFunction
 from contact.model.rigid import Motion
 from contact.results.differentiable import named_quantities
 from contact.results.resultants import contact_resultant, supports

@@ -7,12 +7,12 @@ import pytest
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.interface.obstacle import Plane
 from contact.mesh.domain import revolved
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
 from contact.model.friction import Friction
+from contact.model.obstacle import Plane
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields

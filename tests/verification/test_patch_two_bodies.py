@@ -11,7 +11,6 @@ from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from contact.body.description import Body, Material
-from contact.interface.obstacle import GapFunction
 from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, revolved
 from contact.mesh.reader import from_file
@@ -19,6 +18,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
 from contact.model.friction import Friction
+from contact.model.obstacle import GapFunction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields

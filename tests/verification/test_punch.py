@@ -8,12 +8,12 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.errors import InputError
-from contact.interface.obstacle import Plane
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
+from contact.model.obstacle import Plane
 from contact.model.rigid import Motion, Rigid
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

@@ -8,10 +8,10 @@ from mpi4py import MPI
 
 from contact import solve
 from contact.body.description import Body
-from contact.interface.obstacle import Sphere
 from contact.mesh.grid import box
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed
+from contact.model.obstacle import Sphere
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.surface import contact_table

@@ -4,9 +4,9 @@ Each shape has its signed distance with normals, and its chord rule; gaps along 
 follow (`protocol.Shape`).
 """
 
-from contact.interface.obstacle.heights import Heights
-from contact.interface.obstacle.protocol import GapFunction, Obstacle, Shape
-from contact.interface.obstacle.shapes import (
+from contact.model.obstacle.heights import Heights
+from contact.model.obstacle.protocol import GapFunction, Obstacle, Shape
+from contact.model.obstacle.shapes import (
     Cone,
     Cylinder,
     Level,
@@ -15,7 +15,7 @@ from contact.interface.obstacle.shapes import (
     Punch,
     Sphere,
 )
-from contact.interface.obstacle.triangles import Triangles
+from contact.model.obstacle.triangles import Triangles
 
 __all__ = [
     "Cone",

@@ -7,16 +7,19 @@ follows from it.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from numbers import Real
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Gt, Lt
+from pydantic import Field
 
-from contact.arguments import expect, real
-from contact.interface.obstacle.protocol import Shape
+from contact.arguments import expect, fill, real
+from contact.errors import InputError
+from contact.model.formula import Expression
+from contact.model.obstacle.protocol import Shape
+from contact.model.section import FormulaOrFunction
 from contact.settings import Accepted, Direction, NonNegative, Positive, Switch, Vector
 from contact.tolerances import EPS
 from contact.typing import Array
@@ -268,22 +271,26 @@ STEP = EPS ** (1 / 3)
 
 @dataclass(frozen=True)
 class Level(Shape):
-    """A rigid body where a function is negative.
+    """A rigid body where a function is negative: a formula, or one of points of shape (n, d).
 
-    Parameters
+    Attributes
     ----------
     function
-        Signed distance of points of shape (n, d), positive outside, shape (n,). Its slope need
-        not be 1: it is divided by it, which is exact on the surface, and nearly so close to it.
+        Signed distance, positive outside. Where its slope is not 1 it is divided by that, which is
+        exact on the surface, and nearly so close to it.
     """
 
-    function: Callable[[Array], Array]
+    function: Annotated[FormulaOrFunction, Field(alias="distance")]
+    shape: Literal["distance"] = field(default="distance", kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse an object that is no function."""
         super().__post_init__()
-        words = "a function of points of shape (n, d)"
-        expect("Level: function", self.function, words, callable(self.function))
+        if isinstance(self.function, str):
+            fill(self, function=Expression(self.function))
+        words = "a formula, or a function of points of shape (n, d)"
+        fits = isinstance(self.function, Expression) or callable(self.function)
+        expect("Level: function", self.function, words, fits)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals; NaN where the function has no slope."""
@@ -302,5 +309,11 @@ class Level(Shape):
         count, d = points.shape
         # A rank without points asks too: mistakes are found by all.
         asked = points if count > 0 else np.zeros((d + 1, d))
+        if isinstance(self.function, Expression):
+            try:
+                return self.function.numpy(asked)[:count]
+            except InputError:  # no value at one of them: ranks ask at points of their own
+                return np.full(count, np.nan)
         words = f"one number for each of the points, an array of shape {asked.shape}"
+        assert callable(self.function)
         return real(self.function(asked), asked.shape[:1], words)[:count]

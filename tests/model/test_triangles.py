@@ -12,13 +12,13 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.errors import InputError
-from contact.interface.obstacle import (
+from contact.mesh.domain import from_mesh
+from contact.model.body import Fixed
+from contact.model.obstacle import (
     Level,
     Triangles,
 )
-from contact.interface.obstacle.triangles import read_stl
-from contact.mesh.domain import from_mesh
-from contact.model.body import Fixed
+from contact.model.obstacle.triangles import read_stl
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

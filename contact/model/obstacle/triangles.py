@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.arguments import expect, one_of
 from contact.errors import InputError
-from contact.interface.obstacle.protocol import Shape
+from contact.model.obstacle.protocol import Shape
+from contact.model.section import File
+from contact.settings import Accepted, Internal, Required
 from contact.typing import Array
 
 
@@ -23,15 +26,33 @@ class Triangles(Shape):
     The sign of the distance is that of the side of an angle-weighted pseudonormal (Baerentzen and
     Aanaes, IEEE Trans. Vis. Comput. Graph. 11 (2005) 243).
 
-    Parameters
+    Attributes
     ----------
     corners
-        Shape (m, 3, 3). None is degenerate.
+        Shape (m, 3, 3), none degenerate. Or a file:
+    file
+        STL file, binary or text, its normals towards the body. Relative to the case file.
     """
 
     only = 3
 
-    corners: Array
+    corners: Annotated[Array | None, Internal()] = None
+    file: Annotated[File | None, Accepted("an STL file"), Required()] = None
+    shape: Literal["surface"] = field(default="surface", kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Refuse a surface that is given in no way, or in two."""
+        super().__post_init__()
+        given = one_of("Triangles", corners=self.corners, file=self.file)
+        expect("Triangles: file", None, "an STL file, or corners", given is not None)
+
+    @cached_property
+    def triangles(self) -> Array:
+        """The corners, shape (m, 3, 3)."""
+        if self.corners is not None:
+            return self.corners
+        assert self.file is not None  # one of both
+        return read_stl(self.file)
 
     def check(self, dim: int) -> None:
         """Refuse neighbours whose normals point to different sides, too.
@@ -39,13 +60,13 @@ class Triangles(Shape):
         Each of their edges is then run along twice in one direction, and never in the other.
         """
         super().check(dim)
-        vertex = _numbered(_vertices(self.corners))
+        vertex = _numbered(_vertices(self.triangles))
         ends = np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2).reshape(-1, 2)
         edge = _numbered(ends.min(axis=1) * (vertex.max() + 1) + ends.max(axis=1))
         turns = np.bincount(edge, np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0))
         wrong = np.flatnonzero(np.abs(turns)[edge] > 1)
         if wrong.size:
-            x, y, z = self.corners.reshape(-1, 3)[wrong[0]]
+            x, y, z = self.triangles.reshape(-1, 3)[wrong[0]]
             raise InputError(
                 f"normals point to both sides of the surface, at ({x:g}, {y:g}, {z:g}) for "
                 "instance; accepted: triangles that all have their corners counter-clockwise, "
@@ -61,12 +82,13 @@ class Triangles(Shape):
         from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
         from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
 
+        corners = self.triangles
         _, first, number = np.unique(
-            _vertices(self.corners).ravel(), return_index=True, return_inverse=True
+            _vertices(corners).ravel(), return_index=True, return_inverse=True
         )
         points, cells, surface = vtkPoints(), vtkCellArray(), vtkPolyData()
-        points.SetData(numpy_to_vtk(self.corners.reshape(-1, 3)[first], deep=True))
-        offsets = 3 * np.arange(len(self.corners) + 1, dtype=np.int64)
+        points.SetData(numpy_to_vtk(corners.reshape(-1, 3)[first], deep=True))
+        offsets = 3 * np.arange(len(corners) + 1, dtype=np.int64)
         cells.SetData(*(numpy_to_vtkIdTypeArray(a, deep=True) for a in (offsets, number.ravel())))
         surface.SetPoints(points)
         surface.SetPolys(cells)
@@ -77,7 +99,7 @@ class Triangles(Shape):
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals: towards the nearest point, on it the pseudonormal."""
         distance, normal = self._signed(points)
-        size = np.abs(self.corners).max()
+        size = np.abs(self.triangles).max()
         on = np.flatnonzero(np.abs(distance) <= 1e-9 * size)
         # On the surface the nearest point tells no direction, but the slope of the distance does.
         h = 1e-4 * size * np.eye(3)

@@ -8,7 +8,8 @@ from mpi4py import MPI
 from scipy.optimize import minimize_scalar
 
 from contact import Body, Contact, Fixed, InputError, Linear, Problem
-from contact.interface.obstacle import (
+from contact.mesh.grid import rectangle
+from contact.model.obstacle import (
     Cone,
     Cylinder,
     Heights,
@@ -20,7 +21,6 @@ from contact.interface.obstacle import (
     Sphere,
     Triangles,
 )
-from contact.mesh.grid import rectangle
 
 TILT = np.array([0.3, -0.5, 0.8])
 UP = TILT / np.linalg.norm(TILT)
@@ -242,3 +242,22 @@ def test_a_problem_names_the_shape():
     Problem(domain, body, Contact("bottom", Turned()))
     with pytest.raises(InputError, match=r"contact\.foundation: Turned: distance"):
         Problem(domain, body, Contact("bottom", Turned(10.0)))
+
+
+def test_shapes_by_formulas_and_files_are_those_of_functions_and_arrays(tmp_path):
+    ellipse = Level(lambda x: (x[:, 0] / 2) ** 2 + x[:, 1] ** 2 - 1)
+    x = np.linspace(-1.0, 1.0, 9)
+    (tmp_path / "heights.csv").write_text("x,y\n" + "".join(f"{a},{a * a}\n" for a in x))
+    corners = np.array([[[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]])
+    rows = "".join(f"vertex {' '.join(map(str, c))}\n" for c in corners[0])
+    (tmp_path / "floor.stl").write_text(rows)
+    points = np.random.default_rng(0).uniform(0.1, 1.0, (20, 3))
+    for one, other, dim in (
+        (Level("(x/2)**2 + y**2 - 1"), ellipse, 2),
+        (Heights(file=str(tmp_path / "heights.csv")), Heights((x,), x * x), 2),
+        (Triangles(file=str(tmp_path / "floor.stl")), Triangles(corners), 3),
+    ):
+        for found, known in zip(
+            one.distance(points[:, :dim]), other.distance(points[:, :dim]), strict=True
+        ):
+            assert found == pytest.approx(known, abs=1e-12)

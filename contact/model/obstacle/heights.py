@@ -1,0 +1,209 @@
+"""A rigid surface by its heights over a line or a plane, as profilometers measure it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.arguments import expect, naming, one_of
+from contact.errors import InputError
+from contact.model.data import read_data
+from contact.model.obstacle.protocol import Shape
+from contact.model.section import File
+from contact.settings import Accepted, Internal, Number, Positive, Required, Switch
+from contact.tolerances import NEGLIGIBLE
+from contact.typing import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Heights(Shape):
+    """A body below, or above, heights along the last axis, smooth between them (cubic splines).
+
+    Beyond the outermost points the surface goes on level, and a hole between points is bridged:
+    contact there is told (`output.foundations`). Distances are those along the last axis times the
+    cosine of the slope: exact on the surface, and nearly so close to it; along an axis or the
+    body's normals gaps are exact.
+
+    Attributes
+    ----------
+    places
+        Coordinates of the points along the other axes, ascending: shape (n,) in the plane, and
+        (n,), (m,) in 3-D.
+    heights
+        Shape (n,), or (n, m). Instead of both a file:
+    file
+        CSV file with a row of names and the columns x, y (3-D: x, y, z, at all points of a grid);
+        or a NumPy array of heights, an image for instance. Relative to the case file. A warning
+        tells the share of the contact that lies beyond them, or in a hole.
+    spacing
+        Distances of the points of an array: along its first axis, which is x, and in 3-D along its
+        second, y. Required for an array.
+    origin
+        Place of the first point of an array. Default: zeros.
+    above
+        Whether the rigid body lies above the heights, and the elastic one below.
+    """
+
+    places: Annotated[tuple[Array, ...], Internal()] = ()
+    heights: Annotated[Array | None, Internal()] = None
+    above: Switch = False
+    file: Annotated[
+        File | None, Accepted("a CSV file, or a .npy file with an array of heights"), Required()
+    ] = None
+    spacing: Annotated[
+        tuple[Positive, ...] | None, Accepted("distances > 0, one per direction of the array")
+    ] = None
+    origin: Annotated[
+        tuple[Number, ...] | None, Accepted("numbers, one per direction of the array")
+    ] = None
+    shape: Literal["heights"] = field(default="heights", kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Refuse heights that are given in no way, or in two; and those that are no grid."""
+        super().__post_init__()
+        given = one_of("Heights", heights=self.heights, file=self.file)
+        expect("Heights: file", None, "a file, or places and heights", given is not None)
+        for key in ("spacing", "origin"):
+            accepted = "that of a .npy file alone: the rows of a CSV file have their places"
+            fits = getattr(self, key) is None or (self.file or "").endswith(".npy")
+            expect(f"Heights: {key}", getattr(self, key), accepted, fits)
+        if self.heights is not None:
+            self._check(self.places, self.heights)
+
+    @staticmethod
+    def _check(places: tuple[Array, ...], heights: Array) -> None:
+        sizes, words = tuple(map(np.size, places)), "two places or more a direction"
+        expect("Heights: places", sizes, words, len(sizes) in (1, 2) and min(sizes) > 1)
+        rising = all(np.all(np.diff(axis) > 0) for axis in places)
+        expect("Heights: places", "others", "ascending numbers", rising)
+        shape = np.shape(heights)
+        expect("Heights: heights", f"the shape {shape}", f"{sizes}", shape == sizes)
+        known = bool(np.isfinite(heights).all())
+        expect("Heights: heights", "some that are no numbers", "a number at each place", known)
+
+    def check(self, dim: int) -> None:
+        """Refuse heights in another dimension, too."""
+        super().check(dim)
+        expect("Heights: dimension", dim, f"{len(self.grid[0]) + 1}", len(self.grid[0]) == dim - 1)
+
+    @cached_property
+    def grid(self) -> tuple[tuple[Array, ...], Array]:
+        """The places and the heights; those of a file are read."""
+        if self.heights is not None:
+            return self.places, self.heights
+        assert self.file is not None
+        given = self._array(self.file) if self.file.endswith(".npy") else _columns(self.file)
+        with naming(self.file):
+            self._check(*given)
+        return given
+
+    def _array(self, file: str) -> tuple[tuple[Array, ...], Array]:
+        """Return places and heights of an array."""
+        try:
+            heights = np.asarray(np.load(file), dtype=float)
+        except (OSError, ValueError, EOFError) as error:
+            raise InputError(
+                f"{file}: {error}; accepted: a NumPy array of heights", "heights"
+            ) from None
+        spacing, origin = self.spacing or (), self.origin or (0.0,) * heights.ndim
+        one = f"{heights.ndim} numbers, one per direction of the array"
+        for key, given in (("spacing", spacing), ("origin", origin)):
+            expect(f"Heights: {key}", given, one, len(given) == heights.ndim)
+        steps = zip(origin, spacing, heights.shape, strict=True)
+        return tuple(first + step * np.arange(n) for first, step, n in steps), heights
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy import interpolate
+
+        places, heights = self.grid
+        degrees = [min(3, axis.size - 1) for axis in places]  # cubic, of few points less
+        if len(places) == 1:
+            return interpolate.make_interp_spline(*places, heights, degrees[0])
+        kx, ky = degrees
+        return interpolate.RectBivariateSpline(*places, heights, kx=kx, ky=ky)
+
+    def _surface(self, points: Array) -> tuple[Array, Array]:
+        """Return heights, (n,), and their slopes, (n, d - 1), below points."""
+        across = points[:, :-1].T
+        places = self.grid[0]
+        least, most = (np.array([axis[end] for axis in places]) for end in (0, -1))
+        inside = np.clip(across, least[:, None], most[:, None])
+        beyond = inside != across
+        if len(places) == 1:
+            height = self._spline(inside[0])
+            slopes = [self._spline(inside[0], 1)]
+        else:
+            height = self._spline.ev(*inside)
+            slopes = [self._spline.ev(*inside, dx=1), self._spline.ev(*inside, dy=1)]
+        return height, np.where(beyond, 0.0, slopes).T
+
+    @cached_property
+    def gaps(self) -> tuple[Array, ...]:
+        """Intervals along each axis that have no heights, shape (n, 2): infinite ones at its ends.
+
+        Within it these are longer than both beside them together. They begin and end half a spacing
+        beyond the last place, as an image has its places in the middle of its pixels.
+        """
+        found = []
+        for axis in map(np.asarray, self.grid[0]):
+            steps = np.diff(axis)
+            half = (0.5 + NEGLIGIBLE) * steps
+            wide = 1 + np.flatnonzero(steps[1:-1] > 2 * (half[:-2] + half[2:]))
+            begin = np.append(-np.inf, axis[wide] + half[wide - 1])
+            end = np.append(axis[0] - half[0], axis[wide + 1] - half[wide + 1])
+            last = [axis[-1] + half[-1], np.inf]
+            found.append(np.vstack([np.column_stack([begin, end]), last]))
+        return tuple(found)
+
+    def unknown(self, points: Array) -> NDArray[np.bool_]:
+        """Tell which points lie in one of the `gaps` of an axis, shape (n,)."""
+        found = np.zeros(len(points), dtype=bool)
+        for k, gaps in enumerate(self.gaps):
+            at = points[:, k, None]
+            found |= ((at > gaps[:, 0]) & (at < gaps[:, 1])).any(axis=1)
+        return found
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return distances and normals."""
+        height, slope = self._surface(points)
+        normal = np.column_stack([-slope, np.ones(len(points))])
+        length = np.linalg.norm(normal, axis=1)
+        side = -1.0 if self.above else 1.0
+        return side * (points[:, -1] - height) / length, side * normal / length[:, None]
+
+
+def _columns(file: str) -> tuple[tuple[Array, ...], Array]:
+    """Return places and heights of a file with columns."""
+    columns = read_data(file)
+    names = [name for name in "xyz" if name in columns]
+    accepted = "columns x, y in the plane, x, y, z in 3-D"
+    expect(file, f"columns {', '.join(columns)}", accepted, len(names) > 1)
+    *across, heights = (columns[name] for name in names)
+    order = np.lexsort(across[::-1])
+    places = tuple(np.unique(values) for values in across)
+    shape = tuple(axis.size for axis in places)
+    made = f"the grid of {' by '.join(map(str, shape))} points that their coordinates make"
+    if math.prod(shape) > 4 * len(heights):  # scattered points
+        raise InputError(
+            f"{file}: {len(heights)} points of {made}; accepted: each point of a grid once",
+            "heights",
+        )
+    grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(across))
+    given = np.column_stack(across)[order]
+    if given.shape != grid.shape or np.any(given != grid):
+        known, counts = np.unique(given, axis=0, return_counts=True)
+        twice = known[counts > 1]
+        missing = {*map(tuple, grid.tolist())} - {*map(tuple, known.tolist())}
+        one = twice[0].tolist() if twice.size else min(missing)
+        where = f"({', '.join(f'{x:g}' for x in one)})"
+        said = f"{where} stands twice" if twice.size else f"no height at {where}"
+        raise InputError(
+            f"{file}: {said}, of {made}; accepted: each point of a grid once", "heights"
+        )
+    return places, heights[order].reshape(shape)
