@@ -383,7 +383,7 @@ def _steps(
                 schedule.keep(records[-1])
             share = (now - schedule.begin) / (end - schedule.begin)
             words = "t = %g of %g: iterations %d, residual %.1e"
-            tell(logger, share, words, now, end, len(taken), outcome.kkt.largest)
+            tell(logger, share, words, now, end, len(taken), outcome.residuals.largest)
     reached = 0.0
     if records:
         state, reached = records[-1].state, records[-1].state.time

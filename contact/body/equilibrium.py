@@ -66,7 +66,7 @@ class BodyEquilibrium:
         If a part is missing, a vector has the wrong length, or the material or the degree is none.
     """
 
-    most_rounding = MOST_ROUNDING
+    rounding_limit = MOST_ROUNDING
 
     def __init__(
         self, domain: Domain, body: Body, degree: int = 1, element: str = STANDARD

@@ -39,7 +39,7 @@ def table(record: Record, within: str = "") -> list[str]:
     if not shown(record.iteration):
         return []
     kkt, sets, number = (
-        record.kkt,
+        record.residuals,
         record.sizes or ("", "", ""),
         f"{within}{record.iteration}",
     )

@@ -37,7 +37,6 @@ from contact.derivatives.differences import Family, Parameter, at, family_of
 from contact.errors import InputError, counted
 from contact.history import History
 from contact.linear.operator import Counters
-from contact.methods.complementarity_parameters import complementarity_parameters
 from contact.methods.options import NewtonOptions
 from contact.problem.linearised import (
     Equations,
@@ -258,7 +257,7 @@ class LoadPath:
         self.steps = [(base.at(state.time, state.history), state) for state in states]
         self.base, self.counters = base, Counters()
         gamma = NewtonOptions().gamma
-        self._parameters = complementarity_parameters(base.scales, gamma)
+        self._parameters = base.scales.complementarity_parameters(gamma)
 
     def linearised(self, index: int) -> Linearised:
         """Return the linearised equations at the end of a step. Collective."""

@@ -1,16 +1,15 @@
 """Solution methods: each takes an initial guess of a problem to a `State` and its `Outcome`.
 
-`newton` is the default: it condenses the body where that pays, and loops over its material.
+`newton` is the default: it condenses the body where that pays, and iterates over its material.
 `semismooth` is the semismooth Newton method (primal-dual active set) on the whole body or on the
-condensed one, and `newton_step` one step of it. `fallbacks` has the methods after it, in order: all
-nodes open and a working set, a continuation, `unconstrained_modes`, `interior_point`.
+condensed one, `newton_step` one step of it. `fallbacks` has the methods after it, in order.
 `load_stepping` is the quasi-static load stepping around any method. The fixed points, Uzawa block
-relaxation and penalty of `contact.thesis` are no fallbacks of it.
+relaxation and penalty are in `contact.thesis`; none is a fallback.
 
-Parts of methods: `cones` (slacks and multipliers of the interior point), `step_control`
-(stagnation, chord steps, Newton or Picard in the conductivity). For all methods: `method` is their
-protocol, `options` has tolerances and limits, `complementarity_parameters` c, r and gamma, `report`
-the history and the outcome; `signals` ends a solve by Ctrl-C.
+Parts of methods: `interior_point` and its `cones`, `unconstrained_modes` (rigid-body modes),
+`step_control` (stagnation, chord steps, Newton or Picard in the conductivity). For all methods:
+`method` is their protocol, `options` has tolerances and limits, `report` records and outcome;
+`signals` ends a solve by Ctrl-C.
 
 The methods share, and do not define: complementarity functions and active set
 (`contact.interface.complementarity`, `active_set`), static condensation

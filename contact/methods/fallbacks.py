@@ -4,20 +4,19 @@ Where Newton's steps have ended without convergence the state with all nodes ope
 linear solve, where the supports constrain all rigid-body modes, and from there contact at one node
 more in turn (`working_set`). If neither is a solution these follow, in this order:
 
-1. on a condensed body with charge at its contact nodes, continuation in the conductivity of the
-   foundation (`continuation`);
-2. on a condensed body that the supports do not constrain, a rigid motion to a state in which
-   all nodes are open (`unconstrained_modes`);
+1. on a condensed body with a conducting foundation, continuation in its conductivity
+   (`continuation`);
+2. on a condensed body with a rigid-body mode that the supports do not constrain, a rigid motion to
+   a state with all nodes open (`unconstrained_modes`);
 3. a primal-dual interior point on the same operator, which finds the active sets, with the friction
-   bound updated outside, and Newton's last steps from there (`interior_point`). A converged
-   solution in which contact has moved a body to where nothing constrains it, although friction
-   could, gives way to that of a fallback if there is one;
-4. where friction has to hold a motion that the supports do not, proximal points: an elastic bed
-   about the last iterate, which becomes softer (`proximal_points`);
-5. the condensed body, where it has so many contact nodes that it was not condensed before.
+   bound updated outside, and Newton's last steps from there (`interior_point`). A fallback is also
+   tried where Newton's method has converged to a solution at which a rigid-body mode has become
+   unconstrained, although friction could constrain it;
+4. where friction has to constrain a rigid-body mode, proximal points: an elastic bed about the last
+   iterate, which becomes softer (`proximal_points`);
+5. the condensed body, where its many contact nodes spoke against it before.
 
-The notes of the history name the first four. A condensed contact problem has fallbacks 1 to 4 of
-its own.
+The notes of the history name the first four. A condensed contact problem has 1 to 4 of its own.
 
 References
 ----------
@@ -55,27 +54,26 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
 
-#: Solves the whole problem from a state on by another way.
+#: Solver of the whole problem from an initial guess: steps on the condensed body.
 LastFallback: TypeAlias = Callable[[State], tuple[State, Outcome]]
 
-#: Notes of the steps in the history.
+#: Notes of steps in the history.
 WORKING_SET, CONTINUATION, PROXIMAL_POINT = "working set", "continuation", "proximal point"
 
 #: Factor by which the conductivity grows: the first, and the least one that is tried.
 FACTOR, LEAST_FACTOR = 1e3, 1.2
 
-#: First part of the conductivity: three of the first factors below the whole.
+#: First part of the conductivity.
 FIRST_PART = FACTOR**-3
 
-#: Stagnation limit in a continuation: condensed steps cost little beside another value of the
-#: parameter, and Example 8.4 with ten times its conductivity needs them.
+#: Stagnation limit in a continuation; Example 8.4 with ten times its conductivity needs it.
 CONTINUATION_LIMIT = 20
 
-#: First stiffness of the proximal term over c, its factors after a problem that is solved and after
-#: one that is not, and most problems.
+#: Proximal points: first stiffness of the bed over c, its factors after success and after failure,
+#: and most problems.
 PROXIMAL_STIFFNESS, SOFTER, STIFFER, PROXIMAL_PROBLEMS = 1e-2, 0.2, 4.0, 40
 
-#: Residual of the problem without the term below which its own solution is tried.
+#: Residual without the bed below which Newton's last steps are tried.
 NEARLY_BALANCED = 0.03
 
 
@@ -92,9 +90,9 @@ def solve_contact(
     newton
         The method on the problem.
     state, linearised_at
-        Initial guess, and where the material is linearised first.
+        Initial guess, and unknowns of the first secant.
     last
-        Solves from a state on where all else fails; None without such a method.
+        The last fallback; None for none.
     """
     state, outcome = newton.iterate(state, linearised_at, give_up=True)
     if outcome.converged and newton.modes.pushed_aside(newton.problem, state):
@@ -106,38 +104,34 @@ def solve_contact(
 def completed(
     newton: SemismoothNewton, state: State, outcome: Outcome, last: LastFallback | None = None
 ) -> tuple[State, Outcome]:
-    """Return the end of an iteration, or of the fallbacks where it has failed. Collective.
-
-    The best iterate if all fail.
-    """
+    """Return the end of an iteration, of a fallback, or the best iterate of all. Collective."""
     if outcome.converged or outcome.overloaded:
         return state, outcome
     without_contact = None
     if newton.modes.constrained_by_supports:
-        # Active sets may cycle on contact forces that are rounding of the other forces. Where
-        # contact constrains a mode, a body moved aside may be in balance with all nodes open too,
-        # though friction has another solution that holds it.
+        # Active sets may cycle on contact forces that are rounding. Where contact has to constrain
+        # a mode, friction may have another solution than the one with all nodes open.
         found, without_contact = from_open(newton)
         if found is not None:
             return found
     state, outcome = fall_back(newton, state, outcome, without_contact, last)
     if not (outcome.converged or outcome.overloaded) and newton.best.found is not None:
         state = newton.best.found
-        outcome = replace(outcome, kkt=evaluate(newton.problem, state))
+        outcome = replace(outcome, residuals=evaluate(newton.problem, state))
     return state, outcome
 
 
 def from_open(
     newton: SemismoothNewton,
 ) -> tuple[tuple[State, Outcome] | None, State | None]:
-    """Return a solution with all nodes open, or with a working set, if any. Collective.
+    """Return a solution with all nodes open or by a working set, and the state without contact.
 
-    And the state after a linear solve without contact, if that is regular.
+    None for what there is not. Collective.
     """
     problem, best = newton.problem, newton.best.found
     try:
         state = newton.step.without_contact(problem, problem.start() if best is None else best)
-    except SingularError:  # without contact nothing may hold the potential
+    except SingularError:  # the potential may be floating without contact
         newton.step.renew()
         return None, None
     allowed = newton.options.allowed
@@ -160,11 +154,7 @@ def fall_back(
     without_contact: State | None,
     last: LastFallback | None,
 ) -> tuple[State, Outcome]:
-    """Try the fallbacks in turn, on the condensed body where there is one. Collective.
-
-    Their many steps cost one factorisation of the body there. They start from the zero initial
-    guess: where the active sets cycle, a body may have moved far away.
-    """
+    """Try the fallbacks in turn, from the zero initial guess. Collective."""
     problem, singular = newton.problem, None
     if isinstance(problem, CondensedProblem):
         found = _in_the_conductivity(newton, problem) or _separated(newton, problem, outcome)
@@ -172,7 +162,7 @@ def fall_back(
             return found
     if newton.left > 0:
         logger.info("%s; going on with an interior point", outcome.ended)
-        # Half of the steps remain for the condensed body, where that is still to come.
+        # Half of the steps are for the condensed body.
         newton.reserved = 0 if last is None else (newton.left + 1) // 2
         try:
             state, outcome = interior_point(newton, without_contact)
@@ -180,18 +170,18 @@ def fall_back(
             newton.step.renew()
             singular = error
         newton.reserved = 0
-    held_by_friction = problem.interface.friction.acts and not newton.modes.constrained_by_supports
-    if held_by_friction and not outcome.converged and newton.left > 0:
+    by_friction = problem.interface.friction.acts and not newton.modes.constrained_by_supports
+    if by_friction and not outcome.converged and newton.left > 0:
         found = proximal_points(newton)
         if found is not None:
             return found
     if last is not None and not (outcome.converged or outcome.overloaded) and newton.left > 0:
         logger.info("%s; going on with the condensed body", outcome.ended)
         found = last(problem.start())
-        # Where steps are left the interior point says more of the reason.
+        # The reason of the interior point says more, unless no steps are left.
         if found[1].converged or newton.left <= 0:
             state, outcome = found
-    # Another material may have softened too much at the strains of a step.
+    # A nonlinear material may be singular at the strains of a step alone.
     if singular is not None and problem.equilibrium.linear and not outcome.converged:
         raise singular
     return state, outcome
@@ -200,7 +190,7 @@ def fall_back(
 def _separated(
     newton: SemismoothNewton, problem: CondensedProblem, outcome: Outcome
 ) -> tuple[State, Outcome] | None:
-    """Return a state with all nodes open that a rigid motion leads to, if any. Collective."""
+    """Return a solution with all nodes open after a rigid motion, if any. Collective."""
     if outcome.converged or newton.modes.constrained_by_supports:
         return None
     state = newton.modes.separated(
@@ -208,7 +198,7 @@ def _separated(
     )
     if state is None:
         return None
-    # All forces are rounding then: they are relative to those at zero displacement.
+    # No force acts there: relative to the forces at zero displacement.
     body = problem.equilibrium
     left, first = (
         body.norm(body.unbalanced(residual_forces(problem, at))) for at in (state, problem.start())
@@ -222,21 +212,19 @@ def _separated(
 
 
 def working_set(newton: SemismoothNewton, state: State) -> State | None:
-    """Return a solution that penetrates nowhere, by a working set of contact nodes. Collective.
+    """Return a solution by a working set of contact nodes (dual active set method). Collective.
 
-    For bodies that touch at one node or two: at stops, tips, corners. Such a body mostly touches at
-    one node, but without contact most of its nodes penetrate: active sets of all these cycle.
-    Contact is therefore stated at the node of largest penetration alone, and at one more in turn
-    while others penetrate, as a dual active set method adds the constraint that is violated most.
-    Where one more node does not halve the number of those that penetrate, the working set is given
-    up, and None returned: an interior point then takes fewer steps.
+    For bodies that touch at one node or two: stops, tips, corners. Without contact most of their
+    nodes penetrate, and active sets of all these cycle. The node of largest penetration enters the
+    working set, then one more in turn. None where a node more does not halve the number of those
+    that penetrate: an interior point then takes fewer steps.
 
     Parameters
     ----------
     newton
         The method on the problem.
     state
-        After a linear solve without contact.
+        State after a linear solve without contact.
     """
     problem, interface = newton.problem, newton.problem.interface
     nodes = interface.jump
@@ -247,7 +235,7 @@ def working_set(newton: SemismoothNewton, state: State) -> State | None:
         inside |= opening <= -deepest
         gap = np.where(inside, nodes.gap, np.inf)
         less = problem.with_interface(replace(interface, jump=replace(nodes, gap=gap)))
-        # Of one stiff node in a soft body a forcing term leaves pressures of any size and sign.
+        # At one stiff node of a soft body a forcing term leaves pressures of any sign.
         state, outcome = newton.on(less).iterate(state, note=WORKING_SET, exact=True)
         before = count
         deepest, count = _penetrating(interface, state, inside)
@@ -259,7 +247,7 @@ def working_set(newton: SemismoothNewton, state: State) -> State | None:
 def _penetrating(
     interface: Interface, state: State, inside: NDArray[np.bool_]
 ) -> tuple[float, int]:
-    """Return the largest penetration of other nodes (length), and how many do. Collective."""
+    """Return the largest penetration of nodes outside a set, and their number. Collective."""
     nodal = interface.jump.apply(state.x)
     depth = np.where(inside, 0.0, -interface.opening(nodal))
     deepest = interface.jump.maximum(depth)
@@ -271,15 +259,14 @@ def _penetrating(
 def continuation(
     solve: Callable[[float, State], tuple[State, Outcome]], start: State
 ) -> tuple[State, Outcome] | None:
-    """Return the solution with the whole of a parameter; None where continuation fails. Collective.
+    """Solve by continuation in a parameter from `FIRST_PART` to 1; None on failure. Collective.
 
-    After a part that fails the square root of the factor is tried. Where the first part fails the
-    parameter is not the cause, and no other is tried.
+    After a failure the square root of the factor is taken; after a failure of the first part none.
 
     Parameters
     ----------
     solve
-        Solves the problem with a part of the parameter, from a state on.
+        Solver of the problem with a part of the parameter, from an initial guess.
     start
         Initial guess of the first problem.
     """
@@ -302,12 +289,10 @@ def continuation(
 def _in_the_conductivity(
     newton: SemismoothNewton, problem: CondensedProblem
 ) -> tuple[State, Outcome] | None:
-    """Return the solution by continuation in the conductivity of the foundation. Collective.
+    """Solve by continuation in the conductivity k_e of the foundation; None on failure. Collective.
 
-    A foundation of high conductivity fixes the potential of a node that comes near and releases it
-    where the node leaves, so that the active set cycles. With a small part of the conductivity k_e
-    the problem is nearly one of contact alone; the part is raised to 1, and each solution is the
-    initial guess of the next problem.
+    A foundation of high conductivity fixes the potential of a node that comes near, and releases it
+    where the node leaves: the active set cycles. With little of it contact is nearly uncoupled.
     """
     interface = problem.interface
     if interface.law.conductor is None:
@@ -322,14 +307,13 @@ def _in_the_conductivity(
 
 
 def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
-    """Return a solution by a proximal-point method; None where it finds none. Collective.
+    """Solve by a proximal-point method; None on failure. Collective.
 
-    For belts, arched leaves, wedges: bodies that friction alone holds along a motion. Newton's
-    steps and the updates of a friction bound leave these where the friction of the present
-    pressures does not hold them. An elastic bed along the tangents of the contact nodes, about the
-    last iterate, holds them meanwhile: k (u_tau - u_tau of the last problem). Its stiffness falls
-    after each problem that is solved, and rises after one that is not. Where the bed bears
-    little, its forces are left out, and Newton's method takes the last steps.
+    For belts, arched leaves, wedges: bodies with a mode that friction alone constrains. The
+    friction of the pressures of an iterate may not balance the loads, and the body slides off. An
+    elastic bed at the contact nodes, k (u_tau - u_tau of the last iterate), constrains the mode;
+    k falls after each problem that is solved, and rises after one that is not. Where the bed
+    bears little, Newton's method takes the last steps without it.
     """
     problem, interface = newton.problem, newton.problem.interface
     nodes, state = interface.jump, problem.start()
@@ -339,7 +323,7 @@ def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
         method = newton.on(problem.with_interface(replace(interface, proximal=term)))
         try:
             held, outcome = method.iterate(state, note=PROXIMAL_POINT)
-        except SingularError:  # the bodies have parted: nothing resists along the normals
+        except SingularError:  # no contact: a normal motion is unconstrained
             newton.step.renew()
             return None
         if outcome.converged:

@@ -108,9 +108,9 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
         if newton.left <= 0:
             break
         # Pressures of the last steps are nearer where these make progress, else those of the cones.
-        if aside is None and outcome.kkt.significant < PROGRESS * best:
+        if aside is None and outcome.residuals.significant < PROGRESS * best:
             state = last
-        best = min(best, outcome.kkt.significant)
+        best = min(best, outcome.residuals.significant)
         nodal = interface.jump.apply(state.x)
         bound = interface.bound(nodal, state.forces)
         # Where all nodes are open, the next bound is zero and has the same solution.
@@ -118,7 +118,7 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
             break
         multiple = modes.overload(bound)
         if multiple == np.inf or (raised and multiple > 1):
-            outcome = replace(outcome, kkt=evaluate(problem, state))
+            outcome = replace(outcome, residuals=evaluate(problem, state))
             last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
             break
         if multiple > 1:  # with as much friction as the loads ask for pressures may differ

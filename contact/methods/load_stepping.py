@@ -142,7 +142,7 @@ def evaluated(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[
     """Evaluate the residuals of a state at the time and history of a problem. Collective."""
     x = problem.equilibrium.prescribe(state.x, problem.time)
     state = replace(state, x=x, time=problem.time, history=problem.history)
-    return state, replace(outcome, kkt=evaluate(problem, state))
+    return state, replace(outcome, residuals=evaluate(problem, state))
 
 
 #: Largest ratio of the predicted increment of the solution to that of the last step.

@@ -16,17 +16,16 @@ from contact.typing import Array
 
 
 class Method(Protocol):
-    """A solver of one problem: it takes an initial guess to a state and its `Outcome`.
+    """A solver of one problem, from an initial guess to a state and its `Outcome`.
 
-    A new one is a class with these that is made of a problem, its options and a monitor; its
-    options, with an entry in `contact.methods.options.OPTIONS`; and an entry in
-    `contact.methods.method.METHODS`. One that uses others makes their options by `with_method`,
-    hands the monitor and the counters on to them, and its history has the records of all of them.
+    A new one is a class made of a problem, its options and a monitor, with an entry in `METHODS`;
+    and its options, with an entry in `contact.methods.options.OPTIONS`. One that uses others makes
+    their options by `with_method`, and has their records in its history.
     """
 
     @property
     def options(self) -> Any:
-        """Its options; `allowed` among them, the tolerance of each residual."""
+        """Its options; `allowed` is the tolerance of each residual."""
 
     @property
     def history(self) -> list[Record]:
@@ -38,13 +37,10 @@ class Method(Protocol):
 
     @property
     def state(self) -> State:
-        """The state after the last outer iteration, for a solve that is ended by a signal."""
+        """The last iterate: the end of a solve after a signal."""
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Go on with another step of the same problem, with a history of its own.
-
-        Factorisations are kept: the body is the same.
-        """
+        """Take another load step of the same problem; factorisations remain, the history is new."""
 
     def solve(
         self, start: State | None = None, linearised_at: Array | None = None
@@ -56,8 +52,8 @@ class Method(Protocol):
         start
             Initial guess; zero by default.
         linearised_at
-            Unknowns at which the material is linearised first, by its secant; those of the start by
-            default. Prescribed values that have changed strain the elements beside them alone.
+            Unknowns of the first secant of the material; those of the start by default. Prescribed
+            values that have changed strain the elements beside them alone.
 
         Raises
         ------

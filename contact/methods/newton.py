@@ -39,7 +39,6 @@ import time
 from dataclasses import dataclass, field, replace
 
 from contact.linear.operator import Counters
-from contact.methods.complementarity_parameters import complementarity_parameters
 from contact.methods.fallbacks import (
     CONTINUATION,
     PROXIMAL_POINT,
@@ -66,14 +65,14 @@ logger = logging.getLogger("contact.solver")
 #: Ratio of the tolerance of the condensed contact problem to the residual before the step.
 CONTACT_PART = 1e-3
 
-#: Ratio of the residual of the condensed contact problem to that before the step above which the
-#: problem counts as unsolved, and the whole body is taken.
+#: Ratio of the residual of the condensed contact problem to that before the step above which
+#: iterations go on with the whole body.
 UNSOLVED = 0.05
 
-#: Notes of fallbacks that a record of the whole problem repeats.
+#: Notes of fallbacks on the condensed problem, repeated in the record of the whole one.
 FALLBACKS = WORKING_SET, CONTINUATION, RIGID_MOTION, INTERIOR_POINT, PROXIMAL_POINT
 
-#: Why the loop over the material ends where a condensed problem has no solution.
+#: Reason of an end without solution of a condensed problem.
 NOT_CONDENSED = "the condensed contact problem is not solved"
 
 
@@ -88,7 +87,7 @@ class Newton:
     options
         Options of the method.
     monitor
-        Told of every step.
+        Called after each step.
     """
 
     problem: ContactProblem
@@ -99,7 +98,7 @@ class Newton:
     def __post_init__(self) -> None:
         """Choose the complementarity parameters, and whether the body is to be condensed."""
         problem, options = self.problem, self.options
-        self._parameters = complementarity_parameters(problem.scales, options.gamma)
+        self._parameters = problem.scales.complementarity_parameters(options.gamma)
         self._modes = UnconstrainedModes(problem)
         self._step = self._newton_step(problem, options, self.counters)
         self._condensable = options.condense and condensable(problem, options.linear)
@@ -109,7 +108,7 @@ class Newton:
         self.set_load_step(problem)
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Go on with another step of the same problem; factorisations remain."""
+        """Take another load step of the same problem; factorisations remain."""
         self.problem = self._modes.problem = problem
         self.recorder = Recorder(self.monitor)
         if self._condensation is not None:
@@ -128,7 +127,7 @@ class Newton:
 
     @property
     def condensation(self) -> Condensation | None:
-        """The body condensed onto its contact nodes, where that has been asked for."""
+        """The condensed body; None before the first condensed step."""
         return self._condensation
 
     @property
@@ -144,16 +143,7 @@ class Newton:
     def solve(
         self, start: State | None = None, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
-        """Iterate until convergence or the limit; the best iterate if all fails. Collective.
-
-        Parameters
-        ----------
-        start
-            Initial guess; zero by default, where the material is linearised in the reference
-            configuration.
-        linearised_at
-            Unknowns at which the material is linearised first; those of the start by default.
-        """
+        """Iterate until convergence or the limit; the best iterate on failure; see `Method`."""
         self._begin()
         self.recorder.begin = time.perf_counter()
         if self.options.keep != "across":
@@ -181,11 +171,7 @@ class Newton:
     def _condensed_steps(
         self, state: State, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
-        """Linearise the material, solve contact on the condensed body, and so on. Collective.
-
-        Active sets and friction are iterated in small dense steps on the Schur complement; this
-        loop is over the material alone, with chord steps.
-        """
+        """Iterate over the material; contact is solved on the Schur complement. Collective."""
         if self._condensation is None:
             self._condensation = Condensation(self.problem, self.counters)
         options, body = self.options, self.problem.equilibrium
@@ -202,7 +188,7 @@ class Newton:
             condensed = self._condensation.linearise(kind, state, keep, linearised_at, known)
             if condensed is None:
                 return last, loop.outcome(NOT_CONDENSED)
-            # No more accurate than the material is linearised, nor than the end asks for.
+            # Inexact Newton: no more digits than the linearised material has.
             enough = 0.1 * options.tolerance
             if not body.linear and not keep:
                 enough = max(enough, CONTACT_PART * min(residuals, 1.0))
@@ -211,7 +197,7 @@ class Newton:
             records = tuple(contact.recorder.records)
             self.counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
-            unsolved = outcome.kkt.significant > max(enough, UNSOLVED * residuals)
+            unsolved = outcome.residuals.significant > max(enough, UNSOLVED * residuals)
             if unsolved and not overloaded:
                 return last, loop.outcome(NOT_CONDENSED)
             increment = self._condensation.expand(condensed, end.x)

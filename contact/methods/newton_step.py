@@ -1,8 +1,8 @@
-"""One step of Newton's method: contact, friction, layer and current linearised together.
+"""One step of Newton's method: material, contact, friction, layer and current linearised together.
 
-The nodal multipliers are eliminated node by node (`contact.interface.complementarity.linearise`),
-so that the linear systems keep the size and the pattern of the elastic ones. Iterative solvers stop
-at a forcing term (inexact Newton).
+Multipliers are eliminated node by node (`contact.interface.complementarity.linearise`): the linear
+systems keep the size and pattern of the elastic ones. Iterative solvers stop at a forcing term
+(inexact Newton).
 
 References
 ----------
@@ -32,21 +32,19 @@ from contact.problem.residuals import Residuals, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Forcing term of inexact Newton: more digits last longer than the steps that they save. One that
-#: depended on the residuals would ask for more digits on finer meshes, whose residuals pass through
-#: more values between the first and the last.
+#: Forcing term of inexact Newton. One by the residuals (Eisenstat and Walker) would ask for more
+#: digits on finer meshes.
 FORCING = 1e-2
 
-#: Steps in a row without progress after which the forcing term becomes a hundredth of itself: with
-#: two digits the active set may cycle. Its least value is the tolerance.
+#: Steps without progress after which the forcing term is divided by 100: with two digits the active
+#: set may cycle. Its least value is the tolerance.
 STAGNANT = 3
 
-#: Levenberg-Marquardt regularisation of underconstrained bodies, over the stiffness of a node times
-#: the residual.
+#: Levenberg-Marquardt parameter over the stiffness of a node times the residual.
 REGULARISATION = 1e-2
 
-#: Ratio of the equilibrium residual to the largest one below which the last linearisation of the
-#: material is used again: the error is in contact and friction.
+#: Ratio of the equilibrium residual to the largest one below which the linearised material of the
+#: last step is kept: the error is in contact and friction.
 SMALL = 0.1
 
 
@@ -56,17 +54,16 @@ class NewtonStep:
     Parameters
     ----------
     problem
-        Whose operator it is; steps may be those of the problem with other gaps, or another time.
+        The problem of the operator; steps may be those of the same body with another interface.
     options, parameters
         The options and the complementarity parameters.
     counters
-        Where factorisations and solves are counted.
+        Counters of factorisations and solves.
     underconstrained
-        Whether a rigid-body mode is constrained by contact alone, and not by the nodes that touch
-        in the reference configuration. A body that touches at a single node, say, rolls or slides
-        off by any length until it touches at more. A Levenberg-Marquardt regularisation at all
-        contact nodes prevents that while the active set changes; its forces are left to the next
-        step, and it decreases with the residual.
+        Whether a rigid-body mode is constrained neither by the supports nor by the nodes that touch
+        in the reference configuration: a body that touches at one node rolls until it touches at
+        another one. A Levenberg-Marquardt regularisation at all contact nodes bounds the steps
+        while the active set changes, and decreases with the residual.
     """
 
     def __init__(
@@ -78,25 +75,27 @@ class NewtonStep:
         underconstrained: bool = False,
     ) -> None:
         self._underconstrained = underconstrained
-        lost = "no contact constrains the body" if underconstrained else "the stiffness is singular"
-        self.fault = f"{lost} at that displacement"
+        fault = (
+            "no contact constrains the body" if underconstrained else "the stiffness is singular"
+        )
+        self.fault = f"{fault} at that displacement"
         self.options, self.parameters = options, parameters
         self._problem, self._counters = problem, counters
         self._operator: Operator | None = None
         self.begin()
 
     def begin(self) -> None:
-        """Forget the steps before."""
+        """Begin another iteration: forcing term and conductivity derivative anew."""
         self.conductivity_derivative = ConductivityDerivative()
         self._kind = ""
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
     def renew(self) -> None:
-        """Make a new operator in the next step: MUMPS does not recover from a failed solve."""
+        """Drop the operator: MUMPS does not recover from a failed factorisation."""
         self._kind, self._operator = "", None
 
     def _forcing_term(self, reached: float) -> float:
-        """Return the forcing term of a step, given the residual before it."""
+        """Return the forcing term of a step from the residual before it."""
         self._stagnant = 0 if reached < self._nearest else self._stagnant + 1
         self._nearest = min(self._nearest, reached)
         if self._stagnant >= STAGNANT:
@@ -115,7 +114,7 @@ class NewtonStep:
         return self._operator
 
     def assemble(self, problem: Problem, state: State, blocks: Array) -> None:
-        """Assemble the operator with given blocks, and those of layer and current. Collective."""
+        """Assemble the operator with nodal blocks and those of layer and current. Collective."""
         interface, body = problem.interface, problem.equilibrium
         if interface.law.active:
             nodal = interface.jump.apply(state.x)
@@ -142,22 +141,22 @@ class NewtonStep:
         internal: Array | None = None,
         exact: bool = False,
     ) -> State | None:
-        """Take a step; None if its matrix is singular. Collective.
+        """Return the next iterate; None if the matrix is singular. Collective.
 
         Parameters
         ----------
         problem, state
-            The problem, and where from.
+            The problem and the iterate.
         tangent
-            Whether the material's tangent is taken, or its secant.
+            Whether to take the tangent of the material, or its secant.
         reached
-            The residuals there.
+            Residuals of the iterate.
         linearised_at
-            Unknowns at which the secant is taken; those of the state by default.
+            Unknowns of the secant; those of the state by default.
         internal
-            The internal forces of the state, where they are known already.
+            Internal forces of the state, if known.
         exact
-            Whether iterative solvers go to their own tolerance in place of the forcing term.
+            Whether iterative solvers go to their own tolerance, without the forcing term.
         """
         interface = problem.interface
         body, jump = problem.equilibrium, interface.jump
@@ -195,14 +194,14 @@ class NewtonStep:
             if body.linear or (self._underconstrained and state.active_set is None):
                 raise
             self.renew()
-            return None  # it has been moved too far, or the material has softened too much
+            return None
         moved = jump.apply(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)
         vectors = contact.forces.vectors(jump) + change[:, : interface.dim]
         forces = Multipliers.of(jump, jump.normal_component(vectors), vectors)
         pressed = jump.normal_component(np.einsum("nij,nj->ni", layer, moved))
         known = interface.law.layer_pressure(nodal) + shift + pressed
-        # Nodes of a rigid part that has moved far and comes back follow it but for rounding.
+        # Far motions leave nodes of a rigid part off it by rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
         return replace(
             state, x=x, forces=forces, active_set=contact.active_set, layer_pressure=known
@@ -211,11 +210,11 @@ class NewtonStep:
     def _current(
         self, interface: Interface, nodal: Array, contact: LinearisedContact, reached: float
     ) -> Array | float:
-        """Return the derivative of the current, with psi followed or frozen."""
+        """Return the derivative of the current, with that of psi(u_nu - rho) or psi frozen."""
         law = interface.law
         if not law.active:
             return 0.0
-        follow = contact.unchanged  # else the derivative is that of nodes that will not be there
+        follow = contact.unchanged
         if law.follows_gap:
             follow = self.conductivity_derivative(reached, follow)
         return law.current_block(nodal, interface.pressure(nodal, contact.forces), follow)
@@ -228,11 +227,10 @@ def linearised_layer(
     parameters: ComplementarityParameters,
     full: bool,
 ) -> tuple[Array, Array]:
-    """Linearise the layer; return its block, and how it differs from the layer's force.
+    """Linearise the layer; return its block, and the linearised pressure minus the pressure.
 
-    Like the active set, the place of the linearisation follows from pressure and displacement
-    together: it is the point of the law with their sum p + c u_nu. Linearised about the
-    displacement alone, a layer stiffer than the body cycles between its regimes.
+    As for the active set, the point of linearisation is that of the law with the sum p + c u_nu:
+    about the displacement alone, a layer stiffer than the body cycles between its regimes.
     """
     law, jump, c = interface.law, interface.jump, parameters.c
     graph = law.normal_law(nodal)

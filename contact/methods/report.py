@@ -1,4 +1,4 @@
-"""Reports of a solver: a record of each iteration, and the outcome."""
+"""Report of a solve: a `Record` of each outer iteration, and its `Outcome`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ logger = logging.getLogger("contact.solver")
 
 
 def tell(logger: logging.Logger, share: float, text: str, *values: object) -> None:
-    """Log the progress of a run of many solves: the part of it that is done, 0 to 1."""
+    """Log the progress of many solves; `share` is the completed part, 0 to 1."""
     logger.info(text, *values, extra={"share": share})
 
 
@@ -29,26 +29,26 @@ class Record:
     Attributes
     ----------
     iteration
-        Number of the iteration; 0 is the frictionless start of the fixed point.
+        Its number; 0 for the frictionless start of the fixed point.
     inner
-        Linear solves that it took.
-    kkt
+        Number of linear solves.
+    residuals
         Residuals after it.
     change
-        Relative change of the friction bound, (3.46); NaN where there is none.
+        Relative change of the friction bound, (3.46); NaN without friction or fixed point.
     seconds
-        Since the start of the solve.
+        Time since the start of the solve.
     note
-        Its kind where it is no plain one, for instance "tangent".
+        Kind of the step, for instance "tangent", or name of the fallback.
     sizes
-        Numbers of nodes that are open, stick and slip after it; None where nothing is known.
+        Numbers of open, stick and slip nodes after it; None without an active set.
     steps
-        Newton iterations on the condensed problem that it took, a record each.
+        Newton steps on the condensed problem, a record each.
     """
 
     iteration: int
     inner: int
-    kkt: Residuals
+    residuals: Residuals
     change: float
     seconds: float
     note: str = ""
@@ -57,11 +57,11 @@ class Record:
 
     @property
     def contact_solves(self) -> int:
-        """Number of linear solves of the condensed problem."""
+        """Number of linear solves with the condensed body."""
         return sum(step.inner for step in self.steps)
 
 
-#: Told of every outer iteration, on all ranks.
+#: Called after each outer iteration, on all ranks.
 Monitor: TypeAlias = Callable[[Record], None]
 
 
@@ -70,7 +70,7 @@ class Poll(Protocol):
     """A monitor that can stop the solve within an outer iteration too."""
 
     def poll(self) -> None:
-        """Raise on all ranks if the solve is to end. Collective."""
+        """Raise on all ranks to end the solve. Collective."""
 
 
 @dataclass
@@ -84,7 +84,7 @@ class Recorder:
 
     def record(
         self,
-        kkt: Residuals,
+        residuals: Residuals,
         note: str,
         inner: int = 1,
         sizes: tuple[int, int, int] | None = None,
@@ -93,7 +93,7 @@ class Recorder:
         """Append the record of the next step."""
         seconds = time.perf_counter() - self.begin
         number = len(self.records) + 1
-        self.add(Record(number, inner, kkt, np.nan, seconds, note, sizes, steps))
+        self.add(Record(number, inner, residuals, np.nan, seconds, note, sizes, steps))
 
     def add(self, record: Record) -> None:
         """Append a record, log it and call the monitor."""
@@ -103,9 +103,9 @@ class Recorder:
             "iteration %d: %s; equilibrium %.1e, contact %.1e, friction %.1e%s",
             record.iteration,
             counted(record.inner, "linear solve"),
-            record.kkt.equilibrium,
-            record.kkt.contact,
-            record.kkt.friction,
+            record.residuals.equilibrium,
+            record.residuals.contact,
+            record.residuals.friction,
             f" ({record.note})" if record.note else "",
         )
         if self.monitor is not None:
@@ -123,7 +123,7 @@ class Outcome:
 
     Attributes
     ----------
-    kkt
+    residuals
         Final residuals, of the problem at its whole load.
     allowed
         Tolerance of each residual.
@@ -141,7 +141,7 @@ class Outcome:
         Factorisations and linear solves.
     """
 
-    kkt: Residuals
+    residuals: Residuals
     allowed: Residuals
     ended: str = ""
     signal: int = 0
@@ -152,19 +152,17 @@ class Outcome:
 
     @property
     def converged(self) -> bool:
-        """Whether every residual is within its tolerance, and no signal has interrupted."""
-        return not self.signal and not self.kkt.excess(self.allowed)
+        """Whether all residuals are within their tolerances, and no signal has interrupted."""
+        return not self.signal and not self.residuals.excess(self.allowed)
 
     @property
     def reason(self) -> str:
-        """Why the method ended, and its residuals, in words."""
+        """Reason of the end, and the residuals, in words."""
         if self.signal:
             return self.ended
-        if excess := self.kkt.excess(self.allowed):
-            # A criterion that is met is contradicted by the residual, any other end explained.
+        if excess := self.residuals.excess(self.allowed):
             met = f"{self.criterion}, but " if self.criterion else ""
             return (f"{self.ended}: " if self.ended else met) + excess
-        # A converged end is no failure, even where the method had given up.
         words = self.criterion or f"all residuals <= {self.allowed.largest:g}"
-        granted = self.kkt.granted(self.allowed)
+        granted = self.residuals.granted(self.allowed)
         return f"{words}, to rounding: {granted}" if granted else words

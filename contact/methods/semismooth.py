@@ -1,8 +1,7 @@
-"""Semismooth Newton method on one problem: its iteration, on a whole body or on a condensed one.
+"""Semismooth Newton method on one problem, the whole body or the condensed one; no fallbacks.
 
-Each step linearises all laws together (`newton_step`); the iteration ends by the residuals, which
-are computed from scratch. It knows no fallback: `newton` has their order, and each of them is given
-the iteration that failed.
+Each step linearises all laws together (`newton_step`); the residuals, computed from scratch, end
+the iteration.
 """
 
 from __future__ import annotations
@@ -13,41 +12,45 @@ import numpy as np
 
 from contact.interface.active_set import touching
 from contact.interface.multipliers import Multipliers
-from contact.methods.complementarity_parameters import overestimates_stiffness
 from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome, Record, Recorder
 from contact.methods.step_control import PROGRESS, Best, Stagnation, undeformed_equilibrium
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.protocols import Problem
-from contact.problem.residuals import Residuals, evaluate_forces
+from contact.problem.residuals import Residuals, evaluate_forces, residual_forces
 from contact.problem.state import State
+from contact.ranks import summed
 from contact.typing import Array
 
-#: Why an iteration ends whose complementarity parameter overestimates the stiffness.
+#: Ratio of c times the penetration of the first step to all loads above which c overestimates the
+#: stiffness of the body: for a block, whose stiffness c estimates, it is about sqrt(H/h).
+OVERESTIMATE = 1e3
+
+#: Reason of an end whose complementarity parameter overestimates the stiffness.
 OVERESTIMATED = "the complementarity parameter is far above the stiffness of the body"
 
 
 class SemismoothNewton:
-    """The semismooth Newton method on one problem, with the operator of one body.
+    """The semismooth Newton method on one problem, with one operator.
 
     Parameters
     ----------
     problem, options
-        The problem, and the tolerances and limits.
+        The problem; tolerances and limits.
     step
-        Takes the steps.
+        One linearisation and solve.
     modes
         Rigid-body modes of the whole problem.
     recorder
-        Gets a record of each step.
+        Recorder of the steps.
 
     Attributes
     ----------
     at, best
-        The last iterate, and the one with the least residual.
+        Last iterate, and iterate of least residual.
     reserved
-        Number of steps of the limit that are kept for later stages.
+        Steps of the limit that are reserved for the condensed body.
     """
 
     def __init__(
@@ -65,26 +68,25 @@ class SemismoothNewton:
 
     @property
     def left(self) -> int:
-        """Number of steps that are left of the limit."""
+        """Number of steps left of the limit."""
         return self.options.max_outer - self.reserved - len(self.recorder.records)
 
     def see(self, state: State, residuals: Residuals) -> None:
-        """Take note of an iterate."""
+        """Keep an iterate as the last one, and as the best one if it is."""
         self.at = state
         self.best.see(state, residuals.significant)
 
     def on(self, problem: Problem) -> SemismoothNewton:
-        """Return the method on the problem with another interface, with the same operator."""
+        """Return the method on a problem with another interface, with the same operator."""
         other = SemismoothNewton(problem, self.options, self.step, self.modes, self.recorder)
         other.reserved = self.reserved
         return other
 
     def started(self, start: State) -> State:
-        """Return a state with its active set, to start from."""
+        """Return an initial guess with its active set."""
         interface, c = self.problem.interface, self.step.parameters.c
         nodal = interface.jump.apply(start.x)
-        # A remainder of pressure where a node is open would give it a friction bound: one of the
-        # size of rounding, with friction of any direction, on which the node would stick.
+        # Rounding of the pressure at an open node would be a friction bound, and make it stick.
         closed = touching(start.forces.pressure, interface.opening(nodal), c)
         pressure = np.where(closed, start.forces.pressure, 0.0)
         forces = Multipliers.of(interface.jump, pressure, start.forces.friction)
@@ -101,23 +103,22 @@ class SemismoothNewton:
         give_up: bool = False,
         exact: bool = False,
     ) -> tuple[State, Outcome]:
-        """Take steps until the residuals say that they have converged or stagnate. Collective.
+        """Iterate until the residuals converge or stagnate. Collective.
 
         Parameters
         ----------
         state
             Initial guess.
         linearised_at
-            Unknowns at which the material is linearised first; those of the state by default.
+            Unknowns of the first secant; those of the state by default.
         note
             Note of the steps in the history.
         stagnation_limit
             Stagnation limit; that of the options by default.
         give_up
-            Whether to end after a first step from the zero initial guess whose penetration shows
-            that c overestimates the stiffness of the body.
+            Whether to end after a first step from zero that shows c to overestimate the stiffness.
         exact
-            Whether iterative solvers go to their own tolerance.
+            Whether iterative solvers go to their own tolerance, without a forcing term.
         """
         problem, options, step = self.problem, self.options, self.step
         linear = problem.equilibrium.linear
@@ -125,7 +126,7 @@ class SemismoothNewton:
         if loop.starts_converged:
             return state, loop.outcome()
         step.begin()
-        # A start from elsewhere is near the solution; zero displacement has no better tangent.
+        # At zero strain the secant is the tangent; an initial guess with an active set is near.
         tangent = state.active_set is not None and linearised_at is None and not linear
         for _ in range(min(options.max_iterations, self.left)):
             before, residuals = state, loop.residuals
@@ -143,12 +144,11 @@ class SemismoothNewton:
             if (found := loop.ended(state)) is not None:
                 return found
             if give_up and before.active_set is None:
-                if overestimates_stiffness(problem, step.parameters, state):
+                if _overestimates_stiffness(problem, step.parameters.c, state):
                     return state, loop.outcome(OVERESTIMATED)
             if not linear:
                 falls = loop.residuals.equilibrium < max(residuals.equilibrium, options.tolerance)
-                # After a tangent that overshoots, the secant (Kacanov), as where unloading differs
-                # from loading.
+                # The secant (Kacanov) after a tangent that overshoots, as at unloading.
                 tangent = falls or not tangent
             if (stalled := loop.stalled()) is not None:
                 return state, stalled
@@ -156,24 +156,7 @@ class SemismoothNewton:
 
 
 class Iteration:
-    """The residuals of the iterates of one loop of steps, and whether they end it.
-
-    Parameters
-    ----------
-    newton
-        Whose problem, tolerances and history they are.
-    state
-        Initial guess.
-    note
-        Note of the steps in the history.
-    stagnation_limit
-        Stagnation limit; that of the options by default.
-
-    Attributes
-    ----------
-    residuals, internal
-        Residuals of the last iterate, and its internal forces.
-    """
+    """Residuals and internal forces of the last iterate, and the ends by these residuals."""
 
     def __init__(
         self,
@@ -195,7 +178,7 @@ class Iteration:
 
     @property
     def converged(self) -> bool:
-        """Whether the residuals of the last iterate are within the tolerance, or rounding."""
+        """Whether the residuals of the last iterate are below tolerance, or rounding."""
         return self.residuals.significant <= self._options.tolerance
 
     def evaluate(self, state: State) -> None:
@@ -204,13 +187,13 @@ class Iteration:
         self._newton.see(state, self.residuals)
 
     def record(self, state: State, *words: str, steps: tuple[Record, ...] = ()) -> None:
-        """Append a record of the step to an iterate. Collective."""
+        """Record the step to an iterate. Collective."""
         note = " ".join(word for word in (self._note, *words) if word)
         sizes = _node_counts(state, self._problem)
         self._newton.recorder.record(self.residuals, note, sizes=sizes, steps=steps)
 
     def ended(self, state: State) -> tuple[State, Outcome] | None:
-        """Return the end of a loop that has converged, diverged, or lost contact. Collective."""
+        """Return the end by convergence, divergence, or loss of contact; else None. Collective."""
         if self.converged:
             return state, self.outcome()
         if (found := self._loss_of_contact(state)) is not None:
@@ -221,13 +204,13 @@ class Iteration:
         return None
 
     def stalled(self) -> Outcome | None:
-        """Count a step; return the outcome where the stagnation limit is reached."""
+        """Count a step; return the outcome at the stagnation limit, else None."""
         if not self._stagnation(self.residuals.significant):
             return None
         return self.outcome(f"Newton's method stalled at {self._stagnation.best:.1e}")
 
     def out_of_steps(self) -> Outcome:
-        """Return the outcome of a loop that has taken all of its steps."""
+        """Return the outcome at the limit of steps."""
         return self.outcome(f"not converged in {len(self._newton.recorder.records)} steps")
 
     def outcome(self, ended: str = "") -> Outcome:
@@ -238,11 +221,8 @@ class Iteration:
         return self._problem.interface.jump.maximum(state.forces.pressure)
 
     def _loss_of_contact(self, state: State) -> tuple[State, Outcome] | None:
-        """Return zero displacement where nothing touches any more and nothing acts. Collective.
-
-        Displacements fall by their rounding in each step then, and so do the forces beside which
-        residuals are measured: nodes that touch press by a part of the largest pressure before.
-        """
+        """Return zero displacement if contact is lost and no load acts; else None. Collective."""
+        # Displacements and forces then fall together from step to step: no relative residual does.
         counts, tolerance = _node_counts(state, self._problem), self._options.tolerance
         if counts is None:
             return None
@@ -262,8 +242,19 @@ class Iteration:
 
 
 def _node_counts(state: State, problem: Problem) -> tuple[int, int, int] | None:
-    """Return the numbers of nodes that are open, stick and slip, if they are known. Collective."""
+    """Return the numbers of open, stick and slip nodes; None without an active set. Collective."""
     if state.active_set is None:
         return None
     interface = problem.interface
     return interface.node_counts(interface.jump.apply(state.x), state.active_set)
+
+
+def _overestimates_stiffness(problem: Problem, c: float, state: State) -> bool:
+    """Tell whether c times the penetration of a first state is far above all loads. Collective."""
+    interface = problem.interface
+    penetration = np.maximum(-interface.opening(interface.jump.apply(state.x)), 0.0)
+    forces = np.abs(residual_forces(problem, problem.start()))
+    on_nodes, on_global = np.split(forces, [problem.equilibrium.owned])
+    loads = float(summed(interface.comm, on_nodes.sum())) + on_global.sum()
+    # A given motion of the foundation alone is no load to compare with.
+    return bool(c * interface.jump.sum(penetration) > OVERESTIMATE * loads > 0)

@@ -1,10 +1,9 @@
-"""How a loop of steps is controlled by its residuals; all ranks decide alike.
+"""Control of an iteration by its residuals, alike on all ranks.
 
-`Stagnation` ends it, and `Best` keeps the iterate with the least residual. `Chord` decides whether
-a step is a modified Newton step with a frozen factorisation: a Newton step costs a factorisation, a
-chord step a few substitutions, and chord steps converge linearly, but fast where little of the body
-is in the plastic range. `ConductivityDerivative` decides whether a step includes the derivative of
-the conductivity by the gap.
+`Stagnation` is the stagnation limit, `Best` the iterate of least residual. `Chord` chooses between
+Newton and chord steps: a chord step keeps the factorisation and costs a few substitutions, but
+converges linearly; fast while little of the body is in the plastic range. `ConductivityDerivative`
+chooses between Newton's method and Picard's in the conductivity.
 
 References
 ----------
@@ -23,7 +22,7 @@ from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Ratio to the least residual so far below which a residual counts as progress.
+#: Ratio to the least residual so far that is progress.
 PROGRESS = 0.5
 
 T = TypeVar("T")
@@ -31,39 +30,32 @@ T = TypeVar("T")
 
 @dataclass
 class Best(Generic[T]):
-    """The iterate with the least residual, which a method returns where it fails.
-
-    Attributes
-    ----------
-    found
-        The iterate; None before there was one that has a residual.
-    """
+    """Iterate of least residual, `found`: the end of a method that fails."""
 
     found: T | None = None
     _least: float = np.inf
 
     def see(self, iterate: T, residual: float) -> None:
-        """Keep an iterate if its residual is the least; NaN is no residual."""
+        """Keep an iterate if its residual is the least, and not NaN."""
         if residual < self._least:
             self.found, self._least = iterate, residual
 
 
 @dataclass
 class Stagnation:
-    """Counts the steps since the last progress; all ranks count alike.
+    """Stagnation limit: number of steps without progress.
 
     Attributes
     ----------
     limit
-        Steps without progress after which the iteration is given up.
+        Steps without progress at which the iteration is given up.
     progress
-        Ratio to the reference below which a measure is progress.
+        Ratio to the reference residual that is progress.
     cumulative
-        Whether the decrease over several steps counts: the reference is then the least measure at
-        the last progress, else the least of all steps before. With a ratio of 1/2, steps that
-        reduce the measure by a fifth each would be given up else.
+        Whether the reference is the least residual at the last progress, so that a slow decrease
+        over several steps counts; else the least residual of all steps before.
     best
-        The least measure so far.
+        Least residual so far.
     """
 
     limit: int
@@ -73,52 +65,43 @@ class Stagnation:
     _since: int = 0
     _reference: float = np.inf
 
-    def __call__(self, measure: float, limit: int | None = None) -> bool:
-        """Count a step by its measure; tell whether the limit is reached.
-
-        Parameters
-        ----------
-        measure
-            The residual, or another number that is to vanish.
-        limit
-            Limit for this step in place of the attribute.
-        """
-        gained = measure < self.progress * self._reference
+    def __call__(self, residual: float, limit: int | None = None) -> bool:
+        """Count a step by its residual; True at the limit, that of this step if given."""
+        gained = residual < self.progress * self._reference
         self._since = 0 if gained else self._since + 1
-        self.best = min(self.best, measure)
+        self.best = min(self.best, residual)
         if gained or not self.cumulative:
             self._reference = self.best
         return self._since >= (self.limit if limit is None else limit)
 
 
 def undeformed_equilibrium(problem: Problem, tolerance: float) -> tuple[State, Residuals] | None:
-    """Return zero displacement and its residuals, where it is in equilibrium. Collective.
+    """Return zero displacement and its residuals if it is in equilibrium, else None. Collective.
 
-    Residuals are relative to the forces that act. Where all of these vanish in the limit, as at
-    zero displacement without loads, a method that approaches it never has a small residual, and
-    does not end. Asked only where a method has failed: with friction there may be other solutions.
+    Residuals are relative to the forces that act: approaching a state without forces, none becomes
+    small. With friction there may be other solutions, so a method asks for this where it fails.
     """
     state = problem.start()
     residuals = evaluate(problem, state)
     return (state, residuals) if residuals.significant <= tolerance else None
 
 
-#: Chord steps that cost as much as a new factorisation: more are not taken with the old one.
+#: Cost of a factorisation, in chord steps.
 MOST_STEPS = 10.0
 
-#: Residual above which no factorisation is frozen: the tangent is not good there.
+#: Residual above which there are no chord steps.
 RADIUS = 0.05
 
 
 class Chord:
-    """Decides by the residuals whether the next step is a chord step, which needs no factorisation.
+    """Choice between a Newton step and a chord step, by the rate of convergence.
 
     Parameters
     ----------
     goal
-        The residual that is to be reached.
+        Tolerance on the residual.
     most_steps
-        Most chord steps to the goal for which the factorisation is kept; 0: it never is.
+        Most chord steps to the goal; 0 for none at all.
     """
 
     def __init__(self, goal: float, most_steps: float) -> None:
@@ -127,27 +110,26 @@ class Chord:
         self.begin()
 
     def drop(self) -> None:
-        """Drop the factorisation: the next step makes a new one."""
+        """Take a Newton step next."""
         self._factorised = self._keeps = False
 
     def begin(self) -> None:
-        """Begin another loop, with other loads or another initial guess."""
+        """Begin an iteration with other loads or another initial guess."""
         self._before: State | None = None
         self._reached = np.inf
 
     def choose(
         self, state: State, reached: float, linearised_at: Array | None = None
     ) -> tuple[State, bool]:
-        """Return the state to go on from, and whether the factorisation is kept.
+        """Return the iterate to step from, and whether the step is a chord step.
 
         Parameters
         ----------
-        state
-            The last iterate.
-        reached
-            The largest residual there.
+        state, reached
+            Last iterate and its residual. Where a chord step has raised it, the one before is
+            taken.
         linearised_at
-            Unknowns at which the material is to be linearised; None for those of the state.
+            Unknowns of the secant; None for those of the state.
         """
         before, last = self._before, self._reached
         if not self._factorised or self._most_steps <= 0:
@@ -164,26 +146,25 @@ class Chord:
         return state, keep
 
     def note_factorisation(self) -> None:
-        """Take note that a step has made, or kept, a factorisation."""
+        """Note that there is a factorisation."""
         self._factorised = True
 
 
 @dataclass
 class ConductivityDerivative:
-    """Decides by the residuals whether a step includes the derivative of the conductivity.
+    """Choice between psi'(u_nu - rho) in the tangent (Newton) and psi frozen (Picard).
 
-    With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and Newton's
-    method converges fast even where the ramp psi is steep. But a node that opens draws less charge,
-    and may thus open further. The linearised charge then leads back to contact, where the node is
-    under tension: the active set cycles. Without the derivative (psi frozen, Picard) the node opens
-    to the other end of the ramp.
+    With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and steep
+    ramps psi converge fast. But a node that opens draws less charge, and may open further: the
+    linearised charge leads back to contact, the node is then under tension, and the active set
+    cycles. With psi frozen it opens to the other end of the ramp.
 
     Attributes
     ----------
     near
-        Largest residual at which the derivative may be included at all.
+        Largest residual with the derivative.
     included
-        Whether the last step has included it.
+        Whether the last step had it.
     """
 
     near: float = np.inf
@@ -191,32 +172,19 @@ class ConductivityDerivative:
     _limit: float = np.inf
 
     def worsened(self, residual: float) -> bool:
-        """Tell whether the last step included the derivative and has raised the residual.
+        """Tell whether a step with the derivative has raised the residual: it is to be rejected.
 
-        If so, it is included again only below a tenth of the residual before that step.
-
-        Parameters
-        ----------
-        residual
-            The largest residual after that step.
+        The derivative is taken again below a tenth of the residual before that step.
         """
         if not self.included or residual <= self._limit:
             return False
-        # The next step, with psi frozen, may only undo this one: ask for a smaller residual.
+        # A step with psi frozen may only undo this one.
         self._limit *= 0.1
         self.included = False
         return True
 
     def __call__(self, residual: float, allowed: bool = True) -> bool:
-        """Tell whether the next step is to include the derivative.
-
-        Parameters
-        ----------
-        residual
-            The largest residual before that step.
-        allowed
-            Whether the solver would include it.
-        """
+        """Tell whether the next step is to have the derivative, by the residual before it."""
         self.worsened(residual)
         self.included = allowed and residual <= min(self.near, self._limit)
         if self.included:

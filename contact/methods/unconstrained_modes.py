@@ -306,7 +306,7 @@ def with_least_displacements(
         residuals = evaluate(problem, free)
         if residuals.excess(outcome.allowed):
             return state, outcome
-        state, outcome = free, replace(outcome, kkt=residuals)
+        state, outcome = free, replace(outcome, residuals=residuals)
     found = modes.free_motion(problem, state)
     if found is None:
         return state, outcome
@@ -316,7 +316,7 @@ def with_least_displacements(
         least = replace(state, x=x, forces=forces)
         residuals = evaluate(problem, least)
         if not residuals.excess(outcome.allowed):
-            outcome = replace(outcome, kkt=residuals)
+            outcome = replace(outcome, residuals=residuals)
             pressed = problem.interface.jump.maximum(state.forces.pressure) > 0
             if pressed and forces is not state.forces:
                 # Pressures that are gone, as rounding, have held other motions.

@@ -89,7 +89,7 @@ class CondensedBody:
     component_norms: ComponentNorms
     inclined: Inclined | None = None
 
-    linear, symmetric, most_rounding = True, True, MOST_ROUNDING
+    linear, symmetric, rounding_limit = True, True, MOST_ROUNDING
 
     @property
     def block_size(self) -> int:

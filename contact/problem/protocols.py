@@ -1,7 +1,8 @@
-"""Protocols that methods are written against, and the scales of a problem."""
+"""Protocols of a body and of a contact problem, and the scales of a problem."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,6 +10,7 @@ from mpi4py import MPI
 
 from contact.body.component_norms import ComponentNorms
 from contact.history import Evaluated
+from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.interface import Interface
 from contact.linear.operator import Counters, Operator
 from contact.problem.state import State
@@ -17,7 +19,7 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class Scales:
-    """Sizes that fit a body in any units.
+    """Lengths and stiffnesses of a body and its mesh, in any units.
 
     Attributes
     ----------
@@ -26,11 +28,11 @@ class Scales:
     size
         Largest extent (length).
     height
-        Volume over the area of Gamma_3 (length).
+        H, volume over the area of Gamma_3 (length).
     area
-        Of Gamma_3 (length^(d - 1)); of a body of revolution over the full turn (length^2).
+        Area of Gamma_3 (length^(d - 1)); of a body of revolution of the full turn (length^2).
     spacing
-        Of the contact nodes (length).
+        h, spacing of the contact nodes (length).
     """
 
     young: float
@@ -47,12 +49,27 @@ class Scales:
         """E' = E/(1 - nu^2) (stress)."""
         return self.young / (1 - self.poisson**2)
 
+    @property
+    def augmentation(self) -> float:
+        """r* = 1.39 E'/sqrt(h H), geometric mean of the ends of the Steklov spectrum.
+
+        Displacements of Gamma_3 that vary over H meet the stiffness E'/H, those that vary from node
+        to node r*^2 H/E' (stress/length).
+        """
+        return 1.39 * self.plane_modulus / math.sqrt(self.spacing * self.height)
+
+    def complementarity_parameters(self, gamma: float) -> ComplementarityParameters:
+        """Return c = r*, the stiffness r*^2 H/E' of a node, and gamma times the larger one."""
+        c = self.augmentation
+        nodal = c**2 * self.height / self.plane_modulus
+        return ComplementarityParameters(c, nodal, gamma * max(c, nodal))
+
 
 class Equilibrium(Protocol):
-    """A body as its contact nodes feel it: forces at given unknowns.
+    """Equilibrium of a body: nodal forces at given unknowns, without a state of its own.
 
-    The whole body (`contact.body.equilibrium`) and the one condensed onto its contact nodes
-    (`contact.problem.condensed`) are two implementations. Neither keeps a state.
+    Implemented by the whole body (`contact.body.equilibrium`) and by the body condensed onto its
+    contact nodes (`contact.problem.condensed`).
     """
 
     @property
@@ -81,20 +98,20 @@ class Equilibrium(Protocol):
 
     @property
     def component_norms(self) -> ComponentNorms:
-        """Which forces are compared with each other."""
+        """Norms of forces and charges of each connected component."""
 
     @property
-    def most_rounding(self) -> float:
-        """Most that counts as rounding, over all forces of a field."""
+    def rounding_limit(self) -> float:
+        """Largest residual that is accepted as rounding, over all forces of a field."""
 
     def rest(self) -> Array:
-        """Return the local unknowns of the undeformed body."""
+        """Return the local unknowns of the reference configuration: zeros."""
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
-        """Return unknowns with the prescribed values at a time. Collective."""
+        """Return unknowns with the prescribed values of a time. Collective."""
 
     def owned_part(self, x: Array) -> Array:
-        """Return the owned ones of local unknowns, and the global ones behind them."""
+        """Return the owned unknowns of local ones, the global ones behind them."""
 
     def moved(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment of the owned ones. Collective."""
@@ -106,19 +123,19 @@ class Equilibrium(Protocol):
         """Return the owned nodal loads at a time. Collective."""
 
     def unbalanced(self, forces: Array) -> Array:
-        """Return the part of forces that has to vanish in equilibrium. Collective."""
+        """Return the forces on free unknowns, which vanish in equilibrium. Collective."""
 
     def reactions(self, forces: Array) -> Array:
-        """Return the part of forces that the supports bear."""
+        """Return the forces on fixed unknowns: reactions of the supports."""
 
     def norms(self, values: Array) -> Array:
-        """Return the norms of owned forces, and of charges, of each component apart. Collective."""
+        """Return norms of owned forces and charges, by connected component. Collective."""
 
     def load_norms(self, time: float = 1.0) -> Array:
         """Return the `norms` of the loads at a time. Collective."""
 
     def exchanged(self, state: Evaluated) -> Array:
-        """Return the `norms` of the forces of each field on the other. Collective."""
+        """Return the `norms` of the piezoelectric coupling forces and charges. Collective."""
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
@@ -141,16 +158,16 @@ class Problem(Protocol):
 
     @property
     def time(self) -> float:
-        """When its loads and prescribed values act; 1 for a static problem."""
+        """Time of its loads and prescribed values; 1 for a static problem."""
 
     def start(self, time: float | None = None) -> State:
-        """Return the state to start from: zero, but for the prescribed values.
+        """Return the zero initial guess, with the prescribed values of the problem's time.
 
-        Those of another time than the problem's, where one is given.
+        Or of another time.
         """
 
     def with_interface(self, interface: Interface) -> Problem:
-        """Return the problem with other laws, or gaps, at the same contact nodes."""
+        """Return the problem with another interface on the same contact nodes."""
 
     def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> Operator:
-        """Return the operator of its linear systems, with blocks where the interface has some."""
+        """Return the operator of its linear systems: bulk matrix plus blocks at contact nodes."""

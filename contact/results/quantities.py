@@ -241,9 +241,9 @@ _RUN = (
         "kkt", "", "Residuals of the equations, each relative to its own size: `equilibrium` "
         "(forces; of piezoelectric bodies charges, where these are farther from balance), "
         "`contact` (no penetration, no tension, one of them zero), `friction` (stick or slip).",
-        lambda r: {key: getattr(r.outcome.kkt, key) for key in r.floors},
+        lambda r: {key: getattr(r.outcome.residuals, key) for key in r.floors},
     ),
-    Quantity("kkt", "", "The largest residual.", lambda r: r.outcome.kkt.largest, ROWS),
+    Quantity("kkt", "", "The largest residual.", lambda r: r.outcome.residuals.largest, ROWS),
     Quantity(
         "rounding", "", "Rounding floors of the residuals in `kkt`, up to which they are accepted; "
         "of `equilibrium` in an evolution the largest of all steps. Larger than the tolerance in "
@@ -343,10 +343,10 @@ _HISTORY = (
     Quantity("inner", "", "Linear solves of the iteration.", files=(HISTORY,)),
     Quantity(
         "equilibrium", "", "Residual after the iteration, as in `kkt`.",
-        lambda r: r.kkt.equilibrium, (HISTORY,),
+        lambda r: r.residuals.equilibrium, (HISTORY,),
     ),
-    Quantity("contact", "", "Likewise.", lambda r: r.kkt.contact, (HISTORY,)),
-    Quantity("friction", "", "Likewise.", lambda r: r.kkt.friction, (HISTORY,)),
+    Quantity("contact", "", "Likewise.", lambda r: r.residuals.contact, (HISTORY,)),
+    Quantity("friction", "", "Likewise.", lambda r: r.residuals.friction, (HISTORY,)),
     Quantity(
         "change", "", "Relative change of the friction bound; `nan` where there is none.",
         files=(HISTORY,),

@@ -69,7 +69,7 @@ class StepRecord:
     enthalpy
         Where the energy balance of the next step begins, see `problem.energy.Balance`.
     rounding
-        Largest `rounding` of the residuals of a step so far, see `problem.kkt.Residuals`.
+        Largest `equilibrium_rounding` of the residuals of a step so far, see `problem.residuals.Residuals`.
     """
 
     state: State
@@ -115,7 +115,7 @@ class StepRecorder:
             way, force = (find(problem, state) for find in (self._driven.way, self._driven.force))
             solution.driven = way, force
         row = values_of(STEPS, solution)
-        self._rounding = max(self._rounding, outcome.kkt.rounding)
+        self._rounding = max(self._rounding, outcome.residuals.equilibrium_rounding)
         return StepRecord(state, row, energies.enthalpy, self._rounding)
 
 
@@ -219,12 +219,12 @@ class Solution(Solved):
     @property
     def rounding(self) -> float:
         """Forces out of balance that count as rounding; of an evolution the most in a step."""
-        return max([self.outcome.kkt.rounding, *(step.rounding for step in self.steps[-1:])])
+        return max([self.outcome.residuals.equilibrium_rounding, *(step.rounding for step in self.steps[-1:])])
 
     @property
     def floors(self) -> dict[str, float]:
         """Rounding floors of the residuals."""
-        balance, contact, friction = self.outcome.kkt.floors
+        balance, contact, friction = self.outcome.residuals.floors
         balance = max(balance, self.rounding)
         return {"equilibrium": balance, "contact": contact, "friction": friction}
 

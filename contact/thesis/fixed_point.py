@@ -20,7 +20,6 @@ from typing import ClassVar
 import numpy as np
 
 from contact.linear.operator import Operator
-from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import Outcome
 from contact.methods.step_control import ConductivityDerivative
@@ -53,7 +52,7 @@ class FixedPoint(OuterLoop):
         """Choose r and set up the operator."""
         super().__post_init__()
         given = self.options.r
-        self.r = automatic_r(self.problem.scales) if given == "auto" else given
+        self.r = self.problem.scales.augmentation if given == "auto" else given
         self.operator = self._new_operator(symmetric=True)
 
     def _new_operator(self, symmetric: bool) -> Operator:

@@ -25,7 +25,9 @@ def main(out: Path = Path("results/bar_pressure"), cells: tuple[int, int] = (128
     write_outputs(solution, out)
 
     if MPI.COMM_WORLD.rank == 0:
-        print(f"{solution.outcome.reason}; largest residual {solution.outcome.kkt.largest:.1e}")
+        print(
+            f"{solution.outcome.reason}; largest residual {solution.outcome.residuals.largest:.1e}"
+        )
         print(f"force on the foundation: {force[0]:.5f}, {force[1]:.5f}")
         draw(out)
     return solution

@@ -126,7 +126,7 @@ def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
             state, outcome = Newton(problem, NewtonOptions(tolerance=1e-9)).solve()
             if not outcome.converged:
                 raise NotConvergedError(f"{label}, 1/h = {n}: {outcome.reason}")
-            residuals.append(outcome.kkt.largest)
+            residuals.append(outcome.residuals.largest)
             if dim:
                 e, largest = errors(problem.equilibrium, state.x, exact(dim)), np.nan
             else:

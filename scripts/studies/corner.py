@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> list[float]:
         pressures.append(float(nodes.gather(solution.pressure)[last]))
         sticks = nodes.gather((solution.status == "stick").astype(float))[last] > 0
         columns["status"].append("sticks" if sticks else "slides")
-        columns["residual"].append(solution.outcome.kkt.largest)
+        columns["residual"].append(solution.outcome.residuals.largest)
     # p ~ h^(lambda - 1)
     fitted = [order + 1 for order in observed_orders(1 / np.array(cells), pressures)]
     theory = exponent(POISSON)

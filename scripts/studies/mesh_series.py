@@ -88,7 +88,7 @@ def measure(variant: Variant) -> tuple[Array, list[float]]:
 
 def _residual(outcome: Outcome, variant: Variant) -> float:
     """Return the residual that decides: for a penalised problem that of its own laws."""
-    return outcome.kkt.equilibrium if variant.penalised else outcome.kkt.largest
+    return outcome.residuals.equilibrium if variant.penalised else outcome.residuals.largest
 
 
 def mesh_series(

@@ -88,8 +88,8 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
             int(np.count_nonzero(status == "stick")),
             int(np.count_nonzero(status == "slip")),
             relative.energy,
-            solution.outcome.kkt.largest,
-            uzawa.outcome.kkt.largest,
+            solution.outcome.residuals.largest,
+            uzawa.outcome.residuals.largest,
         )
         solutions[label], tables[label] = solution, contact_table(solution)
     name = f"nonlocal-{abs(load):g}".replace(".", "_")

@@ -377,7 +377,7 @@ def newton(report: Report) -> None:
     found: dict[str, list[float]] = {}
     for record in solution.history:
         step = f"t = {record.note.split()[2]}"
-        found.setdefault(step, []).append(record.kkt.largest)
+        found.setdefault(step, []).append(record.residuals.largest)
     most = max(map(len, found.values()))
     columns: dict[str, list[Any]] = {"iteration": list(range(1, most + 1))}
     for step, residuals in found.items():

@@ -115,7 +115,7 @@ def measured(series: Series, n: int, degree: int) -> tuple[Array, float]:
         error, dual, norm = solution.pressure - given, DualNorm(problem), problem.nodes.norm
         ratios = norm(error) / norm(given), dual.pressure(error) / dual.pressure(given)
         squares += np.square(ratios) / len(series.places)
-        residual = max(residual, solution.outcome.kkt.largest)
+        residual = max(residual, solution.outcome.residuals.largest)
     return np.sqrt(squares), residual
 
 

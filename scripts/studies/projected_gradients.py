@@ -208,7 +208,7 @@ def by_interior_point(problem: ContactProblem) -> tuple[Counted, Array]:
     took, cycles = time.process_time() - begin, found.counters.linear_iterations
     x = problem.equilibrium.owned_part(found.state.x)
     # each iteration of conjugate gradients is a product and a cycle
-    left = found.outcome.kkt.largest
+    left = found.outcome.residuals.largest
     return Counted(cycles, cycles, cycles, 0, 0, left, found.converged, took), x
 
 

@@ -98,7 +98,7 @@ def measured(solution: Solution) -> dict[str, object]:
         "max phi": nodes.maximum(phi, -np.inf),
         "charge": charges.foundation,
         "converged": solution.converged,
-        "residual": solution.outcome.kkt.largest,
+        "residual": solution.outcome.residuals.largest,
         "several": any("several solutions" in text for text in solution.warnings),
     }
 

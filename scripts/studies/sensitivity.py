@@ -121,7 +121,7 @@ def study(report: Report, name: str, coarse: bool) -> None:
             nodes.norm(solution.pressure),
             int(nodes.sum(np.where(solution.status == "open", 0.0, 1.0 / nodes.weight))),
             solution.converged,
-            solution.outcome.kkt.largest,
+            solution.outcome.residuals.largest,
         )
         for key, entry in zip(names, row, strict=True):
             columns[key].append(entry)

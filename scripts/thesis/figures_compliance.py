@@ -207,7 +207,7 @@ def remark(solution: Solution, table: Table) -> str:
     touching = f"{stick}, {counts['slip']} slide"
     if not solution.problem.frictional:
         touching = f"{counts['slip']} nodes are in contact"
-    residual = solution.outcome.kkt.largest
+    residual = solution.outcome.residuals.largest
     return f"{touching}, {counts['open']} are open; largest residual {residual:.1e}."
 
 

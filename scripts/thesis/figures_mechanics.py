@@ -71,7 +71,7 @@ def draw(report: Report, number: str, case: Case, text: str, load: float) -> Tab
 
 def _remark(solution: Solution, table: Table) -> str:
     """Return the solver's residuals and the visible quantities."""
-    kkt = solution.outcome.kkt
+    kkt = solution.outcome.residuals
     counts = {kind: np.count_nonzero(table["status"] == kind) for kind in ("stick", "slip", "open")}
     return (
         f"{counts['stick']} nodes stick, {counts['slip']} slide, {counts['open']} are open; "

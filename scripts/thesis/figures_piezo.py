@@ -80,7 +80,7 @@ def potentials(
     for k, curve in enumerate(curves):
         solution = solution_of(name, cells, *curve.changes, domain=domain)
         domain = solution.problem.domain
-        residual = max(residual, solution.outcome.kkt.largest)
+        residual = max(residual, solution.outcome.residuals.largest)
         table = contact_table(solution)
         if table is not None:
             data.setdefault("x", table["x"])

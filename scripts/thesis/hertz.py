@@ -147,7 +147,7 @@ def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], So
             found.moment / hertz.half_width,
             found.peak / hertz.peak,
             found.force_error,
-            solution.outcome.kkt.largest,
+            solution.outcome.residuals.largest,
         )
     report.table(
         "hertz-cylinder",
@@ -261,7 +261,7 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
             *values.values(),
             found.peak / hertz.peak,
             len(solution.history),
-            solution.outcome.kkt.largest,
+            solution.outcome.residuals.largest,
         )
         for key, value in values.items():
             ratios[key].append(value)

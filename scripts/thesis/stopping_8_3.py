@@ -76,7 +76,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             states, solves, outcome = iterates(problem, case.solver)
             counts = [count(body, states, scale) for scale in (1.0, body.phi_scale)]
             last = solves[int(np.nan_to_num(counts[0], nan=len(solves))) - 1]
-            append(columns, topic, rule, THESIS, *counts, solves[0], last, outcome.kkt.largest)
+            append(
+                columns, topic, rule, THESIS, *counts, solves[0], last, outcome.residuals.largest
+            )
     Report(chosen.out).table(
         "stopping-8-3",
         f"Example 8.3: iterations of Algorithm 8 until (6.40) with eps_fp = 1e-5, {cells[0]} x "

@@ -77,7 +77,7 @@ def run(n: int, load: float, rho: float, *changes: str) -> Run:
         inner=sum(r.inner for r in solution.history),
         solves=solution.counters.linear_solves,
         factorizations=solution.counters.factorizations,
-        residual=solution.outcome.kkt.largest,
+        residual=solution.outcome.residuals.largest,
         change=first(1e-5),
         square=first(np.sqrt(1e-5)),
         converged=solution.converged,

@@ -91,16 +91,16 @@ def table(report: Report, n: int) -> None:
             stopped = penalty(problem, n, load, eps, 'solver.stopping="thesis"', lagged)
             alone = checked(penalty(problem, n, load, eps, lagged, "solver.max_outer=1000"))
             converged = checked(penalty(problem, n, load, eps))
-            error, kkt = distance(reference, converged), converged.outcome.kkt
+            error, kkt = distance(reference, converged), converged.outcome.residuals
             append(
                 counts,
                 load,
                 eps,
                 thesis,
                 *_counts(stopped),
-                stopped.outcome.kkt.equilibrium,
+                stopped.outcome.residuals.equilibrium,
                 _counts(alone)[0],
-                alone.outcome.kkt.equilibrium,
+                alone.outcome.residuals.equilibrium,
                 *_counts(converged),
                 kkt.equilibrium,
             )
@@ -178,7 +178,7 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
             small = ("solver.method=penalty", f"solver.eps_contact={eps}", "solver.max_outer=1000")
             solution = checked(solve(problem, _with(n, changes, *small).solver))
             distances.append(distance(reference, solution))
-            residuals.append(solution.outcome.kkt.equilibrium)
+            residuals.append(solution.outcome.residuals.equilibrium)
             dual.append(measure.pressure(reference.pressure - solution.pressure))
             ratios.append(dual[-1] / measure.displacement(reference.state.x, solution.state.x))
         energy = [d.energy for d in distances]

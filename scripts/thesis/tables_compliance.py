@@ -80,7 +80,7 @@ def iterations(solution: Solution) -> tuple[float, float]:
     if solution.converged and not still:
         # A run ends with its residuals: the next iteration is the first that moves no more.
         still = [records[-1].iteration + 1]
-    exact = [record.iteration for record in records if record.kkt.largest <= 1e-8]
+    exact = [record.iteration for record in records if record.residuals.largest <= 1e-8]
     return (still or [np.nan])[0], (exact or [np.nan])[0]
 
 
@@ -112,11 +112,11 @@ def table_8_4(
             lagged[0],
             iterations(solution(*LAGGED, *EXACT, STEEP))[0],
             literal.history[-1].iteration if met else np.nan,
-            literal.outcome.kkt.largest,
+            literal.outcome.residuals.largest,
             lagged[1],
             iterations(implicit)[1],
             implicit.counters.linear_solves,
-            implicit.outcome.kkt.largest,
+            implicit.outcome.residuals.largest,
             newton.counters.linear_solves if alone else np.nan,
             newton.counters.contact_solves,
             difference(implicit, newton) if alone else np.nan,
@@ -183,7 +183,7 @@ def values(solution: Solution) -> tuple[object, ...]:
         solution.converged,
         solution.history[-1].iteration,
         solution.counters.linear_solves,
-        solution.outcome.kkt.largest,
+        solution.outcome.residuals.largest,
         int(touching.sum()),
         int(rigid.sum()),
         float(x.min()),

@@ -11,7 +11,6 @@ import numpy as np
 
 from contact import Case, Solution, build_problem, load_case
 from contact.linear.operator import SparseOperator
-from contact.methods.complementarity_parameters import automatic_r
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.results.resultants import charge_balance
@@ -94,7 +93,7 @@ def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
             changes[1],
             iterations(implicit)[1],
             implicit.counters.linear_solves,
-            implicit.outcome.kkt.largest,
+            implicit.outcome.residuals.largest,
             newton.counters.linear_solves if newton.converged else np.nan,
             newton.counters.contact_solves,
             difference(implicit, newton),
@@ -185,7 +184,7 @@ def values(solution: Solution) -> tuple[object, ...]:
         solution.converged,
         solution.history[-1].iteration,
         solution.counters.linear_solves,
-        solution.outcome.kkt.largest,
+        solution.outcome.residuals.largest,
         -nodes.maximum(-phi, -np.inf),
         nodes.maximum(phi, -np.inf),
         max(problem.comm.allgather(float(np.abs(u).max()))),
@@ -203,7 +202,7 @@ def linear_iterations(problem: ContactProblem) -> int:
     """Return the MINRES iterations of the first solve, all of Gamma_3 in contact. Collective."""
     interface, state = problem.interface, problem.start()
     nodal = problem.nodal(state)
-    blocks = augmentation(problem.nodes, automatic_r(problem.scales), problem.frictional)
+    blocks = augmentation(problem.nodes, problem.scales.augmentation, problem.frictional)
     blocks = blocks + interface.law.current_block(nodal, np.ones(len(nodal)))
     operator = SparseOperator(problem.equilibrium, interface.coupled, kind="iterative")
     operator.update("secant", state, interface.weighted(blocks, state.x))

@@ -14,7 +14,6 @@ import contact
 from contact import nesting
 from contact.linear import multigrid
 from contact.methods import (
-    complementarity_parameters,
     fallbacks,
     interior_point,
     load_stepping,
@@ -200,7 +199,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
     said = {
         f"after [{options.stagnation_limit}] steps in which": semismooth.PROGRESS == 0.5,
         f"after [{options.max_iterations}] steps;": True,
-        "is [10³] times all loads": complementarity_parameters.OVERESTIMATE == 1e3,
+        "is [10³] times all loads": semismooth.OVERESTIMATE == 1e3,
         "limited to [1/4] κ": options.softening == 0.25,
         "10^4 \\max(c, \\kappa)": options.gamma == 1e4,
         "below [1/10] of the\n   largest one": newton_step.SMALL == 0.1,

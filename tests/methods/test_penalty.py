@@ -51,7 +51,7 @@ def test_error_and_pressure_fall_like_eps(load):
     for eps in (1e-7, 1e-8, 1e-9):
         state, outcome = Penalty(problem, PenaltyOptions(eps_contact=eps)).solve()
         assert outcome.converged, outcome.reason
-        assert outcome.kkt.equilibrium <= 1e-8
+        assert outcome.residuals.equilibrium <= 1e-8
         errors.append(relative(problem, state.x[:owned], x))
         pressure = reference.forces.pressure
         difference = problem.nodes.norm(state.forces.pressure - pressure)
@@ -73,7 +73,7 @@ def test_without_friction_the_penetration_is_eps_times_the_pressure():
     touching = state.forces.pressure > 0
     assert np.allclose(opening[touching], -1e-5 * state.forces.pressure[touching])
     # The Signorini residual is the penetration: c eps with c = E/size = 1/4.
-    assert outcome.kkt.contact == pytest.approx(0.25e-5, rel=1e-6)
+    assert outcome.residuals.contact == pytest.approx(0.25e-5, rel=1e-6)
 
 
 @pytest.mark.core
@@ -236,7 +236,7 @@ def test_the_defaults_fit_any_units():
 def test_a_foundation_that_is_too_soft_is_no_convergence():
     solution = solve(parse_case(steel(eps_contact=1e-4)))
     assert not solution.converged
-    assert solution.outcome.kkt.equilibrium < 1e-8
+    assert solution.outcome.residuals.equilibrium < 1e-8
     assert "the contact residual is 1.00e+04" in solution.outcome.reason
 
 

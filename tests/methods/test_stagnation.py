@@ -52,13 +52,13 @@ def test_the_best_iterate_is_left_where_the_last_one_is_worse(
     assert not outcome.converged
     # The penalty method solves for equilibrium, and the laws hold as its penalties let them.
     name = "equilibrium" if method is Penalty else "largest"
-    sizes = [getattr(record.kkt, name) for record in solver.history]
+    sizes = [getattr(record.residuals, name) for record in solver.history]
     assert not sizes[-1] <= min(sizes[:-1])
     if stopping == "residual":
-        assert outcome.kkt == evaluate(problem, state)
-        assert getattr(outcome.kkt, name) == min(sizes[:-1])
+        assert outcome.residuals == evaluate(problem, state)
+        assert getattr(outcome.residuals, name) == min(sizes[:-1])
     else:
-        assert getattr(outcome.kkt, name) == pytest.approx(sizes[-1], nan_ok=True)
+        assert getattr(outcome.residuals, name) == pytest.approx(sizes[-1], nan_ok=True)
 
 
 @pytest.mark.parametrize(("rate", "given_up"), [(0.4, False), (0.8, False), (0.95, True)])

@@ -69,7 +69,7 @@ def test_what_a_potential_exerts_is_what_acts():
     found = solve(parse_case({**section("newton"), **apart}), comm=MPI.COMM_SELF)
     assert found.converged, found.outcome.reason
     raw = imbalance(found)
-    assert 0 < found.outcome.kkt.rounding < TOLERANCE
+    assert 0 < found.outcome.residuals.equilibrium_rounding < TOLERANCE
     assert raw.force < TOLERANCE * raw.applied
 
 

@@ -22,7 +22,7 @@ def test_small_load():
     assert found.moment == pytest.approx(exact.half_width, rel=0.01)
     assert found.peak == pytest.approx(exact.peak, rel=0.01)
     assert found.force_error < 1e-8
-    assert solution.outcome.kkt.largest <= 1e-8
+    assert solution.outcome.residuals.largest <= 1e-8
 
 
 @pytest.mark.core

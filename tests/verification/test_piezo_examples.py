@@ -7,7 +7,6 @@ import pytest
 from mpi4py import MPI
 
 from contact.linear.operator import SparseOperator
-from contact.methods.complementarity_parameters import automatic_r
 from contact.methods.options import FixedPointOptions
 from contact.model.friction import Friction
 from contact.problem.residuals import residual_forces
@@ -150,7 +149,7 @@ def first_solve(problem, symmetric=True, compare=True):
     """Return the iterations of a first linear solve, and its difference to the direct one."""
     interface, state = problem.interface, problem.start()
     nodal = problem.nodal(state)
-    blocks = augmentation(problem.nodes, automatic_r(problem.scales), problem.frictional)
+    blocks = augmentation(problem.nodes, problem.scales.augmentation, problem.frictional)
     blocks = blocks + interface.law.current_block(nodal, np.ones(nodal.shape[0]))
     blocks = interface.weighted(blocks, state.x)
     found = []

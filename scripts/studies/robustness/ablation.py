@@ -28,7 +28,6 @@ from contact.case.file import Case, parse_case
 from contact.interface import complementarity
 from contact.linear import block, dense, multigrid
 from contact.methods import (
-    complementarity_parameters,
     fallbacks,
     interior_point,
     newton_step,
@@ -258,8 +257,8 @@ DEVICES = (
     Device("continuation in the conductivity", (fallbacks.continuation,), "Allgower and Georg 2003",
            ((fallbacks, "_in_the_conductivity", _nothing),)),
     Device("estimate of the stiffness from the first step",
-           (complementarity_parameters.overestimates_stiffness,), "-",
-           ((semismooth, "overestimates_stiffness", lambda *_: False),), (), _own("stop")),
+           (semismooth._overestimates_stiffness,), "-",
+           ((semismooth, "_overestimates_stiffness", lambda *_: False),), (), _own("stop")),
     Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
            ((newton_step, "REGULARISATION", 0.0),), (), _own("two-spheres")),
     Device("forcing term that tightens", (newton_step.NewtonStep._forcing_term,),
