@@ -1,8 +1,7 @@
-"""The history of an evolution: one value with named parts, which a step begins with.
+"""The history at the beginning of a load step: a value with named parts.
 
-A part is arrays over places of one kind: the slip at contact nodes, internal variables of the
-material at quadrature points. Who keeps, writes, reads or transfers a history goes by names and
-places, and knows none of the parts.
+A part has arrays at contact nodes (slip) or at quadrature points (internal variables). Checkpoints
+and transfer between meshes use the names and places alone.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 
 from contact.typing import Array
 
-#: Kinds of places: the first axis of an array counts those that this rank owns.
+#: Places of a part: the first axis of its arrays, those that this rank owns.
 CONTACT_NODES, QUADRATURE_POINTS = "contact nodes", "quadrature points"
 
 
@@ -24,30 +23,30 @@ class Part(Protocol):
 
     @property
     def place(self) -> str:
-        """Where its arrays live."""
+        """`CONTACT_NODES` or `QUADRATURE_POINTS`."""
 
     @property
     def arrays(self) -> Mapping[str, Array]:
         """Its arrays by name, shape (places, ...)."""
 
     def replaced(self, arrays: Mapping[str, Array]) -> Part:
-        """Return the same part with other arrays, of the same names and shapes behind."""
+        """Return the part with other arrays of the same names."""
 
 
 @dataclass(frozen=True)
 class InternalVariables:
-    """A part that is arrays and no more, not to be written to (they are marked so)."""
+    """Internal variables of a material; the arrays are read-only."""
 
     place: str
     arrays: Mapping[str, Array]
 
     def __post_init__(self) -> None:
-        """Keep whoever holds it from changing it."""
+        """Mark the arrays as read-only."""
         for array in self.arrays.values():
             array.flags.writeable = False
 
     def replaced(self, arrays: Mapping[str, Array]) -> InternalVariables:
-        """Return the same part with other arrays."""
+        """Return the part with other arrays of the same names."""
         return InternalVariables(self.place, dict(arrays))
 
 
@@ -63,11 +62,11 @@ class History(dict[str, Part]):
 
     @property
     def places(self) -> list[str]:
-        """The kinds of places that there are arrays at."""
+        """The places of its arrays."""
         return sorted({part.place for part in self.values()})
 
     def arrays(self, place: str | None = None) -> dict[str, Array]:
-        """Return the arrays at places of a kind, all by default, by "part.name"."""
+        """Return the arrays at a place, or all, by "part.name"."""
         return {
             f"{name}.{key}": array
             for name, part in self.items()
@@ -76,7 +75,7 @@ class History(dict[str, Part]):
         }
 
     def replaced(self, arrays: Mapping[str, Array]) -> History:
-        """Return the same parts with other arrays, named as by `arrays`."""
+        """Return the history with other arrays, named as by `arrays`."""
         return History(
             {
                 name: part.replaced({key: arrays[f"{name}.{key}"] for key in part.arrays})
@@ -86,7 +85,7 @@ class History(dict[str, Part]):
 
 
 class Evaluated(Protocol):
-    """Where a body is evaluated: its unknowns, and the history that its step began with."""
+    """Unknowns of a body and history at the beginning of the step: a `State`, or these alone."""
 
     @property
     def x(self) -> Array:
@@ -99,7 +98,7 @@ class Evaluated(Protocol):
 
 @dataclass(frozen=True)
 class BodyState:
-    """The state of a body by itself; see `Evaluated`."""
+    """Unknowns and history of a body without contact forces; see `Evaluated`."""
 
     x: Array
     history: History = field(default_factory=History)

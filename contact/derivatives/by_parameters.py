@@ -41,15 +41,13 @@ from contact.methods.options import NewtonOptions
 from contact.problem.linearised import (
     Equations,
     Linearised,
-    equations,
-    moved_state,
-    weakly_active,
-)
-from contact.problem.linearised_steps import (
     before_along,
     before_transposed,
     commit_along,
     commit_transposed,
+    equations,
+    moved_state,
+    weakly_active,
 )
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

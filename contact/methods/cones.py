@@ -50,16 +50,16 @@ def _mixed(x: Array, y: Array) -> Array:
 
 @dataclass
 class ConeStep:
-    """A search direction: changes of slacks and multipliers.
+    """A search direction.
 
     Attributes
     ----------
     slack, force
-        Of half lines, shape (n,).
+        Changes in the half lines, shape (n,).
     slip, friction
-        Of the discs' vectors, in the frame, shape (k, 2 + t).
+        Changes of (t, a) and (h, -q) in the frame, shape (k, 2 + t).
     tails
-        a and -q, each of shape (k, t).
+        Changes of a and -q, shapes (k, t).
     """
 
     slack: Array
@@ -70,18 +70,18 @@ class ConeStep:
 
 
 class Cones:
-    """A point strictly inside all cones, those of this rank; sums over all cones are collective.
+    """Slacks and multipliers strictly inside their cones, those of this rank.
 
     Parameters
     ----------
     slack, force
-        Of the half lines: open gaps and contact forces, shape (n,), positive.
+        Open gaps and contact forces, shape (n,), positive.
     length, slip
-        t and a of the discs, shapes (k,) and (k, t), t > |a|.
+        t and a, shapes (k,) and (k, t), t > |a|.
     bound, friction
         h and -q, shapes (k,) and (k, t), h > |q|.
     comm
-        The ranks that have a part of the cones each.
+        Communicator of the cones.
     """
 
     def __init__(
@@ -105,21 +105,18 @@ class Cones:
         return int(self._comm.allreduce(self.slack.size + self.length.size))
 
     def interior(self) -> bool:
-        """Tell whether all vectors are inside their cones by more than rounding. Collective.
-
-        Where nothing constrains a body, they come to the boundary, or grow without limit.
-        """
+        """Tell whether all vectors are inside their cones, and finite. Collective."""
         depths = np.concatenate([self.slack, self.force, *self._dets])
         inside = bool(np.all((depths > 1 / HUGE) & (depths < HUGE)))  # NaN is not
         return bool(self._comm.allreduce(inside, op=MPI.LAND))
 
     def duality_gap(self) -> float:
-        """Return the sum of slacks times multipliers."""
+        """Return the sum of slacks times multipliers. Collective."""
         discs = float(self.length @ self.bound + np.sum(self.slip * self.friction))
         return float(self._comm.allreduce(self.slack @ self.force + max(discs, 0.0)))
 
     def duality_gap_after(self, step: ConeStep, part: float) -> float:
-        """Return the duality gap after part of a step."""
+        """Return the duality gap after part of a step. Collective."""
         slack, force = self.slack + part * step.slack, self.force + part * step.force
         relative = [self._lambda + part * move for move in self._scaled(step)]
         discs = (relative[0][:, :2] * relative[1][:, :2]).sum() / 2
@@ -132,7 +129,7 @@ class Cones:
         s1, z1 = self.slip / roots[0][:, None], self.friction / roots[1][:, None]
         a, b = np.linalg.norm(s1, axis=1), np.linalg.norm(z1, axis=1)
         s0, z0 = np.hypot(1.0, a), np.hypot(1.0, b)
-        # s.z >= 1 without the differences of large numbers that it is made of
+        # s.z >= 1 without cancellation
         ratio, aside = (s0 + a) / (z0 + b), unit_vectors(s1) + unit_vectors(z1)
         inner = (ratio + 1 / ratio) / 2 + a * b * dot(aside, aside) / 2
         inner = np.where(a * b > 0, inner, s0 * z0)
@@ -152,21 +149,18 @@ class Cones:
         self._size = np.sqrt(roots[0] * roots[1])  # root of the determinant of lambda
 
     def stiffness(self) -> tuple[Array, Array]:
-        """Return the stiffness that the cones add, shapes (n,) and (k, t, t).
-
-        That is force/slack, and W^-2 with t eliminated: soft along the slip, stiff across it.
-        """
+        """Return the nodal stiffness: force/slack, (n,), and W^-2 with t eliminated, (k, t, t)."""
         e = self._axis
         outer = e[:, :, None] * e[:, None, :] * (1 - 1 / self._first)[:, None, None]
         blocks = (np.eye(e.shape[1]) - outer) / (self._scale**2)[:, None, None]
         return self.force / self.slack, blocks
 
     def affine_target(self) -> tuple[Array, Array]:
-        """Return k in d(multiplier) = k - W^-2 d(slack) without centring, (n,) and in the frame."""
+        """Return k in d(multiplier) = k - W^-2 d(slack) of the predictor, (n,) and in the frame."""
         return -self.force, -self._multiplier
 
     def target(self, affine: ConeStep, centre: float) -> tuple[Array, Array]:
-        """Return k with Mehrotra's correction, for slack times multiplier = centre."""
+        """Return k with Mehrotra's correction, to slack times multiplier = centre."""
         force = -self.force + (centre - affine.slack * affine.force) / self.slack
         cross = -_product(*self._scaled(affine))
         cross[:, :2] += centre
@@ -179,24 +173,16 @@ class Cones:
         return force, -self._multiplier + divided / self._factor
 
     def reduced(self, constants: tuple[Array, Array]) -> tuple[Array, Array]:
-        """Return the forces that the constants leave once t is eliminated, (n,) and (k, t)."""
+        """Return the constants with t eliminated, (n,) and (k, t)."""
         force, k = constants
         return force, k[:, 2:] + self._along(k)[:, None] * self._axis
 
     def complete(self, constants: tuple[Array, Array], slack: Array, slip: Array) -> ConeStep:
-        """Return the step of all slacks and multipliers, given that of gaps and slips.
-
-        Parameters
-        ----------
-        constants
-            See `affine_target`.
-        slack, slip
-            Changes of the gaps, (n,), and of the slips a, (k, t).
-        """
+        """Return the step for the constants k, and changes of gaps (n,) and slips a (k, t)."""
         force, k = constants
         along = dot(self._axis, slip)
         across = slip - along[:, None] * self._axis
-        # t - e.a and t + e.a, neither as a difference
+        # t - e.a and t + e.a without cancellation
         lead = self._scale**2 * _lead(k)[:, 0]
         minus = (lead - along / self._boost**2) / self._first
         plus = (lead + along * self._boost**2) / self._first
@@ -211,7 +197,7 @@ class Cones:
         )
 
     def to_boundary(self, step: ConeStep) -> float:
-        """Return the part of a step that leads to the boundary of a cone; 0 of a step with NaN."""
+        """Return the part of a step to the boundary of a cone; 0 for NaN. Collective."""
         rates = [-step.slack / self.slack, -step.force / self.force]
         for lead, size in self._relative(step):
             rates.append(size - lead)
@@ -232,7 +218,7 @@ class Cones:
         self.friction = self.friction + part * step.tails[1]
 
     def _framed(self, lead: Array, tail: Array, det: Array) -> Array:
-        """Return vectors in the frame."""
+        """Return vectors x_0, x_1 in the frame, given their determinants."""
         along = dot(self._axis, tail)
         across = tail - along[:, None] * self._axis
         large = lead + np.abs(along)
@@ -249,7 +235,7 @@ class Cones:
         return step.slip / self._factor, step.friction * self._factor
 
     def _relative(self, step: ConeStep) -> list[tuple[Array, Array]]:
-        """Return x_0 and |x_1| of both directions as seen with lambda turned into (1, 0)."""
+        """Return x_0 and |x_1| of both directions, in the frame in which lambda is (1, 0)."""
         unit, found = self._lambda / self._size[:, None], []
         for moved in self._scaled(step):
             lead = _mixed(unit, moved)
@@ -261,5 +247,6 @@ class Cones:
 
 
 def _determinant(lead: Array, tail: Array) -> Array:
+    """Return x_0^2 - |x_1|^2."""
     size = np.linalg.norm(tail, axis=1)
     return (lead - size) * (lead + size)

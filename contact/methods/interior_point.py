@@ -4,19 +4,19 @@ Frictionless contact and Tresca's friction are convex. The linear systems of an 
 those of a Newton step with other nodal blocks: along the normal, force over slack in place of
 gamma. So it runs on whole bodies and condensed ones alike, on any number of ranks.
 
-1. The friction bound is zero at first. Where friction alone constrains a rigid-body mode, or has to
+1. The first friction bound is zero; where friction alone constrains a rigid-body mode, or has to
    balance loads on one, it is above all loads at the nodes that touch first.
 2. A step of the interior point is Mehrotra's predictor and corrector with the scaling of Nesterov
    and Todd (`cones`), both with one matrix. Every step linearises layer and current, and the
    material by its secant.
-3. Where the duality gap is closed the active set is known. From there, or where rounding ends the
-   steps before, Newton's method takes the last steps.
-4. Where these have not converged, or contact has moved a body aside, the friction bound becomes
-   that of the pressures found (Haslinger's fixed point on the friction bound), and the next problem
-   begins at 2. It has a solution where this friction balances the loads on rigid motions
-   (`limit_analysis`). Where it does not, the bound is scaled once, to twice its least multiple that
-   does. The method ends where no multiple does, where a later bound does not either, where nothing
-   presses on a body that contact has moved aside, or after a number of bounds.
+3. With a closed duality gap the active set is known. From there, or where rounding ends the steps
+   before, Newton's method takes the last steps.
+4. Without convergence, or where a rigid-body mode has become unconstrained at the solution, the
+   friction bound becomes that of the pressures found (Haslinger's fixed point), and the next
+   problem begins at 2. It has a solution if this friction balances the loads on rigid motions
+   (`limit_analysis`). If not, the bound is scaled once, to twice its least multiple that does. The
+   method ends where no multiple does, where a later bound does not either, where a body with an
+   unconstrained mode is not in contact, or after a number of bounds.
 
 References
 ----------
@@ -44,48 +44,45 @@ from contact.ranks import summed
 from contact.tolerances import EPS
 from contact.typing import Array
 
-#: Note of its steps in the history.
+#: Note of the steps in the history.
 INTERIOR_POINT = "interior point"
 
-#: Why the updates of the friction bound end where the next convex problem has no solution.
+#: Reason of an end whose next convex problem has no solution.
 OVERLOADED = "the friction of the pressures that were found does not balance the loads"
 
-#: Most steps of one convex problem, and most friction bounds (Haslinger's iterations).
+#: Most steps of a convex problem, and most friction bounds (Haslinger's iterations).
 LIMIT, UPDATES = 60, 8
 
 #: Ratio of the duality gap to the work of loads and contact below which the active set is known.
 #: Below its square the iteration ends whatever the residual of equilibrium is.
 CLOSED = 1e-10
 
-#: Forcing term of inexact Newton: relative residual of an iterative solve. With a hundredth of that
-#: there are as many steps, and a third to a half more iterations. The residual of equilibrium may
-#: be as large at the end: further slacks vanish below the tolerance of an iterative solver, and
-#: Newton's last steps, whose right-hand sides are residuals, do better.
+#: Forcing term of inexact Newton, and residual of equilibrium that suffices at the end: with a
+#: hundredth of it there are as many steps, and a third to a half more iterations.
 FORCING = 1e-4
 
 #: Slack times force of each node at the start, over the work of the loads in the penetration of
-#: the displacement without contact. With a hundred times that slender bodies take a quarter more.
+#: the displacement without contact.
 SHARE = 1e-4
 
-#: The same where rigid-body modes are not constrained by the supports, over the work of the loads
-#: in the mean gap.
+#: The same over the work of the loads in the mean gap, where the supports do not constrain all
+#: rigid-body modes.
 SHARE_UNSUPPORTED = 0.1
 
-#: Least and largest part of the way to the boundary of the cones that a step takes.
+#: Least and largest step, over that to the boundary of the cones.
 SHORTEST, LONGEST = 0.9, 0.999
 
 
 def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tuple[State, Outcome]:
-    """Solve by the interior point and Newton's last steps, and update the bound. Collective.
+    """Solve by the interior point, Newton's last steps and updates of the bound. Collective.
 
     Parameters
     ----------
     newton
-        Newton's method on the problem, whose operator has nodal blocks that the cones take the
-        place of.
+        Newton's method on the problem.
     begin
-        State without contact, whose gaps the slacks start from; None where nothing but contact
-        constrains a rigid-body mode or the potential.
+        State without contact, whose gaps are the first slacks; None where contact has to constrain
+        a rigid-body mode or the potential.
     """
     problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
     stuck = modes.stuck_bound()
@@ -94,12 +91,12 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
     best, raised = 1.0, False
     for _ in range(UPDATES):
         method = InteriorPoint(newton, bound, begin)
-        outcome, state = method.run(), method.state
+        outcome, state = method.iterate(), method.state
         last = state
         if not outcome.converged and newton.left > 0:
             try:
                 last, outcome = newton.iterate(newton.started(state), note=INTERIOR_POINT)
-            except SingularError:  # with another bound other nodes may hold the body
+            except SingularError:  # another bound may constrain the body
                 newton.step.renew()
         if outcome.converged and modes.pushed_aside(problem, last):
             aside = last, outcome
@@ -107,13 +104,13 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
             return last, outcome
         if newton.left <= 0:
             break
-        # Pressures of the last steps are nearer where these make progress, else those of the cones.
+        # Pressures of Newton's last steps if these have made progress, else of the interior point.
         if aside is None and outcome.residuals.significant < PROGRESS * best:
             state = last
         best = min(best, outcome.residuals.significant)
         nodal = interface.jump.apply(state.x)
         bound = interface.bound(nodal, state.forces)
-        # Where all nodes are open, the next bound is zero and has the same solution.
+        # With all nodes open the next bound is zero, and the solution the same.
         if aside is not None and interface.jump.maximum(bound) <= interface.rounding(nodal):
             break
         multiple = modes.overload(bound)
@@ -121,25 +118,22 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
             outcome = replace(outcome, residuals=evaluate(problem, state))
             last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
             break
-        if multiple > 1:  # with as much friction as the loads ask for pressures may differ
+        if multiple > 1:  # pressures may differ with as much friction as the loads need
             bound, raised = np.asarray(multiple / PROGRESS * bound, dtype=float), True
     return aside or (last, outcome)
 
 
 class InteriorPoint:
-    """The interior-point method for one given friction bound, as of Tresca's law.
-
-    Layer and current are linearised anew in each step, like the material.
+    """The interior-point method for a given friction bound (Tresca), on the operator of Newton's.
 
     Parameters
     ----------
     newton
-        Newton's method on the problem, whose operator has nodal blocks that the cones take the
-        place of.
+        Newton's method on the problem.
     bound
         Friction bound, shape (n,) (stress).
     begin
-        State whose gaps the slacks start from; None where there is none without contact.
+        State whose gaps are the first slacks; None for none.
     """
 
     def __init__(self, newton: SemismoothNewton, bound: Array, begin: State | None) -> None:
@@ -159,8 +153,7 @@ class InteriorPoint:
         block = scales.plane_modulus * scales.area / scales.height
         if begin is not None:
             way = jump.maximum(np.abs(moved[:, : jump.dim]).max(axis=1, initial=0.0))
-            # Where no load moves the body its stiffness is that of a block, and where it meets
-            # nothing by that displacement, any work will do.
+            # Without loads the stiffness is that of a block; without penetration any work will do.
             far = jump.maximum(-opening) or SHARE * (way or interface.diameter)
             least = np.sqrt(SHARE) * far
             work = (total / way if total > 0 and way > 0 else block) * least**2
@@ -168,36 +161,35 @@ class InteriorPoint:
             total = total or block * jump.maximum(np.abs(opening))
             least = float(summed(jump.comm, np.maximum(gap, 0.0).sum())) / count + total / block
             work = SHARE_UNSUPPORTED * total * least / count
-        # Where the body would lift off, the slack at the start is that opening.
+        # Where the body lifts off without contact, the first slack is that opening.
         slack = np.maximum(np.maximum(gap, opening), least)
         frictional = self._frictional
         slips, limit = interface.slip_length(nodal + moved)[frictional], limit[frictional]
         zeros = np.zeros((limit.size, jump.dim))
         length = np.maximum(work / limit, slips)
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
-        #: Work beside which the duality gap is small in any case. Beside that of the displacement
-        #: without contact a gap may be small, and contact not known yet.
+        #: Least reference of the duality gap, where no work is done: all nodes stick.
         self._least_work = CLOSED * self.cones.duality_gap() if begin is None else 0.0
 
-    def run(self) -> Outcome:
+    def iterate(self) -> Outcome:
         """Take steps until the duality gap is closed. Collective."""
         newton = self._newton
-        kkt, self._internal = evaluate_forces(self.problem, self.state)
+        residuals, self._internal = evaluate_forces(self.problem, self.state)
         ended = "the interior point was given no step"
         for steps in range(1, min(LIMIT, newton.left) + 1):
             try:
                 taken = self.step()
             except InputError as error:
-                # At its end the matrices are singular but for rounding; memory is another matter.
+                # Near the solution the matrices are singular to rounding.
                 if error.identifier == "memory":
                     raise
                 self._step.renew()
                 taken = False
-            kkt, self._internal = evaluate_forces(self.problem, self.state)
-            newton.see(self.state, kkt)
-            newton.recorder.record(kkt, INTERIOR_POINT, 2)
+            residuals, self._internal = evaluate_forces(self.problem, self.state)
+            newton.see(self.state, residuals)
+            newton.recorder.record(residuals, INTERIOR_POINT, 2)
             ended = f"the interior point has not converged in {steps} steps"
-            if not taken or not np.isfinite(kkt.significant):
+            if not taken or not np.isfinite(residuals.significant):
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
             nodal = self.problem.interface.jump.apply(self._state.x)
@@ -206,16 +198,15 @@ class InteriorPoint:
                 ended = f"nothing presses after {steps} steps"
                 break
             gap = self.relative_gap()
-            if gap <= CLOSED and (
-                kkt.equilibrium <= max(FORCING, kkt.floors[0]) or gap <= CLOSED**2
-            ):
+            balanced = residuals.equilibrium <= max(FORCING, residuals.floors[0])
+            if gap <= CLOSED and (balanced or gap <= CLOSED**2):
                 ended = f"duality gap closed after {steps} steps"
                 break
-        return Outcome(kkt, newton.options.allowed, ended)
+        return Outcome(residuals, newton.options.allowed, ended)
 
     @property
     def state(self) -> State:
-        """The present iterate."""
+        """The iterate."""
         cones, jump = self.cones, self.problem.interface.jump
         pressure, friction = np.zeros(jump.weight.size), np.zeros(jump.normal.shape)
         pressure[self._near] = cones.force / jump.weight[self._near]
@@ -232,12 +223,11 @@ class InteriorPoint:
         own = body.owned_part(x)[: body.owned]
         forces = self._internal, body.external(self._state.time)
         works = [abs(float(summed(jump.comm, own @ force[: body.owned]))) for force in forces]
-        # Where all nodes stick as they are no work is done, and the gap falls from its first value.
         return cones.duality_gap() / (max(contact + sum(works), self._least_work) or 1.0)
 
-    @np.errstate(over="ignore", invalid="ignore")  # of a body that falls; no such step is taken
+    @np.errstate(over="ignore", invalid="ignore")  # such a step is not taken
     def step(self) -> bool:
-        """Take a step; False if rounding lets no more be taken. Collective."""
+        """Take a step by Mehrotra's predictor and corrector; False at rounding. Collective."""
         cones, interface, state = self.cones, self.problem.interface, self.state
         if not cones.interior():
             return False
@@ -269,7 +259,6 @@ class InteriorPoint:
                 constants, closed, jump.tangential_component(moved)[frictional] + slip
             )
 
-        # Mehrotra's predictor and corrector, both with the same matrix.
         now, affine = cones.duality_gap(), solve(cones.affine_target())[1]
         length = min(1.0, cones.to_boundary(affine))
         if length == 0:  # the system is singular to rounding

@@ -1,8 +1,4 @@
-"""Options of the methods: tolerances, limits and parameters.
-
-Each setting is stated here alone, see `contact.settings`: the case file's `[solver]` is one of
-these classes, by its method.
-"""
+"""Options of the methods: tolerances, limits and parameters; `[solver]` of the case file."""
 
 from __future__ import annotations
 
@@ -20,7 +16,7 @@ from contact.tolerances import LARGEST_VIOLATION, PRECISION
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Options that every method has.
+    """Options of all methods.
 
     Attributes
     ----------
@@ -42,7 +38,7 @@ class Options:
     linear: Literal["auto", "lu", "iterative"] = "auto"
 
     def __post_init__(self) -> None:
-        """Refuse a tolerance that nothing or anything meets."""
+        """Refuse a tolerance outside (0, 1)."""
         if not (isinstance(self.tolerance, float | int) and 0 < self.tolerance < 1):
             raise InputError(
                 f"tolerance: given {self.tolerance!r}; accepted: between 0 and 1", "value"
@@ -50,7 +46,7 @@ class Options:
 
     @property
     def allowed(self) -> Residuals:
-        """How large each residual may be at the end."""
+        """Tolerance of each residual."""
         return Residuals(self.tolerance, self.tolerance, self.tolerance)
 
 
@@ -151,7 +147,7 @@ class PenaltyOptions(LoopOptions):
 
     @property
     def allowed(self) -> Residuals:
-        """How large each residual may be at the end."""
+        """Tolerance of each residual."""
         return Residuals(self.tolerance, LARGEST_VIOLATION, LARGEST_VIOLATION)
 
 
@@ -206,20 +202,10 @@ OPTIONS: Mapping[str, type[Options]] = {
 }
 
 
-Told = TypeVar("Told", bound=Options)
+AnyOptions = TypeVar("AnyOptions", bound=Options)
 
 
-def with_method(options: Options, method: type[Told], **changes: Any) -> Told:
-    """Return the options of a method with those settings of another's that both have.
-
-    Parameters
-    ----------
-    options
-        Options of any method.
-    method
-        Class of the options of the method to be told.
-    changes
-        Further settings of that method.
-    """
+def with_method(options: Options, method: type[AnyOptions], **changes: Any) -> AnyOptions:
+    """Return the options of a method with the settings that it shares with given ones."""
     shared = {f.name for f in fields(method)} & {f.name for f in fields(options)} - {"method"}
     return method(**{key: getattr(options, key) for key in shared} | changes)

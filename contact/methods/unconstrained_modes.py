@@ -1,11 +1,11 @@
-"""Rigid-body modes of a problem's bodies: constrained by supports, by contact or by friction alone.
+"""Rigid-body modes that the supports do not constrain: by contact, by friction alone, by nothing.
 
-Where friction alone constrains a mode, the linear systems are singular without friction, and at
-zero displacement there are no pressures yet that would give a friction bound. The nodes that touch
-first are therefore given a bound at which they stick (`UnconstrainedModes.stuck_bound`).
+A mode that friction alone constrains makes the linear systems singular at zero displacement, where
+no pressure gives a friction bound: the nodes that touch first get a bound at which they stick
+(`UnconstrainedModes.stuck_bound`).
 
-Where nothing constrains a mode at a solution, a rigid motion costs nothing: of all solutions the
-one is taken whose displacements have the least norm in L2.
+Solutions with an unconstrained mode differ by a rigid motion: the one of least displacements in L2
+is taken (`with_least_displacements`).
 
 References
 ----------
@@ -40,27 +40,29 @@ from contact.problem.state import State
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 
-#: Note of a rigid motion to where all nodes are open.
+#: Note of a rigid motion to a state with all nodes open.
 RIGID_MOTION = "rigid motion"
 
-#: Friction bound of such a node, as a force over all loads.
+#: Friction bound of a sticking node, as a force over all loads.
 STUCK = 10.0
 
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """Rigid motions that nothing constrains at a solution, and the amounts to subtract.
+    """The m unconstrained modes of a solution, and the amounts to subtract.
 
     Attributes
     ----------
     motions, columns
-        Of the whole problem's unknowns, shape (unknowns, m), and of the jumps, (n, d, m).
+        Modes in the unknowns of the whole problem, shape (unknowns, m), and in the jumps,
+        (n, d, m).
     wanted, amounts
-        For the least norm of the displacements, and for the least without penetration, (m,).
+        Amounts for the displacements of least norm, without and with the constraint that nothing
+        penetrates, (m,).
     depth
-        Penetration with `wanted` (length); 0 without any.
+        Penetration with `wanted` (length).
     limited
-        Whether that is more than rounding.
+        Whether `depth` is more than rounding.
     """
 
     motions: Array
@@ -72,19 +74,13 @@ class RigidMotion:
 
     @property
     def motion(self) -> Array:
-        """The motion to subtract, of owned and global unknowns of the whole problem."""
+        """The motion to subtract, in owned and global unknowns of the whole problem."""
         return self.motions @ self.amounts
 
 
 @dataclass
 class UnconstrainedModes:
-    """How the rigid-body modes are constrained; computed when first asked for. Collective.
-
-    Parameters
-    ----------
-    problem
-        The whole problem: of a condensed one the supports are not seen.
-    """
+    """Constraints of the rigid-body modes of the whole problem. Collective."""
 
     problem: ContactProblem
 
@@ -95,30 +91,25 @@ class UnconstrainedModes:
 
     @cached_property
     def constrained_undeformed(self) -> bool:
-        """Whether supports, and contact where it touches in the reference configuration, do."""
-        return self._held_undeformed(self.problem.frictional)
+        """Whether the supports and the contact of the reference configuration do."""
+        return self._constrained_undeformed(self.problem.frictional)
 
     @cached_property
     def friction_alone(self) -> bool:
-        """Whether a mode is constrained by friction alone.
+        """Whether the friction of the reference configuration has to constrain a mode."""
+        return self.problem.frictional and not self._constrained_undeformed(friction=False)
 
-        Nodes that touch at once hold bodies along their normals, no others: a ring between two
-        plates moves far aside before others touch.
-        """
-        return self.problem.frictional and not self._held_undeformed(friction=False)
-
-    def _held_undeformed(self, friction: bool) -> bool:
-        """Tell whether supports, and contact where it touches undeformed, hold all bodies."""
+    def _constrained_undeformed(self, friction: bool) -> bool:
+        """Tell whether supports and contact of the reference configuration constrain all modes."""
         interface, rest = self.problem.interface, self.problem.start()
         touching = interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.diameter
-        held = [group.held(friction, touching) for group in groups(self.problem)]
-        return all(null_space(gram).size == 0 for gram in held)
+        grams = [group.constraints(friction, touching) for group in groups(self.problem)]
+        return all(null_space(gram).size == 0 for gram in grams)
 
     def stuck_bound(self) -> Array | None:
-        """Return friction bounds that no load exceeds, shape (n,) (stress). Collective.
+        """Return friction bounds above all loads, shape (n,) (stress); None if not needed.
 
-        None where supports and the foundation restrain all modes, and the loads on them, without
-        friction.
+        That is where supports and frictionless contact balance all loads. Collective.
         """
         problem = self.problem
         weight = problem.interface.jump.weight
@@ -128,29 +119,22 @@ class UnconstrainedModes:
             return None
         loads = _loads(problem)
         borne, total = float(loads[_without_supports(problem)].sum()), float(loads.sum())
-        # Loads on another body need not be borne, but where a body is squeezed by it alone.
+        # Loads on bodies with supports count where there are no others.
         bound = STUCK * (borne if borne > EPS * total else total)
         return np.where(self._nearest(), bound / weight, 0.0)
 
     def overload(self, bound: Array) -> float:
-        """Return the least multiple of friction bounds that balances the loads, at least 1.
+        """Return the least multiple, >= 1, of friction bounds (n,) that balances the loads.
 
-        Infinity where none does, however large the pressures. Collective.
-
-        Parameters
-        ----------
-        bound
-            The bounds at the contact nodes of this rank, shape (n,) (stress).
+        Infinity where none does. Collective.
         """
         friction, time = self.problem.nodes.weight * bound, self.problem.time
         found = [Overload.of(group, time, friction) for group in self._unsupported]
         return max((lost.multiple for lost in found if lost is not None), default=1.0)
 
     def _nearest(self) -> NDArray[np.bool_]:
-        """Tell which nodes of each unsupported body touch first, shape (n,). Collective.
-
-        By friction at others, whose tangents are inclined, a body could hang without pressure.
-        """
+        """Return which nodes of each unsupported body touch first, shape (n,). Collective."""
+        # At others, whose tangents are inclined, friction could bear a body without pressure.
         interface, rest = self.problem.interface, self.problem.start()
         opening = interface.opening(interface.jump.apply(rest.x))
         found = np.zeros(opening.size, dtype=bool)
@@ -162,32 +146,31 @@ class UnconstrainedModes:
 
     @cached_property
     def _unsupported(self) -> list[Group]:
+        """Groups of bodies with modes that their supports do not constrain."""
         return [group for group in groups(self.problem) if null_space(group.supports).size > 0]
 
     def separated(
         self, problem: CondensedProblem, operator: Operator, stiffness: float
     ) -> State | None:
-        """Return a state with all nodes open, by a rigid motion out of penetration. Collective.
+        """Return a state with all nodes open after a rigid motion; None without one. Collective.
 
-        None where the motion is longer than sqrt(2) times the penetration, more than 45 degrees off
-        the normal: out of a wedge, say, in which friction might hold the body.
+        None too where the motion is more than 45 degrees off the normal: out of a wedge, in which
+        friction might constrain the body.
 
         Parameters
         ----------
-        problem
-            The condensed problem.
-        operator
-            That of its body.
+        problem, operator
+            The condensed problem, and its operator.
         stiffness
-            Of a node (stress/length). A proximal term of sqrt(EPS) times it makes the system
-            regular and leaves rigid motions as they are; a second step removes its forces.
+            Stiffness of a node (stress/length). A proximal term of sqrt(EPS) times it makes the
+            system regular; a second step removes its forces.
         """
         jump, start = problem.interface.jump, problem.start()
         blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
         blocks[:] = np.sqrt(EPS) * stiffness * np.eye(jump.block_size)
         operator.update("secant", start, problem.interface.weighted(blocks, start.x))
         state = start
-        for _ in range(2):  # each leaves the root of the rounding
+        for _ in range(2):  # each leaves an error of sqrt(EPS)
             increment = operator.solve(-residual_forces(problem, state))
             state = replace(state, x=problem.equilibrium.moved(state.x, increment))
         found = self.free_motion(problem, state)
@@ -202,22 +185,17 @@ class UnconstrainedModes:
         return replace(state, x=state.x - moved.ravel())
 
     def free_motion(self, problem: Problem, state: State) -> RigidMotion | None:
-        """Return the free rigid motion to take off a solution; None without any. Collective.
+        """Return the unconstrained modes at a solution, of the whole or condensed problem.
 
-        Parameters
-        ----------
-        problem
-            The whole problem, or the condensed one.
-        state
-            Its solution.
+        None without any. Collective.
         """
         interface = problem.interface
         jump, nodal = interface.jump, interface.jump.apply(state.x)
-        # Pressures that are rounding hold nothing.
+        # Pressures that are rounding do not constrain.
         pressed = interface.pressure(nodal, state.forces) > interface.rounding(nodal)
         motions, columns = [], []
         for group in self._unsupported:
-            free = null_space(group.held(self.problem.frictional, pressed))
+            free = null_space(group.constraints(self.problem.frictional, pressed))
             if free.shape[1] > 0:
                 along = group.normal[:, None, :] * jump.lift[:, :, None]
                 columns.append((along + group.tangential) @ free)
@@ -229,7 +207,7 @@ class UnconstrainedModes:
             body = problem.equilibrium
             vectors = [*(body.local(column) for column in whole.T), state.x]
             rows, weights = _by_volume(problem, vectors)
-        else:  # of a condensed body the displacements at contact nodes, relative to the other side
+        else:  # of a condensed body the jumps alone are known
             values = np.concatenate([moved, nodal[:, : jump.dim, None]], axis=2)
             rows, weights = values.reshape(-1, values.shape[2]), np.repeat(jump.weight, jump.dim)
         gram = jump.comm.allreduce(rows.T @ (weights[:, None] * rows), op=MPI.SUM)
@@ -240,7 +218,7 @@ class UnconstrainedModes:
         depth = jump.maximum(-(opening + rising @ wanted)[near])
         limited = depth > NEGLIGIBLE * interface.diameter
         if limited:
-            # Depths of a solution are rounding.
+            # Penetration of a solution is rounding.
             deep = opening < -NEGLIGIBLE * interface.diameter
             room = np.where(deep, opening, np.maximum(opening, 0.0))
             parts = jump.comm.allgather((rising[near], room[near]))
@@ -249,9 +227,9 @@ class UnconstrainedModes:
         return RigidMotion(whole, moved, wanted, amounts, depth, limited)
 
     def pushed_aside(self, problem: Problem, state: State) -> bool:
-        """Tell whether contact has moved a body to where nothing constrains it. Collective.
+        """Tell whether a rigid-body mode has become unconstrained at a solution. Collective.
 
-        With friction there may be another solution, in which it is constrained.
+        With friction there may be another solution, at which it is constrained.
         """
         if not problem.interface.friction.acts or self.constrained_by_supports:
             return False
@@ -260,10 +238,9 @@ class UnconstrainedModes:
 
 
 def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array, Array]:
-    """Return displacements at points of this rank's cells, (n, k), and the points' volumes, (n,).
+    """Return displacements at quadrature points, (n, k), of local unknowns, and the weights (n,).
 
-    Of local unknowns; products with these weights, some of which are negative, are those in L2.
-    Foundations that move count as the whole body.
+    A foundation that moves counts as the whole body. Some weights are negative.
     """
     body, domain = problem.equilibrium, problem.domain
     shape, nodes = shape_of(domain.mesh), geometry_nodes(domain)
@@ -282,26 +259,16 @@ def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array
 def with_least_displacements(
     modes: UnconstrainedModes, state: State, outcome: Outcome
 ) -> tuple[State, Outcome]:
-    """Take a rigid motion that costs nothing off a solution, whatever found it. Collective.
+    """Subtract unconstrained rigid-body modes from a solution: least displacements in L2.
 
-    Parameters
-    ----------
-    modes
-        Those of the whole problem, at the time of the step.
-    state, outcome
-        Where a method has ended; without convergence nothing is changed but where the bodies are in
-        balance without any contact force.
-
-    Returns
-    -------
-    The solution with the least displacements in L2, and its residuals; those given where nothing is
-    free.
+    Without convergence nothing is changed, unless the bodies are in equilibrium without contact
+    forces. Collective.
     """
     problem, body = modes.problem, modes.problem.equilibrium
     if outcome.signal or modes.constrained_by_supports:
         return state, outcome
     if not outcome.converged:
-        # Bodies that have been pushed aside press by rounding, on which a method stalls.
+        # A method may stall on contact forces that are rounding.
         free = replace(state, forces=Multipliers.zero(problem.interface.jump))
         residuals = evaluate(problem, free)
         if residuals.excess(outcome.allowed):
@@ -311,7 +278,7 @@ def with_least_displacements(
     if found is None:
         return state, outcome
     x = body.moved(state.x, -found.motion)
-    # Where nothing presses, forces by rounding alone are out of balance elsewhere.
+    # Contact forces that are rounding are out of balance after the motion.
     for forces in (Multipliers.zero(problem.interface.jump), state.forces):
         least = replace(state, x=x, forces=forces)
         residuals = evaluate(problem, least)
@@ -319,17 +286,14 @@ def with_least_displacements(
             outcome = replace(outcome, residuals=residuals)
             pressed = problem.interface.jump.maximum(state.forces.pressure) > 0
             if pressed and forces is not state.forces:
-                # Pressures that are gone, as rounding, have held other motions.
+                # Pressures that were rounding have constrained other modes.
                 return with_least_displacements(modes, least, outcome)
             return least, outcome
     return state, outcome
 
 
 def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -> Array:
-    """Return the q nearest to a wanted one in the norm of `products` with cone q >= least.
-
-    NaN where there is none.
-    """
+    """Minimise (q - wanted)^T products (q - wanted) with cone q >= least; NaN if infeasible."""
     values, vectors = np.linalg.eigh(products)
     used = values > EPS * values.max()
     back = vectors[:, used] / np.sqrt(values[used])
@@ -344,12 +308,12 @@ def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -
 
 
 def all_loads(problem: Problem) -> float:
-    """Return the sum of the magnitudes of all loads at zero displacement. Collective."""
+    """Return the sum of |load| over the unknowns, at zero displacement. Collective."""
     return float(_loads(problem).sum())
 
 
 def _loads(problem: Problem) -> Array:
-    """Return these sums of each connected component, shape (k,). Collective."""
+    """Return this sum for each connected component, shape (k,). Collective."""
     body, of = problem.equilibrium, problem.equilibrium.component_norms
     residual = residual_forces(problem, problem.start())
     forces = np.abs(body.unbalanced(residual)) * of.mechanical
@@ -359,7 +323,7 @@ def _loads(problem: Problem) -> Array:
 
 
 def _without_supports(problem: ContactProblem) -> NDArray[np.bool_]:
-    """Return which connected components have no support at all, shape (k,). Collective."""
+    """Return which connected components have no support, shape (k,). Collective."""
     body, of = problem.equilibrium, problem.equilibrium.component_norms
     supported = np.any(~body.unsupported[:, : body.dim], axis=1).astype(float)
     if body.layout.inclined is not None:

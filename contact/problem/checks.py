@@ -249,7 +249,7 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
     free = null_space(group.supports)
     if free.shape[1] == 0:
         return
-    unconstrained = null_space(group.held(problem.frictional))
+    unconstrained = null_space(group.constraints(problem.frictional))
     if unconstrained.shape[1] > 0:
         raise InputError(_unconstrained(problem, group, unconstrained), "unsupported")
     support = UnilateralSupport.of(group)

@@ -1,8 +1,7 @@
-"""Static condensation: a contact problem with its body condensed onto the contact nodes.
+"""Static condensation of a linearised body onto its contact nodes.
 
-Once the material is linearised, only the unknowns at Gamma_3 are left to be found: the
-Schur complement of the body takes the place of its operator, and every method that solves a
-contact problem solves this one too, in small dense steps.
+The Schur complement takes the place of the operator: the condensed problem is a contact problem of
+its own, solved in small dense steps.
 """
 
 from __future__ import annotations
@@ -34,47 +33,46 @@ from contact.ranks import summed
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
-#: Unknowns that are kept at most: the dense matrix then takes 130 MB.
+#: Most kept unknowns: the dense matrix then takes 130 MB.
 LARGEST = 4200
 
-#: Most that counts as rounding at the contact nodes, over the loads. Not as little as for the whole
-#: body, by which the solution is judged once more.
+#: Largest residual that is accepted as rounding at the contact nodes. Larger than for the whole
+#: body, whose residuals are evaluated afterwards.
 MOST_ROUNDING = 1e-3
 
 PREFIX = "contact_"
 
-#: Unknowns up to which dense steps take no time to speak of.
+#: Kept unknowns up to which condensation always pays.
 ALWAYS = 1000
 
-#: How much faster dense operations are than those of a sparse factorisation, and how many more of
-#: its steps Newton's method takes in the worst case.
+#: Speed of dense over sparse operations, times the ratio of the numbers of Newton steps.
 DENSE_IS_FASTER = 50.0
 
 
 @dataclass(frozen=True)
 class CondensedBody:
-    """A linear body seen from its kept nodes: an equilibrium of its own.
+    """Equilibrium of a linear body at its kept nodes: S (x - x_0) + r_0.
 
     Attributes
     ----------
     comm, dim
-        As those of the body.
+        Those of the body.
     free
-        Which unknowns of the owned kept nodes are not fixed, shape (nodes, block size).
+        Which unknowns of the owned kept nodes are free, shape (nodes, block size).
     rows
-        The owned rows of the Schur complement.
+        Owned rows of the Schur complement S.
     stiffness
-        All of it, of which the other ranks have nothing.
+        All of S, on the first rank.
     residual
-        Condensed internal forces minus loads where the body was linearised, all ranks.
+        r_0: condensed internal forces minus loads at the linearisation, of all ranks.
     at, own
-        The owned kept unknowns there, and where these are among those of all ranks.
+        x_0: the owned kept unknowns there, and their slice among those of all ranks.
     acting
-        `norms` of all that acts on the whole body: loads, reactions, and one field on the other.
+        `norms` of loads, reactions and coupling forces of the whole body.
     component_norms
-        Which forces are compared with each other.
+        Norms of forces and charges of each connected component.
     inclined
-        Directions in which supports hold kept nodes, by their places; None for none.
+        Inclined directions of supports at kept nodes; None for none.
     """
 
     comm: MPI.Intracomm
@@ -102,11 +100,11 @@ class CondensedBody:
         return self.free.size
 
     def rest(self) -> Array:
-        """Return unknowns of zero."""
+        """Return zeros."""
         return np.zeros(self.owned)
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
-        """Return unknowns with the fixed ones as they were: the load has been condensed."""
+        """Return unknowns with the fixed ones of the linearisation."""
         fixed = self.at - masked(self.free, self.inclined, self.at)
         return masked(self.free, self.inclined, x) + fixed
 
@@ -119,12 +117,12 @@ class CondensedBody:
         return x
 
     def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
-        """Return the owned forces of the linear body, loads taken off. Collective."""
+        """Return S (x - x_0) + r_0: internal forces minus loads. Collective."""
         moved = np.concatenate(self.comm.allgather(state.x - self.at))
         return np.asarray(self.rows @ moved + self.residual[self.own])
 
     def external(self, time: float = 1.0) -> Array:
-        """Return zero: the loads are part of the forces."""
+        """Return zero: loads are part of r_0."""
         return np.zeros(self.owned)
 
     def unbalanced(self, forces: Array) -> Array:
@@ -136,15 +134,15 @@ class CondensedBody:
         return forces - masked(self.free, self.inclined, forces)
 
     def norms(self, values: Array) -> Array:
-        """Return the norms of forces, and of charges, of each component apart. Collective."""
+        """Return norms of forces and charges, by connected component. Collective."""
         return self.component_norms.norms(values)
 
     def load_norms(self, time: float = 1.0) -> Array:
-        """Return the `norms` of all that acts on the whole body."""
+        """Return the `norms` of loads, reactions and coupling forces of the whole body."""
         return self.acting
 
     def exchanged(self, state: Evaluated) -> Array:
-        """Return zero: that is part of all that acts on the whole body."""
+        """Return zero: part of `load_norms`."""
         return np.zeros_like(self.acting)
 
     def norm(self, values: Array) -> float:
@@ -154,7 +152,7 @@ class CondensedBody:
 
 @dataclass(frozen=True)
 class CondensedProblem:
-    """The contact nodes of a problem, with a linear body behind them."""
+    """A contact problem of a condensed body."""
 
     equilibrium: CondensedBody
     interface: Interface
@@ -162,27 +160,27 @@ class CondensedProblem:
     time: float = 1.0
 
     def start(self, time: float | None = None) -> State:
-        """Return the state with the free unknowns at zero."""
+        """Return the zero initial guess."""
         x = self.equilibrium.prescribe(self.equilibrium.rest())
         return State(x, Multipliers.zero(self.interface.jump), self.time)
 
     def with_interface(self, interface: Interface) -> CondensedProblem:
-        """Return the problem with other laws, or gaps, at the same contact nodes."""
+        """Return the problem with another interface on the same contact nodes."""
         return replace(self, interface=interface)
 
     def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> DenseOperator:
-        """Return the dense operator; it has blocks at all nodes, in their order."""
+        """Return the dense operator, with blocks at all nodes."""
         body = self.equilibrium
         return DenseOperator(body.comm, body.free, body.stiffness, counters, body.inclined)
 
 
 def at_kept_nodes(interface: Interface) -> Interface:
-    """Return an interface whose nodes are numbered among the kept ones."""
+    """Return an interface numbered by kept nodes."""
     count = interface.jump.nodes.size
     first, others = np.split(np.arange(interface.coupled.size, dtype=np.int32), [count])
 
     def kept(nodes: ContactNodes, positions: NDArray[np.int32]) -> ContactNodes:
-        """Return nodes of other numbers, whose jumps are nodal values."""
+        """Return nodes of other numbers, whose unknowns are the jumps."""
         return replace(nodes, nodes=positions, motion=None, carried=None, coupling=None)
 
     law, held = interface.law, interface.held
@@ -195,9 +193,9 @@ def at_kept_nodes(interface: Interface) -> Interface:
 
 
 class Condensation:
-    """The body of a problem, linearised and condensed onto the contact nodes.
+    """Linearisation of the whole problem and condensation onto the contact nodes.
 
-    The constraint of the problem makes jumps the unknowns of these nodes (`linear.constraint`). Its
+    The constraint of the problem makes jumps the unknowns of these nodes (`linear.constraint`);
     global unknowns q border the system, and are eliminated from the dense one.
 
     Parameters
@@ -205,7 +203,7 @@ class Condensation:
     full
         The whole problem.
     counters
-        Where sparse factorisations and solves are counted.
+        Counters of sparse factorisations and solves.
     """
 
     def __init__(self, full: ContactProblem, counters: Counters) -> None:
@@ -228,7 +226,7 @@ class Condensation:
         self._stiffness = DenseStiffness(self._rows)
 
     def set_load_step(self, full: ContactProblem) -> None:
-        """Go on with another step of the same problem; factorisations remain."""
+        """Take another load step of the same problem; factorisations remain."""
         self.full = full
         self._interface = at_kept_nodes(full.interface)
 
@@ -240,23 +238,23 @@ class Condensation:
         linearised_at: Array | None = None,
         internal: Array | None = None,
     ) -> CondensedProblem | None:
-        """Condense the body, linearised at a state of the full problem. Collective.
+        """Linearise at a state of the whole problem, and condense. Collective.
 
         Parameters
         ----------
         kind, state
-            "secant" or "tangent", and where.
+            "secant" or "tangent", and the state.
         keep
-            Whether to take the last factorisation, wherever that was.
+            Whether to keep the last factorisation (chord step).
         linearised_at
-            Unknowns at which a secant is taken; those of the state by default.
+            Unknowns of the secant; those of the state by default.
         internal
-            The internal forces, where they are known already.
+            Internal forces of the state, if known.
 
         Returns
         -------
-        The condensed problem; None if it cannot be condensed: many unknowns are kept, or all, or
-        these do not hold the others.
+        The condensed problem; None with too many kept unknowns, or if the eliminated block is
+        singular.
 
         Raises
         ------
@@ -278,7 +276,7 @@ class Condensation:
         acting = body.load_norms(state.time) + reactions + body.exchanged(state)
         restricted = self._constraint.restrict(-residual)
         self._rhs = body.layout.mask(restricted[: body.owned])
-        # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
+        # With loads along those before, the extrapolated state is in equilibrium inside.
         nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
         if body.comm.allreduce(bool(self._schur.exceeds(self._rhs, nothing)), op=MPI.LOR):
             kept = self._schur.reduce(self._rhs)
@@ -308,10 +306,9 @@ class Condensation:
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 
     def stiffness(self, state: State) -> Array | None:
-        """Return the stiffness at the kept nodes, on the first rank. Collective.
+        """Return the Schur complement, on the first rank; None with too many rows, or if singular.
 
-        That of the last linearisation, or the tangent at a state before there was one; None if it
-        has too many rows, or is not regular.
+        Of the last linearisation, or else the tangent at a state. Collective.
         """
         if not 0 < self._schur.size <= min(LARGEST, self.full.equilibrium.layout.unknowns - 1):
             return None
@@ -320,11 +317,11 @@ class Condensation:
         return self._stiffness.matrix if self._regular else None
 
     def _factorise(self, kind: str, state: State) -> None:
-        """Find the dense stiffness of the body at a state. Collective."""
+        """Factorise at a state, and eliminate q from the Schur complement. Collective."""
         body, schur = self.full.equilibrium, self._schur
         self._rows = np.zeros((0, 0))
         self._stiffness = DenseStiffness(self._rows)  # room for a new one
-        # The symmetric part of a tangent converges as a chord step does, and condenses alike.
+        # The symmetric part of a tangent converges linearly, as chord steps.
         part = "symmetric" if kind == "tangent" and not body.symmetric else kind
         self._bulk.assemble(self._matrix, part, state)
         balance(self._matrix, body.layout)
@@ -334,7 +331,7 @@ class Condensation:
         responses = [schur.interior(np.asarray(column)) for column in columns]
         border = [schur.condense(*pair) for pair in zip([*columns], responses, strict=True)]
         self._responses = np.reshape(responses, columns.shape).T
-        #: Forces on q by kept unknowns, shape (free, kept).
+        #: Derivative of the forces on q by kept unknowns, shape (free, kept).
         self._border = np.reshape(border, (self._free.size, schur.size))
         inside = summed(body.comm, columns @ self._responses)
         corner = self._bulk.corner[np.ix_(self._free, self._free)] - inside
@@ -353,7 +350,7 @@ class Condensation:
         return np.asarray(lu_solve(self._corner, forces, check_finite=False))
 
     def _scattered(self, stiffness: Array) -> Array:
-        """Return the owned rows of a matrix that the first rank has. Collective."""
+        """Scatter the rows of a matrix on the first rank. Collective."""
         comm, own = self.full.comm, self._own
         every = comm.gather(own)
         if comm.rank > 0:
@@ -365,14 +362,9 @@ class Condensation:
         return stiffness[own]
 
     def expand(self, condensed: CondensedProblem, x: Array) -> Array:
-        """Return the increment of the full problem's owned unknowns. Collective.
+        """Return the increment of the whole body's owned unknowns. Collective.
 
-        Parameters
-        ----------
-        condensed
-            The condensed problem that was made last.
-        x
-            Its solution.
+        Given the solution x of the condensed problem that `linearise` returned last.
         """
         self.counters.linear_solves += 1
         self.counters.linear_iterations += 1
@@ -384,13 +376,11 @@ class Condensation:
 
 
 def condensation_pays(problem: ContactProblem, kind: str) -> bool:
-    """Tell whether Newton steps on the condensed problem cost less than those on the whole body.
+    """Tell whether dense Newton steps on the condensed problem cost less than sparse ones.
 
-    Large bodies in 3-D are left to multigrid, unless a direct solver is asked for by `kind`.
-
-    A dense factorisation costs k^3 operations with k kept unknowns. A sparse one costs n b^2 with
-    n unknowns and fronts of b: in 2-D the body's depth, n/k nodes, in 3-D some n^(1/2). On slender
-    bodies condensation does not pay: the contact nodes are too large a part.
+    A dense factorisation costs k^3 operations with k kept unknowns, a sparse one n b^2 with n
+    unknowns and fronts of b: in 2-D the body's depth, n/k nodes, in 3-D some n^(1/2). Large bodies
+    in 3-D are left to multigrid, unless `kind` is a direct solver.
     """
     layout = problem.equilibrium.layout
     if not condensable(problem, kind) or (kind == "auto" and multigrid.is_large(layout)):
@@ -401,11 +391,7 @@ def condensation_pays(problem: ContactProblem, kind: str) -> bool:
 
 
 def condensable(problem: ContactProblem, kind: str) -> bool:
-    """Tell whether a problem can be condensed onto its contact nodes.
-
-    That is where the contact nodes are few and a direct solver has the memory, unless the user
-    or his options of PETSc ask for another.
-    """
+    """Tell whether kept unknowns are few, and a direct solver has the memory and is not refused."""
     options = PETSc.Options(PREFIX)
     names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
     chosen = any(options.hasName(name) for name in names)

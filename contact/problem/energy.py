@@ -1,14 +1,12 @@
 """The energy balance of a step: work, stored energy, and dissipation by friction and plastic flow.
 
-Work is that of all but the unilateral constraint and friction: loads, supports, electrodes, and
-of layer and conductive foundation on the body, by the trapezoidal rule. Energy is stored
-in the body. Per step
+The work is that of loads, supports, electrodes, layer and conductive foundation on the body, by the
+trapezoidal rule. Per step
 
-    work - change of energy = dissipation + plastic dissipation + O(step^2),
+    work - change of energy = dissipation + plastic dissipation + O(step^2).
 
-and the dissipation, sum w lambda_f . Delta j_tau with the friction at the end of the step, is
-never negative; neither is that of plastic flow, which the material states, as it states the energy
-that it stores. Before the reference configuration nothing has acted.
+The dissipation sum w lambda_f . Delta j_tau, with the friction at the end of the step, is never
+negative; nor is the plastic one, which the material states, like its stored energy.
 """
 
 from __future__ import annotations
@@ -24,10 +22,10 @@ from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Points at which the stress power of a step is taken where the material is not linear.
+#: Gauss points of the stress power in a step of a nonlinear material.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
-#: The same on sixteen parts of the way from nothing to a state.
+#: The same on sixteen parts of the straight path to a state.
 _WAY = ((np.arange(16)[:, None] + 0.5 + 0.5 * _POINTS) / 16).ravel()
 _SHARES = np.tile(_WEIGHTS / 32, 16)
 
@@ -66,10 +64,7 @@ class Balance:
 
 
 def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]:
-    """Return the forces and charges that do work, and those of the stresses. Collective.
-
-    On the owned unknowns: loads, supports, layer and conductive foundation are the first.
-    """
+    """Return external forces and charges on the owned unknowns, and internal ones. Collective."""
     body, interface = problem.equilibrium, problem.interface
     external = body.external(state.time)
     residual = residual_forces(problem, state)
@@ -84,9 +79,9 @@ def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]
 def dissipated(
     problem: ContactProblem, state: State, nodes: NDArray[np.bool_] | None = None
 ) -> float:
-    """Return the energy that friction takes during the step of a state. Collective.
+    """Return the dissipation by friction in the step of a state, at some nodes (n,) or all.
 
-    At some of the owned contact nodes, shape (n,); at all by default.
+    Collective.
     """
     interface = problem.interface
     slip = interface.slip(problem.nodal(state))
@@ -95,10 +90,10 @@ def dissipated(
 
 
 def stored(problem: ContactProblem, state: State) -> float:
-    """Return the energy that is stored in the body at a state. Collective.
+    """Return the stored energy of a state. Collective.
 
-    It is the work of the stresses on a straight way there, and, of materials with internal
-    variables, the energy that they state; nan where one does not.
+    The work of the stresses on a straight path; for materials with internal variables the energy
+    that they state, NaN if they do not.
     """
     body, x = problem.equilibrium, problem.equilibrium.owned_part(state.x)
     own = 0.0
@@ -135,7 +130,7 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
         power = 0.5 * _WEIGHTS @ np.array([forces_at(replace(state, x=x)) for x in way])
     enthalpy = before.enthalpy + body.product(power, x - x_before) + gained
     mechanical = body.component_norms.mechanical
-    # The enthalpy's work is that of charges on changing potentials: potentials move charges.
+    # Mechanical work f.du; electric work phi dq, from the enthalpy's -q dphi.
     work = np.where(
         mechanical,
         0.5 * (given + before.given) * (x - x_before),

@@ -1,9 +1,9 @@
-"""Whether contact forces can balance the loads on bodies: limit analysis by linear programs.
+"""Limit analysis by linear programs: whether contact forces can balance the loads.
 
-Of bodies with rigid-body modes that their supports do not constrain. Contact forces do no work on
-rigid motions m with m.nu <= -mu |m_tau| at every node: where loads do, no forces within the
-friction cones balance them (Farkas). With bounds s on the friction in place of the cones, friction
-takes s |m_tau| at most, and loads whose work is more slide the bodies for ever.
+For bodies with rigid-body modes that their supports do not constrain. Admissible contact forces do
+no positive work on rigid motions m with m.nu <= -mu |m_tau| at every node: if the loads do, no
+forces within the friction cones balance them (Farkas' lemma). With given friction bounds s,
+friction dissipates s |m_tau| at most: loads whose power is more slide the bodies.
 
 References
 ----------
@@ -28,25 +28,26 @@ from contact.ranks import on_root
 from contact.tolerances import BALANCED, NEGLIGIBLE
 from contact.typing import Array
 
-#: Directions in 3-D, of half a turn, in which friction is asked for its bound.
+#: Facets of the friction cone in 3-D, per half turn.
 DIRECTIONS = 8
 
-#: Halvings of the time between loads that contact holds and others; linear programs of a limit.
+#: Bisections for the time of release; linear programs of an overload.
 ROUNDS = 20
 
 
 @dataclass(frozen=True)
 class UnilateralSupport:
-    """Contact as a unilateral support of bodies with modes that their supports do not constrain.
+    """Contact as unilateral support of a group of bodies.
 
     Attributes
     ----------
     group
-        The components, with all their motions.
+        The bodies, with their modes.
     free
-        The motions that no support holds, shape (m, k).
+        The modes that the supports do not constrain, shape (m, k).
     cone
-        Of all ranks, shape (rows, k): contact forces do no work on motions q with cone q <= 0.
+        Rows of all ranks, shape (rows, k): admissible contact forces do no positive work on motions
+        q with cone q <= 0.
     """
 
     group: Group
@@ -55,15 +56,10 @@ class UnilateralSupport:
 
     @staticmethod
     def of(group: Group, at: NDArray[np.bool_] | slice = slice(None)) -> UnilateralSupport | None:
-        """Return that of bodies; None if supports hold them, or no bound is known. Collective.
+        """Return the support of a group by some or all contact nodes of this rank. Collective.
 
-        A given friction bound, and a smoothed pressure, are not bounded by the pressure at the
-        node: such problems are left to the solver.
-
-        Parameters
-        ----------
-        group, at
-            The bodies, and the contact nodes of this rank that may press, all by default.
+        None if the supports constrain all modes, or if friction is not bounded by the pressure at
+        its node: a given bound, a smoothed pressure.
         """
         problem, free = group.problem, null_space(group.supports)
         friction, comm = problem.interface.friction, problem.comm
@@ -82,17 +78,15 @@ class UnilateralSupport:
         )
 
     def lost(self, time: float) -> Array | None:
-        """Return the rigid motion by which the loads of a time take the bodies off. Collective.
+        """Return the mode, shape (m,), by which loads release the bodies; None if balanced.
 
-        Shape (m,); None where contact forces can balance them. They cannot where the loads do work
-        on a rigid motion m on which no admissible contact force does any against them:
-        m.nu <= -mu |m_tau| at every node (Farkas).
+        Collective.
         """
         work, scale = _work(self.group, self.free, time)
         return on_root(self.group.problem.comm, lambda: self._lost(work, scale))
 
     def _lost(self, work: Array, scale: float) -> Array | None:
-        """Return the motion on which loads do most work, on the rank that has the cone."""
+        """Return the mode of most power of the loads, on the rank that has the cone."""
         if np.abs(work).max() <= NEGLIGIBLE * scale:
             return None
         from scipy.optimize import linprog  # takes a while to load
@@ -105,7 +99,7 @@ class UnilateralSupport:
 
     @property
     def besides(self) -> str:
-        """The other motions that may be lost besides a body that is pulled off, in words."""
+        """Other ways of release than a body pulled off, in words."""
         moving = ", or force and moment the rigid part off the body" if self.group.moving else ""
         moving += ", or the force of a bolt one side of its cut" if self.group.cut else ""
         along = ", or along it by more than friction holds" if self.group.problem.frictional else ""
@@ -113,22 +107,22 @@ class UnilateralSupport:
 
 
 def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
-    """Return the modes of a problem that contact alone has to constrain. Collective."""
+    """Return the unilateral supports of all groups that need one. Collective."""
     found = [UnilateralSupport.of(group) for group in groups(problem)]
     return [support for support in found if support is not None]
 
 
-def released(held_by: Sequence[UnilateralSupport], begin: float, end: float) -> str:
-    """Say when loads let a body go that contact alone holds, and how; nothing if not. Collective.
+def released(supports: Sequence[UnilateralSupport], begin: float, end: float) -> str:
+    """Say when and how loads up to a time release a body; "" if they do not. Collective.
 
     Parameters
     ----------
-    held_by
-        Its unilateral supports.
+    supports
+        The unilateral supports.
     begin, end
-        A time at which contact can hold it, and one that is asked for.
+        A time of equilibrium, and the time of the loads.
     """
-    for support in held_by:
+    for support in supports:
         if support.lost(end) is None:
             continue
         for _ in range(ROUNDS):
@@ -140,14 +134,14 @@ def released(held_by: Sequence[UnilateralSupport], begin: float, end: float) -> 
 
 @dataclass(frozen=True)
 class Overload:
-    """Loads on bodies that friction within given bounds does not balance.
+    """Loads on a group that friction within given bounds does not balance.
 
     Attributes
     ----------
     motion
-        The rigid motion by which they slide, of all motions of a group, shape (m,).
+        The mode by which the bodies slide, shape (m,).
     multiple
-        The least multiple of all bounds that balances them; infinity where none does.
+        Least multiple of all bounds that balances the loads; infinity for none.
     """
 
     motion: Array
@@ -155,16 +149,9 @@ class Overload:
 
     @staticmethod
     def of(group: Group, time: float, friction: Array) -> Overload | None:
-        """Return that of bodies; None where friction balances the loads. Collective.
+        """Return the overload of a group by the loads of a time; None for none. Collective.
 
-        Parameters
-        ----------
-        group
-            The bodies.
-        time
-            The time of the loads.
-        friction
-            The largest friction forces of the contact nodes of this rank, shape (n,) (force).
+        `friction`: bounds of the friction forces at the nodes of this rank, shape (n,) (force).
         """
         problem, free = group.problem, null_space(group.supports)
         if free.shape[1] == 0:
@@ -192,12 +179,11 @@ class Overload:
 def _overload(
     free: Array, work: Array, normal: Array, tangential: Array, bound: Array, along: list[Array]
 ) -> Overload | None:
-    """Return how loads slide bodies by the motion whose work exceeds most that of friction.
+    """Maximise the power of the loads minus the dissipation of friction.
 
-    Of a motion friction takes the bounds times the length of its slips, which unit vectors along
-    tell from below: where the motion that was found slips in other directions, these are taken in
-    (Kelley's cutting planes). The multiple is that of this motion, then that of the worst with the
-    bounds so multiplied, and so on (Dinkelbach).
+    The dissipation, bound times |slip|, is approximated from below by slips along unit vectors;
+    slip directions of the last motion are added (Kelley's cutting planes). The multiple of the
+    bounds is updated from the motion (Dinkelbach).
     """
     from scipy.optimize import linprog  # takes a while to load
     from scipy.sparse import block_array, eye_array
@@ -227,22 +213,21 @@ def _overload(
 
 
 def _work(group: Group, free: Array, time: float) -> tuple[Array, float]:
-    """Return the work of loads on free motions, shape (k,), and the sum of them. Collective."""
+    """Return the power of the loads on free modes, (k,), and the sum of |loads|. Collective."""
     body, comm, moved = group.problem.equilibrium, group.problem.comm, group.moved
     loads = body.external(time)
-    on_masters = loads[body.owned :]
+    on_global = loads[body.owned :]
     own = np.where(group.inside[:, None], body.nodal(loads), 0.0).ravel()
     work = comm.allreduce(moved[: body.owned].T @ own, op=MPI.SUM)
-    work = (work + moved[body.owned :].T @ on_masters) @ free
-    scale = comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM) + np.abs(on_masters).sum()
+    work = (work + moved[body.owned :].T @ on_global) @ free
+    scale = comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM) + np.abs(on_global).sum()
     return work, float(scale)
 
 
 def _sideways(normal: Array) -> list[Array]:
-    """Return tangential vectors t, shape (n, d) each, with |m_tau| <= max |m.t| for every m.
+    """Return tangential vectors t, (n, d) each, with |m_tau| <= max |m.t| for every m.
 
-    In 2-D that is the unit tangent. In 3-D they are spread over half a turn, and as long as
-    it takes: planes around the cone of friction, 2 % wider at most.
+    The facets of a polyhedral friction cone, 2 % wider at most in 3-D.
     """
     if normal.shape[1] == 2:
         return [normal[:, ::-1] * [-1.0, 1.0]]

@@ -11,6 +11,12 @@ u_tau = 0 (stick), lambda = s u_tau/|u_tau| (slip). `Linearised` solves with the
 Newton's method; the remainder that gamma leaves in c is corrected by further back-substitutions
 with the same factorisation (augmented Lagrangian iterations), and so is the coupling of the nodes
 by a smoothed pressure.
+
+In an evolution a step ends with x and the history h' = H(x, h), and its equations R(x, f, h) = 0
+have the history h at its beginning. The tangent goes forwards, dh' = dH/dx dx + dH/dh dh, and dR/dh
+dh is part of the equations of dx. The adjoint goes backwards: given the derivatives g of a quantity
+by h', those by x are (dH/dx)^T g, and those by h are (dH/dh)^T g - (dR/dh)^T w, with the adjoint w
+of the step.
 """
 
 from __future__ import annotations
@@ -19,35 +25,36 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contact.body.internal_variables import VARIABLES
 from contact.errors import InputError
+from contact.history import History, InternalVariables, Part
 from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.multipliers import Multipliers
+from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import unit_vectors
 from contact.linear import multigrid
 from contact.linear.operator import Counters
-from contact.problem.problem import ContactProblem
+from contact.problem.problem import SLIP, ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 from contact.tolerances import EPS
 from contact.typing import Array
 
-#: Share of the largest pressure, or of the stress that the largest displacement costs, within which
-#: a node counts as weakly active.
+#: Weakly active nodes: ratio to the largest pressure, or to c times the largest displacement.
 WEAK = 1e-6
 
 
 @dataclass(frozen=True)
 class Equations:
-    """The residuals of equilibrium and of the contact conditions, or a change of both.
+    """Residuals of equilibrium and of the contact conditions, or a change of both.
 
     Attributes
     ----------
     forces
-        On the owned unknowns that are free, global ones behind them.
+        On the owned free unknowns, global ones behind them.
     conditions
-        At the contact nodes, shape (n, d): stresses, and gaps and slips times `stiffness` of the
-        interface, for a normal that is along no axis mixes them.
+        At the contact nodes, shape (n, d): stresses, or gaps and slips times the interface's
+        `stiffness`.
     """
 
     forces: Array
@@ -65,7 +72,7 @@ def active_set(problem: ContactProblem, state: State) -> ActiveSet:
 
 
 def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equations:
-    """Return the residuals of the equations that belong to an active set. Collective."""
+    """Return the residuals of the equations of an active set. Collective."""
     interface, jump, nodal = problem.interface, problem.nodes, problem.nodal(state)
     vectors = state.forces.vectors(jump)
     slip, pressure = interface.slip(nodal), interface.pressure(nodal, state.forces)
@@ -78,17 +85,13 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     closing = -interface.stiffness * interface.opening(nodal)
     normal = np.where(active.closed, closing, jump.normal_component(vectors))
     conditions = normal[:, None] * jump.normal + tangential
-    # Forces on nodes of a rigid part are those on it: its moment arms may be the parameter.
+    # Forces on nodes of a rigid part as forces on it: a parameter may be its moment arm.
     forces = problem.equilibrium.unbalanced(residual_forces(problem, state))
     return Equations(forces, conditions)
 
 
 def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float]:
-    """Return the norms that changes of the equations are compared with. Collective.
-
-    Those of the forces, and of the stresses and jumps at the contact nodes in L2(Gamma_3); of a
-    body on which nothing acts those at a small strain.
-    """
+    """Return reference norms of forces and, in L2(Gamma_3), of conditions. Collective."""
     body, jump, scales = problem.equilibrium, problem.nodes, problem.scales
     least = WEAK * scales.young * scales.area
     forces = body.norm(body.internal_forces(state)) + body.norm(body.external(state.time))
@@ -98,17 +101,16 @@ def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float
 
 
 def weakly_active(problem: ContactProblem, state: State) -> Array:
-    """Return the points of nodes at the border of two states, shape (n, d). Collective.
+    """Return the points of weakly active nodes, shape (n, d). Collective.
 
-    There the solution has one-sided derivatives only: a node in contact without pressure, one that
-    sticks at its friction bound, one that slips by nothing.
+    In contact without pressure, sticking at the friction bound, or slipping by nothing: there the
+    solution has one-sided derivatives only.
     """
     interface, nodal, forces = problem.interface, problem.nodal(state), state.forces
     active, c = active_set(problem, state), interface.stiffness
     moved = c * np.linalg.norm(nodal[:, : problem.dim], axis=1)
     small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(nodal, forces), moved))
     opening, length = np.abs(interface.opening(nodal)), interface.slip_length(nodal)
-    # Where a body touches without being moved all of these are 0.
     weak = np.where(active.closed, np.abs(forces.pressure) <= small, c * opening <= small)
     if interface.friction.acts:
         bound = interface.bound(nodal, forces)
@@ -126,9 +128,9 @@ class Linearised:
     problem, state
         The problem, and its solution: of a step of an evolution that of the step.
     parameters
-        Those of Newton's method; gamma is taken.
+        Complementarity parameters, for gamma.
     counters
-        Where the factorisation and the back-substitutions are counted.
+        Counters of factorisation and back-substitutions.
 
     Attributes
     ----------
@@ -163,7 +165,7 @@ class Linearised:
         self._operator.update("tangent", state, interface.weighted(law, state.x))
 
     def _conditions(self, nodal: Array) -> None:
-        """Find the derivatives C_u and C_f, shapes (n, d, block size) and (n, d, d)."""
+        """Compute C_u, shape (n, d, block size), and C_f, shape (n, d, d)."""
         interface, jump, active = self.problem.interface, self.problem.nodes, self.active
         d, slip = jump.dim, interface.slip(nodal)
         length = np.linalg.norm(slip, axis=1)
@@ -178,7 +180,7 @@ class Linearised:
         falls = turning + by_slip[:, None, None] * (along[:, :, None] * along[:, None, :])
         slips, sticks = active.slips[:, None, None], active.sticks[:, None, None]
         self._along = np.where(active.slips[:, None], along, 0.0)
-        #: Derivative of the bound by the smoothed pressure; the one by the node's own in C_f.
+        #: Derivative of the bound by the smoothed pressure; by the nodal one it is in C_f.
         self._rate = np.zeros_like(length)
         if friction.law is not None:
             total, smooth = friction.history.accumulated + length, friction.smooth(self._pressure)
@@ -196,18 +198,12 @@ class Linearised:
         self._by_jump -= (local[:, None] * self._along)[:, :, None] * self._layer[:, None, :]
         pressed = (local[:, None] * self._along)[:, :, None] * jump.normal[:, None, :]
         self._by_force = np.where(closed, 0.0, normal) + np.where(sticks, 0.0, jump.tangent)
-        # There is no contact force along components that supports hold.
+        # No contact force along fixed components.
         self._by_force += np.eye(d) - normal - jump.tangent
         self._by_force -= pressed
 
     def solve(self, change: Equations) -> tuple[Array, Array]:
-        """Return the changes of the owned unknowns and of f that answer a residual. Collective.
-
-        Parameters
-        ----------
-        change
-            The change of the residuals; that of the solution takes it away.
-        """
+        """Return dx on the owned unknowns and df with J (dx, df) = -change. Collective."""
         jump = self.problem.nodes
         rhs, left = -change.forces, -change.conditions
         x, f = np.zeros_like(rhs), np.zeros_like(left)
@@ -228,15 +224,7 @@ class Linearised:
                 return x, f
 
     def solve_transposed(self, by_x: Array, by_force: Array) -> tuple[Array, Array]:
-        """Return the adjoint unknowns and conditions of a gradient. Collective.
-
-        Parameters
-        ----------
-        by_x
-            Derivative of a quantity by the owned unknowns.
-        by_force
-            By the contact forces at the nodes, shape (n, d).
-        """
+        """Return w with J^T w = (by_x, by_force), shapes (owned,) and (n, d). Collective."""
         jump, weight = self.problem.nodes, self.problem.nodes.weight[:, None]
         rhs, left = by_x.copy(), by_force
         x, c = np.zeros_like(rhs), np.zeros_like(left)
@@ -257,15 +245,7 @@ class Linearised:
                 return x, c
 
     def by_gap(self, x: Array, conditions: Array) -> Array:
-        """Return the derivatives of a quantity by the gap at each node, shape (n,), given w.
-
-        The gap is met by the normal displacement alone, which it takes its place of.
-
-        Parameters
-        ----------
-        x, conditions
-            The adjoint, as `solve_transposed` returns it.
-        """
+        """Return the derivatives by the gap at each node, (n,), from the adjoint. Collective."""
         jump, d = self.problem.nodes, self.problem.dim
         by_normal = np.einsum("nij,nj->ni", self._by_jump[:, :, :d], jump.normal)
         found = np.einsum("ni,ni->n", conditions, by_normal)
@@ -273,7 +253,7 @@ class Linearised:
         return found + pressed * np.einsum("ni,ni->n", self._layer[:, :d], jump.normal)
 
     def _conditions_of(self, moved: Array, f: Array) -> Array:
-        """Return the change of the conditions with jumps and contact forces. Collective."""
+        """Return C_u du + C_f df, with the smoothed pressure. Collective."""
         changed = np.einsum("nij,nj->ni", self._by_jump, moved)
         changed += np.einsum("nij,nj->ni", self._by_force, f)
         friction = self.problem.interface.friction
@@ -285,7 +265,7 @@ class Linearised:
         return changed - bound[:, None] * self._along
 
     def _smoothed_transposed(self, conditions: Array) -> tuple[Array, Array]:
-        """Return the derivatives by jumps and forces through a smoothed pressure. Collective."""
+        """Return the transposed derivative of the smoothed pressure, by jumps and forces."""
         friction = self.problem.interface.friction
         if friction.local:
             return np.zeros_like(self._layer), np.zeros_like(conditions)
@@ -295,20 +275,7 @@ class Linearised:
 
     @staticmethod
     def _enough(taken: list[float], size: float) -> bool:
-        """Tell whether no correction is to follow the last one.
-
-        Parameters
-        ----------
-        taken
-            The norms of all corrections.
-        size
-            That of the solution.
-
-        Raises
-        ------
-        InputError
-            If they do not halve from one to the next.
-        """
+        """Tell whether corrections have converged; raise InputError where they do not halve."""
         last, now = (np.inf, *taken)[-2:]
         if EPS * 2.0 ** len(taken) > 1:
             raise InputError(
@@ -316,12 +283,11 @@ class Linearised:
                 "for derivatives; accepted: a smaller radius or coefficient of friction",
                 "smoothed-pressure",
             )
-        # Rounding, or the next correction is as much smaller than this one as this one than the
-        # last. The first ones may grow, as the smoothed pressure follows.
+        # Rounding, or linear convergence; the first corrections may grow by the smoothed pressure.
         return (now >= last and now <= WEAK * size) or now**2 <= EPS * size * min(last, size)
 
     def _norm(self, x: Array, nodal: Array) -> float:
-        """Return the norm of owned unknowns, or of nodal values where these are larger."""
+        """Return |x| + EPS |f|."""
         return self.problem.equilibrium.norm(x) + EPS * self.problem.nodes.norm(nodal)
 
 
@@ -331,3 +297,83 @@ def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> St
     vectors = state.forces.vectors(jump) + f
     forces = Multipliers.of(jump, jump.normal_component(vectors), vectors)
     return replace(state, x=problem.equilibrium.moved(state.x, x), forces=forces)
+
+
+def commit_along(linearised: Linearised, x: Array, change: History) -> History:
+    """Return dh' = dH/dx dx + dH/dh dh, given dx of the owned unknowns and dh. Collective."""
+    problem, state = linearised.problem, linearised.state
+    slip, variables = _parts(change)
+    along = problem.equilibrium.local(x)
+    jump = problem.nodes.tangential_component(problem.nodes.apply(along))
+    longer = np.einsum("ni,ni->n", _direction(problem, problem.nodal(state)), jump - slip.jump)
+    parts: dict[str, Part] = {SLIP: SlipHistory(jump, slip.accumulated + longer)}
+    if variables is not None:
+        parts[VARIABLES] = problem.equilibrium.laws.commit_along(state, along, variables)
+    return History(parts)
+
+
+def before_along(linearised: Linearised, change: History) -> Equations:
+    """Return dR/dh dh. Collective."""
+    problem, state = linearised.problem, linearised.state
+    slip, variables = _parts(change)
+    conditions = linearised.by_length * slip.accumulated[:, None]
+    conditions -= np.einsum("nij,nj->ni", linearised.by_slip, slip.jump)
+    if variables is None:
+        return Equations(np.zeros_like(problem.equilibrium.owned_part(state.x)), conditions)
+    problem.equilibrium.laws.before_along(state, variables)
+    return Equations(problem.equilibrium.forces_of_laws(), conditions)
+
+
+def commit_transposed(problem: ContactProblem, state: State, after: History) -> Array:
+    """Return (dH/dx)^T g on the owned unknowns, given g by h'. Collective."""
+    slip, variables = _parts(after)
+    by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+    if variables is not None:
+        problem.equilibrium.laws.commit_transposed(state, variables)
+        by_x += problem.equilibrium.forces_of_laws()
+    jump, nodal = problem.nodes, problem.nodal(state)
+    by_jump = np.zeros_like(nodal)
+    by_jump[:, : jump.dim] = jump.tangential_component(slip.jump)
+    by_jump[:, : jump.dim] += slip.accumulated[:, None] * _direction(problem, nodal)
+    jump.transpose(by_jump, by_x)
+    return by_x
+
+
+def before_transposed(
+    linearised: Linearised, along: Array, conditions: Array, after: History | None
+) -> History:
+    """Return (dH/dh)^T g - (dR/dh)^T w. Collective.
+
+    Parameters
+    ----------
+    linearised
+        The equations of the step.
+    along, conditions
+        Derivatives by the internal forces on the owned unknowns, and adjoint of the conditions.
+    after
+        g, the derivatives by h'; None for the last step.
+    """
+    problem, state = linearised.problem, linearised.state
+    jump = np.einsum("nji,nj->ni", linearised.by_slip, conditions)
+    accumulated = -np.einsum("ni,ni->n", linearised.by_length, conditions)
+    slip, variables = (None, None) if after is None else _parts(after)
+    if slip is not None:
+        jump -= slip.accumulated[:, None] * _direction(problem, problem.nodal(state))
+        accumulated += slip.accumulated
+    parts: dict[str, Part] = {SLIP: SlipHistory(jump, accumulated)}
+    local = problem.equilibrium.local(along)
+    before = problem.equilibrium.laws.before_transposed(state, local, variables)
+    return History(parts if before is None else {**parts, VARIABLES: before})
+
+
+def _direction(problem: ContactProblem, nodal: Array) -> Array:
+    """Return the slip directions in a step, shape (n, d)."""
+    return unit_vectors(problem.interface.slip(nodal))
+
+
+def _parts(history: History) -> tuple[SlipHistory, InternalVariables | None]:
+    """Return slip and internal variables of a history."""
+    slip, variables = history[SLIP], history.get(VARIABLES)
+    assert isinstance(slip, SlipHistory)
+    assert variables is None or isinstance(variables, InternalVariables)
+    return slip, variables

@@ -1,8 +1,8 @@
-"""Rigid-body modes that the supports do not constrain, and whether contact constrains them.
+"""Rigid-body modes of connected components, and their constraints by supports and contact.
 
-Of each connected component of the mesh, or of those that move together, the modes are seen by their
-Gram matrices at supports and contact nodes. A cut of a bolt under a given force ends a component:
-its sides move together, but for the shortening.
+A mode is constrained unless it is in the null space of the Gram matrix of the modes at supports and
+contact nodes. Components joined by contact, a rigid part or the cut of a bolt are one group; a cut
+under a given force separates components, whose modes agree there but for the shortening.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from contact.problem.problem import ContactProblem
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
-#: Rigid motions in the order of `rigid_motions`.
+#: Names of the rigid motions, in the order of `rigid_motions`.
 NAMES = {
     2: ["translation along x", "translation along y", "rotation"],
     3: [f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"],
@@ -32,24 +32,24 @@ NAMES = {
 
 @dataclass(frozen=True)
 class Group:
-    """Components of the mesh that are held together or not at all, and their m rigid motions.
+    """A connected component, or several that contact or rigid parts join, and their m modes.
 
     Attributes
     ----------
     problem
         The problem.
     component, count
-        The component of each owned node, and how many there are.
+        Component of each owned node, and number of components of the mesh.
     components
-        Which of them are the group's.
+        Components of the group.
     moved
-        The motions, of owned unknowns and global ones, shape (owned + global, m).
+        The modes in owned and global unknowns, shape (owned + global, m).
     names, centres
-        The names of the motions, and the middles of the components.
+        Names of the modes, and centres of the components.
     supports
-        Gram matrix of the motions where supports hold the body, shape (m, m).
+        Gram matrix of the modes at the supports, shape (m, m).
     moving, cut
-        Whether rigid parts, and cuts of bolts, move with them.
+        Whether the modes have those of rigid parts, and shortenings of bolts.
     """
 
     problem: ContactProblem
@@ -65,11 +65,11 @@ class Group:
 
     @property
     def inside(self) -> NDArray[np.bool_]:
-        """Which owned nodes are its components'."""
+        """Which owned nodes belong to the group."""
         return np.isin(self.component, self.components)
 
     def of_components(self, motions: Array) -> Array:
-        """Return the rows of motions, shape (m, k), by its components: (components, 1 to 6, k)."""
+        """Return motions, shape (m, k), by components: (components, 1 to 6, k)."""
         each = 1 if self.problem.domain.revolved else 3 * (self.problem.dim - 1)
         own = motions[: each * len(self.components)]
         return own.reshape(len(self.components), each, motions.shape[1])
@@ -82,34 +82,25 @@ class Group:
 
     @cached_property
     def normal(self) -> Array:
-        """The motions at the contact nodes of this rank along the normal, (n, m). Collective."""
+        """Normal jumps of the modes at the contact nodes of this rank, (n, m). Collective."""
         return np.einsum("ni,nim->nm", self.problem.nodes.normal, self._at_contact)
 
     @cached_property
     def tangential(self) -> Array:
-        """The others, shape (n, d, m). Collective."""
+        """Tangential jumps of the modes, shape (n, d, m). Collective."""
         return np.einsum("nij,njm->nim", self.problem.nodes.tangent, self._at_contact)
 
-    def held(self, friction: bool, at: NDArray[np.bool_] | slice = slice(None)) -> Array:
-        """Return the Gram matrix where supports and contact hold the body, (m, m). Collective.
+    def constraints(self, friction: bool, at: NDArray[np.bool_] | slice = slice(None)) -> Array:
+        """Return the Gram matrix of the modes at supports and contact nodes, (m, m). Collective.
 
-        Parameters
-        ----------
-        friction
-            Whether contact holds it in the tangential directions too.
-        at
-            At which contact nodes contact holds it; at all of them by default.
+        With tangential jumps if there is friction; at some or all of the contact nodes.
         """
-        held = self.supports + _gram(self.problem, self.normal[at][:, None, :])
-        return held + _gram(self.problem, self.tangential[at]) if friction else held
+        gram = self.supports + _gram(self.problem, self.normal[at][:, None, :])
+        return gram + _gram(self.problem, self.tangential[at]) if friction else gram
 
 
 def groups(problem: ContactProblem) -> Iterator[Group]:
-    """Give the components of the mesh one by one, joined ones together. Collective.
-
-    That is for those that touch each other, or that a rigid part, a foundation or a cut joins: they
-    are looked at together, with its motion.
-    """
+    """Yield the groups of a problem: single components, and one of all joined ones. Collective."""
     pieces = _pieces(problem)
     whole = problem.equilibrium.components
     component, count = whole if pieces is None else (pieces.component, pieces.count)
@@ -123,12 +114,12 @@ def groups(problem: ContactProblem) -> Iterator[Group]:
 
 
 def constrained_by_supports(problem: ContactProblem) -> bool:
-    """Tell whether no rigid motion were free without contact. Collective."""
+    """Tell whether the supports constrain all rigid-body modes. Collective."""
     return all([null_space(group.supports).size == 0 for group in groups(problem)])
 
 
 def _free_motions(problem: ContactProblem) -> dict[int, str]:
-    """Return the global unknowns that are motions and not given, with their names."""
+    """Return the free motions among the global unknowns, with their names."""
     members = problem.equilibrium.global_unknowns.members
     rigid = {
         member.begin + k: f"{NAMES[problem.dim][k]} of the rigid part"
@@ -144,13 +135,13 @@ def _free_motions(problem: ContactProblem) -> dict[int, str]:
 
 
 def _pieces(problem: ContactProblem) -> Pieces | None:
-    """Return the pieces between cuts under given forces; None without any. Collective."""
+    """Return the components between cuts under given forces; None without cuts. Collective."""
     cuts = problem.equilibrium.cuts
     return None if cuts is None else cuts.pieces
 
 
 def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
-    """Tell which components touch a free motion, or each other, shape (count,). Collective."""
+    """Tell which components a free motion, contact or a cut joins, shape (count,). Collective."""
     free, nodes, ties = (
         [*_free_motions(problem)],
         problem.nodes,
@@ -178,23 +169,11 @@ def _group(
     count: int,
     moving: Mapping[int, str] = MappingProxyType({}),
 ) -> Group:
-    """Return components of the mesh with their motions. Collective.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    component
-        The component of each owned node, shape (nodes,).
-    components, count
-        Those asked for, and how many there are in all.
-    moving
-        Global unknowns that move them, with their names.
-    """
+    """Return a group with its modes; `moving`: global unknowns among these. Collective."""
     body, d = problem.equilibrium, problem.dim
     points, global_unknowns = body.layout.points, body.global_unknowns
     names: list[str] = []
-    # Rotations about the mean of the contact nodes are well scaled.
+    # Rotations about the mean of the contact nodes: well scaled.
     contact = problem.nodes
     weight = contact.sum(np.ones_like(contact.weight))
     centres, centre = [], np.array([contact.sum(x) for x in contact.points.T]) / weight
@@ -222,13 +201,12 @@ def _group(
         if pieces is not None and k in pieces.places:
             joints[:, :, len(names)] = pieces.normals[:, :, pieces.places.index(k)]
         names.append(name)
-    # Relative to its restraints: supports, rigid parts where nodes follow them, the other side of
-    # a cut.
+    # Relative to supports, to rigid parts that nodes follow, and to the other side of a cut.
     nodes = body.layout.restrained
     dofs = nodes[:, None] * body.block_size + np.arange(d)
     follows = global_unknowns.ties[dofs.ravel()] @ moved[body.owned :]
     nodal = motions[nodes, :d] - follows.reshape(nodes.size, d, many)
-    held = nodal - np.einsum("nij,njk->nik", body.movable(nodes), nodal)
+    fixed = nodal - np.einsum("nij,njk->nik", body.movable(nodes), nodal)
     return Group(
         problem,
         component,
@@ -237,14 +215,14 @@ def _group(
         moved,
         names,
         np.array(centres),
-        _gram(problem, held) + _elastic_gram(problem, moved) + _gram(problem, joints),
+        _gram(problem, fixed) + _elastic_gram(problem, moved) + _gram(problem, joints),
         any("rigid part" in name for name in moving.values()),
         pieces is not None,
     )
 
 
 def _elastic_gram(problem: ContactProblem, moved: Array) -> Array:
-    """Return the work of elastic supports on motions, over the largest one. Collective."""
+    """Return the stiffness of elastic supports against the modes, scaled to 1. Collective."""
     body, size = problem.equilibrium, moved.shape[1]
     if not problem.body.elastic:
         return np.zeros((size, size))
@@ -263,13 +241,13 @@ def _elastic_gram(problem: ContactProblem, moved: Array) -> Array:
 
 
 def described(motions: Array, names: list[str]) -> str:
-    """Name the axis motions that a space of rigid motions contains, or count it."""
+    """Name the translations and rotations that a space of rigid motions contains."""
     contained = np.linalg.norm(motions, axis=1) > 1 - 1e-6
     found = [name for name, inside in zip(names, contained, strict=True) if inside]
     for axis in "xyz":
         if f"translation along {axis}" in found:
             continue
-        # Of several together.
+        # A common translation of several components.
         all_along = np.array([f"translation along {axis}" in name for name in names], dtype=float)
         along = all_along * (np.linalg.norm(motions, axis=1) > 1e-6)
         size = float(np.linalg.norm(along))
@@ -279,7 +257,7 @@ def described(motions: Array, names: list[str]) -> str:
 
 
 def middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
-    """Return the middle of the box around points of all ranks, and its diagonal."""
+    """Return the centre of the bounding box of points, and its diagonal. Collective."""
     low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
     problem.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
     problem.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
@@ -287,13 +265,13 @@ def middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
 
 
 def _gram(problem: ContactProblem, rows: Array) -> Array:
-    """Return the sum over all ranks of the products of rows (n, k, m), scaled to about 1."""
+    """Return the Gram matrix of rows (n, k, m) of all ranks, with trace 1. Collective."""
     total = problem.comm.allreduce(np.einsum("nkm,nkl->ml", rows, rows), op=MPI.SUM)
     scale = np.trace(total)
     return np.asarray(total / scale if scale > 0 else total)
 
 
 def null_space(gram: Array) -> Array:
-    """Return a basis of the null space, shape (m, k), of a matrix with eigenvalues up to some 1."""
+    """Return an orthonormal basis of the null space, (m, k), of a matrix of norm about 1."""
     values, vectors = np.linalg.eigh(gram)
     return vectors[:, values < NEGLIGIBLE]

@@ -1,4 +1,4 @@
-"""The state of a contact problem: a value, which queries take and methods return."""
+"""The state of a contact problem, a frozen value."""
 
 from __future__ import annotations
 
@@ -14,27 +14,22 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class State:
-    """Unknowns and contact forces at a time.
-
-    Its arrays are not to be written to (they are marked so): a new state has new ones.
+    """Unknowns and contact forces at a time; its arrays are read-only.
 
     Attributes
     ----------
     x
-        Local unknowns, those of the ghosts behind the owned ones: displacement and scaled
-        potential, node by node.
+        Local unknowns, ghosts behind the owned ones: displacement and scaled potential by node.
     forces
-        Multipliers of the unilateral constraint and of friction.
+        Contact pressure and friction at the contact nodes.
     time
-        When: loads and prescribed values are those of this time. A value without an amplitude
-        grows with it, so that 1 stands for all of it (`contact.model.fields`).
+        Time of loads and prescribed values; 1 of a static problem.
     history
-        That at the beginning of the step that led here; empty for a step from the reference
-        configuration.
+        History at the beginning of the step; empty for the reference configuration.
     active_set
-        Which nodes were open, stick or slip in the Newton step that led here; None after none.
+        Active set of the last Newton step; None without one.
     layer_pressure
-        Pressure of the linearised layer after it, shape (n,); None for that of the unknowns.
+        Pressure of the linearised layer after that step, shape (n,); None for the law's.
     """
 
     x: Array
@@ -45,12 +40,12 @@ class State:
     layer_pressure: Array | None = None
 
     def __post_init__(self) -> None:
-        """Keep whoever holds the state from changing it."""
+        """Mark the arrays as read-only."""
         for array in (self.x, self.forces.pressure, self.forces.friction):
             array.flags.writeable = False
 
     def near(self, other: State, rtol: float = 0.0, atol: float = 0.0) -> bool:
-        """Tell whether another state of the same problem has the same values on this rank."""
+        """Tell whether another state has the same values on this rank."""
         pairs = (
             (self.x, other.x),
             (self.forces.pressure, other.forces.pressure),

@@ -217,7 +217,7 @@ MUTANTS = (
     Mutant(
         "adjoint-of-slip",
         "the sign of accumulated slip in the adjoint of several steps",
-        "contact/problem/linearised_steps.py",
+        "contact/problem/linearised.py",
         'accumulated = -np.einsum("ni,ni->n", linearised.by_length, conditions)',
         'accumulated = np.einsum("ni,ni->n", linearised.by_length, conditions)',
         ("tests/test_derivatives.py",),
@@ -226,8 +226,8 @@ MUTANTS = (
         "late-history",
         "the history of a step: one step behind",
         "contact/methods/load_stepping.py",
-        "return problem.at(time, problem.commit(last), since=last.time)",
-        "return problem.at(time, last.history, since=last.time)",
+        "problem = problem.at(time, problem.commit(last), since=last.time)",
+        "problem = problem.at(time, last.history, since=last.time)",
         ("tests/methods/test_steps.py",),
     ),
     Mutant(
