@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.global_unknowns import GlobalUnknowns
-from contact.linear.krylov import Components
+from contact.linear.krylov import Subsystems
 from contact.mesh.domain import Domain
 from contact.mesh.entities import component_sums, graph_components
 from contact.ranks import summed
@@ -67,10 +67,10 @@ class ComponentNorms:
         )
 
     @property
-    def apart(self) -> Components | None:
-        """The components of owned unknowns; None where there is one."""
+    def apart(self) -> Subsystems | None:
+        """Connected components as uncoupled subsystems; None for one."""
         of = np.repeat(self.component, self.block_size)
-        return Components(self.comm, of, self.count) if self.count > 1 else None
+        return Subsystems(self.comm, of, self.count) if self.count > 1 else None
 
     def norms(self, values: Array) -> Array:
         """Return the Euclidean norms of owned values, by field and component. Collective.

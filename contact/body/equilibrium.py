@@ -373,7 +373,7 @@ class BodyEquilibrium:
         """
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "kind": kind}
         if constraint is None:
-            return SparseOperator(self, nodes, components=self.component_norms.apart, **options)
+            return SparseOperator(self, nodes, subsystems=self.component_norms.apart, **options)
         bulk = ConstrainedBulk(self, constraint, BodyState(self.rest()))
         return ConstrainedOperator(bulk, nodes, **options)
 

@@ -1,9 +1,8 @@
 """Gradients of results by fields: the gap along a surface, a constant of a material in the body.
 
-A field has one parameter a node or cell. One adjoint gives the derivatives by all of them, for
-dR/dm of each is local to its place: that of the gap is known node by node, and of a constant of a
-material the central difference of the work of the stresses along the adjoint, divided among the
-functions of the field.
+One adjoint gives the derivatives by all values of a field, as dR/dm of each is local: that of a gap
+is known node by node, that of a constant of a material is the central difference of the work of the
+stresses along the adjoint, tested with the functions of the field.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from contact.results.differentiable import Differentiable, Quantity
 from contact.results.solution import Solution
 from contact.typing import Array
 
-#: Section of a case with the constants that may be fields.
+#: Section of a case whose constants may be fields.
 MATERIAL = "material"
 
 
@@ -137,7 +136,7 @@ def field_gradient(
 
 
 def _one(solution: Solution, quantity: str | Quantity) -> Mapping[str, Differentiable]:
-    """Return a quantity that has a gradient by a name. Collective."""
+    """Return a quantity with a gradient, by its name. Collective."""
     given = [quantity] if isinstance(quantity, str) else {"quantity": quantity}
     ((name, found),) = quantities_of(solution, given).items()
     words = "a quantity with a gradient"
@@ -146,17 +145,10 @@ def _one(solution: Solution, quantity: str | Quantity) -> Mapping[str, Different
 
 
 class _FieldWork:
-    """Work along given unknowns, one value for each function of a field.
+    """Work of the stresses along given unknowns, by the functions phi_i of a DG0 or P1 field.
 
-    The functions add up to 1, so that the values add up to the work: if a constant of a material is
-    the sum of m_i phi_i, the derivative of value i by the constant is that of the work by m_i.
-
-    Parameters
-    ----------
-    body
-        The body.
-    space
-        Of the field: DG0 or P1.
+    With a constant m = sum m_i phi_i, sum phi_i = 1, the derivative of value i by m is that of the
+    work by m_i.
     """
 
     def __init__(self, body: BodyEquilibrium, space: fem.FunctionSpace) -> None:
@@ -169,17 +161,16 @@ class _FieldWork:
     def __call__(
         self, state: Evaluated, along: Array, phi_scale: float, after: InternalVariables | None
     ) -> Array:
-        """Return the values of the functions that this rank owns. Collective.
+        """Return the values of the functions of this rank. Collective.
 
         Parameters
         ----------
         state, along
-            The unknowns of the stresses, and the owned ones along which they work.
+            State of the stresses, and owned unknowns along which they work.
         phi_scale
-            The unit of the potential in both, which may be that of another body.
+            Unit of the potential in both.
         after
-            Weights of the internal variables at the end of the step, whose sum counts as work;
-            None for none.
+            Weights of the internal variables at the end of the step, added to the work.
         """
         body = self._body
         for into, values in ((body.forms.at, state.x), (self._along, body.local(along))):

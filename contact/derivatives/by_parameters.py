@@ -6,12 +6,11 @@ the history at the beginning of a step, and R(z, h; m) = 0 the equations of its 
     dz/dm = -J^-1 (dR/dm + dR/dh dh/dm)                              (tangent),
     dQ/dm = dQ/dm|_z - w . dR/dm,    J^T w = (dQ/dz)^T               (adjoint),
 
-one back-substitution a parameter and step, or one a quantity and step. The tangent is carried
+one back-substitution per parameter and step, or per quantity and step. The tangent is carried
 forwards through the steps of an evolution with the history, the adjoint backwards. dR/dm is a
-central difference of residuals at the fixed solution (semi-analytical sensitivities: nothing is
-solved again), so that any number of a case may be the parameter, sizes of the mesh too. The state
-of another parameter has the same free unknowns; those that follow a rigid part or an electrode, and
-the moments about its centre, are as its problem has them.
+central difference of residuals at the fixed solution (semi-analytical sensitivities), so that any
+number of a case may be the parameter, sizes of the mesh too. The free unknowns are fixed; tied
+ones, and moments about the centre of a rigid part, are those of the other parameter.
 
 References
 ----------
@@ -64,16 +63,16 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.sensitivity")
 
-#: Problems and states a little above and below a parameter.
+#: Problems and states above and below a parameter.
 _Sides = list[tuple[ContactProblem, State]]
 
-#: Sections of a case by whose numbers there are no derivatives.
+#: Sections of a case without derivatives.
 WITHOUT = "case", "solver", "output", "evolution"
 
-#: Numbers of [friction] without which there is none.
+#: Numbers of [friction] at whose 0 friction begins.
 BEGIN = "mu", "bound", "radius"
 
-#: The method whose solutions meet other equations.
+#: Method of other equations.
 PENALTY = "penalty"
 
 #: Methods of `sensitivity`.
@@ -221,12 +220,12 @@ def parameters_of(
 
 
 class LoadPath:
-    """The steps that have led to a solution.
+    """The load steps of a solution.
 
     Raises
     ------
     InputError
-        If it has not converged, or its linear systems are not those of the derivatives.
+        If it has not converged, or its equations have no derivatives here.
     """
 
     def __init__(self, solution: Solution) -> None:
@@ -267,12 +266,12 @@ class LoadPath:
 
 
 def _with_gradients(quantities: Mapping[str, Quantity]) -> dict[str, Differentiable]:
-    """Return those of the quantities that the adjoint can take."""
+    """Return the quantities with a gradient."""
     return {name: it for name, it in quantities.items() if isinstance(it, Differentiable)}
 
 
 def _moved(family: Family, state: State, x: Array, forces: Array, change: History) -> _Sides:
-    """Return the sides of a parameter, moved by changes per unit of it. Collective."""
+    """Return the problems and states beside a parameter, with dz/dm and dh/dm. Collective."""
     sides = []
     for way, problem in zip(family.ways, family.problems, strict=True):
         there = moved_state(problem, state, way * x, way * forces)
@@ -281,13 +280,13 @@ def _moved(family: Family, state: State, x: Array, forces: Array, change: Histor
 
 
 def _sum(history: History, factor: float, change: History) -> History:
-    """Return a history and so many times a change of it."""
+    """Return h + factor dh."""
     more = change.arrays()
     return history.replaced({k: v + factor * more[k] for k, v in history.arrays().items()})
 
 
 def _explicit(family: Family, state: State, linearised: Linearised) -> tuple[Equations, _Sides]:
-    """Return dR/dm at the fixed state and history, and the problems beside it. Collective."""
+    """Return dR/dm at fixed z and h, and the problems and states of the difference. Collective."""
     sides = [at(problem, state) for problem in family.problems]
     found = [equations(*side, linearised.active) for side in sides]
     change = Equations(
@@ -298,19 +297,19 @@ def _explicit(family: Family, state: State, linearised: Linearised) -> tuple[Equ
 
 
 def _explicit_history(family: Family, sides: _Sides) -> History:
-    """Return dH/dm: how the history at the end of a step changes at the fixed state. Collective."""
+    """Return dH/dm at fixed z and h. Collective."""
     found = [here.commit(there) for here, there in sides]
     every = [one.arrays() for one in found]
     return found[0].replaced({k: family.slope([one[k] for one in every]) for k in every[0]})
 
 
 def _slope_of(family: Family, quantity: Quantity, sides: _Sides) -> float:
-    """Return the difference quotient of a quantity. Collective."""
+    """Return dQ/dm by a difference quotient. Collective."""
     return float(family.slope([np.asarray(quantity(*side)) for side in sides]))
 
 
 def _located(quantity: Quantity, problem: ContactProblem, state: State) -> Quantity:
-    """Return a quantity at the node to which its gradient belongs: others may be as large."""
+    """Return a largest value at its node: other nodes may be as large."""
     return quantity.located(problem, state) if isinstance(quantity, Largest) else quantity
 
 
@@ -320,7 +319,7 @@ def _tangent(
     families: Mapping[str, Family],
     found: Sensitivities,
 ) -> None:
-    """Carry the derivatives by each parameter forwards through the steps. Collective."""
+    """Carry the tangent of each parameter forwards through the steps. Collective."""
     rows: dict[str, dict[str, list[float]]] = {
         name: {key: [] for key in families} for name in quantities
     }
@@ -358,18 +357,17 @@ def _tangent(
 
 @dataclass(frozen=True)
 class Adjoint:
-    """The adjoint of a step and quantity.
+    """The adjoint w of a step and quantity.
 
     Attributes
     ----------
     x, conditions
-        On the owned unknowns and on the contact conditions; see `Linearised.solve_transposed`.
+        w on the owned unknowns and on the contact conditions; see `Linearised.solve_transposed`.
     along
-        Derivatives of the quantity by the forces of the stresses on the owned unknowns: -x, but
-        for a reaction, which sums up such forces itself.
+        Derivatives by the internal forces on the owned unknowns: -x, plus the weights of a
+        reaction, a sum of such forces.
     after
-        Derivatives of the quantity by the history at the end of the step; None for the last step,
-        whose state gives the quantity itself.
+        Derivatives by the history at the end of the step; None for the last step.
     """
 
     x: Array
@@ -381,7 +379,7 @@ class Adjoint:
 def backwards(
     path: LoadPath, quantities: Mapping[str, Differentiable]
 ) -> Iterator[tuple[Linearised, dict[str, Adjoint]]]:
-    """Yield the steps from the last to the first, and the adjoint of each quantity. Collective."""
+    """Yield equations and adjoints of the steps, from the last to the first. Collective."""
     after: dict[str, History | None] = dict.fromkeys(quantities)
     for index in reversed(range(len(path.steps))):
         problem, state = path.steps[index]
@@ -410,7 +408,7 @@ def _adjoint(
     families: Mapping[str, Family],
     found: Sensitivities,
 ) -> None:
-    """Carry the derivatives of each quantity backwards through the steps. Collective."""
+    """Carry the adjoint of each quantity backwards through the steps. Collective."""
     for name in quantities:
         found[name] = dict.fromkeys(families, 0.0)
     for linearised, adjoints in backwards(path, quantities):
@@ -430,5 +428,5 @@ def _adjoint(
 
 
 def _total(problem: ContactProblem, one: Array, other: Array) -> float:
-    """Return the inner product of values at places of all ranks. Collective."""
+    """Return the inner product of values of all ranks. Collective."""
     return float(summed(problem.comm, np.sum(one * other)))

@@ -1,9 +1,8 @@
-"""The problems beside a parameter, and the difference quotients of values at them.
+"""Central differences by a parameter: the problems beside it, and the step.
 
-The step of a quotient is relative to the parameter, unless that says nothing of the problem: at 0,
-near it, or far from it. Then it is chosen by its effect: the equations at the fixed solution change
-by far more than rounding and far less than themselves (Gill, Murray, Saunders and Wright, SIAM J.
-Sci. Stat. Comput. 4 (1983)). That asks for no unit, so that any number of a case may be one.
+The step is relative to the parameter, or chosen by the change of the equations at the fixed
+solution: far above rounding, far below their size (Gill, Murray, Saunders and Wright, SIAM J. Sci.
+Stat. Comput. 4 (1983)). So the parameter may be 0, and needs no unit.
 """
 
 from __future__ import annotations
@@ -20,28 +19,26 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Relative change of parameters in difference quotients: their error, largest with plastic flow,
-#: and that of rounding are some 1e-10 then.
+#: Relative step of difference quotients: truncation and rounding errors are about 1e-10.
 STEP = 2e-6
 
-#: Relative changes of the equations between which a step remains as it is, and the one that another
-#: step is to make.
+#: Least and largest accepted change of the equations, and that of a new step.
 LEAST, MOST, AIM = 1e-8, 1e-4, 3e-7
 
-#: How often a step is chosen anew, and by how much at once at most.
+#: Most choices of a step, and largest factor.
 TRIES, FACTOR = 6, 1e4
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that a problem depends on.
+    """A parameter of a problem.
 
     Attributes
     ----------
     value
-        The number.
+        Its value.
     problem
-        Returns the problem of another number, with the same mesh, spaces and contact nodes.
+        The problem of another value, with the same mesh, spaces and contact nodes.
     """
 
     value: float
@@ -50,14 +47,14 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Family:
-    """Problems at numbers beside a parameter, and the difference quotient of values at them.
+    """Problems beside a parameter; the difference quotient is sum factors * values / over.
 
     Attributes
     ----------
     problems, ways
-        The problems, and how far away their numbers are.
+        The problems, and the differences of their parameter.
     factors, over
-        The quotient is the sum of the values times the factors, over this.
+        Coefficients of the quotient.
     """
 
     problems: tuple[ContactProblem, ...]
@@ -74,20 +71,19 @@ class Family:
 def family_of(
     name: str, parameter: Parameter, steps: Sequence[tuple[ContactProblem, State]]
 ) -> Family:
-    """Return the problems beside that of a parameter. Collective.
+    """Return the problems beside a parameter. Collective.
 
     Parameters
     ----------
     name, parameter
-        The parameter, and its name for messages.
+        The parameter and its name.
     steps
-        Problems and states at the end of each step of a solution.
+        Problem and state of each step of a solution.
 
     Raises
     ------
     InputError
-        If no number beside its own is accepted, or contact nodes, mesh or the variables of the
-        material change with it.
+        If no value beside it is accepted, or contact nodes, mesh or internal variables change.
     """
     step, found, fault = STEP * (abs(parameter.value) or 1.0), None, None
     for _ in range(TRIES):
@@ -97,10 +93,10 @@ def family_of(
             fault = fault or error
             if found is not None:
                 break
-            step /= FACTOR  # it may have gone too far
+            step /= FACTOR
             continue
         if found is not None and len(made.problems) > len(found.problems):
-            break  # beyond a border
+            break  # across a border
         found, change = made, _change(made, steps)
         if LEAST <= change <= MOST or (change == 0 and parameter.value != 0):
             break
@@ -112,7 +108,7 @@ def family_of(
 
 
 def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) -> Family:
-    """Return the problems of a central difference; at a border, of a one-sided one. Collective."""
+    """Return a central difference, or a one-sided one at a border. Collective."""
     problems, faults = dict[float, ContactProblem](), list[InputError]()
     for way in (step, -step):
         try:
@@ -124,7 +120,7 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
     factors: tuple[float, ...] = 1.0, -1.0
     over = 2 * step
     if len(problems) == 1:
-        # Of second order too.
+        # One-sided, of second order.
         (way,) = problems
         factors, over = (4.0, -3.0, -1.0), 2 * way
         for other in (0.0, 2 * way):
@@ -143,10 +139,7 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
 
 
 def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> float:
-    """Return how far the equations at the ends change, relative to their norms. Collective.
-
-    The largest of all steps; those before one where it is enough are not asked.
-    """
+    """Return the largest relative change of the equations of all steps. Collective."""
     found = 0.0
     for base, state in reversed(steps):
         active, norms = active_set(base, state), reference_norms(base, state)
@@ -157,15 +150,12 @@ def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> fl
         forces = base.equilibrium.norm(one.forces - other.forces) / norms[0]
         conditions = base.nodes.norm(one.conditions - other.conditions) / norms[1]
         found = max(found, forces, conditions)
-        if found >= LEAST:
+        if found >= LEAST:  # large enough: no earlier steps
             break
     return found
 
 
 def at(problem: ContactProblem, state: State) -> tuple[ContactProblem, State]:
-    """Return the step of a state of another problem, with the values prescribed there. Collective.
-
-    Unknowns that follow a rigid part or an electrode do so as that problem has it.
-    """
+    """Return step and state of another problem, with its prescribed values. Collective."""
     here = problem.at(state.time, state.history)
     return here, replace(state, x=here.equilibrium.prescribe(state.x, state.time))

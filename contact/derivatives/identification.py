@@ -1,7 +1,7 @@
 """Parameters from measurements: least squares on the columns of ``steps.csv``.
 
-The derivatives are those of `contact.derivatives.by_parameters`, so that an evaluation costs one
-run and a few back-substitutions a step, however many parameters there are.
+An evaluation costs one run, and a back-substitution per parameter and step
+(`contact.derivatives.by_parameters`).
 
 References
 ----------
@@ -36,15 +36,14 @@ logger = logging.getLogger("contact.identify")
 #: The column with the times of a measurement.
 TIME = "t"
 
-#: Share of the largest singular value below which the measurements do not see a combination of
-#: parameters, and of a parameter in such a combination.
+#: Ratio to the largest singular value of an undetermined combination of parameters, and least part
+#: of a parameter in it.
 UNSEEN, SHARE = 1e-8, 1e-4
 
-#: How often an interval is halved in which a number stops to be accepted, and how far from a bound
-#: the search begins, relative to it.
+#: Bisections for a bound of the accepted values, and relative distance of the start from a bound.
 HALVED, INSIDE = 50, 2e-10
 
-#: Changes of the parameters, and of the misfit, over themselves at which the search ends.
+#: Relative changes of parameters and misfit at the end.
 ENOUGH = 1e-10
 
 
@@ -165,7 +164,7 @@ def identify(
         if key not in last:
             last.clear()
             numbers = dict(zip(parameters, values, strict=True))
-            last[key] = np.concatenate([model.run(numbers) for model in models])
+            last[key] = np.concatenate([model.residuals(numbers) for model in models])
         return last[key]
 
     def trial(values: Array) -> Array:
@@ -173,13 +172,13 @@ def identify(
             return residuals(values)
         except InputError as error:
             logger.info("%s: taken back", error)
-            return np.full(count, np.inf)  # scipy takes a shorter step then
+            return np.full(count, np.inf)  # SciPy takes a shorter step
 
     def jacobian(values: Array) -> Array:
         return np.concatenate([model.jacobian(parameters) for model in models])
 
     low, high = np.transpose(limits)
-    inside = INSIDE * np.maximum(1.0, np.abs(first))  # as scipy begins, too
+    inside = INSIDE * np.maximum(1.0, np.abs(first))
     begin = np.clip(first, low + inside, np.maximum(high - inside, low + inside))
     residuals(begin)
     size = np.linalg.norm(jacobian(begin), axis=0)
@@ -194,7 +193,7 @@ def identify(
         xtol=ENOUGH,
         gtol=ENOUGH,
     )
-    left = residuals(found.x)  # the last trial may have been another
+    left = residuals(found.x)
     freedom = left.size - found.x.size
     covariance, unseen = _covariance(jacobian(found.x), scale, left @ left / freedom)
     deviation = np.sqrt(np.diag(covariance))
@@ -226,16 +225,9 @@ def identify(
 
 
 def _covariance(slopes: Array, scale: Array, variance: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the covariance of parameters, and which of them the measurements do not determine.
+    """Return the covariance of the parameters, and which are undetermined.
 
-    Parameters
-    ----------
-    slopes
-        Derivatives of the residuals, shape (n, k).
-    scale
-        Sizes of the parameters, shape (k,).
-    variance
-        Of a residual.
+    Of derivatives (n, k) of the residuals, sizes (k,) of the parameters, variance of a residual.
     """
     _, singular, ways = np.linalg.svd(slopes * scale, full_matrices=False)
     seen = singular > UNSEEN * singular.max()
@@ -248,7 +240,7 @@ def _covariance(slopes: Array, scale: Array, variance: float) -> tuple[Array, ND
 
 
 def _accepted(cases: Sequence[Case], key: str) -> tuple[float, float]:
-    """Return the least and the largest number that cases accept at a key."""
+    """Return the least and the largest value that cases accept at a key."""
 
     def fits(value: float) -> bool:
         try:
@@ -279,7 +271,7 @@ def _accepted(cases: Sequence[Case], key: str) -> tuple[float, float]:
 
 
 class _Model:
-    """A case beside a measurement."""
+    """A case and a measurement."""
 
     solution: Solution
     fit: dict[str, Array]
@@ -318,7 +310,7 @@ class _Model:
         """Number of measured values."""
         return self._time.size * len(self._measured)
 
-    def run(self, values: Mapping[str, float]) -> Array:
+    def residuals(self, values: Mapping[str, float]) -> Array:
         """Solve the case with values of the parameters; return the scaled residuals."""
         case = self._case
         for key, value in values.items():
@@ -355,7 +347,7 @@ class _Model:
         )
 
     def _at(self, values: ArrayLike) -> Array:
-        """Return values at the ends of steps at the measured times, from 0 at the beginning."""
+        """Interpolate values at the ends of steps, 0 at the beginning, to the measured times."""
         assert self._case.evolution is not None
         begin = self._case.evolution.times[0]
         ends = [record.state.time for record in self.solution.steps]

@@ -1,7 +1,6 @@
-"""Smoothed aggregation whose coarse operator is a sum of products of each rank's own rows.
+"""Smoothed aggregation with a coarse operator from sequential products of each rank.
 
-GAMG multiplies as well, but of matrices that ranks share PETSc keeps K P, the rank's rows of P,
-its transpose and all summands of P^T K P from one set-up to the next: more than K itself.
+On several ranks PETSc keeps K P, P, its transpose and all summands of P^T K P: more memory than K.
 """
 
 from __future__ import annotations
@@ -19,10 +18,10 @@ from contact.ranks import exchanged
 
 Integers = NDArray[np.integer[Any]]
 
-#: Parts in which a rank copies its rows: a copy of all takes as much memory as the matrix.
+#: Parts in which a rank copies its rows, to save memory.
 PARTS = 8
 
-#: Options of the GAMG that finds aggregates: it neither smooths them nor solves.
+#: Options of the GAMG that finds aggregates, without smoothing or solving.
 AGGREGATES = {
     "pc_gamg_agg_nsmooths": "0",
     "pc_gamg_parallel_coarse_grid_solver": "true",
@@ -34,17 +33,9 @@ AGGREGATES = {
 
 
 def tentative(matrix: PETSc.Mat, prefix: str) -> PETSc.Mat | None:
-    """Return the tentative interpolation P0 of the aggregates that GAMG finds. Collective.
+    """Return the tentative interpolation P0 of GAMG's aggregates; None without a coarse level.
 
-    Its columns are the near null space on each aggregate, orthonormal. None where GAMG makes no
-    coarse level, for the matrix is small.
-
-    Parameters
-    ----------
-    matrix
-        An operator with its near null space.
-    prefix
-        Prefix of PETSc options.
+    Its columns are the near null space on each aggregate, orthonormal. Collective.
     """
     pc = PETSc.PC().create(matrix.comm)
     pc.setOptionsPrefix(prefix)
@@ -52,8 +43,8 @@ def tentative(matrix: PETSc.Mat, prefix: str) -> PETSc.Mat | None:
     pc.setType("gamg")
     pc.setGAMGLevels(2)
     pc.setFromOptions()
-    # GAMG would not make the graph symmetric: where an entry is rounding and its transpose is zero,
-    # one rank would break off and the others wait.
+    # GAMG takes the graph of such a matrix for symmetric, and deadlocks where an entry is rounding
+    # and its transpose 0.
     told = all(matrix.isSymmetricKnown())
     if told:
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, False)
@@ -68,19 +59,18 @@ def tentative(matrix: PETSc.Mat, prefix: str) -> PETSc.Mat | None:
 class Aggregation:
     """The first coarse level of an operator K: the interpolation P, and P^T K P.
 
-    P is smoothed aggregation (Vanek, Mandel and Brezina 1996). Each rank has its rows of P in a
-    sequential matrix, with the columns that these reach. P^T K P is the sum of sequential
-    products: on each rank that of its own columns of K, and a thin one of those of others, for
-    which their owners send rows of P.
+    Smoothed aggregation (Vanek, Mandel and Brezina 1996). Each rank has its rows of P in a
+    sequential matrix. P^T K P is the sum of two products of each rank: with its own columns of K,
+    and with those of other ranks, which send their rows of P.
 
     Parameters
     ----------
     matrix
         The operator K.
     tentative
-        The tentative interpolation P0, which is destroyed.
+        P0, which is destroyed.
     steps
-        How often it is smoothed.
+        Number of smoothing steps.
     """
 
     def __init__(self, matrix: PETSc.Mat, tentative: PETSc.Mat, steps: int = 1) -> None:
@@ -90,17 +80,17 @@ class Aggregation:
         sizes, self._range = tentative.getSizes(), tentative.getOwnershipRangeColumn()
         self._find_others()
         starts, columns, values = _smoothed(matrix, tentative, steps)
-        #: A power of two by which P is multiplied.
+        #: Scale of P, a power of two.
         self.unit = self._unit()
         values *= self.unit
-        #: Lengths of the rows that others ask for.
+        #: Lengths of the rows sent to other ranks.
         self._counts = np.diff(starts)[self._asked]
         sent = columns[_places(starts, self._asked)].astype(np.int64)
         _, there = exchanged(self._comm, np.repeat(self._asking, self._counts), sent)
         _, counts = exchanged(self._comm, self._asking, self._counts)
         low, high = (number // self._bs for number in self._range)
         aside = [part[self._aside(part)] // self._bs for part in (columns, there)]
-        # Ascending as in the whole matrix, so that rows stay sorted.
+        # Ascending, so that rows stay sorted.
         self._blocks = np.unique(np.concatenate([np.arange(low, high), *aside]))
         csr = starts, self._local(columns).astype(PETSc.IntType), values
         #: This rank's rows of P.
@@ -109,7 +99,7 @@ class Aggregation:
         )
         self.rows.setBlockSizes(matrix.getBlockSize(), self._bs)
         pattern = np.append(0, np.cumsum(counts)), self._local(there)
-        #: Starts and columns of rows of P that others own.
+        #: Starts and columns of rows of P of other ranks.
         self._theirs = tuple(part.astype(PETSc.IntType) for part in pattern)
         here = np.arange(*matrix.getOwnershipRange(), dtype=PETSc.IntType)
         blocks = self._blocks.astype(PETSc.IntType)
@@ -124,24 +114,19 @@ class Aggregation:
         self.coarse: Any = None
 
     def _unit(self) -> float:
-        """Return the factor that brings P^T K P to numbers near 1. Collective.
-
-        From 3.25 on PETSc takes pivots below 2e-14 of coarse levels for zero, in any units.
-        """
+        """Return the factor that scales P^T K P to about 1. Collective."""
+        # From 3.25 on PETSc takes pivots of coarse levels below 2e-14 for zero.
         diagonal = self._matrix.getDiagonal()
         size = diagonal.norm(PETSc.NormType.NORM_1) / diagonal.getSize()
         return 2.0 ** round(-np.log2(size) / 2) if 0 < size < np.inf else 1.0
 
     @property
     def _width(self) -> int:
-        """The number of columns of `rows`."""
+        """Number of columns of `rows`."""
         return int(self._blocks.size * self._bs)
 
     def _find_others(self) -> None:
-        """Find columns of K that others own, the rows that have them, and who asks for own ones.
-
-        Collective.
-        """
+        """Find columns of K of other ranks, their rows here, and requests for own rows."""
         first, last = self._matrix.getOwnershipRange()
         columns, beside = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
         alone = self._comm.size == 1
@@ -160,7 +145,7 @@ class Aggregation:
         self._asked = asked - first
 
     def _aside(self, columns: Integers) -> NDArray[np.bool_]:
-        """Tell which columns of P others own."""
+        """Return which columns of P are of other ranks."""
         low, high = self._range
         return (columns < low) | (columns >= high)
 
@@ -179,9 +164,9 @@ class Aggregation:
         return _scipy(rows_of(self.rows, rows))
 
     def _thin(self, pattern: bool = False) -> Iterator[sparse.csr_array]:
-        """Give the part of the product of columns of K that others own, in pieces. Collective.
+        """Yield the product with columns of K of other ranks, in parts. Collective.
 
-        For its pattern all entries count as ones: SciPy leaves out sums that are zero.
+        With all entries 1 for the pattern: SciPy drops sums that are zero.
         """
         to, sent = np.repeat(self._asking, self._counts), self._chosen(self._asked).data
         _, values = exchanged(self._comm, to, sent)
@@ -199,8 +184,8 @@ class Aggregation:
             yield sparse.csr_array(own.T @ (beside[part] @ theirs))
 
     def update(self) -> PETSc.Mat:
-        """Return P^T K P of K and P as they are. Collective."""
-        # Of a sequential matrix the option has other values.
+        """Return P^T K P of the present K and P. Collective."""
+        # The option has other values for sequential matrices.
         with hidden("", ["matptap_via"]):
             own = self._matrix.getDiagonalBlock().ptap(self.rows, result=self._product)
         self._product = own
@@ -241,7 +226,7 @@ class Aggregation:
         )
         whole.setISLocalMat(own)
         whole.assemble()
-        # Without a matrix to convert to, PETSc would convert this one.
+        # Out of place.
         made = whole.convert("aij", PETSc.Mat())
         whole.destroy()
         made.setLGMap(self._map, self._map)
@@ -249,7 +234,7 @@ class Aggregation:
 
 
 def _restricted(modes: PETSc.NullSpace, tentative: PETSc.Mat) -> PETSc.NullSpace:
-    """Return a near null space on the coarse level: P0 keeps lengths and angles. Collective."""
+    """Return the near null space on the coarse level, by P0^T. Collective."""
     found = []
     for mode in modes.getVecs():
         found.append(tentative.createVecRight())
@@ -260,10 +245,9 @@ def _restricted(modes: PETSc.NullSpace, tentative: PETSc.Mat) -> PETSc.NullSpace
 def _smoothed(
     matrix: PETSc.Mat, tentative: PETSc.Mat, steps: int
 ) -> tuple[Integers, Integers, Any]:
-    """Return the owned rows of P = (I - w D^-1 K)^steps P0: starts, global columns, values.
+    """Return the owned rows of P = (I - w D^-1 K)^steps P0 in CSR, w = 4/(3 lambda_max).
 
-    With w = 4/3 over the largest eigenvalue of D^-1 K (Vanek, Mandel and Brezina 1996). P0 is
-    destroyed. Collective.
+    P0 is destroyed. Collective.
     """
     diagonal = matrix.getDiagonal()
     diagonal.reciprocal()
@@ -272,7 +256,7 @@ def _smoothed(
         product = matrix.matMult(made)
         product.diagonalScale(L=diagonal)
         product.aypx(factor, made, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        # On several ranks Python would not free it before all come to it.
+        # Collective: Python would free it at different times on the ranks.
         made.destroy()
         made = product
     rows = made.getValuesCSR()
@@ -282,10 +266,7 @@ def _smoothed(
 
 
 def _largest_eigenvalue(matrix: PETSc.Mat) -> float:
-    """Return an estimate for D^-1 K by CG with the diagonal D (Lanczos). Collective.
-
-    It is infinite where numbers overflow, of which the solver will tell.
-    """
+    """Estimate lambda_max of D^-1 K by CG (Lanczos); infinity at overflow. Collective."""
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setType("cg")
     ksp.getPC().setType("jacobi")
@@ -303,14 +284,14 @@ def _largest_eigenvalue(matrix: PETSc.Mat) -> float:
 
 
 def _places(starts: Integers, rows: Integers) -> Integers:
-    """Return the places of all entries of rows of a sparse matrix."""
+    """Return the positions of all entries of some rows of a sparse matrix."""
     counts = np.diff(starts)[rows]
     ends = np.cumsum(counts)
     return np.repeat(starts[rows] - (ends - counts), counts) + np.arange(counts.sum())
 
 
 def rows_of(matrix: PETSc.Mat, rows: Integers) -> PETSc.Mat:
-    """Return rows of a matrix of one rank."""
+    """Return rows of a sequential matrix."""
     every = PETSc.IS().createStride(matrix.getSize()[1], step=1, comm=PETSc.COMM_SELF)
     return matrix.createSubMatrix(_index(rows), every)
 

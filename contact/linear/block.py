@@ -20,15 +20,15 @@ from contact.linear import multigrid
 from contact.linear.layout import Layout, set_defaults
 from contact.linear.multigrid import rigid_motions
 
-#: Options of the displacement's block where the user gives none, under ``fieldsplit_u_``. The
-#: W-cycle keeps the counts flat at a small price: coarse levels have few unknowns.
+#: Default options of the displacement's block, under ``fieldsplit_u_``. The W-cycle keeps the
+#: counts flat; coarse levels have few unknowns.
 MECHANICAL = {
     "pc_type": "gamg",
     **multigrid.DEFAULTS,
     "pc_mg_cycle_type": "w",
 }
 
-#: The same for the potential's block, under ``fieldsplit_phi_``, where PETSc has no hypre.
+#: The same of the potential's block, under ``fieldsplit_phi_``, without hypre.
 ELECTRIC = {
     "pc_type": "gamg",
     "pc_gamg_agg_nsmooths": "1",
@@ -72,10 +72,7 @@ class BlockPreconditioner:
         set_defaults(f"{prefix}fieldsplit_phi_", electric_options)
 
     def set_goal(self, rhs: PETSc.Vec | None) -> None:
-        """Let MINRES end where its residual is as small as from zero, for a right-hand side.
-
-        None where it begins at zero. Collective.
-        """
+        """Set the absolute tolerance of MINRES to rtol |b|; to 0 for None. Collective."""
         if self._ksp.getType() != "minres":
             return
         size = 0.0
@@ -86,7 +83,7 @@ class BlockPreconditioner:
         self._ksp.setTolerances(atol=self._ksp.rtol * size)
 
     def matrix(self, operator: PETSc.Mat) -> PETSc.Mat:
-        """Return the matrix that preconditions an operator. Collective."""
+        """Return the copy of an operator with negated electric rows. Collective."""
         if self._matrix is None:
             self._matrix = operator.copy()
             # The diagonal of fixed unknowns is positive, and stays so.

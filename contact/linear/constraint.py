@@ -1,21 +1,19 @@
 """The constraint of a linear system: unknowns x = C y + d, and the system C^T K C in y.
 
-Of the increments of a solve d is 0: prescribed values are in x already. y are as many nodal
-unknowns as those of x, and m global ones q behind them,
+In the increments of a solve d is 0: prescribed values are in x already. y has as many nodal
+unknowns as x, and m global ones q behind them,
 
     x = Q (y^ + R q).
 
-Q makes mortar jumps the unknowns of slave nodes, of two bodies or of one quadratic facet, so that
-contact laws are blocks at single nodes of y^. The columns of R are rigid motions and potentials of
-electrodes: nodes that follow q have no y^ of their own, and at contact nodes in front of a moving
-foundation y^ is the distance to it.
+Q makes mortar jumps the unknowns of slave nodes, so that contact laws are blocks at single nodes of
+y^. The columns of R are rigid motions and potentials of electrodes: tied nodes, which follow q,
+have no y^, and at contact nodes in front of a moving foundation y^ is the displacement relative to
+it.
 
-Q is sparse, and Q^T K Q is made by PtAP. R is not: its columns would fill the rows of all nodes
-that they touch. So q borders the system, [[K, K R], [R^T K, R^T K R]], which takes one solve either
-way: a factorisation solves for the columns of K R together with the right-hand side; for an
-iterative solver q is eliminated, which takes a matrix of rank m from K and leaves its
-preconditioner as it is. Where an iterative solver is asked for a few digits only, q is corrected
-after the solve: the rows of q are met to rounding, and the residual is in those of the nodes.
+Q^T K Q is computed by PtAP. R would fill the rows of all tied nodes: q borders the system instead,
+[[K, K R], [R^T K, R^T K R]]. A factorisation solves for the columns of K R together with the
+right-hand side; for an iterative solver q is eliminated, a low-rank update of K that keeps its
+preconditioner. After an inexact solve q is corrected: its rows are met to rounding.
 `contact.problem.condensed` condenses the same system.
 
 Right-hand sides and solutions have the values of q, the same on all ranks, behind the owned ones.
@@ -63,25 +61,24 @@ class BasisChange:
         jumps: sparse.csr_array,
         unknowns: tuple[Array, NDArray[np.bool_]],
     ) -> BasisChange:
-        """Return the change that makes jumps unknowns, in place of those of some nodes. Collective.
+        """Return the change that makes jumps the free unknowns of some nodes. Collective.
 
-        Where an unknown is fixed it remains itself; the others lose their dependence on it, for it
-        does not change. Of an unknown j = s x + ... s is the diagonal D, and x = F x + j/s: F is
-        nilpotent, for nothing follows itself, and Q = (1 + F + F^2 + ...)/D.
+        A jump j = s x + ... has s in the diagonal D, and x = F x + j/s with a nilpotent F, without
+        the fixed unknowns: Q = (1 + F + F^2 + ...)/D.
 
         Parameters
         ----------
         comm, halo
-            Communicator, and the nodes that jumps are made of.
+            Communicator, and the nodes in the jumps.
         rows
-            The nodes of this rank that are replaced, local numbers, shape (r,).
+            Replaced nodes of this rank, local numbers, shape (r,).
         jumps
-            The jumps by the values at the nodes of the halo, shape (r, nodes). One is made of the
-            node itself, of nodes that are not replaced, and of replaced ones, but in no circle.
+            Jumps by nodal values of the halo, shape (r, nodes): of the node itself and of others,
+            replaced or not, without cycles.
         unknowns
-            The unknowns that take the place of the free ones by the jumps, shape (r, block size,
-            block size): those of the node's own free components are these themselves. And which
-            unknowns of this rank's nodes are not fixed, shape (nodes, block size).
+            Unknowns by jumps, shape (r, block size, block size), the identity on the free
+            components of the node; and which unknowns of this rank's nodes are free, shape
+            (nodes, block size).
         """
         made, free = unknowns
         (count, size), entries = free.shape, sparse.coo_array(jumps)
@@ -90,7 +87,7 @@ class BasisChange:
         own = at == entries.col
         scale = np.ones((count, size))
         scale[at[own]] = np.where(free[at[own]], entries.data[own, None], 1.0)
-        # Unknowns of a replaced node by those of other nodes that are not fixed.
+        # Unknowns of a replaced node by the free ones of other nodes.
         blocks = entries.data[:, None, None] * made[entries.row] * known[entries.col][:, None, :]
         entry, first, second = np.nonzero(np.where(own[:, None, None], 0.0, blocks))
         row, column = at[entry] * size + first, halo.numbers[entries.col[entry]] * size + second
@@ -125,7 +122,7 @@ def _matrix(
     column: NDArray[np.int64],
     values: Array,
 ) -> PETSc.Mat:
-    """Return a matrix of entries in local rows and global columns of unknowns. Collective."""
+    """Return a matrix from entries by local rows and global columns. Collective."""
     local = count * size
     width = comm.allreduce(local, op=MPI.SUM)
     csr = sparse.csr_array((values, (row, column)), shape=(local, width))
@@ -147,9 +144,9 @@ class Constraint:
     change
         Q; None for the identity.
     motions
-        R, shape (owned, m): rows of zeros where an unknown is fixed.
+        R, shape (owned, m); zero rows at fixed unknowns.
     free
-        Which of q are unknown, shape (m,).
+        Which of q are free, shape (m,).
     """
 
     def __init__(
@@ -184,7 +181,7 @@ class Constraint:
         return np.concatenate([own, forces[self.owned :] + self.gathered(own)])
 
     def forces(self, restricted: Array) -> Array:
-        """Return the forces on x of those on y, where q is given none. Collective."""
+        """Return the forces on x of forces on y, 0 on fixed q. Collective."""
         own = restricted[: self.owned]
         q = np.where(self.free, restricted[self.owned :] - self.gathered(own), 0.0)
         return np.concatenate([times(self._inverse, own, transposed=True), q])
@@ -196,16 +193,16 @@ class ConstrainedBulk:
     Parameters
     ----------
     bulk
-        Assembles K.
+        K.
     constraint
         C.
     rest
-        A state at which a first matrix is assembled, for its pattern.
+        State of a first matrix, for its pattern.
 
     Attributes
     ----------
     columns, corner
-        K R and R^T K R of the matrix that was assembled last, shapes (owned, m) and (m, m).
+        K R and R^T K R of the last matrix, shapes (owned, m) and (m, m).
     """
 
     def __init__(self, bulk: Bulk, constraint: Constraint, rest: Evaluated) -> None:
@@ -216,7 +213,7 @@ class ConstrainedBulk:
 
     @property
     def layout(self) -> Layout:
-        """The unknowns: fixed ones, and fixed directions, are the same in x and y."""
+        """The unknowns; fixed ones are the same in x and y."""
         return self.constraint.layout
 
     def create_matrix(self) -> PETSc.Mat:
@@ -231,10 +228,7 @@ class ConstrainedBulk:
         return product
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
-        """Assemble Q^T K Q, zero where an unknown is fixed or follows q, and the border.
-
-        Collective.
-        """
+        """Assemble Q^T K Q, 0 at fixed and tied unknowns, and the border. Collective."""
         if self._plain is None:
             self._bulk.assemble(matrix, kind, state)
         else:
@@ -247,19 +241,19 @@ class ConstrainedBulk:
         self.corner = self.constraint.gathered(self.columns)
         border = self._bulk.border(kind)
         if border is not None:
-            # Rows of nodes that follow a rigid part count by R alone.
+            # Rows of tied nodes count by R alone.
             own = [times(self.constraint.matrix, c, transposed=True) for c in border[0].T]
             added = np.stack(own, axis=1)
             across = self.constraint.gathered(added)
             self.columns += added
             self.corner = self.corner + across + across.T + border[1]
         self.columns = np.stack([self.layout.mask(column) for column in self.columns.T], axis=1)
-        kept = matrix.createVecLeft()  # without unknowns that are not free
+        kept = matrix.createVecLeft()
         kept.array[:] = self.layout.free.ravel()
         matrix.diagonalScale(kept, kept)
 
     def border(self, kind: str) -> None:
-        """Return None: the border is that of `columns` and `corner`."""
+        """Return None: `columns` and `corner` are the border."""
 
 
 class ConstrainedOperator:
@@ -285,11 +279,11 @@ class ConstrainedOperator:
         self._bulk, self._constraint, self._nodes = bulk, bulk.constraint, nodes
         self._inner = SparseOperator(bulk, nodes, symmetric=symmetric, counters=counters, kind=kind)
         self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.constraint.free)
-        #: Whether the responses to the columns K R are those of an earlier matrix.
+        #: Whether the responses K^-1 K R are those of an earlier matrix.
         self._outdated = False
         self._responses = np.zeros((self._owned, self._free.size))
         self._inverse: Array = np.zeros((self._free.size, self._free.size))
-        #: Inverse of the stiffness of the blocks alone against q.
+        #: Inverse of the stiffness of the blocks against q.
         self._compliance_of_q = np.zeros_like(self._inverse)
 
     @property
@@ -330,15 +324,14 @@ class ConstrainedOperator:
         q[free] = moved
         solution = constraint.expand(np.concatenate([relative, q]))
         if self._inner.iterative and rtol is not None and free.size:
-            # Blocks are stiff then: q hardly moves.
             left = rhs[self._owned :] - self.multiply(solution)[self._owned :]
             solution[self._owned :][free] += self._compliance_of_q @ left[free]
         return solution
 
     def multiply(self, values: Array, transposed: bool = False) -> Array:
-        """Return the matrix, or its transpose, times values on x and q, as forces. Collective.
+        """Return the matrix, or its transpose, times values on x and q. Collective.
 
-        The border is its own transpose: of a matrix that is not symmetric no q is free.
+        The border is symmetric: with a non-symmetric matrix no q is free.
         """
         bulk, layout = self._bulk, self._bulk.layout
         relative = self._constraint.relative(values)
@@ -364,28 +357,25 @@ class ConstrainedOperator:
         return constraint.expand(np.concatenate([first - responses @ moved, q]))
 
     def _condensed(self, columns: Array, responses: Array) -> Array:
-        """Return the inverse of the stiffness against q, given the columns' responses.
-
-        Collective.
-        """
+        """Return the pseudoinverse of the condensed stiffness against q. Collective."""
         corner = self._bulk.corner[np.ix_(self._free, self._free)]
         left, size, right = np.linalg.svd(corner - self._on_q(columns, responses))
         resists = size > ROUNDING * np.abs(corner).max(initial=0.0)
         return np.asarray((right[resists].T / size[resists]) @ left[:, resists].T)
 
     def _on_q(self, columns: Array, values: Array) -> Array:
-        """Return columns^T times values, summed over the ranks. Collective."""
+        """Return columns^T times values. Collective."""
         return summed(self._bulk.layout.comm, columns.T @ values)
 
     def _eliminate(self, blocks: Array) -> None:
-        """Eliminate those of q that anything resists, for an iterative solver. Collective."""
+        """Eliminate the q that anything resists, for an iterative solver. Collective."""
         bulk, inner, free = self._bulk, self._inner, self._free
         motion, pushed = self._pushed(blocks)
-        held = self._held(pushed)
+        resisted = self._resisted(pushed)
         resists = bulk.layout.comm.allreduce(motion.T @ pushed, op=MPI.SUM)
         self._compliance_of_q = np.linalg.pinv(resists, rcond=ROUNDING)
-        stiffness, turned = np.linalg.eigh(held.T @ bulk.corner[np.ix_(free, free)] @ held)
-        basis = held @ turned
+        stiffness, turned = np.linalg.eigh(resisted.T @ bulk.corner[np.ix_(free, free)] @ resisted)
+        basis = resisted @ turned
         self._inverse = basis / stiffness @ basis.T
         size = (self._owned, None), (None, basis.shape[1])
         columns = PETSc.Mat().createDense(size, comm=bulk.layout.comm)
@@ -410,15 +400,15 @@ class ConstrainedOperator:
         nodal = motion.reshape(n, size, free.size)
         return motion, np.einsum("nij,njk->nik", blocks, nodal).reshape(-1, free.size)
 
-    def _held(self, pushed: Array) -> Array:
-        """Return a basis of the free motions that parts or blocks resist, (free, k). Collective."""
+    def _resisted(self, pushed: Array) -> Array:
+        """Return a basis of the q that bodies or blocks resist, (free, k). Collective."""
         bulk, free = self._bulk, self._free
         gram = bulk.layout.comm.allreduce(pushed.T @ pushed, op=MPI.SUM)
         other = np.ones(self._owned)
         other[self._dofs] = 0.0
         tied = self._constraint.motions[:, free].multiply(other[:, None]).toarray()
         parts = bulk.layout.comm.allreduce(tied.T @ tied, op=MPI.SUM)
-        # One that no node follows, and that something resists, is a jump within the body.
+        # A q without tied nodes, but with stiffness, is a jump within the body.
         motions = bulk.layout.comm.allreduce(
             abs(self._constraint.motions[:, free]).sum(axis=0), op=MPI.SUM
         )

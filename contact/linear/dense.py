@@ -1,4 +1,4 @@
-"""A dense operator at kept nodes plus a small block at each: the first rank solves for all."""
+"""Dense operators: a Schur complement plus blocks at its nodes, solved on the first rank."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ from contact.typing import Array
 
 
 class DenseStiffness:
-    """A dense matrix of the first rank, and the factors of its last sum with nodal blocks.
+    """A dense matrix on the first rank, and the factors of its last sum with nodal blocks.
 
-    Chord steps that change no active set take the same sum again. Unknowns at which no block has
-    acted yet are eliminated first, once for all sums: those along the contact boundary without
-    friction, and all of nodes that stay open.
+    Unknowns without a block so far are eliminated once for all sums: tangential ones without
+    friction, and those of open nodes.
 
     Parameters
     ----------
@@ -34,13 +33,13 @@ class DenseStiffness:
         self.matrix = matrix
         self._blocks: Array | None = None
         self._solve: Callable[[Array], Array] | None = None
-        #: Number of each unknown among those that are left, negative if it is eliminated.
+        #: Number of each unknown among the remaining ones, negative if eliminated.
         self._place: NDArray[np.intp] | None = None
 
     def factorise(self, blocks: Array) -> bool:
-        """Add blocks at the nodes and factorise, unless the last ones were the same.
+        """Add blocks at the nodes and factorise, unless they are the last ones.
 
-        By Cholesky where that is possible: in each step of an interior point.
+        By Cholesky if possible: in each step of an interior point.
         """
         if self._blocks is not None and np.array_equal(blocks, self._blocks):
             return False
@@ -53,7 +52,7 @@ class DenseStiffness:
         return True
 
     def _factors(self, blocks: Array) -> Callable[[Array], Array]:
-        """Return the solves for the unknowns at which blocks act."""
+        """Return the solver of the reduced matrix plus the blocks."""
         if not self._rows.size:
             return lambda rhs: rhs
         if np.array_equal(blocks, blocks.transpose(0, 2, 1)):
@@ -74,15 +73,14 @@ class DenseStiffness:
         return np.asarray(total)
 
     def _eliminate(self, acted: NDArray[np.bool_]) -> None:
-        """Eliminate the unknowns at which no block acts, nor has acted."""
+        """Eliminate the unknowns without a block so far."""
         matrix, rows, others = self.matrix, np.flatnonzero(acted), np.flatnonzero(~acted)
         self._place, self._reduced, self._border = None, matrix[:0], matrix[:0]
         lower, fault = _cholesky(matrix, others)
-        if fault:  # a potential makes it indefinite, or nothing else holds the body
+        if fault:  # indefinite by a potential, or singular without contact
             rows, others = np.arange(acted.size), others[:0]
             lower, _ = _cholesky(matrix, others)
         border = _forward(lower, matrix[np.ix_(others, rows)])
-        # No copy where none is eliminated.
         self._reduced = matrix[np.ix_(rows, rows)] - border.T @ border if others.size else matrix
         self._rows, self._others, self._lower, self._border = rows, others, lower, border
         self._place = np.full(acted.size, -1)
@@ -90,7 +88,7 @@ class DenseStiffness:
 
     @np.errstate(over="ignore", invalid="ignore")  # of a singular sum
     def solve(self, blocks: Array, rhs: Array) -> Array:
-        """Solve with the sum with some blocks."""
+        """Solve with the matrix plus blocks."""
         self.factorise(blocks)
         assert self._solve is not None
         inner = _forward(self._lower, rhs[self._others])
@@ -104,7 +102,7 @@ class DenseStiffness:
 
 
 def _cholesky(matrix: Array, rows: NDArray[np.intp]) -> tuple[Array, int]:
-    """Return the lower factor of a principal submatrix, and whether there is none."""
+    """Return the lower Cholesky factor of a principal submatrix, and the fault of LAPACK."""
     if not rows.size:
         return np.zeros((0, 0)), 0
     lower, fault = dpotrf(matrix[np.ix_(rows, rows)].T, lower=True, clean=False, overwrite_a=True)
@@ -112,6 +110,7 @@ def _cholesky(matrix: Array, rows: NDArray[np.intp]) -> tuple[Array, int]:
 
 
 def _forward(lower: Array, rhs: Array) -> Array:
+    """Return L^-1 b."""
     return np.asarray(solve_triangular(lower, rhs, lower=True, check_finite=False))
 
 
@@ -123,13 +122,13 @@ class DenseOperator:
     comm
         Communicator.
     free
-        Which of the owned kept unknowns are not fixed, shape (nodes, block size).
+        Which of the owned kept unknowns are free, shape (nodes, block size).
     stiffness
-        The matrix, of which the other ranks have nothing.
+        The matrix, on the first rank.
     counters
-        Where factorisations and solves are counted.
+        Counters of factorisations and solves.
     inclined
-        Directions in which supports hold kept nodes, by their places; None for none.
+        Inclined directions of supports at kept nodes; None for none.
     """
 
     symmetric, iterative = False, False
@@ -147,7 +146,7 @@ class DenseOperator:
         self.counters = counters
 
     def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
-        """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
+        """Factorise with blocks; see `operator.SparseOperator.update`. Collective."""
         gathered = self._comm.gather(masked_blocks(self._free, self._inclined, blocks))
         self._blocks = np.concatenate(gathered or [blocks])
         made = on_root(self._comm, lambda: self._stiffness.factorise(self._blocks))
@@ -155,7 +154,7 @@ class DenseOperator:
         return made
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
-        """Solve for the owned unknowns. Collective; see `operator.SparseOperator.solve`."""
+        """Solve for the owned unknowns; see `operator.SparseOperator.solve`. Collective."""
         total = self._comm.gather(masked(self._free, self._inclined, rhs))
         self.counters.linear_solves += 1
         begin = self._comm.scan(rhs.size) - rhs.size

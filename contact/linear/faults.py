@@ -1,4 +1,4 @@
-"""Why a linear system has no solution, and factorisations with as much workspace as they take."""
+"""Faults of linear solvers: messages, and factorisations with growing workspace."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from contact.linear.layout import Layout
 from contact.tolerances import EPS, HUGE
 from contact.typing import Array
 
-#: MUMPS's INFOG(1) where its workspace was too small: that of integers, and that of numbers.
+#: MUMPS's INFOG(1) for too little workspace, of integers and of numbers.
 TOO_SMALL = (-8, -9)
 
-#: MUMPS's ICNTL(14): by how many percent its workspace exceeds the estimate, at first and at most.
+#: MUMPS's ICNTL(14): workspace beyond the estimate, first and largest (percent).
 WORKSPACE, MOST_WORKSPACE = 10, 50_000
 
 
@@ -28,11 +28,10 @@ def is_mumps(pc: PETSc.PC) -> bool:
 def set_up_with_workspace(
     ksp: PETSc.KSP, prepare: Callable[[PETSc.PC], None] = PETSc.PC.setFactorSetUpSolverType
 ) -> None:
-    """Set up a direct solver again and again until its workspace does. Collective.
+    """Set up a direct solver, with more workspace until it suffices. Collective.
 
-    The messages between ranks, and their order, decide how much it takes: MUMPS's estimate may be
-    too low for one run on some ranks and not for the next. It is far too low where few unknowns are
-    eliminated and many kept, as `prepare` says of a new factorisation.
+    MUMPS's estimate may be too low, by the order of messages, or with a Schur complement;
+    `prepare` configures each new factorisation.
     """
     ksp.setUp()
     pc, workspace = ksp.getPC(), WORKSPACE
@@ -40,7 +39,7 @@ def set_up_with_workspace(
         workspace = 4 * max(workspace, pc.getFactorMatrix().getMumpsIcntl(14))
         if workspace > MOST_WORKSPACE:
             return
-        # PETSc does not factorise again with one that has failed for want of memory.
+        # PETSc does not reuse a factorisation that has failed.
         operators = ksp.getOperators()
         pc.reset()
         ksp.setOperators(*operators)
@@ -50,7 +49,7 @@ def set_up_with_workspace(
 
 
 def mat_solve(solver: PETSc.Mat | PETSc.KSP, sides: Array) -> Array:
-    """Solve with the owned parts of right-hand sides at once, shape (owned, k). Collective."""
+    """Solve for several right-hand sides, shape (owned, k). Collective."""
     size = ((sides.shape[0], None), (None, sides.shape[1]))
     given, solution = (PETSc.Mat().createDense(size, comm=solver.comm) for _ in "bx")
     for matrix in (given, solution):
@@ -62,16 +61,16 @@ def mat_solve(solver: PETSc.Mat | PETSc.KSP, sides: Array) -> Array:
     return np.array(solution.getDenseArray())
 
 
-#: MUMPS's INFOG(1) where its workspace, its memory or the limit ICNTL(23) was too small.
+#: MUMPS's INFOG(1) for too little workspace, memory or limit ICNTL(23).
 OUT_OF_MEMORY = (-8, -9, -11, -12, -13, -17, -19, -20)
 
-#: Stiffness of a function, over the largest one, that is rounding.
+#: Ratio of diagonal entries of a coarse operator that is rounding.
 VANISHES = 50 * EPS
 
 
 @contextmanager
 def petsc_options(prefix: str) -> Iterator[None]:
-    """Turn errors of PETSc about its options while a solver is set up into an InputError."""
+    """Raise InputError for an error of PETSc about options."""
     try:
         yield
     except PETSc.Error as error:
@@ -84,13 +83,7 @@ def petsc_options(prefix: str) -> Iterator[None]:
 
 
 def check_overflow(layout: Layout, operator: float, rhs: float) -> None:
-    """Refuse a linear system whose numbers overflow, given its norms.
-
-    Raises
-    ------
-    InputError
-        If they do.
-    """
+    """Raise InputError if the norms of operator or right-hand side overflow."""
     young = layout.stiffness
     if not (operator < HUGE and rhs < HUGE and rhs < HUGE * young):
         lost = np.isnan(operator) or np.isnan(rhs)
@@ -104,15 +97,7 @@ def check_overflow(layout: Layout, operator: float, rhs: float) -> None:
 
 
 def no_solution(pc: PETSc.PC, prefix: str) -> InputError:
-    """Say why a system whose numbers do not overflow has no solution.
-
-    Parameters
-    ----------
-    pc
-        The preconditioner that failed.
-    prefix
-        Prefix of its PETSc options.
-    """
+    """Return the error of a failed preconditioner with a prefix of options."""
     if out_of_memory(pc):
         return InputError(
             "out of memory in the factorisation; accepted: a smaller mesh, more memory or "
@@ -136,7 +121,7 @@ def no_solution(pc: PETSc.PC, prefix: str) -> InputError:
 
 
 def _functions_vanish(pc: PETSc.PC) -> bool:
-    """Whether functions on coarse levels are zero, as no motion of a body is. Collective."""
+    """Tell whether coarse functions vanish. Collective."""
     if pc.getType() not in ("gamg", "mg"):
         return False
     for level in range(pc.getMGLevels() - 1):
@@ -148,7 +133,7 @@ def _functions_vanish(pc: PETSc.PC) -> bool:
 
 
 def out_of_memory(pc: PETSc.PC) -> bool:
-    """Whether the factorisation had too little memory. PETSc knows of some cases only."""
+    """Tell whether the factorisation had too little memory; PETSc misses some cases."""
     if pc.getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
         return True
     return is_mumps(pc) and bool(pc.getFactorMatrix().getMumpsInfog(1) in OUT_OF_MEMORY)

@@ -1,15 +1,13 @@
-"""Krylov solvers: iterative refinement of their solutions, and operators known by their products.
+"""Iterative refinement of the solutions of Krylov solvers.
 
-The norm of the preconditioner is blind where that is nearly singular: of a body that hardly
-anything holds the first correction is a huge rigid motion, and beside it all else is small. And
-some methods end without a solution, and tell only who asks.
+Their residuals, in the norm of the preconditioner, are blind where that is nearly singular: for a
+weakly constrained body the first correction is a huge rigid motion, beside which all else is small.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -19,22 +17,22 @@ from petsc4py import PETSc
 from contact.mesh.entities import component_sums
 from contact.typing import Array
 
-#: How often a solution is corrected, at most, by a solve for its residual.
+#: Most corrections of a solution.
 CORRECTIONS = 3
 
 
 @dataclass(frozen=True)
-class Components:
-    """Systems that nothing couples.
+class Subsystems:
+    """Uncoupled subsystems: those of connected components.
 
     Attributes
     ----------
     comm
         Communicator.
     of
-        To which each owned unknown belongs.
+        Subsystem of each owned unknown.
     count
-        How many they are.
+        Number of subsystems.
     """
 
     comm: MPI.Intracomm
@@ -42,7 +40,7 @@ class Components:
     count: int
 
     def norms(self, vector: PETSc.Vec) -> Array:
-        """Return the norm of a vector in each of them, shape (count,). Collective."""
+        """Return the norm of a vector in each subsystem, shape (count,). Collective."""
         return np.sqrt(component_sums(self.comm, self.of, vector.array_r**2, self.count))
 
 
@@ -51,26 +49,25 @@ def refine(
     rhs: PETSc.Vec,
     solution: PETSc.Vec,
     solve: Callable[[PETSc.Vec, PETSc.Vec], None],
-    components: Components | None = None,
+    subsystems: Subsystems | None = None,
 ) -> None:
-    """Correct a solution while it leaves far too much and corrections help. Collective.
+    """Correct a solution until |b - A x| <= sqrt(rtol) |b|, in each subsystem. Collective.
 
-    That is more than the root of the tolerance: norms differ by as much as that. Of systems
-    beside each other, which iterations take for one, each has to leave little by itself: beside a
-    far larger right-hand side nothing of a small one is seen.
+    The norms of the preconditioner and of the residual differ by about sqrt(rtol); beside a far
+    larger right-hand side a small subsystem is not seen.
 
     Parameters
     ----------
     ksp
-        Has the matrix and the tolerance.
+        Solver with the matrix and the tolerance.
     rhs, solution
-        The system's; the latter is corrected.
+        b and x; x is corrected.
     solve
-        Solves for another right-hand side, from zero.
-    components
-        Systems that nothing couples; None where there is one.
+        Solver for another right-hand side, from zero.
+    subsystems
+        Uncoupled subsystems; None for one.
     """
-    norms = (lambda vector: np.array([vector.norm()])) if components is None else components.norms
+    norms = (lambda vector: np.array([vector.norm()])) if subsystems is None else subsystems.norms
     matrix, asked_for = ksp.getOperators()[0], ksp.getTolerances()[0]
     allowed = asked_for**0.5 * norms(rhs)
     left = rhs - matrix * solution
@@ -80,10 +77,10 @@ def refine(
         if not beyond.any():
             return
         correction, asked = left.duplicate(), left.copy()
-        if components is not None:
-            asked.array[~beyond[components.of]] = 0.0
+        if subsystems is not None:
+            asked.array[~beyond[subsystems.of]] = 0.0
         ksp.setInitialGuessNonzero(False)
-        # No more than is missing, by the factor that norms may differ by.
+        # No more digits than are missing.
         missing = float(allowed[beyond].min() / np.linalg.norm(before[beyond]))
         ksp.setTolerances(rtol=max(asked_for, missing**2))
         try:
@@ -94,68 +91,8 @@ def refine(
         gained = norms(corrected) < before
         if not np.any(gained & beyond):
             return
-        if components is not None:
-            lost = ~gained[components.of]
+        if subsystems is not None:
+            lost = ~gained[subsystems.of]
             correction.array[lost], corrected.array[lost] = 0.0, left.array_r[lost]
         solution.axpy(1.0, correction)
         left = corrected
-
-
-class Multiplies(Protocol):
-    """An operator that is known by its products."""
-
-    def multiply(self, values: Array) -> Array:
-        """Return the matrix times owned values and q. Collective."""
-
-
-class _Products:
-    """The context of a matrix that is known by its products."""
-
-    def __init__(self, operator: Multiplies, packing: Packing) -> None:
-        self._operator, self._packing = operator, packing
-
-    def mult(self, _: Any, vector: PETSc.Vec, image: PETSc.Vec) -> None:
-        """Multiply."""
-        values = self._packing.unpacked(vector.array_r)
-        image.array[:] = self._packing.packed(self._operator.multiply(values))
-
-
-class Packing:
-    """Global unknowns in PETSc's vectors: the first rank holds them, behind its own.
-
-    Parameters
-    ----------
-    comm
-        Communicator.
-    size
-        Number of global unknowns.
-    """
-
-    def __init__(self, comm: MPI.Intracomm, size: int) -> None:
-        self._comm, self._size = comm, size
-
-    @property
-    def here(self) -> int:
-        """How many of them this rank holds."""
-        return self._size if self._comm.rank == 0 else 0
-
-    def packed(self, values: Array) -> Array:
-        """Return the share of owned values and global ones that a rank holds."""
-        return values if self.here == self._size else values[: values.size - self._size]
-
-    def unpacked(self, values: Array) -> Array:
-        """Return owned values and global ones behind them, the same on all ranks. Collective."""
-        if self._size == 0:
-            return values.copy()
-        own = values[: values.size - self.here]
-        return np.concatenate([own, self._comm.bcast(values[own.size :])])
-
-
-def shell(operator: Multiplies, comm: MPI.Intracomm, owned: int, size: int) -> PETSc.Mat:
-    """Return a matrix that multiplies as an operator does."""
-    packing = Packing(comm, size)
-    local = owned + packing.here
-    context = _Products(operator, packing)
-    matrix = PETSc.Mat().createPython(((local, None), (local, None)), context, comm)
-    matrix.setUp()
-    return matrix

@@ -1,4 +1,4 @@
-"""The unknowns of a linear system: nodes with a block of unknowns each, some of them fixed."""
+"""Unknowns of a linear system by nodes, some fixed; options and products of PETSc."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class Inclined:
-    """Directions across the axes in which supports hold some nodes: rollers on inclined faces.
+    """Fixed directions that are not axes: rollers on inclined faces.
 
     Attributes
     ----------
     nodes
-        Which nodes, shape (n,).
+        The nodes, shape (n,).
     across
-        The projectors onto their directions, shape (n, block size, block size); these have nothing
-        along unknowns that are fixed.
+        Projectors onto the fixed directions, shape (n, block size, block size), across the fixed
+        unknowns.
     """
 
     nodes: NDArray[np.int32]
     across: Array
 
     def at(self, nodes: NDArray[np.int32]) -> Inclined:
-        """Return the directions of some nodes, by their places among these."""
+        """Return the directions of some nodes, by positions among these."""
         _, places, rows = np.intersect1d(nodes, self.nodes, return_indices=True)
         return Inclined(places.astype(np.int32), self.across[rows])
 
-    def held(self, values: Array) -> Array:
-        """Return the parts of flat nodal values along the directions, 0 at all other nodes."""
+    def along(self, values: Array) -> Array:
+        """Return flat nodal values projected onto the fixed directions."""
         nodal = values.reshape(-1, self.across.shape[1])
         found = np.zeros_like(nodal)
         found[self.nodes] = np.einsum("nij,nj->ni", self.across, nodal[self.nodes])
         return found.reshape(values.shape)
 
     def projection(self, layout: Layout) -> PETSc.Mat:
-        """Return the projector P of all unknowns onto the other directions. Collective."""
+        """Return the projector onto the free directions, a matrix. Collective."""
         size, owned = layout.block_size, layout.free.shape[0]
         rows = size * self.nodes[:, None] + np.arange(size)
         grid = np.broadcast_arrays(rows[:, :, None], rows[:, None, :])
@@ -61,25 +61,18 @@ class Inclined:
         return made
 
     def add(self, matrix: PETSc.Mat, scale: float) -> None:
-        """Add the projectors, times a number, to a matrix. Collective."""
+        """Add multiples of the projectors to a matrix. Collective."""
         insert_blocks(matrix, self.nodes, scale * self.across, PETSc.InsertMode.ADD_VALUES)
 
 
 def masked(free: NDArray[np.bool_], inclined: Inclined | None, values: Array) -> Array:
-    """Return flat values of nodes, 0 at fixed unknowns and along fixed directions."""
+    """Return flat nodal values, 0 at fixed unknowns and along fixed directions."""
     own = np.where(free.ravel(), values, 0.0)
-    return own if inclined is None else own - inclined.held(own)
+    return own if inclined is None else own - inclined.along(own)
 
 
 def projectors(free: NDArray[np.bool_], inclined: Inclined | None) -> Array:
-    """Return the projectors onto the free directions of nodes, shape (n, block size, block size).
-
-    Parameters
-    ----------
-    free, inclined
-        Which unknowns of the nodes are not fixed, shape (n, block size), and their inclined
-        directions, by their places among these.
-    """
+    """Return the projectors onto the free directions of nodes, (n, block size, block size)."""
     made = np.eye(free.shape[1]) * free[:, None, :]
     if inclined is not None:
         made[inclined.nodes] -= inclined.across
@@ -87,7 +80,7 @@ def projectors(free: NDArray[np.bool_], inclined: Inclined | None) -> Array:
 
 
 def masked_blocks(free: NDArray[np.bool_], inclined: Inclined | None, blocks: Array) -> Array:
-    """Return blocks at nodes, 0 at fixed unknowns and along fixed directions; as `projectors`."""
+    """Return nodal blocks, 0 at fixed unknowns and along fixed directions."""
     if inclined is None:
         own = free.astype(float)
         return blocks * own[:, :, None] * own[:, None, :]
@@ -97,7 +90,7 @@ def masked_blocks(free: NDArray[np.bool_], inclined: Inclined | None, blocks: Ar
 
 @dataclass(frozen=True)
 class Layout:
-    """Nodes and their unknowns: d displacement components, then a potential or none.
+    """Unknowns of the nodes: d displacement components, then a potential or none.
 
     Attributes
     ----------
@@ -108,16 +101,15 @@ class Layout:
     points
         Coordinates of the owned nodes, shape (nodes, d) (length).
     free
-        Which unknowns of the owned nodes are not fixed, shape (nodes, block size).
+        Which unknowns of the owned nodes are free, shape (nodes, block size).
     size
         Largest extent of the body (length).
     stiffness
         Young's modulus, the unit of the operator (stress).
     revolved
-        Whether the nodes are those of the half plane of a body of revolution, x its radius: it
-        then moves along y alone.
+        Whether the nodes are those of the half plane of a body of revolution.
     inclined
-        Directions across the axes in which supports hold nodes; None where no rank has any.
+        Fixed directions that are not axes; None without any on all ranks.
     """
 
     comm: MPI.Intracomm
@@ -151,18 +143,18 @@ class Layout:
 
     @property
     def restrained(self) -> NDArray[np.int32]:
-        """The owned nodes of which not all unknowns are free, ascending."""
+        """Owned nodes with supports, ascending."""
         some = np.asarray(~self.free.all(axis=1))
         if self.inclined is not None:
             some[self.inclined.nodes] = True
         return np.flatnonzero(some).astype(np.int32)
 
     def mask(self, values: Array) -> Array:
-        """Return owned values, 0 where the unknown is fixed, and along fixed directions."""
+        """Return owned values, 0 at fixed unknowns and along fixed directions."""
         return masked(self.free, self.inclined, values)
 
     def at(self, nodes: NDArray[np.int32]) -> tuple[NDArray[np.bool_], Inclined | None]:
-        """Return which unknowns of owned nodes are free, and their inclined directions."""
+        """Return free unknowns and inclined directions of some owned nodes."""
         return self.free[nodes], None if self.inclined is None else self.inclined.at(nodes)
 
 
@@ -179,18 +171,10 @@ def times(matrix: PETSc.Mat | None, values: Array, transposed: bool = False) -> 
 
 
 def congruent(matrix: PETSc.Mat, basis: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
-    """Return Q^T K Q of a basis Q with few entries a row. Collective.
+    """Return Q^T K Q of a basis Q with few entries per row, into an earlier result if given.
 
-    Of several ranks it is summed row by row, unless the user says how: by default PETSc keeps K Q
-    and all summands, twice the size of K. With many entries a row that default is faster.
-
-    Parameters
-    ----------
-    matrix, basis
-        K and Q.
-    result
-        The matrix of an earlier call with the same Q and a K of the same pattern, to be
-        computed again; None for a new matrix.
+    On several ranks summed row by row, unless the user's options say how: PETSc's default keeps K Q
+    and all summands, twice the size of K. Collective.
     """
     via = {"matptap_via": "allatonce_merged"} if matrix.comm.size > 1 else {}
     with options("", via):
@@ -207,7 +191,7 @@ def set_defaults(prefix: str, values: Mapping[str, str]) -> None:
 
 @contextmanager
 def options(prefix: str, values: Mapping[str, str]) -> Iterator[None]:
-    """Have options of PETSc under a prefix for a while, where the user gives none."""
+    """Set options of PETSc under a prefix temporarily, where the user gives none."""
     known = PETSc.Options(prefix)
     own = [name for name in values if not known.hasName(name)]
     set_defaults(prefix, values)
@@ -220,7 +204,7 @@ def options(prefix: str, values: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def hidden(prefix: str, names: Iterable[str]) -> Iterator[None]:
-    """Hide options of PETSc that the user gives under a prefix for a while."""
+    """Hide options of the user under a prefix temporarily."""
     known = PETSc.Options(prefix)
     given = {name: known.getString(name) for name in names if known.hasName(name)}
     for name in given:
@@ -230,17 +214,14 @@ def hidden(prefix: str, names: Iterable[str]) -> Iterator[None]:
     finally:
         for name, value in given.items():
             known[name] = value
-            # PETSc warns of options that nobody has read.
+            # Mark it as read: PETSc warns of unread options.
             known.hasName(name)
 
 
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:
-    """Put the size of the matrix's own diagonal at fixed unknowns, in place of ones. Collective.
+    """Scale the diagonal at fixed unknowns and directions to the mean diagonal. Collective.
 
-    So along fixed directions.
-
-    Against a modulus of 1e12 ones are nothing, and multigrid takes them for a body that is not
-    held; against 1e-12 they are all that it sees.
+    Ones there would depend on the units: multigrid would see nothing else, or no support.
     """
     diagonal, free = matrix.getDiagonal(), layout.free.ravel()
     sizes = np.array([np.abs(diagonal.array[free]).sum(), np.count_nonzero(free)])
@@ -271,7 +252,7 @@ def insert_blocks(
     blocks: Array,
     mode: PETSc.InsertMode = PETSc.InsertMode.INSERT_VALUES,
 ) -> None:
-    """Put blocks at owned nodes, in place of those that are there, or add them. Collective."""
+    """Insert or add blocks at owned nodes. Collective."""
     rows, at = np.arange(nodes.size + 1, dtype=PETSc.IntType), nodes.astype(PETSc.IntType)
     matrix.setValuesBlockedLocalIJV(rows, at, blocks, addv=mode, rowmap=at)
     matrix.assemble()

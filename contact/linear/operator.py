@@ -1,7 +1,7 @@
-"""A linear operator that is assembled and factorised once and then solves many times.
+"""Linear operators: a bulk matrix plus small dense blocks at contact nodes, factorised once.
 
-The operator is a bulk matrix plus a small dense block at each of some nodes: the augmentation
-r I of Algorithm 2, a compliant layer, a current, or Newton's linearised contact laws.
+The blocks are the augmentation r I of Algorithm 2, a compliant layer, a current, or Newton's
+linearised contact laws.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from contact.linear.faults import (
     petsc_options,
     set_up_with_workspace,
 )
-from contact.linear.krylov import Components, refine
+from contact.linear.krylov import Subsystems, refine
 from contact.linear.layout import (
     Layout,
     balance,
@@ -38,7 +38,7 @@ from contact.typing import Array
 
 
 class Bulk(Protocol):
-    """A body as operators need it: matrices of its unknowns."""
+    """Matrices of a body."""
 
     @property
     def layout(self) -> Layout:
@@ -47,26 +47,22 @@ class Bulk(Protocol):
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective.
 
-        It lives no longer than the mesh, whose communicator it has, and nor do copies of it: after
-        that PETSc ends in a segmentation fault.
+        It must not outlive the mesh, whose communicator it has (segmentation fault in PETSc).
         """
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
-        """Assemble the body's "secant", "tangent" or its "symmetric" part. Collective."""
+        """Assemble the "secant", the "tangent" or its "symmetric" part. Collective."""
 
     def border(self, kind: str) -> tuple[Array, Array] | None:
-        """Return derivatives of the forces on x and on q by q where it assembled last. Collective.
-
-        Those that motions do not make, of which there may be none.
-        """
+        """Return the derivatives by q of the forces on x and q beyond K R, if any. Collective."""
 
 
 @dataclass
 class Counters:
-    """How often the expensive steps were taken.
+    """Numbers of factorisations and solves.
 
-    `linear_iterations` are those of iterative solvers; a direct one counts one a solve.
-    `contact_solves` are dense ones at the contact nodes, with the body condensed onto these.
+    A direct solve counts as one of `linear_iterations`; `contact_solves` are those with the
+    condensed body.
     """
 
     factorizations: int = 0
@@ -75,12 +71,12 @@ class Counters:
     contact_solves: int = 0
 
     def __sub__(self, before: Counters) -> Counters:
-        """Return the counts since an earlier moment."""
+        """Return the difference of two counts."""
         return Counters(**{name: count - vars(before)[name] for name, count in vars(self).items()})
 
 
 class Operator(Protocol):
-    """Solves with a bulk matrix plus blocks at nodes, sparse or dense."""
+    """Bulk matrix plus blocks at nodes, sparse or dense."""
 
     @property
     def symmetric(self) -> bool:
@@ -99,21 +95,20 @@ class SparseOperator:
     Parameters
     ----------
     bulk
-        Assembles the matrices of the body.
+        Matrices of the body.
     nodes
-        Owned nodes that may have blocks, local numbers, shape (n,).
+        Owned nodes with blocks, local numbers, shape (n,).
     symmetric
         Whether the blocks are symmetric too: LDL^T instead of LU.
     prefix
         Prefix of PETSc options, for instance ``-contact_ksp_type cg``.
     counters
-        Where factorisations and solves are counted.
+        Counters of factorisations and solves.
     kind
-        "lu", "iterative", or "auto": iterative for large problems. "many": where hundreds of
-        solves with one matrix are to come, iterative for those alone that are too large for LU.
-    components
-        Bodies that nothing couples, each of which an iterative solver has to solve for; None for
-        one, or where blocks couple them.
+        "lu", "iterative", or "auto": iterative for large problems. "many", for hundreds of solves
+        with one matrix: iterative if LU has too little memory.
+    subsystems
+        Uncoupled subsystems; None for one.
     """
 
     def __init__(
@@ -125,17 +120,17 @@ class SparseOperator:
         prefix: str = "contact_",
         counters: Counters | None = None,
         kind: str = "auto",
-        components: Components | None = None,
+        subsystems: Subsystems | None = None,
     ) -> None:
         self.bulk, self.layout, self._nodes = bulk, bulk.layout, nodes
         self.counters = counters or Counters()
         self.symmetric = symmetric
         self.matrix = bulk.create_matrix()
-        #: The system: the matrix, or with global unknowns eliminated from it.
+        #: The matrix, or with global unknowns eliminated from it.
         self.system = self.matrix
         self._kind = ""
         self._blocks: Array | None = None
-        self._components = components
+        self._subsystems = subsystems
         self._rhs, self._solution = self.matrix.createVecs()
         self.ksp = PETSc.KSP().create(self.layout.comm)
         self.ksp.setOptionsPrefix(prefix)
@@ -174,12 +169,11 @@ class SparseOperator:
         blocks
             Weighted blocks at the nodes, shape (n, block size, block size).
         constant
-            Whether the bulk matrix has not changed since the last call with the same kind:
-            nothing is done when the blocks are the same too.
+            Whether the bulk matrix is that of the last call with the same kind.
 
         Returns
         -------
-        Whether anything was done.
+        Whether matrix or blocks have changed.
         """
         nodes, last, same = self._nodes, self._blocks, constant and kind == self._kind
         if same and last is not None and self._all(np.array_equal(blocks, last)):
@@ -188,19 +182,19 @@ class SparseOperator:
         if not same:
             self.bulk.assemble(self.matrix, kind, state)
             if self._modes is not None:
-                # A matrix that others are copied into does not keep them.
+                # Copies into a matrix drop its near null space.
                 self.matrix.setNearNullSpace(self._modes)
             balance(self.matrix, self.layout)
             self._own = nodal_blocks(self.matrix, nodes)
         rest, own = masked_blocks(*self.layout.at(nodes), blocks), self._own
-        # To insert nothing would be a reason to set the solver up again.
+        # An empty insertion would bump the matrix state and trigger a refactorisation.
         inserts = same or not self._all(not rest.any())
         if self._multigrid and self._hierarchy is None:
             if inserts:
                 insert_blocks(self.matrix, nodes, own + TOUCH * rest)
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             self.ksp.setOperators(self.system, self.matrix)
-            self._hierarchy = Hierarchy(self.ksp, nodes, self._components)
+            self._hierarchy = Hierarchy(self.ksp, nodes, self._subsystems)
         if inserts:
             insert_blocks(self.matrix, nodes, own + rest)
         if self._hierarchy is None:
@@ -213,14 +207,14 @@ class SparseOperator:
 
     @property
     def _multigrid(self) -> bool:
-        """Whether the solver is algebraic multigrid for the displacement alone."""
+        """Whether the solver is multigrid without a potential."""
         return self._split is None and self.ksp.getPC().getType() == "gamg"
 
     def _all(self, flag: bool) -> bool:
         return bool(summed(self.layout.comm, flag) == self.layout.comm.size)
 
     def _set_up(self, symmetric: bool) -> None:
-        """Set up the solver for the matrix as it is."""
+        """Set up the solver for the present matrix."""
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         split = self._split
         self.ksp.setOperators(self.system, split.matrix(self.matrix) if split else self.matrix)
@@ -228,21 +222,21 @@ class SparseOperator:
             set_up_with_workspace(self.ksp)
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
-        """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.
+        """Solve for an owned right-hand side; fixed unknowns stay 0. Collective.
 
         Parameters
         ----------
         rhs
             Owned right-hand side.
         rtol
-            Relative tolerance of an iterative solver, its own by default; a direct one ignores it.
+            Relative tolerance of an iterative solver, its own by default.
         guess
-            Where an iterative solver starts, of the owned unknowns; zero by default.
+            Initial guess of an iterative solver, owned unknowns; zero by default.
 
         Raises
         ------
         InputError
-            If the operator is singular, for a rigid-body mode is free, or its numbers overflow.
+            If the operator is singular or its numbers overflow.
         """
         self._rhs.array[:] = self.layout.mask(rhs)
         self.ksp.setTolerances(rtol=self._tolerance if rtol is None else rtol)
@@ -261,7 +255,7 @@ class SparseOperator:
             iterations, renewed = self._hierarchy.solve(self._rhs, self._solution)
             self.counters.factorizations += renewed
         self._solved(iterations, self._rhs.norm(), self._solution.norm())
-        # An iterative solver leaves fixed unknowns to its tolerance.
+        # Iterative solvers leave fixed unknowns within their tolerance.
         return self.layout.mask(self._solution.array)
 
     def solve_transposed(self, rhs: Array) -> Array:
@@ -273,7 +267,7 @@ class SparseOperator:
         return self.layout.mask(self._solution.array)
 
     def _refine(self) -> int:
-        """Correct a solution that leaves too much; return the iterations that took. Collective."""
+        """Refine the solution; return the number of iterations. Collective."""
         taken = 0
 
         def solve(rhs: PETSc.Vec, correction: PETSc.Vec) -> None:
@@ -281,13 +275,11 @@ class SparseOperator:
             self.ksp.solve(rhs, correction)
             taken += self.ksp.getIterationNumber()
 
-        refine(self.ksp, self._rhs, self._solution, solve, self._components)
+        refine(self.ksp, self._rhs, self._solution, solve, self._subsystems)
         return taken
 
     def solve_all(self, sides: Array) -> Array:
-        """Solve with the owned parts of right-hand sides at once, shape (owned, k). Collective.
-
-        They count as one: a factorisation takes little more time for them than for one.
+        """Solve for several right-hand sides, shape (owned, k); counts as one solve. Collective.
 
         Raises
         ------
@@ -304,7 +296,7 @@ class SparseOperator:
         return np.column_stack([self.layout.mask(x) for x in found.T])
 
     def _solved(self, iterations: int, rhs: float, solution: float) -> None:
-        """Count a solve, and see whether it has one, given norms. Collective."""
+        """Count a solve; raise InputError if it has failed. Collective."""
         self.counters.linear_solves += 1
         self.counters.linear_iterations += iterations
         failed = self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED

@@ -1,7 +1,6 @@
-"""Static condensation: a dense Schur complement at kept nodes.
+"""Static condensation: the dense Schur complement at kept unknowns, by MUMPS.
 
-MUMPS makes it in a sparse factorisation that leaves out the kept unknowns. In 2-D the kept nodes
-are so few that the dense matrix has about as many entries as the mesh has nodes.
+In 2-D the matrix has about as many entries as the mesh has nodes.
 """
 
 from __future__ import annotations
@@ -18,14 +17,14 @@ from contact.linear.layout import times
 from contact.ranks import on_each
 from contact.typing import Array
 
-#: MUMPS's ICNTL(26): to solve with the eliminated unknowns, the kept ones being 0; to reduce a
-#: right-hand side to the kept ones, which takes the first of the two substitutions alone.
+#: MUMPS's ICNTL(26): solve with the kept unknowns 0; reduce a right-hand side, by the first
+#: substitution alone.
 INTERIOR_SOLVE, REDUCE = (26, 0), (26, 1)
 
 #: PETSc's MAT_FACTOR_SCHUR_INVERTED.
 INVERTED = 2
 
-#: MUMPS's ICNTL(19): in which form it returns a Schur complement; 0 for none.
+#: MUMPS's ICNTL(19): form of the Schur complement; 0 for none.
 SCHUR = 19
 
 #: Columns that are copied at a time.
@@ -45,10 +44,9 @@ def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
 
 
 def _complement(factor: PETSc.Mat, size: int) -> Array:
-    """Take the Schur complement, stored by columns, out of a factorisation.
+    """Copy the Schur complement, stored by columns, out of a factorisation.
 
-    PETSc multiplies the right-hand sides that MUMPS reduces by the inverse of the one it holds. The
-    identity is left there, so that they remain as they are.
+    PETSc multiplies reduced right-hand sides by the inverse of its own one: the identity is left.
     """
     if size == 0:
         return np.zeros((0, 0))
@@ -68,7 +66,7 @@ def _complement(factor: PETSc.Mat, size: int) -> Array:
 
 
 def _mirror(matrix: Array) -> None:
-    """Copy the entries below the diagonal, all that MUMPS promises, above it."""
+    """Copy the lower triangle, which MUMPS fills, to the upper one."""
     for begin in range(0, len(matrix), COLUMNS):
         end = begin + COLUMNS
         matrix[begin:end, end:] = matrix[end:, begin:end].T
@@ -77,41 +75,41 @@ def _mirror(matrix: Array) -> None:
 
 
 class SchurComplement:
-    """A symmetric matrix reduced to kept unknowns, some but not all.
+    """Schur complement of a symmetric matrix at kept unknowns.
 
     Parameters
     ----------
     matrix
-        The assembled matrix, for its pattern; `factorise` takes its values.
+        The assembled matrix, for its pattern.
     kept
-        Owned unknowns that are kept, local numbers; the result has them in rank order.
+        Owned kept unknowns, local numbers; the result has them in rank order.
     prefix
         Prefix of PETSc options of the factorisation.
 
     Attributes
     ----------
     size, offset
-        Number of kept unknowns, and where those of this rank begin.
+        Number of kept unknowns, and offset of those of this rank.
     """
 
     def __init__(self, matrix: PETSc.Mat, kept: NDArray[np.int32], prefix: str) -> None:
         self._kept, self.comm = kept, lasting(matrix.getComm().tompi4py())
         begin, end = matrix.getOwnershipRange()
         own_kept = (begin + kept).astype(PETSc.IntType)
-        # With a Schur complement MUMPS orders by minimum degree alone, and breaks its many ties by
-        # the order given. dolfinx numbers along fronts: backwards along these leaves least work.
+        # MUMPS orders by minimum degree, with ties by the given order: backwards along the fronts
+        # of dolfinx's numbering is cheapest.
         self._backwards = PETSc.IS().createStride(end - begin, end - 1, -1, comm=matrix.comm)
         numbers = self.comm.allgather(begin + end - 1 - own_kept)
         self.size = sum(part.size for part in numbers)
         self.offset = sum(part.size for part in numbers[: self.comm.rank])
-        # MUMPS leaves the Schur complement to the first rank, and PETSc asks for its rows there.
+        # The Schur complement is on the first rank.
         own = np.concatenate(numbers)[: None if self.comm.rank == 0 else 0]
         self._numbers = PETSc.IS().createGeneral(own, matrix.comm)
         self._places = (
             PETSc.IS().createGeneral(own_kept, matrix.comm),
             PETSc.IS().createStride(end - begin, begin, 1, comm=matrix.comm),
         )
-        #: Rows of the matrix at kept unknowns, and the matrix numbered backwards.
+        #: Rows at kept unknowns, and the matrix numbered backwards.
         self._rows: PETSc.Mat | None = None
         self._reordered: PETSc.Mat | None = None
         self._ksp = PETSc.KSP().create(matrix.comm)
@@ -123,9 +121,7 @@ class SchurComplement:
         pc.setFromOptions()
 
     def factorise(self, matrix: PETSc.Mat) -> Array:
-        """Eliminate; return the Schur complement on rank 0, on the others nothing. Collective.
-
-        It is stored by columns; its entries are NaN where the eliminated block is singular.
+        """Return the Schur complement on rank 0, by columns; NaN if singular. Collective.
 
         Raises
         ------
@@ -141,7 +137,7 @@ class SchurComplement:
             reordered.copy(self._reordered, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             reordered.destroy()
         self._reordered.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        # On several ranks MUMPS writes the other triangle where it factorises with an old analysis.
+        # On several ranks MUMPS fills the other triangle with an old analysis.
         if first or self.comm.size > 1:
             self._ksp.getPC().reset()
             self._ksp.setOperators(self._reordered)
@@ -157,27 +153,24 @@ class SchurComplement:
         return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
 
     def _prepare(self, pc: PETSc.PC) -> None:
-        """Let a factorisation keep unknowns before it begins."""
+        """Tell MUMPS the kept unknowns before a factorisation."""
         pc.setFactorSetUpSolverType()
         pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
         if self.size > 0:
             _set_kept(pc.getFactorMatrix(), self._numbers)
 
     def exceeds(self, rhs: Array, rounding: Array) -> bool:
-        """Tell whether this rank's right-hand side exceeds rounding at eliminated unknowns."""
+        """Tell whether a right-hand side exceeds rounding at eliminated unknowns."""
         beyond = np.abs(rhs) > rounding
         beyond[self._kept] = False
         return bool(beyond.any())
 
     def interior(self, rhs: Array) -> Array:
-        """Return the solution for an owned right-hand side, the kept unknowns being 0. Collective.
-
-        It depends on no values at kept unknowns.
-        """
+        """Solve for an owned right-hand side with the kept unknowns 0. Collective."""
         inside = rhs.copy()
         inside[self._kept] = 0.0
         factor = self._ksp.getPC().getFactorMatrix()
-        # PETSc refuses solves on several ranks for the sake of those with the kept unknowns too.
+        # PETSc refuses solves with a Schur complement on several ranks.
         form = factor.getMumpsIcntl(SCHUR)
         factor.setMumpsIcntl(SCHUR, 0)
         solution = mat_solve(factor, inside[::-1, None])[::-1, 0]
@@ -186,9 +179,9 @@ class SchurComplement:
         return solution
 
     def reduce(self, rhs: Array) -> Array:
-        """Return a right-hand side reduced to the kept unknowns, those of all ranks. Collective.
+        """Return a right-hand side reduced to the kept unknowns of all ranks. Collective.
 
-        In runs on one rank that is half a solve; PETSc has none on several.
+        On one rank by half a solve, which PETSc lacks on several.
         """
         if self.comm.size > 1:
             return self.condense(rhs, self.interior(rhs))
@@ -201,12 +194,12 @@ class SchurComplement:
         return reduced.array[::-1][self._kept]
 
     def condense(self, rhs: Array, interior: Array) -> Array:
-        """Reduce a right-hand side as `reduce`, given `interior` of it. Collective."""
+        """Reduce a right-hand side, given its `interior` solution. Collective."""
         own = rhs[self._kept] - times(self._rows, interior)
         return np.concatenate(self.comm.allgather(own))
 
     def expand(self, rhs: Array, kept: Array) -> Array:
-        """Return the owned solution, given that at the kept unknowns of all ranks. Collective."""
+        """Return the owned solution from that at the kept unknowns of all ranks. Collective."""
         own = kept[self.offset : self.offset + self._kept.size]
         solution = self.interior(rhs - times(self._rows, own, transposed=True))
         solution[self._kept] = own

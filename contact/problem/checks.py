@@ -1,7 +1,4 @@
-"""Checks of a problem before anything is solved: loads, supports, rigid-body modes, potential.
-
-Cases and problems that are put together in Python are checked here alike.
-"""
+"""Checks of a problem before a solve: loads, supports, rigid-body modes, potential."""
 
 from __future__ import annotations
 
@@ -36,20 +33,10 @@ from contact.typing import Array
 def expected_displacements(
     problem: ContactProblem, loads: Array, prescribed: Array
 ) -> tuple[float, float]:
-    """Return the displacement of a block of the body's size by loads on Gamma_3. Collective.
+    """Return the displacement of a block of the body's size by all loads on Gamma_3.
 
-    Parameters
-    ----------
-    problem
-        The problem.
-    loads
-        Owned nodal loads, those on global unknowns behind them.
-    prescribed
-        Local unknowns with the prescribed values, 0 elsewhere.
-
-    Returns
-    -------
-    That displacement, and the largest one that is prescribed.
+    And the largest prescribed displacement; of owned nodal loads, and local unknowns with the
+    prescribed values. Collective.
     """
     body, scales = problem.equilibrium, problem.scales
     nodal = np.abs(body.nodal(loads)[:, : body.dim]).sum()
@@ -68,8 +55,8 @@ def check_problem(problem: ContactProblem) -> None:
     Raises
     ------
     InputError
-        If a load acts on a contact part or is no finite number, two supports contradict each
-        other, or `check_rigid_modes` finds that the body can move.
+        If a load acts on a contact part or is not finite, two supports contradict each other, or
+        a rigid-body mode is unconstrained.
     """
     _check_plane_stress(problem)
     _check_loads(problem)
@@ -78,7 +65,7 @@ def check_problem(problem: ContactProblem) -> None:
 
 
 def _check_plane_stress(problem: ContactProblem) -> None:
-    """Refuse materials in plane stress elsewhere than in a plane body that is wholly so."""
+    """Refuse plane stress but for all materials of a plane body."""
     body = problem.equilibrium
     thin = [material.in_plane_stress for material in problem.body.materials]
     if not any(thin):
@@ -93,14 +80,14 @@ def _check_plane_stress(problem: ContactProblem) -> None:
 
 
 def _shared(problem: ContactProblem, one: str, other: str) -> tuple[NDArray[np.int32], bool]:
-    """Return the facets of this rank that two parts share, and whether any rank has some."""
+    """Return the facets of this rank that two parts share, and whether any rank has such."""
     domain = problem.domain
     shared = np.intersect1d(domain.facets_anywhere(one), domain.facets_anywhere(other))
     return shared, domain.comm.allreduce(shared.size > 0, op=MPI.LOR)
 
 
 def _check_loads(problem: ContactProblem) -> None:
-    """Refuse loads on Gamma_3, where the foundation alone acts: Gamma_2 and Gamma_b exclude it."""
+    """Refuse loads and elastic supports on Gamma_3."""
     for contact, (i, load) in product(problem.contacts, enumerate(problem.body.loads)):
         if load.on is not None and _shared(problem, load.on, contact.on)[1]:
             raise InputError(
@@ -120,7 +107,7 @@ def _check_loads(problem: ContactProblem) -> None:
 
 
 def _check_sizes(problem: ContactProblem) -> None:
-    """Refuse loads that are no numbers, or too large for them. Collective."""
+    """Refuse loads that are not finite, or too large. Collective."""
     given, domain, time = problem.body.loads, problem.domain, problem.time
     loads = problem.equilibrium.external(time)
     if not domain.comm.allreduce(bool(np.isfinite(loads).all()), op=MPI.LAND):
@@ -136,7 +123,7 @@ def _check_sizes(problem: ContactProblem) -> None:
 
 
 def check_supports(problem: ContactProblem) -> None:
-    """Refuse different values for one component on a part of two supports. Collective.
+    """Refuse different values of two supports for one component on a common facet. Collective.
 
     Raises
     ------
@@ -162,10 +149,7 @@ def check_supports(problem: ContactProblem) -> None:
 
 
 def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterator[str]:
-    """Say where parts of two supports meet with different values of one component. Collective.
-
-    Of displacements along normals, which differ at an edge, `Rollers` looks at the values.
-    """
+    """Say where the edges of two supports meet with different values. Collective."""
     d, space = problem.dim, problem.equilibrium.space
     for i, j in combinations(range(len(problem.body.fixed)), 2):
         first, last = problem.body.fixed[i], problem.body.fixed[j]
@@ -195,20 +179,9 @@ def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterato
 def _differing(
     problem: ContactProblem, pair: tuple[int, int], name: str, nodes: NDArray[np.int32]
 ) -> Array | None:
-    """Return the values of two supports at a node where they differ. Collective.
+    """Return the values of two supports where they differ, and the point, (2 + d,); or None.
 
-    Parameters
-    ----------
-    problem
-        The problem, at its time.
-    pair, name
-        The numbers of the supports, and the component.
-    nodes
-        Nodes of both, those of this rank.
-
-    Returns
-    -------
-    The two values and the place, shape (2 + d,); None where they agree.
+    `pair`, `name`: numbers of the supports, and component. Collective.
     """
     points = problem.equilibrium.space.tabulate_dof_coordinates()[nodes, : problem.dim]
     values = np.zeros((len(points), 2))
@@ -217,7 +190,7 @@ def _differing(
         given = values_at(fixed.given[name], points, problem.time, key, problem.comm)
         values[:, k] = fixed.factor(problem.time) * given
     size = problem.comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX)
-    # Rounding of a zero, such as sin(pi), is no value.
+    # sin(pi) is 0.
     unit = problem.equilibrium.phi_scale if name == "potential" else 1.0
     rounding = EPS * problem.domain.size
     differ = np.ptp(values, axis=1) > NEGLIGIBLE * size + unit * rounding
@@ -228,16 +201,14 @@ def _differing(
 
 
 def check_rigid_modes(problem: ContactProblem) -> None:
-    """Check that no rigid motion is free, before anything is factorised. Collective.
-
-    Three things are asked for: supports and contact (in the tangential directions too if there
-    is friction) leave no rigid motion at all, the loads do not pull the body off the foundation
-    where that alone holds it, and its potential is known or could be if it conducted everywhere.
+    """Check rigid-body modes, unilateral supports and potential. Collective.
 
     Raises
     ------
     InputError
-        If the body can move freely or is pulled off, or its potential cannot be determined.
+        If supports and contact leave a rigid-body mode unconstrained, loads pull the body off
+        contact that alone constrains it, or the potential would be floating with contact
+        everywhere.
     """
     for group in groups(problem):
         _check_group(problem, group)
@@ -245,7 +216,7 @@ def check_rigid_modes(problem: ContactProblem) -> None:
 
 
 def _check_group(problem: ContactProblem, group: Group) -> None:
-    """Check components of the mesh. Collective."""
+    """Check a group of bodies. Collective."""
     free = null_space(group.supports)
     if free.shape[1] == 0:
         return
@@ -262,7 +233,7 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
 
 
 def _unconstrained(problem: ContactProblem, group: Group, unconstrained: Array) -> str:
-    """Say which connected components can move, and how."""
+    """Return the message on unconstrained modes."""
     count, accepted = group.count, "displacement components fixed so that it cannot"
     whole = "the body, or a rigid part," if group.moving else "the body"
     if count > 1:
@@ -285,32 +256,26 @@ def _unconstrained(problem: ContactProblem, group: Group, unconstrained: Array) 
 
 
 def check_potential(problem: ContactProblem, state: State | None = None) -> None:
-    """Check that the potential is more than known but for constants. Collective.
+    """Check that the potential of no connected component is floating. Collective.
 
     Parameters
     ----------
     problem
         The problem.
     state
-        A solution; before there is one, contact may be anywhere and conduct there.
-
-    Notes
-    -----
-    It is where it is prescribed, and where current flows, also through nodes that cannot move: to
-    a foundation, or to another component whose potential is known. Electrodes join the components
-    that they lie on.
+        A solution; without one, contact and current may be anywhere.
 
     Raises
     ------
     InputError
-        If no potential is prescribed and no current flows, as on a foundation that is conductive
-        but touched nowhere, or on a body that touches another one and does not conduct.
+        If a potential is neither prescribed nor determined by a current to a foundation or to
+        another component; electrodes join components.
     """
     if not problem.piezoelectric:
         return
     body, interface = problem.equilibrium, problem.interface
     component, count = body.components
-    # Constants by which the potential may be raised: of each component, and of each electrode.
+    # Constants that may be added to the potential: of each component, and of each electrode.
     raised = np.zeros((*body.free.shape, count))
     raised[np.arange(component.size), -1, component] = 1.0
     electrodes = np.eye(body.global_unknowns.size)[:, ~body.global_unknowns.mechanical]
@@ -344,7 +309,7 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
 def _flows(
     problem: ContactProblem, state: State | None
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell through which contact nodes current flows, or could, and through which held ones."""
+    """Return through which contact nodes current flows or could; and the nodes with supports."""
     interface = problem.interface
     law, held = interface.law, interface.held
     if state is None:
@@ -357,7 +322,7 @@ def _flows(
 
 
 def _conducts(law: InterfaceLaw | None, deep: float) -> NDArray[np.bool_]:
-    """Tell which nodes conduct where they are pressed, and far into the foundation."""
+    """Return which nodes conduct deep inside the foundation."""
     closed = np.ones(0 if law is None else law.jump.nodes.size, dtype=bool)
     if law is None or law.conductor is None:
         return ~closed

@@ -1,11 +1,8 @@
-"""Acceleration of the Uzawa block relaxation by minimising the residual over all solves so far.
+"""Acceleration of the Uzawa block relaxation: nonlinear GMRES over all solves so far.
 
-Every solve leaves a pair of contact forces and displacements that are in equilibrium, and so
-is every affine combination of such pairs: only complementarity is nonlinear. The method
-therefore looks for the combination that meets it best, which costs no linear
-solve, and takes the next step of the Uzawa block relaxation from there. Once the nodes in contact
-are the right ones this is GMRES with all solves as its Krylov space, also those that were
-made while the nodes were still wrong.
+Affine combinations of forces and displacements in equilibrium are in equilibrium: only
+complementarity is nonlinear. The combination of least defect of complementarity costs no linear
+solve, and is the next iterate. With the right active set this is GMRES.
 """
 
 from __future__ import annotations
@@ -17,12 +14,12 @@ import numpy as np
 
 from contact.typing import Array
 
-#: Trial lengths of a Gauss-Newton step, between two points, and beyond the newest one.
+#: Trial lengths: of a Gauss-Newton step, between two points, beyond the last one.
 DAMPED = 0.5 ** np.arange(5)
 BETWEEN = np.linspace(0, 1, 5)
 BEYOND = 2.0 ** np.arange(1, 21)
 
-#: Most Gauss-Newton steps in one search.
+#: Most Gauss-Newton steps of a search.
 SWEEPS = 20
 
 
@@ -62,21 +59,21 @@ class ResidualMinimiser:
         self._best: Array | None = None
 
     def next(self, force: Array, z: Array, image: Array) -> Array:
-        """Return the z to go on from. Collective.
+        """Return the next z. Collective.
 
         Parameters
         ----------
         force, z
-            The newest lambda and lambda + r u, shape (m,).
+            The last lambda and lambda + r u, shape (m,).
         image
-            The z with which the plain Uzawa block relaxation would go on.
+            The next z of the plain relaxation.
         """
         new, old = np.stack([force, z]), self._best
         if old is None:
             self._best = new
             return z
         self._append(new - old)
-        # Where nothing touches there is no slope to follow: look between the points as well.
+        # Without contact there is no slope: try points in between.
         starts = [old + t * (new - old) for t in BETWEEN]
         norms = self._defect_norms(starts)
         first = int(np.argmin(norms))
@@ -88,7 +85,7 @@ class ResidualMinimiser:
         if beyond is not None:
             self._best = beyond
             return beyond[1]
-        # No way down from here: a plain step, which always gets closer.
+        # No descent: a plain step, which contracts.
         self._directions.clear()
         self._best = new
         return image
@@ -102,7 +99,7 @@ class ResidualMinimiser:
         return np.sqrt(np.maximum(np.diag(self._inner(defects, defects)), 0.0))
 
     def _append(self, direction: Array) -> None:
-        """Add a direction, orthonormal in z to the others; nothing if it depends on them."""
+        """Add a direction, orthonormal in z to the others, unless it depends on them."""
         length = self._norm(direction)
         for _ in range(2):  # twice is enough, in spite of cancellation
             if self._directions:
@@ -136,10 +133,9 @@ class ResidualMinimiser:
         return point, norm
 
     def _beyond(self, old: Array, new: Array) -> Array | None:
-        """Go on from a step that changed nothing as far as nothing gets worse; None if it did.
+        """Extend a step without change of the forces until they change; else None.
 
-        A body that is held by the foundation alone moves freely until it touches: the forces
-        do not change, and nothing tells how far it is but to go there.
+        A body that contact alone constrains moves freely until it touches.
         """
         before, after = self._defect(old), self._defect(new)
         changes = np.column_stack([after - before, after])
@@ -153,11 +149,7 @@ class ResidualMinimiser:
 
 
 def least_squares(gram: Array, load: Array) -> Array:
-    """Solve the normal equations of directions of length 1.
-
-    Combinations that change the residual less than a millionth of their length are left out:
-    they act by rounding, as where a body moves that touches nothing.
-    """
+    """Solve the normal equations, without singular values below 1e-6: free motions."""
     values, vectors = np.linalg.eigh(gram)
     kept = values > 1e-12
     return vectors[:, kept] @ ((vectors[:, kept].T @ load) / values[kept])

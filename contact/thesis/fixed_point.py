@@ -1,7 +1,6 @@
 """Method `uzawa`, the outer loop of Algorithms 1, 4, 6 and 8: fixed point, Uzawa block relaxation.
 
-Elastic and piezoelectric bodies, rigid and compliant foundations differ in the terms that are
-frozen:
+The algorithms differ in the frozen terms:
 
 - Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
 - Algorithm 4, Problem (P~V): also psi, or all of the charge l where it is lagged.
@@ -30,11 +29,10 @@ from contact.thesis.outer_loop import NEAR, OuterLoop
 from contact.thesis.uzawa import augmentation, split, uzawa_block_relaxation
 from contact.typing import Array
 
-#: Outer iterations without progress after which the loop is given up where the Uzawa block
-#: relaxation gets no further either.
+#: Stagnation limit where the Uzawa block relaxation stagnates too.
 STALLED = 3
 
-#: Why the loop stalls far from a solution though its Uzawa block relaxations converge.
+#: Advice where the loop stalls though its Uzawa block relaxations converge.
 FROZEN = (
     " though each frozen problem is solved: the frozen terms (friction bound, conducting nodes, "
     "material) cycle"
@@ -62,27 +60,20 @@ class FixedPoint(OuterLoop):
     def solve(
         self, start: State | None = None, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
-        """Iterate until convergence, stagnation or the limit. Collective.
-
-        Parameters
-        ----------
-        start, linearised_at
-            Initial guess, zero by default; and unknowns at which the first secant is taken.
-        """
+        """Iterate until convergence, stagnation or the limit; see `Method`. Collective."""
         self._stalled, self._residual = False, np.inf
         self._gap_derivative = ConductivityDerivative(NEAR)
-        if not self.operator.symmetric:  # a solve does not depend on an earlier one
+        if not self.operator.symmetric:  # of an earlier solve
             self.operator = self._new_operator(symmetric=True)
         problem, interface = self.problem, self.problem.interface
         frictional = interface.friction.acts
         if start is None:
             self.state, self._secant_at = problem.start(), problem.equilibrium.rest()
             stuck = UnconstrainedModes(problem).stuck_bound()
-            # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
-            # updated in the Uzawa block relaxation needs none, and a body that friction alone holds
-            # has no such problem.
+            # Iteration 0 is the frictionless problem of the thesis: none with a bound that is
+            # updated in the relaxation, or with a mode that friction alone constrains.
             first = 0 if frictional and not self.options.single_loop and stuck is None else 1
-            # At zero strain: prescribed values strain the elements beside them alone.
+            # Secant at zero strain: prescribed values strain the elements beside them alone.
             self._z = self._about(0.0, frictional and first > 0)
             self.bound = np.zeros(interface.jump.gap.size) if stuck is None else stuck
         else:
@@ -101,22 +92,22 @@ class FixedPoint(OuterLoop):
         return self.state, outcome
 
     def _about(self, z: Array | float, friction: bool) -> Array:
-        """Return a state of the relaxation lambda + r u as it is about the iterate: less r u_0."""
+        """Return z = lambda + r (u - u_0) of lambda + r u, with u_0 of the iterate."""
         nodal = self.problem.interface.jump.apply(self.state.x)
         return z - self.r * split(self.problem.interface, nodal, friction)
 
     def _step(self, iteration: int) -> tuple[int, str]:
-        """Freeze, solve the frozen problem, and move the state."""
+        """Freeze, and solve by the Uzawa block relaxation."""
         problem, interface = self.problem, self.problem.interface
         friction, body = interface.friction.acts and iteration > 0, problem.equilibrium
         if friction and self._first == 0 and iteration == 1:
-            # The slip without friction is a bad guess, and so is the contact that goes with it.
+            # Slip and contact without friction are a bad initial guess.
             self._z = self._about(0.0, friction)
         state, nodal = self.state, interface.jump.apply(self.state.x)
         blocks = augmentation(interface.jump, self.r, friction)
         if interface.law.active:
             blocks = blocks + self._current_block(nodal, interface.pressure(nodal, state.forces))
-        # Newton's tangent of a zero strain is the secant, and cheaper.
+        # At zero strain the tangent is the secant.
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
         linearised_at = self._secant_at if kind == "secant" else state.x
         weighted = interface.weighted(blocks, state.x)
@@ -134,7 +125,6 @@ class FixedPoint(OuterLoop):
             self._norm,
             self.recorder.poll,
         )
-        # With frozen terms that is left then: their derivatives change the inner problem.
         self._stalled = result.stalled and not self._gap_derivative.included
         x = body.moved(state.x, result.increment)
         self.state, self._z = replace(state, x=x, forces=result.forces), result.z
@@ -142,10 +132,7 @@ class FixedPoint(OuterLoop):
         return result.iterations, "tangent" if kind == "tangent" else ""
 
     def _current_block(self, nodal: Array, pressure: Array) -> Array:
-        """Linearise the charge: near the solution with psi, which depends on the gap.
-
-        Frozen, a steep ramp costs many iterations there; its derivative overshoots from afar.
-        """
+        """Linearise the charge, near the solution with the derivative of psi by the gap."""
         law = self.problem.interface.law
         if not law.follows_gap or not self._gap_derivative(self._residual):
             return law.current_block(nodal, pressure)
@@ -153,12 +140,13 @@ class FixedPoint(OuterLoop):
             self.operator = self._new_operator(symmetric=False)
         return law.current_block(nodal, pressure, full=True)
 
-    def _measure(self, residuals: Residuals) -> float:
+    def _target(self, residuals: Residuals) -> float:
+        """Return the largest residual."""
         self._residual = residuals.significant
         return self._residual
 
     def _adapt(self, residual: float, best: float) -> None:
-        """Take the material's tangent near the solution: far away it is too soft."""
+        """Choose the tangent of the material near the solution."""
         choice = self.options.material_step
         if choice == "auto" and not self.problem.equilibrium.linear:
             self._tangent = residual < (2 * best if self._tangent else NEAR)

@@ -1,8 +1,9 @@
 """The frame of the thesis's outer loops, Algorithms 1, 3, 4, 6 and 8: freeze, solve, update.
 
-Each outer iteration freezes nonlinear terms (Kacanov's secant modulus, the friction bound), solves
-the frozen problem by an inner iteration and evaluates the residuals. `fixed_point` and `penalty`
-differ in the step. Where a loop fails its best iterate is left, by the thesis's rules the last.
+An outer iteration freezes nonlinear terms (Kacanov's secant modulus, the friction bound), solves
+the frozen problem by an inner iteration, and evaluates the residuals. `fixed_point` and `penalty`
+differ in the step. A loop that fails ends with its best iterate, by the thesis's rules with the
+last.
 """
 
 from __future__ import annotations
@@ -23,17 +24,16 @@ from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Residual below which frozen coefficients give way to their derivatives: from afar these
-#: overshoot.
+#: Residual below which tangents take the place of frozen coefficients.
 NEAR = 1e-2
 
-#: Note of a step that could not be taken, as its linear system was singular.
+#: Note of a step with a singular linear system.
 LOST = "the body has been moved to where nothing constrains it"
 
 
 @dataclass
 class OuterLoop(ABC):
-    """An outer loop, one iteration at a time.
+    """Outer loop of the algorithms of the thesis.
 
     Parameters
     ----------
@@ -42,12 +42,12 @@ class OuterLoop(ABC):
     options
         Options of the loop, a `LoopOptions`.
     monitor
-        Told of every outer iteration.
+        Called after each outer iteration.
 
     Attributes
     ----------
     state, bound
-        The state after the last outer iteration, and its friction bound, shape (n,) (stress).
+        Last iterate, and its friction bound, shape (n,) (stress).
     """
 
     problem: ContactProblem
@@ -55,7 +55,7 @@ class OuterLoop(ABC):
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
 
-    #: Outer iterations without progress after which the loop is given up, and progress.
+    #: Stagnation limit, and ratio of residuals that is progress.
     stagnation: ClassVar[tuple[int, float]]
 
     def __post_init__(self) -> None:
@@ -65,7 +65,7 @@ class OuterLoop(ABC):
         self.set_load_step(self.problem)
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Go on with another step of the same problem; factorisations remain."""
+        """Take another load step of the same problem; factorisations remain."""
         self.problem, self.state = problem, problem.start()
         self.recorder = Recorder(self.monitor)
         self.bound: Array = np.zeros(problem.interface.jump.gap.size)
@@ -77,26 +77,26 @@ class OuterLoop(ABC):
 
     @abstractmethod
     def _step(self, iteration: int) -> tuple[int, str]:
-        """Move the state by a frozen problem; return its inner iterations and a note."""
+        """Solve a frozen problem for the state; return its inner iterations and a note."""
 
     @abstractmethod
-    def _measure(self, residuals: Residuals) -> float:
-        """Return the residual that is to vanish."""
+    def _target(self, residuals: Residuals) -> float:
+        """Return the residual that the loop controls."""
 
     @abstractmethod
     def _adapt(self, residual: float, best: float) -> None:
-        """Choose the next linearisation, given the last residual and the least one."""
+        """Choose the next linearisation by the last residual and the least one."""
 
     def _limit(self) -> int:
         """Return the stagnation limit."""
         return self.stagnation[0]
 
     def _advice(self, residual: float | None = None) -> str:
-        """Say more of an end without convergence; at a residual where it stalled there."""
+        """Return advice on failure; `residual`: where the loop stalled."""
         return ""
 
     def _iterate(self, first: int = 1) -> Outcome:
-        """Iterate until convergence, stagnation or the limit, and leave the best iterate."""
+        """Iterate until convergence, stagnation or the limit; keep the best iterate."""
         begin, problem, options = time.perf_counter(), self.problem, self.options
         stagnation = Stagnation(*self.stagnation)
         best: Best[tuple[State, Residuals]] = Best()
@@ -105,7 +105,7 @@ class OuterLoop(ABC):
             previous = self.state
             inner, note = self._step(iteration)
             residuals = evaluate(problem, self.state)
-            residual = self._measure(residuals)
+            residual = self._target(residuals)
             best.see((self.state, residuals), residual)
             change, seconds = self._update_bound(iteration), time.perf_counter() - begin
             self.recorder.add(Record(iteration, inner, residuals, change, seconds, note))
@@ -134,15 +134,12 @@ class OuterLoop(ABC):
         return self._outcome(residuals, ended)
 
     def _update_bound(self, iteration: int) -> float:
-        """Update the friction bound; return its relative change (3.46), NaN without friction.
-
-        After the frictionless start, iteration 0, it is that of zero slip.
-        """
+        """Update the friction bound; return its relative change (3.46), NaN without friction."""
         interface, forces, old = self.problem.interface, self.state.forces, self.bound
         if not interface.friction.acts:
             return np.nan
         nodal = interface.jump.apply(self.state.x)
-        if iteration == 0:
+        if iteration == 0:  # frictionless start: bound of zero slip
             pressure = interface.pressure(nodal, forces)
             self.bound = interface.friction.bound(pressure, np.zeros_like(pressure))
         else:
@@ -151,7 +148,7 @@ class OuterLoop(ABC):
         return interface.jump.norm(self.bound - old) / size if size > 0 else 0.0
 
     def _thesis_criterion(self, change: float, previous: State) -> bool:
-        """Tell whether (4.38), or (6.40), is met: the displacement has changed by little."""
+        """Tell whether (4.38) or (6.40) is met, on the change of the displacement."""
         assert self._norm is not None
         own = self.problem.equilibrium.owned_part
         now, before = own(self.state.x), own(previous.x)

@@ -1,19 +1,15 @@
 """Algorithm 3: the penalty method, through PETSc's SNES.
 
-The Signorini and Coulomb conditions are replaced by the laws of `contact.interface.penalised`,
-so that the penalised problem (PV_eps) is one nonlinear equation in the displacement. An outer
-iteration freezes the secant modulus of the material and the friction modulus of (4.33); the rest
-of (4.32), the unilateral [u_nu - rho]^+ of the *new* iterate, is solved by SNES as a
-semismooth equation, with a compliant layer where there is one. An outer count is that of
-Algorithm 3; the inner one counts SNES's iterations. SNES takes full steps while friction is lagged,
-and has a backtracking line search with implicit friction and with a layer that is not lagged.
+The laws of `contact.interface.penalised` replace those of Signorini and Coulomb: the penalised
+problem (PV_eps) is one nonlinear equation in the displacement. An outer iteration freezes the
+secant modulus of the material and the friction modulus of (4.33); (4.32), with [u_nu - rho]^+ of
+the *new* iterate and a compliant layer, is solved by SNES as a semismooth equation. Outer
+iterations are those of Algorithm 3, inner ones those of SNES. SNES takes full steps while friction
+is lagged, and has a backtracking line search with implicit friction or a layer that is not lagged.
 
-Convergence. A penalty run solves the penalised problem: it has converged when the equilibrium
-residual with the forces of the regularised laws at the final displacement is below the
-tolerance (those laws then hold by construction). The residuals `contact` and `friction` of the
-reported KKT are those of the Signorini-Coulomb laws themselves; they measure how far the
-penalised solution is from the limit, and fall like eps. Where they are above
-`LARGEST_VIOLATION`, the solution says nothing of contact, and the run has not converged.
+Convergence is that of equilibrium with the forces of the penalised laws. The residuals `contact`
+and `friction` are those of Signorini's and Coulomb's laws: the error of the penalised solution, of
+order eps. Above `LARGEST_VIOLATION` the method has not converged.
 """
 
 from __future__ import annotations
@@ -29,7 +25,6 @@ from petsc4py import PETSc
 from contact.errors import InputError, SingularError
 from contact.interface.penalised import PenalisedLaw, Regularisation, outer
 from contact.linear.faults import petsc_options
-from contact.linear.krylov import Packing, shell
 from contact.linear.operator import Counters
 from contact.methods.options import PenaltyOptions
 from contact.methods.report import Outcome
@@ -47,11 +42,10 @@ logger = logging.getLogger("contact.inner")
 
 
 class PenalisedProblem:
-    """The nonlinear problem of an outer iteration, in the owned unknowns.
+    """The nonlinear problem of an outer iteration, with SNES (prefix of options ``penalty_``).
 
-    SNES asks `SparseOperator` for its linear solves, through a shell preconditioner. Its residual
-    are forces, and charges, over the norms of those that act. Its options have the prefix
-    ``penalty_``, for instance ``-penalty_snes_monitor``.
+    Linear solves are those of `operator`, through a shell preconditioner. The residual is relative
+    to the norms of forces and charges.
     """
 
     def __init__(
@@ -69,24 +63,27 @@ class PenalisedProblem:
         self.operator = problem.operator(
             symmetric=symmetric, counters=counters, kind=options.linear
         )
-        self._packing = Packing(problem.comm, self._body.global_unknowns.size)
-        matrix = shell(self, problem.comm, self._body.owned, self._body.global_unknowns.size)
+        # Global unknowns are on the first rank, behind its own ones.
+        self._here = self._body.global_unknowns.size if problem.comm.rank == 0 else 0
+        size = (self._body.owned + self._here, None)
+        matrix = PETSc.Mat().createPython((size, size), self, problem.comm)
+        matrix.setUp()
         self._iterate, self._residual = matrix.createVecs()
         self.snes = PETSc.SNES().create(problem.comm)
         self.snes.setOptionsPrefix("penalty_")
         self.snes.setFunction(self._function, self._residual)
         self.snes.setJacobian(self._jacobian, matrix)
-        self.snes.setMonitor(self._tell)
+        words = "inner iteration %d: residual %.2e"
+        self.snes.setMonitor(lambda _, iteration, norm: logger.debug(words, iteration, norm))
         self.snes.getKSP().setType("preonly")
         pc = self.snes.getKSP().getPC()
         pc.setType("python")
         pc.setPythonContext(self)
-        # A wrong active set raises the residual by 1/eps, for a step.
+        # A change of the active set may raise the residual by 1/eps.
         self.snes.setDivergenceTolerance(1e300)
-        # Full steps: the active set of the pressure settles in a few of them, while a line
-        # search on the residual, which has kinks of the size 1/eps, takes tiny ones. A layer that
-        # saturates needs the search: full steps cycle between its open and its saturated state.
-        # So do implicit friction and material: full steps jump between sticking and sliding.
+        # Full steps find the active set in a few iterations; a line search on the residual, with
+        # kinks of size 1/eps, takes tiny steps. With a layer that saturates, or implicit friction,
+        # full steps cycle.
         given = PETSc.Options()
         name = "penalty_snes_linesearch_type"
         default = not given.hasName(name)
@@ -101,39 +98,42 @@ class PenalisedProblem:
                 given.delValue(name)
 
     def set_load_step(self, problem: ContactProblem, eps: Regularisation) -> None:
-        """Go on with another step of the same problem."""
+        """Take another load step of the same problem."""
         self._problem, self._interface, self._eps = problem, problem.interface, eps
 
     def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve with the operator: the preconditioner of SNES's KSP."""
         try:
             self._poll()
-            found = self.operator.solve(self._units * self._packing.unpacked(rhs.array_r))
-            solution.array[:] = self._packing.packed(found)
+            found = self.operator.solve(self._units * self._unpacked(rhs.array_r))
+            solution.array[:] = self._packed(found)
         except (InputError, Interrupted) as error:
-            # Not through PETSc, which would wrap it; SNES stops at a solution without numbers.
+            # PETSc would wrap the error; SNES stops at NaN.
             self._error = error
             solution.array[:] = np.nan
 
-    def multiply(self, values: Array) -> Array:
-        """Return the derivative of the residual times owned values. Collective."""
-        return self.operator.multiply(values) / self._units
+    def mult(self, _: Any, vector: PETSc.Vec, image: PETSc.Vec) -> None:
+        """Multiply by the derivative of the residual."""
+        image.array[:] = self._packed(
+            self.operator.multiply(self._unpacked(vector.array_r)) / self._units
+        )
+
+    def _packed(self, values: Array) -> Array:
+        """Return the entries of PETSc's vectors on this rank of owned and global values."""
+        return values[: self._body.owned + self._here]
+
+    def _unpacked(self, values: Array) -> Array:
+        """Return owned values and global ones behind them, the same on all ranks. Collective."""
+        own, first = np.split(values, [self._body.owned])
+        return np.concatenate([own, self._problem.comm.bcast(first)])
 
     def solve(
         self, law: PenalisedLaw, state: State, implicit: bool, poll: Callable[[], None]
     ) -> tuple[Array, int, str]:
-        """Solve from a state; return the unknowns, the iterations and the fault, if any.
+        """Solve from a state; return unknowns, number of iterations, and fault or "". Collective.
 
-        Before each of them `poll` is called, on all ranks.
-
-        Raises
-        ------
-        Interrupted
-            If `poll` raises it.
-        SingularError
-            If nothing holds the body at an iterate.
-        InputError
-            If numbers overflow, where the laws are not implicit.
+        `poll` is called before each linear solve. Raises SingularError, and InputError for overflow
+        with lagged laws.
         """
         body, interface = self._body, self._interface
         nodal = interface.jump.apply(state.x)
@@ -145,7 +145,7 @@ class PenalisedProblem:
         self._current_block = interface.law.current_block(nodal, pressure)
         self._layer = interface.law.normal_law(nodal)
         if self._layer is not None:
-            # Like the unilateral [.]^+ it is that of the new iterate, but for h_nu.
+            # Of the new iterate, as [.]^+, but for h_nu.
             self._response[:, : body.dim] = 0.0
         residual = residual_forces(self._problem, state)
         on_contact = np.zeros_like(residual)
@@ -155,13 +155,13 @@ class PenalisedProblem:
         self._units = body.component_norms.spread(np.where(norms > 0, norms, 1.0))
         self.snes.setTolerances(
             rtol=1e-14,
-            # Rounding is magnified by 1/eps: the residual may stay above any tolerance.
+            # The residual has rounding errors of size 1/eps.
             stol=1e-14,
             atol=self._options.tolerance / 10,
             max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
         )
         self._error, self._poll = None, poll
-        self._iterate.array[:] = self._packing.packed(body.owned_part(state.x) + self._touch())
+        self._iterate.array[:] = self._packed(body.owned_part(state.x) + self._touch())
         self.snes.solve(None, self._iterate)
         lasting = isinstance(self._error, SingularError | Interrupted)
         if self._error is not None and (lasting or not implicit):
@@ -171,13 +171,13 @@ class PenalisedProblem:
         return self._unknowns(self._iterate), self.snes.getIterationNumber(), note
 
     def _touch(self) -> Array:
-        """Return a first guess: zero, or where nothing touches yet, the closest nodes in touch.
+        """Return an initial increment that closes the smallest gaps; zero if a node touches.
 
-        A body that only the foundation holds would otherwise give a singular first system.
+        Without contact the first system may be singular.
         """
         body, interface, nodal = self._body, self._interface, self._nodal
         jump, state = interface.jump, self._state
-        # Of the rigid part, or without one of the layer.
+        # Gap of the rigid part, or of the layer alone.
         opening = jump.normal_component(nodal) - interface.law.jump.gap
         closest = jump.maximum(opening, -np.inf)
         if closest >= 0:
@@ -194,10 +194,7 @@ class PenalisedProblem:
 
     def _unknowns(self, iterate: PETSc.Vec) -> Array:
         """Return the local unknowns of an iterate of SNES. Collective."""
-        return self._body.local(self._packing.unpacked(iterate.array_r))
-
-    def _tell(self, _: PETSc.SNES, iteration: int, norm: float) -> None:
-        logger.debug("inner iteration %d: residual %.2e", iteration, norm)
+        return self._body.local(self._unpacked(iterate.array_r))
 
     def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
         body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
@@ -211,7 +208,7 @@ class PenalisedProblem:
             u_n = np.minimum(jump.normal_component(nodal), jump.gap)
             change[:, : jump.dim] += self._layer.layer(u_n)[:, None] * jump.normal
         jump.transpose(jump.weight[:, None] * (self._response + change), values)
-        residual.array[:] = self._packing.packed(body.unbalanced(values) / self._units)
+        residual.array[:] = self._packed(body.unbalanced(values) / self._units)
 
     def _jacobian(
         self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
@@ -232,20 +229,19 @@ class PenalisedProblem:
         self._assembled = True
 
 
-#: Advice at an end without convergence.
+#: Advice on failure.
 HARDER = "; the larger eps_contact and eps_slip, the easier the problem"
 
-#: Least part of the displacement that a step is taken to add to it.
+#: Least increment of the displacement in a load step, over the displacement.
 LEAST_ADDED = 1e-2
 
 
 def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regularisation:
     """Return the parameters of the penalised laws. Collective.
 
-    Those that are not given fit the body, its mesh and its loads, in any units. The foundation is a
-    hundred times stiffer than a layer of elements, E/h. The slip length is a hundredth of the
-    displacement that the loads, as a stress on Gamma_3, give a block of the body's size; in a step
-    of an evolution, their increment there.
+    By default the foundation is 100 E/h stiff, h the spacing of the contact nodes, and the slip
+    length is a hundredth of the displacement of a block of the body's size under the loads, or
+    under their increment in a load step.
     """
     body, scales = problem.equilibrium, problem.scales
     loads, prescribed = body.external(problem.time), problem.start().x
@@ -255,7 +251,7 @@ def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regulari
         added = loads - body.external(problem.since), prescribed - before
         displacement = max(*expected_displacements(problem, *added), LEAST_ADDED * displacement)
     slip = 1e-2 * displacement or 1e-6 * scales.size
-    # Of the part in contact: slips of a stiff one are its own, however soft its support is.
+    # Modulus of the part in contact, however soft its support is.
     young = problem.interface.stiffness * scales.size
     contact, slip = 1e-2 * scales.spacing / young, slip * min(1.0, scales.young / young)
     if options.eps_contact is not None:
@@ -268,7 +264,7 @@ class Penalty(OuterLoop):
     """Algorithm 3; see `OuterLoop`."""
 
     options: PenaltyOptions
-    #: The lagged friction modulus can creep: only the last hundred iterations count.
+    #: The lagged friction modulus may creep.
     stagnation: ClassVar[tuple[int, float]] = (100, 0.99)
 
     def __post_init__(self) -> None:
@@ -277,7 +273,7 @@ class Penalty(OuterLoop):
         super().__post_init__()
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Go on with another step of the same problem; factorisations remain."""
+        """Take another load step of the same problem; factorisations remain."""
         super().set_load_step(problem)
         self._eps = regularisation(problem, self.options)
         for solver in self._solvers.values():
@@ -286,21 +282,15 @@ class Penalty(OuterLoop):
     def solve(
         self, start: State | None = None, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
-        """Iterate until convergence, stagnation or the limit. Collective.
+        """Iterate until convergence, stagnation or the limit; see `Method`. Collective.
 
-        Parameters
-        ----------
-        start
-            Initial guess; zero by default. From the solution of a somewhat larger eps, small
-            ones are reached that are too hard from there.
-        linearised_at
-            Of no effect.
+        Small eps may need the solution of a larger one as initial guess.
         """
         self.state = self.problem.start() if start is None else start
         self.bound = np.zeros_like(self.bound)
         self._implicit = start is not None and self.options.material_step != "secant"
         self._failed = False
-        # The residual below which material and friction become implicit.
+        # Residual below which material and friction are implicit.
         self._switch = {"secant": 0.0, "auto": NEAR, "tangent": np.inf}[self.options.material_step]
         outcome = self._iterate()
         return self.state, outcome
@@ -310,14 +300,14 @@ class Penalty(OuterLoop):
         interface, implicit = self.problem.interface, self._implicit
         x, inner, fault = self._solve(implicit)
         self._failed = implicit and bool(fault)
-        if self._failed:  # Algorithm 3 goes on a while
+        if self._failed:  # go on with lagged terms
             x, fault = self.state.x, f"implicit: {fault}"
         forces = PenalisedLaw(interface, self._eps).forces(interface.jump.apply(x))
         self.state = replace(self.state, x=x, forces=forces)
         return inner, fault or ("implicit" if implicit else "")
 
     def _solve(self, implicit: bool) -> tuple[Array, int, str]:
-        """Return the unknowns that SNES finds, its iterations and the fault, if any."""
+        """Return unknowns, number of iterations, and fault or ""."""
         interface = self.problem.interface
         nodal = interface.jump.apply(self.state.x)
         law = PenalisedLaw(interface, self._eps) if implicit else self._lagged(nodal)
@@ -333,25 +323,25 @@ class Penalty(OuterLoop):
             taken = solver.snes.getIterationNumber()
             if taken == 0 and not self.history:
                 raise
-            del self._solvers[symmetric]  # MUMPS does not begin anew after that
+            del self._solvers[symmetric]  # MUMPS does not recover
             return self.state.x, taken, LOST
 
     def _lagged(self, nodal: Array) -> PenalisedLaw:
-        """Return the laws with the friction of an iterate; of stuck nodes where that has none.
+        """Return the laws with the friction modulus of an iterate; sticking if it has no pressure.
 
-        At zero displacement there is no pressure, so no friction: a body that friction alone
-        constrains would fly away.
+        A mode that friction alone constrains would be unconstrained at zero displacement.
         """
         law = PenalisedLaw(self.problem.interface, self._eps, nodal)
         if not law.acts() and UnconstrainedModes(self.problem).friction_alone:
             law.stick()
         return law
 
-    def _measure(self, residuals: Residuals) -> float:
+    def _target(self, residuals: Residuals) -> float:
+        """Return the residual of equilibrium."""
         return residuals.equilibrium
 
     def _adapt(self, residual: float, best: float) -> None:
-        """Go on implicitly near the solution; nearer where that has failed."""
+        """Choose implicit laws near the solution; nearer after a failure."""
         self._switch = best / 10 if self._failed else self._switch
         self._implicit = residual < self._switch
 

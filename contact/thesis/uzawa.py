@@ -1,11 +1,10 @@
 """Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
 
-One step solves for u, projects the auxiliary variables phi and updates the multipliers
-lambda, (3.34)-(3.36): the alternating direction method of multipliers. The next step needs only
-lambda + r u of it: the next multiplier is the projection of that sum, and r phi the rest. The step
-is therefore a fixed-point map, which `acceleration` speeds up. Its variable is
-z = lambda + r (u - u_0), with u_0 of the outer iterate: a small lambda beside a large slip
-would be lost in rounding.
+One step solves for u, projects the auxiliary variables phi and updates the multipliers lambda,
+(3.34)-(3.36): the alternating direction method of multipliers. It is a fixed-point map of
+lambda + r u, whose projection is the next multiplier, and r phi the rest; `acceleration` speeds it
+up. The variable is z = lambda + r (u - u_0), with u_0 of the outer iterate, against rounding of a
+small lambda beside a large slip.
 
 References
 ----------
@@ -44,12 +43,12 @@ from forms.foundation import contact_multiplier
 
 logger = logging.getLogger("contact.inner")
 
-#: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
-#: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
+#: Stagnation limits of the accelerated and of the plain relaxation, which creeps with r far from
+#: r*; ratio of residuals that is progress.
 STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
 
-#: Tolerance of an iterative solver over that of the relaxation: with one as large it returns its
-#: initial guess, and rounding decides when it does.
+#: Tolerance of an iterative solver over that of the relaxation, so that it moves off its initial
+#: guess.
 SHARE = 0.1
 
 
@@ -64,24 +63,21 @@ def augmentation(jump: ContactNodes, r: float, friction: bool) -> Array:
 
 
 def split(interface: Interface, nodal: Array, friction: bool) -> Array:
-    """Return normal displacements and slips side by side, shape (n, 1 + d).
-
-    Without friction the slips are no unknowns of the relaxation, and 0 here.
-    """
-    parts = components(interface.jump, nodal, friction)
+    """Return normal displacement and slip, shape (n, 1 + d); slip 0 without friction."""
+    parts = normal_and_tangential(interface.jump, nodal, friction)
     parts[:, 1:] -= friction * interface.friction.history.jump
     return parts
 
 
-def components(jump: ContactNodes, nodal: Array, friction: bool) -> Array:
-    """Return normal and tangential displacements side by side, shape (n, 1 + d); as `split`."""
+def normal_and_tangential(jump: ContactNodes, nodal: Array, friction: bool) -> Array:
+    """Return normal and tangential displacement, shape (n, 1 + d); 0 without friction."""
     tangential = friction * jump.tangential_component(nodal)
     return np.column_stack([jump.normal_component(nodal), tangential])
 
 
 @dataclass
 class Relaxed:
-    """Outcome of a Uzawa block relaxation.
+    """End of a Uzawa block relaxation.
 
     Attributes
     ----------
@@ -90,11 +86,11 @@ class Relaxed:
     forces
         Multipliers in equilibrium with the iterate.
     z
-        State to start the next relaxation from, relative to the new iterate, shape (n, 1 + d).
+        Variable of the next relaxation, about the new iterate, shape (n, 1 + d).
     iterations
         Number of linear solves.
     stalled
-        Whether it was given up because nothing got better: rounding, as a rule.
+        Whether the stagnation limit has ended it.
     """
 
     increment: Array
@@ -106,9 +102,7 @@ class Relaxed:
 
 @dataclass
 class _Projection:
-    """Steps 2 and 3, from z of shape (..., n, 1 + d) to the new multipliers: (3.43) and the disc.
-
-    All that is given is about `origin`.
+    """Steps 2 and 3, from z, shape (..., n, 1 + d), to the multipliers: (3.43) and the disc.
 
     Attributes
     ----------
@@ -117,10 +111,10 @@ class _Projection:
     bound
         Friction bound, shape (n,).
     law
-        The compliant layer in front of the rigid part, which is solved with the constraint; None
-        without one. The multipliers are then those of the total pressure -sigma_nu.
+        Compliant layer in front of the rigid part, None without one; multipliers are then those of
+        the total pressure -sigma_nu.
     origin
-        r u_0 of the iterate, shape (n, 1 + d).
+        r u_0, shape (n, 1 + d).
     """
 
     jump: ContactNodes
@@ -135,14 +129,14 @@ class _Projection:
         if self.law is None:
             pressure = np.asarray(contact_multiplier(z[..., 0], self.r, 0.0, self.jump.gap))
         else:
-            # Laws of users take one value a node.
+            # Laws of users take one value per node.
             rows = z[..., 0].reshape(math.prod(z.shape[:-2]), z.shape[-2])
             pressure = np.reshape([self.law.pressure(row, self.r) for row in rows], z.shape[:-1])
         friction = project_disc(z[..., 1:], self.bound)
         return np.concatenate([pressure[..., None], friction], axis=-1)
 
     def derivative(self, z: Array, directions: Array) -> Array:
-        """Return their derivatives along directions of shape (n, 1 + d, k)."""
+        """Return the derivatives of the multipliers along directions, shape (n, 1 + d, k)."""
         z = z + self.origin
         if self.law is None:
             slope = np.where(z[:, 0] > self.r * self.jump.gap, 1.0, 0.0)
@@ -153,7 +147,7 @@ class _Projection:
         return np.concatenate([normal, tangential], axis=1)
 
     def accelerator(self, depth: int, size: Array) -> ResidualMinimiser:
-        """Return the acceleration of z as a flat array; `size`: unit of forces, (n,)."""
+        """Return the acceleration of the flat z; `size`: unit of stresses, (n,)."""
         jump, shape = self.jump, (self.jump.weight.size, 1 + self.jump.normal.shape[1])
         weights = np.repeat(jump.weight / size**2, shape[1])
 
@@ -171,11 +165,7 @@ class _Projection:
 
 
 def _residual(problem: Problem, state: State, secant_at: Array, layer: bool) -> Array:
-    """Return the owned residual without the multipliers, the unknowns of the relaxation.
-
-    Neither is the layer's pressure a part of it, unless it is lagged. The contact flag of the
-    perfect conductor still looks at the last pressure. Collective.
-    """
+    """Return the owned residual without multipliers and implicit layer. Collective."""
     interface, jump = problem.interface, problem.interface.jump
     residual, unknown = residual_forces(problem, state, secant_at), state.forces.vectors(jump)
     if layer:
@@ -205,21 +195,21 @@ def uzawa_block_relaxation(
     problem, state
         The problem, and the iterate at which it is frozen.
     operator
-        Factorised operator, with `augmentation(jump, r, friction)`.
+        Factorised operator with `augmentation(jump, r, friction)`.
     bound
         Friction bound s_n, shape (n,).
     friction
-        Whether tangential forces act.
+        Whether there is friction.
     secant_at
-        Unknowns at which the secant modulus of the material is taken.
+        Unknowns of the secant modulus.
     z
-        lambda + r (u - u_0) to start from, shape (n, 1 + d); u_0 is that of the iterate.
+        Initial lambda + r (u - u_0), shape (n, 1 + d), with u_0 of the iterate.
     r, options
         Augmentation parameter (stress/length), and the options.
     domain_norm
-        L2(Omega) norm of owned unknowns: ends the relaxation by the thesis's criterion (3.45).
+        L2(Omega) norm of owned unknowns, for the thesis's criterion (3.45); None for residuals.
     poll
-        Called before every iteration, on all ranks; an exception ends the relaxation.
+        Called before each iteration, on all ranks.
     """
     interface, jump = problem.interface, problem.interface.jump
     at, own = jump.apply(state.x), problem.equilibrium.owned_part(state.x)
@@ -236,8 +226,7 @@ def uzawa_block_relaxation(
     stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
     for iteration in range(1, options.max_inner + 1):
         poll()
-        # Neither projections nor solves change the part of z along the normal beside its first
-        # column: of rounding, the acceleration makes a pressure that no law sees.
+        # Tangential again: rounding along the normal would be amplified by the acceleration.
         z[:, 1:] = jump.tangential_component(z[:, 1:])
         multiplier = project(z)
         q = 2 * multiplier - z
@@ -247,8 +236,8 @@ def uzawa_block_relaxation(
         increment = operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
         moved = jump.apply(increment)
         nodal = at + moved
-        way = r * components(jump, moved, friction)
-        # q + r (u - u_0) is the force that the foundation exerted in this very solve.
+        way = r * normal_and_tangential(jump, moved, friction)
+        # q + r (u - u_0) is the contact force of this solve.
         total = q + way
         if iteration == 1:
             beside = interface.component_norms(total)
@@ -260,7 +249,7 @@ def uzawa_block_relaxation(
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         image = multiplier + (1 - over) * (z - multiplier) + over * way
         done = residual <= options.inner or not np.isfinite(residual)
-        # Not the residual: where nothing touches yet it is small, beside the stress of closing.
+        # The residual is small before contact, the defect of the fixed point is not.
         measured = jump.norm((total - project(total + way)) / beside[:, None])
         if domain_norm is not None:
             phi: Array = (image + origin - project(image)) * (1 / r)
