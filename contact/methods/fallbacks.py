@@ -126,7 +126,7 @@ def from_open(
 ) -> tuple[tuple[State, Outcome] | None, State | None]:
     """Return a solution with all nodes open or by a working set, and the state without contact.
 
-    None for what there is not. Collective.
+    None where the linear system is singular, or without such a solution. Collective.
     """
     problem, best = newton.problem, newton.best.found
     try:
