@@ -21,7 +21,8 @@ and a problem that is put together in Python by
 - Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
   `Level`, `Heights`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`,
   `Coulomb`; `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
-- Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
+- Solving: `Problem`, `solve`, `solve_steps`, `evolve`; `NewtonOptions`, `FixedPointOptions`,
+  `PenaltyOptions`.
 - Derivatives: `sensitivity` by `Parameter` gives `Sensitivities`; `gap_gradient` and
   `field_gradient`; `identify` with `read_data` finds parameters from measurements, `Identified`.
 - Case files: `Case`, `load_case`, `parse_case`, `build_problem`.

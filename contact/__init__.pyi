@@ -50,6 +50,7 @@ from contact.solving import NotConvergedError as NotConvergedError
 from contact.solving import SolveInterrupted as SolveInterrupted
 from contact.solving import evolve as evolve
 from contact.solving import solve as solve
+from contact.solving import solve_steps as solve_steps
 from contact.writing import write_outputs as write_outputs
 from forms.hencky import Linear as Linear
 from forms.hencky import Log as Log

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -27,8 +28,13 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.adapt")
 
-#: Solves a problem from an initial guess; the solution is not reviewed.
-Solver = Callable[[ContactProblem, State | None], Solution]
+
+class Solver(Protocol):
+    """Solves a problem from an initial guess; the solution is not reviewed."""
+
+    def __call__(self, problem: ContactProblem, *, start: State | None) -> Solution:
+        """Return the solution. Collective."""
+
 
 #: Cells whose indicator is within that of the last one marked are marked too: rounding, which
 #: differs by the number of ranks, decides nothing.
@@ -61,7 +67,7 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
         if solution is not None and not solution.steps:
             start = prolong(solution.problem, solution.state, problem)
         before = solution
-        solution = solve(problem, start)
+        solution = solve(problem, start=start)
         if solution.outcome.signal:
             break
         if solution.converged:

@@ -60,9 +60,14 @@ def pays(case: Case, problem: ContactProblem) -> bool:
     return slow and enough and case.evolution is None and has_coarser(case)
 
 
-def default_start(case: Case, problem: ContactProblem) -> State | None:
-    """Return a start from coarser meshes where that pays, and the case fits these. Collective."""
-    if not pays(case, problem):
+def default_start(
+    case: Case, problem: ContactProblem, **replacements: Unpack[Replacements]
+) -> State | None:
+    """Return a start from coarser meshes where the case asks for it, or it pays. Collective."""
+    nested = case.solver.nested if isinstance(case.solver, NewtonOptions) else False
+    if nested:
+        return nested_start(case, problem, **replacements)
+    if nested is not None or replacements or not pays(case, problem):
         return None
     try:
         return nested_start(case, problem)

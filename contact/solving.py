@@ -1,6 +1,6 @@
 """Solve a case or a problem: one step, or one load step after the other.
 
-A static solve is an evolution of one step: both are `run_schedule`.
+A static solve is an evolution of one step: both are `solve_problem`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import logging
 import signal
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from numbers import Real
 from pathlib import Path
@@ -21,29 +21,21 @@ from mpi4py import MPI
 from contact._compat import destroy_unused
 from contact.adapting import adapted
 from contact.arguments import expect
-from contact.case.build import (
-    REPLACEMENTS,
-    Replacements,
-    build_problem,
-    named,
-    replaced_by,
-)
+from contact.case.build import REPLACEMENTS, Replacements, build_problem, named, replaced_by
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.io.checkpoint import Checkpoints, check_restart, read_steps
 from contact.methods.load_stepping import LoadStepping, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, Outcome, Record, tell
 from contact.methods.signals import SIGNALLED, stop_on_signal
-from contact.nesting import default_start, nested_start
+from contact.nesting import default_start
 from contact.problem.checks import check_potential, check_problem, check_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.problem.state import State
-from contact.ranks import on_root
 from contact.results.fields import check_variables
 from contact.results.remarks import announce
 from contact.results.solution import Solution, StepRecord, StepRecorder
@@ -83,46 +75,15 @@ class NotConvergedError(RuntimeError):
     """A load step has not converged, even after it was halved."""
 
 
-@dataclass(frozen=True)
-class Schedule:
-    """The load steps of a run.
-
-    Attributes
-    ----------
-    times
-        Their ends; none for a single step to the problem's own time.
-    begin
-        Time of the reference configuration.
-    start
-        Initial guess of a single step; None for zero.
-    guess
-        Name of that guess, for messages.
-    kept
-        Records of the steps of an earlier run, to continue from.
-    keep
-        Called with the record of each step that has converged.
-    """
-
-    times: Sequence[float] = ()
-    begin: float = 0.0
-    start: State | None = None
-    guess: str = GIVEN
-    kept: Sequence[StepRecord] = ()
-    keep: Callable[[StepRecord], None] | None = None
-
-
 def solve(
     case: Case | ContactProblem | str | Path,
     settings: Options | None = None,
     monitor: Monitor | None = None,
     comm: MPI.Intracomm = MPI.COMM_WORLD,
-    folder: str | Path | None = None,
-    restart: str | Path | None = None,
     start: State | Solution | None = None,
-    times: Sequence[float] | Array | None = None,
     **replacements: Unpack[Replacements],
 ) -> Solution:
-    """Build and solve a case, in load steps where it has them. Collective.
+    """Build and solve a case, in load steps where it has them, or solve a problem. Collective.
 
     Parameters
     ----------
@@ -134,15 +95,8 @@ def solve(
         Called after every outer iteration.
     comm
         Communicator of the mesh.
-    folder
-        Folder for the checkpoints of an evolution's steps, until its results are written.
-    restart
-        A folder with checkpoints of the same case, to continue from.
     start
         An earlier solution on the same mesh, or its state, as initial guess; zero by default.
-    times
-        For a problem: the ends of load steps, as in `evolve`. The solution's `steps` have the
-        results of each.
     replacements
         Objects that take the place of parts of the case: `domain`, `law`, `coefficient`,
         `friction`, `foundation`, `layer`; see `build_problem`.
@@ -162,82 +116,69 @@ def solve(
         After a SIGINT or SIGTERM, with the last iterate; a second signal ends the program.
     """
     clock = time.perf_counter()
-    _check_options(settings, monitor)
     start = start.state if isinstance(start, Solution) else start
-    fits = isinstance(start, State | None)
-    expect("start", start, "an earlier solution of the same problem, or its state", fits)
-    fits = isinstance(case, Case | ContactProblem | str | Path)
-    expect("solve", case, "a case, the name of a case file, or a Problem", fits)
-    folder, restart = (None if given is None else Path(given) for given in (folder, restart))
-    for name in replacements.keys() - set(REPLACEMENTS):
-        accepted = f"{', '.join(REPLACEMENTS)}; a method and its tolerances as settings"
-        raise InputError(f"{name}: unknown; accepted: {accepted}", "no-such-name")
-    nested = settings.nested if isinstance(settings, NewtonOptions) else None
+    _check_arguments(case, settings, monitor, start, replacements)
     if isinstance(case, ContactProblem):
-        given = {"folder": folder, "restart": restart, "nested": nested or None, **replacements}
-        _refuse(given, "a problem that is built already")
-        if times is None:
-            check_problem(case)
-            schedule = Schedule(start=start)
-        else:
-            _refuse({"start": start}, "times; evolve(problem, times, start=state) goes on")
-            schedule = Schedule(_checked_times(case, times, 0.0))
-        return _uninterrupted(run_schedule(case, settings or NewtonOptions(), monitor, schedule))
-    _refuse({"times": times}, "a case, whose [evolution] says them")
+        _check_together(case, settings, start, replacements)
+        check_problem(case)
+        return reviewed(solve_problem(case, settings or NewtonOptions(), monitor, start))
     case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
-    settings = settings or case.solver
-    nested = settings.nested if isinstance(settings, NewtonOptions) else False
-    if case.evolution is None:
-        _refuse({"restart": restart}, "a case without [evolution]")
-        if nested:
-            _refuse({"start": start}, "nested = true, which makes an initial guess of its own")
-    else:
-        _refuse({"start": start}, "[evolution]; evolve(problem, times, start=state) goes on")
-        _refuse({"nested": nested or None}, "[evolution]")
-    if restart is not None:
-        on_root(comm, lambda: check_restart(restart, case))
-    adapt = case.mesh.adapt is not None
-    if adapt:
-        _refuse({"restart": restart, "start": start, "nested": nested or None}, "[mesh.adapt]")
-        _refuse(replacements, "[mesh.adapt]")
-    evolution = case.evolution
-    ends, begin = ((), 0.0) if evolution is None else (evolution.ends, evolution.times[0])
-
-    def run(
-        problem: ContactProblem,
-        start: State | None = None,
-        reviewed: bool = True,
-        guess: str = GIVEN,
-        kept: Sequence[StepRecord] = (),
-        keep: Callable[[StepRecord], None] | None = None,
-    ) -> Solution:
-        planned = Schedule(ends, begin, start, guess, kept, keep)
-        return run_schedule(problem, settings, monitor, planned, reviewed)
-
-    problem = None if adapt else build_problem(case, comm, **replacements)
+    options = settings or case.solver
+    _check_together(case, options, start, replacements)
+    times = step_times(case)
+    if case.mesh.adapt is not None:
+        solver = partial(solve_problem, settings=options, monitor=monitor, guess=COARSE)
+        with named(case.source):
+            solution = adapted(case, comm, partial(solver, times=times))
+            return reviewed(solution, case, clock)
+    problem, guess = build_problem(case, comm, **replacements), GIVEN
     with named(case.source):
-        if problem is None:
-            solution = adapted(case, comm, partial(run, guess=COARSE, reviewed=False))
-            announce(solution)
-        elif evolution is not None:
-            kept = [] if restart is None else read_steps(restart, problem)
-            keep = None
-            if folder is not None:
-                here = restart is not None and restart.samefile(folder)
-                keep = Checkpoints(folder, problem, case, kept, here).keep
-            solution = run(problem, kept=kept, keep=keep)
-        else:
-            guess, chosen = GIVEN, case.model_copy(update={"solver": settings})
-            if nested:
-                start, guess = nested_start(chosen, problem, **replacements), COARSE
-            elif nested is None and start is None and not replacements:
-                start, guess = default_start(chosen, problem), COARSE
-            solution = run(problem, start, guess=guess)
-    solution.title, solution.output, solution.units = case.title, case.output, case.case.units
-    if not replacements:
-        solution.case, solution.source = to_toml(case), case
-    solution.seconds["setup"] += time.perf_counter() - clock - sum(solution.seconds.values())
-    return _uninterrupted(solution)
+        if start is None:
+            chosen = case.model_copy(update={"solver": options})
+            start, guess = default_start(chosen, problem, **replacements), COARSE
+        solution = solve_problem(problem, options, monitor, start, guess, times)
+        return reviewed(solution, case, clock, described=not replacements)
+
+
+def step_times(case: Case) -> tuple[float, ...]:
+    """Return the begin and the ends of the load steps of a case; nothing of a static one."""
+    evolution = case.evolution
+    return () if evolution is None else (evolution.times[0], *evolution.ends)
+
+
+def solve_steps(
+    problem: ContactProblem,
+    times: Sequence[float] | Array,
+    settings: Options | None = None,
+    monitor: Monitor | None = None,
+    kept: Sequence[StepRecord] = (),
+    keep: Callable[[StepRecord], None] | None = None,
+) -> Solution:
+    """Load a problem in steps, as `evolve` does, and review the solution. Collective.
+
+    Parameters
+    ----------
+    problem, times, settings, monitor
+        As `evolve` takes them.
+    kept
+        Steps of an earlier run, to continue from: the `steps` of its solution.
+    keep
+        Called with the record of each step that has converged.
+
+    Returns
+    -------
+    The solution of the last step that has converged, with the results of each in its `steps`.
+
+    Raises
+    ------
+    InputError, SolveInterrupted
+        As `evolve` and `solve` raise them.
+    """
+    _check_arguments(problem, settings, monitor)
+    ends = _checked_times(problem, times, 0.0)
+    options = settings or NewtonOptions()
+    solution = solve_problem(problem, options, monitor, times=(0.0, *ends), kept=kept, keep=keep)
+    return reviewed(solution)
 
 
 def evolve(
@@ -284,12 +225,10 @@ def evolve(
     NotConvergedError
         If a step fails; the states before have been given.
     """
-    _check_options(settings, monitor)
     start = start.state if isinstance(start, Solution) else start
-    expect("start", start, "an earlier state, or solution", isinstance(start, State | None))
+    _check_arguments(problem, settings, monitor, start)
     earlier = before is None or (isinstance(before, State) and start is not None)
     expect("before", before, "the state before start", earlier)
-    expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
     begin = 0.0 if start is None else start.time
     ends = _checked_times(problem, times, begin)
     check_variables(problem.equilibrium)
@@ -303,17 +242,31 @@ def evolve(
         yield state
 
 
-def run_schedule(
+def solve_problem(
     problem: ContactProblem,
     settings: Options,
-    monitor: Monitor | None,
-    schedule: Schedule,
-    reviewed: bool = True,
+    monitor: Monitor | None = None,
+    start: State | None = None,
+    guess: str = GIVEN,
+    times: Sequence[float] = (),
+    kept: Sequence[StepRecord] = (),
+    keep: Callable[[StepRecord], None] | None = None,
 ) -> Solution:
-    """Take the steps of a schedule, and return the last one that has converged. Collective.
+    """Solve a problem in one step or in several; `reviewed` gives the warnings. Collective.
 
-    A signal or a step that fails ends them; all complete steps remain, with the outcome of the
-    one that has ended them. Where it is not `reviewed` the solution has no warnings yet.
+    A signal or a step that fails ends the steps; all complete ones remain, with the outcome of the
+    one that has ended them.
+
+    Parameters
+    ----------
+    problem, settings, monitor
+        The problem, the options of a method, and a function called after every outer iteration.
+    start, guess
+        Initial guess of a single step, None for zero, and its name in messages.
+    times
+        Begin and ends of the load steps; none for a single step to the problem's own time.
+    kept, keep
+        Records of the steps of an earlier run, to continue from; called with that of each step.
 
     Raises
     ------
@@ -323,13 +276,13 @@ def run_schedule(
     """
     clock = time.perf_counter()
     check_variables(problem.equilibrium)
-    start = None if schedule.start is None else _prescribed(problem, schedule.start)
-    records = list(schedule.kept)
+    start = None if start is None else _prescribed(problem, start)
+    records = list(kept)
     with stop_on_signal(problem.comm, monitor) as stop:
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - clock
-        if schedule.times:
-            here, state, outcome, history = _steps(problem, method, schedule, records)
+        if times:
+            here, state, outcome, history = _take_steps(problem, method, times, records, keep)
         else:
             state, outcome = solve_step(problem, method, start)
             here, history = problem, [*outcome.records]
@@ -341,26 +294,61 @@ def run_schedule(
     del method, body
     destroy_unused(problem.comm, problem.domain.mesh.comm)
     check_potential(here, state)
-    solution = Solution(
+    return Solution(
         problem=here,
         state=state,
         outcome=outcome,
         history=history,
         counters=counters,
         method=settings.method,
-        start=BEFORE if records else ZERO if start is None else schedule.guess,
+        start=BEFORE if records else ZERO if start is None else guess,
         seconds={"setup": setup, "solve": solved, "output": 0.0},
         steps=records,
         critical_factor=critical,
         jammed=jammed,
     )
-    if reviewed:
-        announce(solution)
+
+
+def reviewed(
+    solution: Solution, case: Case | None = None, clock: float | None = None, described: bool = True
+) -> Solution:
+    """Return a solution with its warnings, and the titles of its case. Collective.
+
+    Parameters
+    ----------
+    solution
+        The solution.
+    case
+        The case that it is of.
+    clock
+        When its setup began (`time.perf_counter`).
+    described
+        Whether the case is the whole description, with no objects in place of its parts.
+
+    Raises
+    ------
+    SolveInterrupted
+        With the solution, if a signal has ended the solve.
+    """
+    announce(solution)
+    if case is not None:
+        solution.title, solution.output, solution.units = case.title, case.output, case.case.units
+    if case is not None and described:
+        solution.case, solution.source = to_toml(case), case
+    if clock is not None:
+        solution.seconds["setup"] += time.perf_counter() - clock - sum(solution.seconds.values())
+    if solution.outcome.signal:
+        ended = _Pressed if solution.outcome.signal == signal.SIGINT else SolveInterrupted
+        raise ended(solution)
     return solution
 
 
-def _steps(
-    problem: ContactProblem, method: Method, schedule: Schedule, records: list[StepRecord]
+def _take_steps(
+    problem: ContactProblem,
+    method: Method,
+    times: Sequence[float],
+    records: list[StepRecord],
+    keep: Callable[[StepRecord], None] | None,
 ) -> tuple[ContactProblem, State, Outcome, list[Record]]:
     """Take load steps, and append the records of those that converge. Collective.
 
@@ -370,18 +358,18 @@ def _steps(
     last one, with the time that was reached; and the outer iterations of all.
     """
     recorder = StepRecorder(problem, records[-1] if records else None)
-    history, outcome, end = list[Record](), None, schedule.times[-1]
+    history, outcome, begin, end = list[Record](), None, times[0], times[-1]
     states = [record.state for record in records[-1:-3:-1]]
     tell(logger, 0.0, "steps to t = %g", end)
     steps = LoadStepping(problem, method, *states)
-    for state, outcome in steps.run(schedule.times, schedule.begin):
+    for state, outcome in steps.run(times[1:], begin):
         now, taken = state.time, outcome.records
         history += [replace(r, note=f"t = {now:g} {r.note}".strip()) for r in taken]
         if outcome.converged:
             records.append(recorder.record(state, outcome))
-            if schedule.keep is not None:
-                schedule.keep(records[-1])
-            share = (now - schedule.begin) / (end - schedule.begin)
+            if keep is not None:
+                keep(records[-1])
+            share = (now - begin) / (end - begin)
             words = "t = %g of %g: iterations %d, residual %.1e"
             tell(logger, share, words, now, end, len(taken), outcome.residuals.largest)
     reached = 0.0
@@ -411,30 +399,54 @@ def _prescribed(problem: ContactProblem, start: State) -> State:
     return State(x, start.forces, problem.time, problem.history)
 
 
-def _uninterrupted(solution: Solution) -> Solution:
-    """Return a solution; raise `SolveInterrupted` with it if a signal has ended the solve."""
-    if solution.outcome.signal:
-        ended = _Pressed if solution.outcome.signal == signal.SIGINT else SolveInterrupted
-        raise ended(solution)
-    return solution
+def _check_arguments(
+    case: object,
+    settings: Options | None,
+    monitor: Monitor | None,
+    start: State | None = None,
+    replacements: Mapping[str, object] | None = None,
+) -> None:
+    """Refuse arguments of other types; without `replacements` a case is one of them."""
+    accepted = "NewtonOptions(), FixedPointOptions(), PenaltyOptions()"
+    expect("settings", settings, accepted, isinstance(settings, Options | None))
+    accepted = "a function of a record, called after each outer iteration"
+    expect("monitor", monitor, accepted, monitor is None or callable(monitor))
+    accepted = "an earlier solution of the same problem, or its state"
+    expect("start", start, accepted, isinstance(start, State | None))
+    if replacements is None:
+        expect("problem", case, "a Problem", isinstance(case, ContactProblem))
+        return
+    fits = isinstance(case, Case | ContactProblem | str | Path)
+    expect("solve", case, "a case, the name of a case file, or a Problem", fits)
+    for name in replacements.keys() - set(REPLACEMENTS):
+        accepted = f"{', '.join(REPLACEMENTS)}; a method as settings, times by solve_steps"
+        raise InputError(f"{name}: unknown; accepted: {accepted}", "no-such-name")
 
 
-def _refuse(given: Mapping[str, object], beside: str) -> None:
+def _check_together(
+    case: Case | ContactProblem,
+    settings: Options | None,
+    start: State | None,
+    replacements: Mapping[str, object],
+) -> None:
     """Refuse arguments that would be ignored."""
+    nested = getattr(settings, "nested", None) or None  # of Newton's method alone
+    given: dict[str, object] = {"start": start, "nested": nested}
+    if isinstance(case, ContactProblem):
+        given, beside = {"nested": nested, **replacements}, "a problem that is built already"
+    elif case.mesh.adapt is not None:
+        given, beside = {**given, **replacements}, "[mesh.adapt]"
+    elif case.evolution is not None:
+        beside = "[evolution]; evolve(problem, times, start=state) goes on"
+    else:
+        given = {} if nested is None else {"start": start}
+        beside = "nested = true, which makes an initial guess of its own"
     for name, value in given.items():
         if value is not None:
             raise InputError(
                 f"{name}: given together with {beside}; accepted: one without it",
                 "ignored-argument",
             )
-
-
-def _check_options(settings: Options | None, monitor: Monitor | None) -> None:
-    """Refuse objects that are no options of a method, or no function."""
-    accepted = "NewtonOptions(), FixedPointOptions(), PenaltyOptions()"
-    expect("settings", settings, accepted, isinstance(settings, Options | None))
-    accepted = "a function of a record, called after each outer iteration"
-    expect("monitor", monitor, accepted, monitor is None or callable(monitor))
 
 
 def _checked_times(

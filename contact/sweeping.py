@@ -42,7 +42,7 @@ from contact.results.quantities import quantities, values_of
 from contact.results.quantity import SUMMARY, SWEEP, is_of
 from contact.results.remarks import measure
 from contact.results.solution import Solution
-from contact.solving import Schedule, run_schedule
+from contact.solving import solve_problem, step_times
 from contact.typing import Array
 
 logger = logging.getLogger("contact.sweep")
@@ -373,8 +373,7 @@ class _Runner:
         self._domain = problem.domain
         with named(case.source):
             if case.evolution is not None:
-                schedule = Schedule(case.evolution.ends, case.evolution.times[0])
-                return run_schedule(problem, case.solver, self._monitor, schedule)
+                return solve_problem(problem, case.solver, self._monitor, times=step_times(case))
             if self._method is None or before is None or not _alike(before, case):
                 self._method = METHODS[case.solver.method](
                     problem, self._settings(case), self._monitor

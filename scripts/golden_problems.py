@@ -26,6 +26,7 @@ from contact import (
     parse_case,
     sensitivity,
     solve,
+    solve_steps,
     write_outputs,
 )
 from scripts.cases import CASES, bar
@@ -177,7 +178,7 @@ def of(make: Callable[[], Case | Problem], **options: Any) -> dict[str, Value]:
 
 def in_steps(make: Callable[[], Problem], times: Iterable[float]) -> dict[str, Value]:
     """Solve a problem in load steps. Collective."""
-    return measured(solve(make(), NewtonOptions(tolerance=TIGHT), times=[*times]))
+    return measured(solve_steps(make(), [*times], NewtonOptions(tolerance=TIGHT)))
 
 
 def of_case_itself(case: Case) -> dict[str, Value]:

@@ -29,6 +29,7 @@ from contact import (
     parse_case,
     sensitivity,
     solve,
+    solve_steps,
 )
 from contact.case.build import build_problem
 from contact.case.text import number_at, with_number
@@ -273,14 +274,14 @@ def test_gradient_by_the_gap(family):
     times = None if family != "evolution" else [1 / 3, 2 / 3, 1.0, 4 / 3, 5 / 3, 2.0, 2.5, 3.0]
     tight = NewtonOptions(tolerance=1e-13)
     name = "max_pressure" if family == "two bodies" else "contact_force_y"
-    gradient = gap_gradient(solve(base, tight, times=times), name)
+    gradient = gap_gradient(solve_steps(base, times, tight), name)
     change = np.cos(3 * base.nodes.points[:, 0])
 
     def force(way):
         there = copy(base)
         jump = replace(base.nodes, gap=base.nodes.gap + way * change)
         there.interface = replace(base.interface, jump=jump)
-        run = solve(there, tight, times=times)
+        run = solve_steps(there, times, tight)
         return named_quantities(there)[name](run.problem, run.state)
 
     way = 1e-7

@@ -6,12 +6,14 @@ import argparse
 import logging
 import signal
 import sys
+import time
 import tomllib
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
+from contact.case.build import build_problem, named
 from contact.case.digest import check_same
 from contact.case.file import Case, load_case, override, parse_case
 from contact.case.text import to_toml
@@ -19,13 +21,21 @@ from contact.cli.check import amplitude_notes
 from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
 from contact.errors import InputError, counted
-from contact.io.checkpoint import check_restart, discard, files_of, kept_case
+from contact.io.checkpoint import (
+    Checkpoints,
+    check_restart,
+    discard,
+    files_of,
+    kept_case,
+    read_steps,
+)
 from contact.io.folder import SUMMARY, read_json, result_folder
+from contact.methods.report import Monitor
 from contact.methods.signals import SIGNALLED, Terminated, signals_held
 from contact.ranks import on_root
 from contact.results.discretisation import locks
 from contact.results.solution import Solution
-from contact.solving import SolveInterrupted, solve
+from contact.solving import SolveInterrupted, reviewed, solve, solve_problem, step_times
 from contact.sweeping import TABLE, Axis, sweep
 from contact.writing import write_outputs
 
@@ -58,9 +68,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
             on_root(comm, lambda: _check_results(folder.path, case))
         with progress(comm, options.quiet, options.log, options.verbose) as monitor:
             try:
-                solution = solve(
-                    case, monitor=monitor, comm=comm, folder=folder.path, restart=restart
-                )
+                solution = solve_and_keep(case, monitor, comm, folder.path, restart)
             except SolveInterrupted as interrupt:
                 solution = interrupt.solution
             logging.getLogger("contact").debug(solution.outcome.reason)
@@ -91,6 +99,38 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if outcome.signal or number:
         return SIGNALLED + (outcome.signal or number)
     return CONVERGED if outcome.converged else NOT_CONVERGED
+
+
+def solve_and_keep(
+    case: Case,
+    monitor: Monitor | None,
+    comm: MPI.Intracomm,
+    folder: Path,
+    restart: Path | None = None,
+) -> Solution:
+    """Solve a case; one with load steps leaves a checkpoint of each in a folder. Collective.
+
+    Parameters
+    ----------
+    case, monitor, comm
+        As `solve` takes them.
+    folder
+        Folder of the results.
+    restart
+        A folder with checkpoints of the same case, to continue from.
+    """
+    if case.evolution is None or case.mesh.adapt is not None:
+        return solve(case, monitor=monitor, comm=comm)
+    clock = time.perf_counter()
+    problem = build_problem(case, comm)
+    with named(case.source):
+        kept = [] if restart is None else read_steps(restart, problem)
+        here = restart is not None and restart.samefile(folder)
+        keep = Checkpoints(folder, problem, case, kept, here).keep
+        solution = solve_problem(
+            problem, case.solver, monitor, times=step_times(case), kept=kept, keep=keep
+        )
+        return reviewed(solution, case, clock)
 
 
 def _results(solution: Solution) -> list[str]:

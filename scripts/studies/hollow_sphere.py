@@ -19,7 +19,7 @@ from dolfinx.mesh import DiagonalType, create_rectangle, locate_entities_boundar
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from contact import J2, Body, Contact, Fixed, Load, Problem, Solution, solve
+from contact import J2, Body, Contact, Fixed, Load, Problem, Solution, solve_steps
 from contact.mesh.domain import from_mesh, revolved
 from contact.results.fields import DerivedFields
 from contact.typing import Array
@@ -211,7 +211,7 @@ def pressed(cells: int, young: float, limit: float, pressure: float, steps: int 
 
 def converged(problem: Problem, times: Sequence[float]) -> Solution:
     """Solve all steps, or stop."""
-    solution = solve(problem, times=list(times))
+    solution = solve_steps(problem, list(times))
     if not solution.converged or len(solution.steps) != len(times):
         raise ValueError(f"hollow sphere: {solution.outcome.reason}")
     return solution

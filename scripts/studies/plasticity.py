@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from contact import Case, NewtonOptions, Solution, load_case, parse_case, solve
+from contact import Case, NewtonOptions, Solution, load_case, parse_case, solve, solve_steps
 from contact.case.build import build_problem
 from contact.typing import Array
 from forms.hencky import UserLaw
@@ -418,7 +418,7 @@ def cost(report: Report, coarse: bool) -> None:
                 for _ in range(repeated):
                     problem = build_problem(case, law=law)
                     begin = time.process_time()
-                    solution = solve(problem, settings, times=times)
+                    solution = solve_steps(problem, times, settings)
                     seconds.append(time.process_time() - begin)
                     assert solution.converged, solution.outcome.reason
                 iterations = len(solution.history)

@@ -169,7 +169,7 @@ def test_what_grows_is_named():
 def test_supports_at_zero_drive_nothing():
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
     body = Body(Linear(10.0, 0.3), Fixed("left", [0.0, 0.0]), Load("right", [0.0, DOWN]))
-    solution = contact.solve(Problem(domain, body, Contact("bottom", 1.0)), times=[0.5, 1.0])
+    solution = contact.solve_steps(Problem(domain, body, Contact("bottom", 1.0)), [0.5, 1.0])
     moved = [step.row["driven_force_y"] for step in solution.steps]
     assert moved == pytest.approx([DOWN / 2, DOWN])
 
@@ -184,7 +184,7 @@ def test_the_force_that_drives_a_part_is_without_supports_beside_it(by):
     loads = [Load("top", [0.0, DOWN])] if by == "load" else []
     loads += [Load(density=[0.0, 0.3 * DOWN]), Load("right", [DOWN, DOWN])]
     problem = Problem(domain, Body(Linear(10.0, 0.3), fixed, loads), Contact("bottom"))
-    solution = contact.solve(problem, times=[0.5, 1.0])
+    solution = contact.solve_steps(problem, [0.5, 1.0])
     assert abs(solution.reaction("left")[0]) > 1e-3
     for step in solution.steps:
         force = step.row["driven_force_x"], step.row["driven_force_y"]

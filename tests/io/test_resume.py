@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact import solve
+from contact import build_problem, solve
 from contact.case.text import to_toml
 from contact.cli.main import main
+from contact.cli.solve import solve_and_keep
 from contact.errors import InputError
-from contact.io.checkpoint import Checkpoints, discard, kept_case, read_steps
+from contact.io.checkpoint import Checkpoints, check_restart, discard, kept_case, read_steps
 from contact.methods.newton import Newton
 from contact.methods.report import Recorder
 from tests.problem.test_plasticity import block
@@ -75,13 +76,13 @@ def test_going_on(tmp_path, ended, count, elsewhere):
     whole = solve(case, comm=SELF)
     heal = ended(count)
     with pytest.raises(Killed):
-        solve(case, comm=SELF, folder=tmp_path)
+        solve_and_keep(case, None, SELF, tmp_path)
     heal()
     out = tmp_path
     if elsewhere:
         out = tmp_path / "elsewhere"
         out.mkdir()
-    solution = solve(case, comm=SELF, folder=out, restart=tmp_path)
+    solution = solve_and_keep(case, None, SELF, out, tmp_path)
     assert solution.converged
     assert len(solution.steps) == len(whole.steps)
     for one, two in zip(whole.steps, solution.steps, strict=True):
@@ -101,9 +102,9 @@ def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
     whole = solve(case, comm=SELF)
     heal = ended(count)
     with pytest.raises(Killed):
-        solve(case, comm=SELF, folder=tmp_path)
+        solve_and_keep(case, None, SELF, tmp_path)
     heal()
-    solution = solve(case, comm=SELF, folder=tmp_path, restart=tmp_path)
+    solution = solve_and_keep(case, None, SELF, tmp_path, tmp_path)
     assert solution.converged and len(solution.steps) == len(whole.steps)
     assert whole.plastic_dissipation > 0
     for one, two in zip(whole.steps, solution.steps, strict=True):
@@ -122,11 +123,11 @@ def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
         restart = None if count == 2 else shared_tmp_path
         if comm is world or world.rank == 0:
             if count is None:
-                solution = solve(case, comm=comm, folder=shared_tmp_path, restart=restart)
+                solution = solve_and_keep(case, None, comm, shared_tmp_path, restart)
             else:
                 heal = ended(count)
                 with pytest.raises(Killed):
-                    solve(case, comm=comm, folder=shared_tmp_path, restart=restart)
+                    solve_and_keep(case, None, comm, shared_tmp_path, restart)
                 heal()
         world.barrier()
     assert solution.converged and len(solution.steps) == len(whole.steps) == 6
@@ -138,7 +139,7 @@ def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
 
 
 def test_a_new_run_leaves_the_earlier_checkpoints_until_its_first_step(tmp_path, monkeypatch):
-    solve(steps_case(), comm=SELF, folder=tmp_path)
+    solve_and_keep(steps_case(), None, SELF, tmp_path)
     written = [path.name for path in sorted((tmp_path / "checkpoints").iterdir())]
 
     def fail(self, record):
@@ -147,7 +148,7 @@ def test_a_new_run_leaves_the_earlier_checkpoints_until_its_first_step(tmp_path,
     with monkeypatch.context() as context:
         context.setattr(Checkpoints, "keep", fail)
         with pytest.raises(Killed):
-            solve(steps_case(), comm=SELF, folder=tmp_path)
+            solve_and_keep(steps_case(), None, SELF, tmp_path)
     assert [path.name for path in sorted((tmp_path / "checkpoints").iterdir())] == written
     assert kept_case(tmp_path) == to_toml(steps_case())
     (tmp_path / "checkpoints" / ".00006.npz.part").touch()  # a run was killed while it wrote
@@ -157,8 +158,8 @@ def test_a_new_run_leaves_the_earlier_checkpoints_until_its_first_step(tmp_path,
 
 def test_all_steps_were_there(tmp_path):
     """A run that is ended while it writes its results has nothing left to solve."""
-    whole = solve(steps_case(), comm=SELF, folder=tmp_path)
-    again = solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path)
+    whole = solve_and_keep(steps_case(), None, SELF, tmp_path)
+    again = solve_and_keep(steps_case(), None, SELF, tmp_path, tmp_path)
     assert again.converged
     assert again.state.near(whole.state)
     assert again.history == []
@@ -166,29 +167,29 @@ def test_all_steps_were_there(tmp_path):
 
 def test_steps_of_an_earlier_run_are_not_gone_on_from(tmp_path, ended):
     """The first step of a run replaces the first of the earlier one; a kill may leave the rest."""
-    solve(steps_case(), comm=SELF, folder=tmp_path)
+    solve_and_keep(steps_case(), None, SELF, tmp_path)
     place, earlier = tmp_path / "checkpoints", tmp_path / "earlier"
     place.rename(earlier)
     heal = ended(2)
     with pytest.raises(Killed):
-        solve(steps_case(), comm=SELF, folder=tmp_path)
+        solve_and_keep(steps_case(), None, SELF, tmp_path)
     heal()
     for name in ("00003.npz", "00004.npz", "00005.npz"):
         shutil.move(earlier / name, place)
     assert len(read_steps(tmp_path, solve(steps_case(), comm=SELF).problem)) == 2
-    solution = solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path)
+    solution = solve_and_keep(steps_case(), None, SELF, tmp_path, tmp_path)
     assert solution.converged and len(solution.history) > 0
     assert len(read_steps(tmp_path, solution.problem)) == len(list(place.iterdir())) == 5
 
 
 def test_another_mesh(tmp_path):
-    solve(steps_case(), comm=SELF, folder=tmp_path)
+    solve_and_keep(steps_case(), None, SELF, tmp_path)
     for cells in ([8, 4], [16, 2]):
         domain = steps_case(mesh__cells=cells).mesh.build(SELF)
         with pytest.raises(InputError, match=r"checkpoint does not fit the problem .nodes"):
-            solve(steps_case(), comm=SELF, restart=tmp_path, domain=domain)
+            read_steps(tmp_path, build_problem(steps_case(), SELF, domain=domain))
         with pytest.raises(InputError, match=r"of another case: there mesh\.cells\.\d is"):
-            solve(steps_case(mesh__cells=cells), comm=SELF, restart=tmp_path)
+            check_restart(tmp_path, steps_case(mesh__cells=cells))
 
 
 def test_another_mesh_file_is_not_continued(tmp_path, ended, capfd):
@@ -209,11 +210,11 @@ def test_another_mesh_file_is_not_continued(tmp_path, ended, capfd):
 @pytest.mark.parametrize("data", [b"", b"no archive"])
 def test_a_damaged_checkpoint_ends_the_steps(tmp_path, data, capfd):
     """A run goes on from the step before it; without one there is a message."""
-    solve(steps_case(), comm=SELF, folder=tmp_path)
+    solve_and_keep(steps_case(), None, SELF, tmp_path)
     place = tmp_path / "checkpoints"
     (place / "00003.npz").write_bytes(data)
     assert len(read_steps(tmp_path, solve(steps_case(), comm=SELF).problem)) == 2
-    assert len(solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path).steps) == 5
+    assert len(solve_and_keep(steps_case(), None, SELF, tmp_path, tmp_path).steps) == 5
     assert len(list(place.iterdir())) == 5
     (place / "00001.npz").write_bytes(data)
     assert on_the_line("solve", "--restart", tmp_path) == 2
@@ -315,6 +316,6 @@ def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monk
 
 
 def test_read_steps_gives_the_states(tmp_path):
-    solution = solve(steps_case(), comm=SELF, folder=tmp_path)
+    solution = solve_and_keep(steps_case(), None, SELF, tmp_path)
     for one, two in zip(solution.steps, read_steps(tmp_path, solution.problem), strict=True):
         assert one.state.near(two.state)

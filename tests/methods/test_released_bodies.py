@@ -14,7 +14,7 @@ from contact.model.friction import Friction
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.solving import NotConvergedError, solve
+from contact.solving import NotConvergedError, solve_steps
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import constant, flat
@@ -69,7 +69,7 @@ def test_an_evolution_ends_where_loads_let_the_body_go(press, push, when, why):
 def test_what_was_complete_remains():
     press, push, when, _ = GONE["pulled"]
     problem = lying(MPI.COMM_SELF, press, push)
-    solution = solve(problem, times=TIMES)
+    solution = solve_steps(problem, TIMES)
     assert not solution.converged
     assert 1.5 < solution.steps[-1].row["t"] < when
     assert solution.state.time == solution.steps[-1].row["t"]

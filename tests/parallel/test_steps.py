@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
+from contact.cli.solve import solve_and_keep
 from contact.ranks import on_root
 from contact.results.quantities import values_of
 from contact.results.quantity import NODES
@@ -41,24 +42,24 @@ def test_the_ranks_do_not_matter(law, comm, shared_tmp_path):
     """From rest; and from the checkpoints of a run on one rank, and back."""
     case = case_of(**LAWS[law])
     alone = solve(case, comm=MPI.COMM_SELF)
-    together = solve(case, comm=comm, folder=shared_tmp_path)
+    together = solve_and_keep(case, None, comm, shared_tmp_path)
     known = tables(alone)
     agree(tables(together), known)
 
     folder = shared_tmp_path / "one"
     if comm.rank == 0:
         folder.mkdir()
-        solve(case, comm=MPI.COMM_SELF, folder=folder)
+        solve_and_keep(case, None, MPI.COMM_SELF, folder)
         for later in (4, 5):
             (folder / "checkpoints" / f"0000{later}.npz").unlink()
     comm.barrier()
-    resumed = solve(case, comm=comm, folder=folder, restart=folder)
+    resumed = solve_and_keep(case, None, comm, folder, folder)
     agree(tables(resumed), known)
     assert len(resumed.history) < len(together.history)
 
     def back() -> list:
         for later in (3, 4, 5):
             (shared_tmp_path / "checkpoints" / f"0000{later}.npz").unlink()
-        return tables(solve(case, comm=MPI.COMM_SELF, restart=shared_tmp_path))
+        return tables(solve_and_keep(case, None, MPI.COMM_SELF, shared_tmp_path, shared_tmp_path))
 
     agree(on_root(comm, back), known)

@@ -13,7 +13,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, left_as_pressures, residual_forces
 from contact.problem.state import State
 from contact.results.remarks import rounding, untouched
-from contact.solving import solve
+from contact.solving import solve, solve_steps
 from forms.hencky import Linear
 from tests.problems.apart import blocks, pressed
 from tests.problems.piezo import pzt
@@ -121,7 +121,7 @@ def test_what_is_left_of_a_body_that_is_no_longer_loaded(method, linear):
     loads = (first, second.model_copy(update={"amplitude": lambda t: float(t == 1)}))
     body = replace(given.body, loads=loads)
     problem = ContactProblem(given.domain, body, given.contacts)
-    found = solve(problem, METHODS[method](linear=linear), times=[1.0, 2.0], comm=MPI.COMM_SELF)
+    found = solve_steps(problem, [1.0, 2.0], METHODS[method](linear=linear))
     assert found.converged, found.outcome.reason
     assert np.abs(of_second(found, found.state.forces.pressure)).max() < 1e-14
 
@@ -132,7 +132,7 @@ def test_forces_that_are_rounding_do_not_press():
     first, second = given.body.loads
     loads = (first, second.model_copy(update={"amplitude": lambda t: 1.0 if t <= 1 else 0.0}))
     problem = ContactProblem(given.domain, replace(given.body, loads=loads), given.contacts)
-    found = solve(problem, times=[1.0, 2.0], comm=MPI.COMM_SELF)
+    found = solve_steps(problem, [1.0, 2.0])
     rng, nodes = np.random.default_rng(1), found.problem.nodes
     on_second = nodes.points[:, 0] > 1.5
     x, forces = found.state.x.copy(), found.state.forces
@@ -158,7 +158,7 @@ def test_what_presses_no_longer_is_not_unknown(method, remaining, gap):
     problem = ContactProblem(given.domain, replace(given.body, loads=loads), given.contacts)
     for linear in ("lu", "iterative"):
         options = method(linear=linear)
-        found = solve(problem, options, times=[0.5, 1.0, 2.0, 3.0], comm=MPI.COMM_SELF)
+        found = solve_steps(problem, [0.5, 1.0, 2.0, 3.0], options)
         assert found.converged, found.outcome.reason
         left = left_as_pressures(problem, found.state, residual_forces(problem, found.state))
         assert max(found.outcome.residuals.pressure_rounding, left) < 1e-3

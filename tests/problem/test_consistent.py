@@ -34,6 +34,7 @@ from contact import (
     make_material,
     parse_case,
     solve,
+    solve_steps,
 )
 from contact.problem.checks import meeting_supports
 from tests.problems.messages import message_of
@@ -148,16 +149,15 @@ WRONG = {
     "a replacement": lambda: solve(problem(), domian=3),
     "a monitor": lambda: solve(problem(), monitor=3),  # type: ignore[arg-type]
     "times": lambda: next(evolve(problem(), 1.0)),  # type: ignore[arg-type]
-    "times none": lambda: solve(problem(), times=[]),
-    "times in words": lambda: solve(problem(), times=["a"]),
-    "times in rows": lambda: solve(problem(), times=np.ones((2, 2))),
+    "times none": lambda: solve_steps(problem(), []),
+    "times in words": lambda: solve_steps(problem(), ["a"]),
+    "times in rows": lambda: solve_steps(problem(), np.ones((2, 2))),
     "an angle in space": lambda: make_material(3, name="PZT-4", poling=90),
     "an axis in the plane": lambda: make_material(
         2, name="PZT-4", poling=np.array([0.0, 0.0, 1.0])
     ),
-    "no times": lambda: solve(problem(), times=[0.5, 0.5]),
+    "no times": lambda: solve_steps(problem(), [0.5, 0.5]),
     "times of a case": lambda: solve(parse_case(CASE), times=[1.0]),
-    "times and a start": lambda: solve(problem(), times=[1.0], start=problem().start()),
 }
 
 

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import InputError, Material, evolve, parse_case, solve
+from contact import InputError, Material, evolve, parse_case, solve, solve_steps
 from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
-from contact.io.checkpoint import read_steps
+from contact.io.checkpoint import Checkpoints, read_steps
 from contact.io.fields import body_share
 from contact.results.fields import DerivedFields, check_variables
 from forms.hencky import Isotropic
@@ -118,7 +118,9 @@ def test_a_restart_goes_on_with_the_same_history(tmp_path):
     given = case(
         load=[{"on": "right", "traction": [0.01, 0.0]}], friction={"mu": 0.2, "law": "coulomb"}
     )
-    whole = solve(given, law=law, comm=comm, folder=tmp_path)
+    problem = build_problem(given, comm, law=law)
+    keep = Checkpoints(tmp_path, problem, given).keep
+    whole = solve_steps(problem, given.evolution.ends, given.solver, keep=keep)
     assert np.ptp(comm.allreduce(kappa_after(whole).tolist(), op=MPI.SUM)) > 1e-4
     steps = read_steps(str(tmp_path), build_problem(given, comm, law=law))
     for one, two in zip(whole.steps, steps, strict=True):

@@ -6,6 +6,7 @@ from mpi4py import MPI
 
 from contact import FixedPointOptions, NewtonOptions, evolve, parse_case, solve
 from contact.case.build import build_problem
+from contact.cli.solve import solve_and_keep
 from contact.errors import InputError
 from contact.io.checkpoint import read_steps
 from contact.io.fields import write_fields
@@ -67,7 +68,7 @@ def test_a_restart_goes_on_with_the_same_history(tmp_path, hardening):
     comm = MPI.COMM_WORLD
     tmp_path = comm.bcast(tmp_path)
     given = block(hardening)
-    whole = solve(given, comm=comm, folder=tmp_path)
+    whole = solve_and_keep(given, None, comm, tmp_path)
     assert whole.converged and len(whole.steps) == 6
     steps = read_steps(tmp_path, build_problem(given, comm))
     for one, two in zip(whole.steps, steps, strict=True):
@@ -143,7 +144,7 @@ def test_recovery_is_condensed_by_the_symmetric_part():
 def test_checkpoints_of_other_materials_are_refused(tmp_path):
     """They have a back stress less."""
     folder = MPI.COMM_WORLD.bcast(tmp_path)
-    assert solve(block(), folder=str(folder)).converged
+    assert solve_and_keep(block(), None, MPI.COMM_WORLD, folder).converged
     assert len(read_steps(folder, build_problem(block()))) == 6
     with pytest.raises(InputError, match=r"does not fit the problem .*back_stress_2.*materials"):
         read_steps(folder, build_problem(block("chaboche")))

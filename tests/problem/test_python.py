@@ -14,6 +14,7 @@ from contact import (
     make_material,
     parse_case,
     solve,
+    solve_steps,
 )
 from tests.problems.put_together import block, problem
 
@@ -41,7 +42,7 @@ def test_steps_of_a_problem() -> None:
     friction = Problem(made.domain, made.body, Contact("bottom"), Friction(mu=0.2))
     times = [0.5, 1.0]
     states = list(evolve(friction, times))
-    solution = solve(friction, times=np.array(times))
+    solution = solve_steps(friction, np.array(times))
     assert [step.row["t"] for step in solution.steps] == times
     assert solution.state.near(states[-1], atol=1e-9)
     force = solution.steps[-1].row["contact_force_y"]

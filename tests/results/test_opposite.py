@@ -22,7 +22,7 @@ from contact.results.quantity import AGAINST, OPPOSITE
 from contact.results.surface import opposite_surface
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
-from contact.solving import Schedule, run_schedule
+from contact.solving import solve_problem
 from forms.hencky import Linear
 from tests.io.test_reference import fits
 from tests.problems.blocks import Blocks
@@ -46,7 +46,7 @@ def test_a_constant_pressure_is_constant_on_both_sides(dim: int, degree: int) ->
     gap = GapFunction(lambda points: np.zeros(len(points)))
     problem = ContactProblem(domain, body, Contact("under", gap, against="over"), degree=degree)
     # The upper block can move as a rigid body, which `solve` would refuse.
-    found = run_schedule(problem, NewtonOptions(tolerance=1e-13), None, Schedule())
+    found = solve_problem(problem, NewtonOptions(tolerance=1e-13))
     surface = opposite_surface(found)
     assert surface is not None
     fields = surface.at_points

@@ -64,7 +64,6 @@ def test_the_solution_of_a_case_starts_another():
     ("given", "message"),
     [
         ({"law": 1}, "law: given together with a problem that is built already"),
-        ({"restart": "here"}, "restart: given together with a problem that is built already"),
         ({"settings": NewtonOptions(nested=True)}, "nested: given together with a problem"),
     ],
 )
@@ -77,8 +76,6 @@ def test_what_a_case_would_ignore_is_refused():
     state = solve(bar()).state
     with pytest.raises(InputError, match="start: given together with nested = true"):
         solve(bar("solver.nested=true"), start=state)
-    with pytest.raises(InputError, match="restart: given together with a case without"):
-        solve(bar(), restart="here")
     with pytest.raises(InputError, match=r"start: given together with \[evolution\]"):
         solve(load_case(CASES / "fretting.toml"), start=state)
 

@@ -9,7 +9,7 @@ from dolfinx import fem
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from contact import NewtonOptions, solve
+from contact import NewtonOptions, solve, solve_steps
 from contact.results.fields import DerivedFields
 from forms.j2 import J2, Tabulated, Voce
 from scripts.studies.hollow_sphere import (
@@ -343,7 +343,7 @@ def test_the_mean_dilatation_is_p2_p0_with_the_return_map_at_the_points():
     """
     young, limit, pressure, nu = YOUNG, YIELD, 0.0045, 0.3
     problem = sphere(4, young, limit, pressure=lambda t: pressure * t, element="mean_dilatation")
-    solution = solve(problem, NewtonOptions(tolerance=1e-11), times=[1.0])
+    solution = solve_steps(problem, [1.0], NewtonOptions(tolerance=1e-11))
     assert solution.converged and len(solution.steps) == 1
     body = problem.equilibrium
     u, mesh = body.function(solution.state.x), body.domain.mesh
