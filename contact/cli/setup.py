@@ -1,8 +1,9 @@
-"""The set-up of a case in one figure: mesh, supports, electrodes, loads, foundation, dimensions."""
+"""The set-up of a case in one figure: mesh, conditions on its parts, foundation, dimensions."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import textwrap
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
@@ -16,56 +17,47 @@ from matplotlib.figure import Figure
 
 from contact import _compat
 from contact.case.file import Case
+from contact.case.text import literal
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
-from contact.mesh.entities import exterior_facets, paths
+from contact.mesh.entities import exterior_facets
 from contact.mesh.geometry import facet_normals
 from contact.model.fields import Field, Moving, at_time
 from contact.plot.space import Camera, rendered
-from contact.plot.style import BLUE, GREEN, ORANGE, PURPLE, SKY, STYLE, YELLOW, heading
+from contact.plot.style import STYLE, heading
 from contact.problem.problem import ContactProblem
 from contact.results.options import Units
 from contact.typing import Array
 
-#: Colours of supports, loads, contact parts and foundations.
-HELD, LOADED, TOUCHED, FOUNDATION = "#000000", ORANGE, BLUE, SKY
-
-#: Colours of electrodes, one after the other.
-ELECTRODES = (GREEN, PURPLE, YELLOW)
-
-#: Lines of rollers, elastic supports, and bolts and electrodes of unknown potential.
-ROLLERS, ELASTIC, UNKNOWN = "-.", ":", "--"
+#: Colours of conditions, one after the other, and of foundations.
+COLOURS, FOUNDATION = matplotlib.colormaps["tab10"].colors, "#666666"
 
 #: Cells up to which the mesh is drawn, and most arrows of a load on one part.
 MOST_CELLS, ARROWS = 20_000, 32
 
+#: Keys of a section that its entry in the legend leaves out, and the length of the entry.
+UNSAID, LONGEST = {"on", "against", "name", "amplitude"}, 68
+
 
 @dataclass(frozen=True)
 class Role:
-    """A part of the boundary and its data.
+    """A condition on a part: its facets by their corners, and a given force on each.
 
     Attributes
     ----------
-    facets
-        Its facets by their corners, shape (n, d, d).
-    colour, words
-        How it is drawn, and its entry in the legend.
-    force
-        Given force on each facet, shape (n, d); None for none.
-    dashes
-        Style of its line in 2-D, by which roles of one colour differ.
+    facets, force
+        Shape (n, c, d), and (n, d) or None.
+    words, colour
+        Its entry in the legend.
+    electric
+        Whether it is one of a potential, drawn below and beside those of displacements.
     """
 
     facets: Array
-    colour: str
     words: str
+    colour: Any
     force: Array | None = None
-    dashes: str = "-"
-
-    @property
-    def outlined(self) -> bool:
-        """Whether its facets are drawn by their edges in 3-D, so that others on them are seen."""
-        return self.colour in (HELD, *ELECTRODES)
+    electric: bool = False
 
     def arrows(self, middle: Array, reach: float) -> tuple[Array, Array]:
         """Return starts and steps of a load's arrows, the longest of a length, outside the body."""
@@ -86,8 +78,7 @@ def save_setup(case: Case, problem: ContactProblem, folder: Path) -> list[Path]:
     figure = draw_setup(case, problem)
     if figure is None:
         return []
-    stem = Path(case.source).stem
-    paths = [folder / f"{stem}-setup.{ending}" for ending in ("png", "pdf")]
+    paths = [folder / f"{Path(case.source).stem}-setup.{ending}" for ending in ("png", "pdf")]
     for path in paths:
         figure.savefig(path, dpi=300)
     return paths
@@ -95,22 +86,24 @@ def save_setup(case: Case, problem: ContactProblem, folder: Path) -> list[Path]:
 
 def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     """Draw a case and the problem that was built of it on rank 0; None elsewhere. Collective."""
-    domain = problem.domain
+    domain, colours = problem.domain, cycle(COLOURS)
     for other in (0, domain.dim):
         domain.mesh.topology.create_connectivity(domain.dim - 1, other)
-    roles = list(_roles(case, problem))
-    boundary = _gathered(domain, _corners(domain, exterior_facets(domain.mesh)))
+    given = [(words, *_gathered(domain, *rest)) for words, *rest in _conditions(case, problem)]
+    (boundary,) = _gathered(domain, _corners(domain, exterior_facets(domain.mesh)))
     owned = slice(domain.mesh.topology.index_map(domain.dim).size_local)
     places = _compat.geometry_dofmap(domain.mesh)[owned, : shape_of(domain.mesh).corners]
-    cells = _gathered(domain, domain.mesh.geometry.x[places][..., : domain.dim])
+    (cells,) = _gathered(domain, domain.mesh.geometry.x[places][..., : domain.dim])
     surface = _foundation(problem)
-    if boundary is None or cells is None:
+    if domain.comm.rank > 0:
         return None
-    given = [role for role in roles if role is not None]
+    roles = [
+        Role(facets, words, next(colours), force, "potential" in words or "electrode" in words)
+        for words, facets, force in given
+    ]
     with matplotlib.rc_context(STYLE):
         draw = _draw_plane if domain.dim == 2 else _draw_space
-        axes = "rz" if domain.revolved else "xy"
-        figure = draw(boundary, cells, given, surface, case.case.units, axes)
+        figure = draw(boundary, cells, roles, surface, case.case.units, "xr"[domain.revolved])
         figure.suptitle(heading(case.title), fontsize="medium")
         figure.legend(loc="outside lower center", ncols=2, fontsize=7, handlelength=4)
     return figure
@@ -125,99 +118,52 @@ def _foundation(problem: ContactProblem) -> Array:
     return np.concatenate(found)
 
 
-def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
-    """Yield the conditions on each part, None on ranks other than 0. Collective."""
-    domain, colours = problem.domain, cycle(ELECTRODES)
+def _conditions(case: Case, problem: ContactProblem) -> Iterator[tuple[str, Array, Array | None]]:
+    """Yield conditions: words, facets of this rank, and the force on each."""
+    domain = problem.domain
     for key, section in case.contacts:
-        yield _role(domain, section.on, TOUCHED, _contact_words(case, key, section))
+        friction, electric = case.friction_of(key, section)[1], case.electric_of(key, section)[1]
+        laws = "" if friction.law == "none" else f"{friction.law.capitalize()} friction"
+        laws += "" if electric is None else f", k_e = {electric.k_e:g}"
+        yield _words("contact", section, laws.removeprefix(", ")), _facets(domain, section.on), None
         if section.against is not None:
-            yield _role(domain, section.against, FOUNDATION, f"opposite: {section.against}")
-    for fixed in case.fixed:
-        if fixed.symmetry is not None:
-            words = f"symmetry across ${fixed.symmetry}$ on {fixed.on}"
-            yield _role(domain, fixed.on, HELD, words, dashes=ROLLERS)
-        if fixed.displacement is not None:
-            words = f"$u$ = ({_said(*fixed.displacement)}) on {fixed.on}"
-            yield _role(domain, fixed.on, HELD, words)
-        if fixed.normal is not None:
-            words = rf"$u_\nu$ = {_said(fixed.normal)} on {fixed.on}"
-            yield _role(domain, fixed.on, HELD, words, dashes=ROLLERS)
-        if fixed.potential is not None:
-            words = rf"$\varphi$ = {_said(fixed.potential)} on {fixed.on}"
-            yield _role(domain, fixed.on, next(colours), words)
-    for support in case.elastic:
-        yield _role(domain, support.on, HELD, f"elastic support: {support.on}", dashes=ELASTIC)
-    for bolt in case.bolt:
-        key = "shortening" if bolt.force is None else "force"
-        words = f"bolt, {key} {_said(getattr(bolt, key))}: {bolt.on}"
-        yield _role(domain, bolt.on, LOADED, words, dashes=UNKNOWN)
-    for electrode in case.electrode:
-        words = f"electrode of charge {_said(electrode.charge)}: {electrode.on}"
-        yield _role(domain, electrode.on, next(colours), words, dashes=UNKNOWN)
-    for part in case.rigid:
-        yield _role(domain, part.on, HELD, f"rigid part: {part.on}")
+            yield f"opposite: {section.against}", _facets(domain, section.against), None
+    for key in ("fixed", "elastic", "bolt", "electrode", "rigid"):
+        for section in getattr(case, key):
+            yield _words(key, section), _facets(domain, section.on), None
     for given, load in zip(case.load, problem.body.loads, strict=True):
-        said = []
-        if given.traction is not None:
-            said.append(f"traction ({_said(*given.traction)})")
-        if given.force is not None:
-            said.append(f"force ({_said(*given.force)})")
-        if given.pressure is not None:
-            said.append(f"pressure {_said(given.pressure)}")
-        if given.charge is not None and _said(given.charge) != "0":
-            said.append(f"charge {_said(given.charge)}")
-        if given.on is not None and said:
-            words = f"{', '.join(said)} on {given.on}"
-            yield _role(domain, given.on, LOADED, words, load.density or load.force, load.pressure)
+        if given.on is None:
+            continue
+        corners = _facets(domain, given.on)
+        middle = corners.mean(axis=1)
+        force = np.zeros_like(middle)
+        if (density := load.density or load.force) is not None:
+            force += np.column_stack([_values(field, middle) for field in density])
+        if load.pressure is not None:
+            normal = facet_normals(domain, given.on, 1)[2].mean(axis=1)
+            normal /= np.linalg.norm(normal, axis=1)[:, None]
+            force -= _values(load.pressure, middle)[:, None] * normal
+        yield _words("load", given), corners, force
 
 
-def _contact_words(case: Case, key: str, section: Any) -> str:
-    """Return the contact parts, with friction and current, in words."""
-    words = [f"contact: {section.on}"]
-    if section.against is not None:
-        words[0] += f" against {section.against}"
-    if section.gap is not None and _said(section.gap) != "0":
-        words.append(f"gap {_said(section.gap)}")
-    friction, electric = case.friction_of(key, section)[1], case.electric_of(key, section)[1]
-    if friction.law != "none":
-        words.append(f"{friction.law.capitalize()} friction")
-    if electric is not None:
-        words.append(rf"$k_e$ = {electric.k_e:g}, $\varphi_F$ = {_said(electric.phi_f)}")
-    return ", ".join(words)
+def _values(field: Field | Moving, points: Array) -> Array:
+    """Return values of a field at points; of one that moves at the end of an evolution."""
+    return np.asarray(at_time(field, 1.0).numpy(points))
 
 
-def _said(*values: Any) -> str:
-    """Return numbers or formulas of the case file as they stand there."""
-    sources = [getattr(value, "source", value) for value in values]
-    return ", ".join(f"{s:g}" if isinstance(s, float) else s.replace("$", "") for s in sources)
+def _words(key: str, section: Any, more: str = "") -> str:
+    """Return the entry of a section in the legend: its keys as in the case file."""
+    table = section.model_dump(by_alias=True, exclude_none=True, exclude_unset=True)
+    said = [more] * bool(more)
+    said += [f"{k} = {literal(v)}" for k, v in table.items() if k not in UNSAID]
+    against = f" against {section.against}" if getattr(section, "against", None) else ""
+    words = f"{key} {section.on}{against}{': ' * bool(said)}{', '.join(said)}"
+    return textwrap.shorten(words.replace("$", ""), LONGEST, placeholder=" ...")
 
 
-def _role(
-    domain: Domain,
-    part: str,
-    colour: str,
-    words: str,
-    given: Sequence[Field | Moving] | None = None,
-    pressure: Field | Moving | None = None,
-    dashes: str = "-",
-) -> Role | None:
-    """Return a part on rank 0, None elsewhere; given are its traction and pressure. Collective."""
-    corners, force = _corners(domain, domain.facets_anywhere(part)), None
-    middle = corners.mean(axis=1)
-
-    def values(field: Field | Moving) -> Array:
-        """Return those of a field; of one that moves at the end of an evolution."""
-        return np.asarray(at_time(field, 1.0).numpy(middle))
-
-    if given is not None:
-        force = np.column_stack([values(field) for field in given])
-    if pressure is not None:
-        normal = facet_normals(domain, part, 1)[2].mean(axis=1)
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        push = -values(pressure)[:, None] * normal
-        force = push if force is None else force + push
-    facets, force = _gathered(domain, corners), None if force is None else _gathered(domain, force)
-    return None if facets is None else Role(facets, colour, words, force, dashes)
+def _facets(domain: Domain, part: str) -> Array:
+    """Return the facets of a part on this rank by their corners."""
+    return _corners(domain, domain.facets_anywhere(part))
 
 
 def _corners(domain: Domain, facets: Indices) -> Array:
@@ -229,35 +175,14 @@ def _corners(domain: Domain, facets: Indices) -> Array:
     return np.asarray(domain.mesh.geometry.x[places[:, shape.around]][..., : domain.dim])
 
 
-def _gathered(domain: Domain, values: Array) -> Array | None:
-    parts = domain.comm.gather(values)
-    return None if parts is None else np.concatenate(parts)
-
-
-def chains(edges: Array) -> list[Array]:
-    """Return edges, shape (n, 2, 2), as lines from end to end, each of shape (m, 2).
-
-    Lines that branch are left as edges.
-    """
-    if not len(edges):
-        return []
-    points = edges.reshape(-1, 2)
-    size = max(float(np.ptp(points, axis=0).max()), np.finfo(float).tiny)
-    _, first, number = np.unique(
-        np.round(points / (1e-9 * size)), axis=0, return_index=True, return_inverse=True
-    )
-    ends, places, found = number.reshape(-1, 2), points[first], list[Array]()
-    degree = np.bincount(ends.ravel())
-    if degree.max() > 2:
-        return list(edges)
-    for line in paths(ends, len(places)):
-        closed = degree[line[0]] > 1
-        found.append(places[np.append(line, line[0]) if closed else line])
-    return found
+def _gathered(domain: Domain, *values: Array | None) -> list[Any]:
+    """Return values of all ranks on rank 0, None elsewhere, and for None. Collective."""
+    every = [None if own is None else domain.comm.gather(own) for own in values]
+    return [None if parts is None else np.concatenate(parts) for parts in every]
 
 
 def _draw_plane(
-    boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
+    boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axis: str
 ) -> Figure:
     """Draw a plane body by its boundary edges, shape (m, 2, 2), and cells, shape (n, c, 2)."""
     extent = np.ptp(boundary, axis=(0, 1))
@@ -270,35 +195,34 @@ def _draw_plane(
         ax.add_collection(PolyCollection(list(cells[:, around]), facecolor="none", **thin))
     middle = cells.reshape(-1, 2).mean(axis=0)
     for role in roles:
-        wide, above = 1.5 if role.colour == LOADED and role.dashes == "-" else 3.0, 2.0
-        if role.colour in ELECTRODES:  # on both sides of other lines
-            wide, above = 7.0, 1.5
-        # Whole lines, for dashes begin anew at each facet.
-        lines = LineCollection(chains(role.facets), colors=role.colour, lw=wide, ls=role.dashes)
+        wide, above = (7.0, 1.5) if role.electric else (3.0 if role.force is None else 1.5, 2.0)
+        lines = LineCollection(list(role.facets), colors=[role.colour], lw=wide)
         lines.set(label=role.words, capstyle="butt", zorder=above)
         ax.add_collection(lines)
         start, step = role.arrows(middle, 0.12 * float(extent.max()))
         if start.size:
-            arrows = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0025}
-            ax.quiver(*start.T, *step.T, color=LOADED, **arrows)
+            arrows = {
+                "angles": "xy",
+                "scale_units": "xy",
+                "scale": 1.0,
+                "width": 0.0025,
+                "zorder": 3,
+            }
+            ax.quiver(*start.T, *step.T, color=role.colour, **arrows)
             ax.update_datalim(np.concatenate([start, start + step]))
     if surface.size:
-        order = np.lexsort(surface.T[::-1])
-        ax.plot(*surface[order].T, ".", ms=4, color=FOUNDATION, label="foundation")
-    sides = [f"{side:.4g} {units.length or ''}".rstrip() for side in extent]
-    ax.text(0.5, 1.01, sides[0], transform=ax.transAxes, ha="center", va="bottom", fontsize=8)
-    upright = {"ha": "left", "va": "center", "rotation": 90.0}
-    ax.text(1.01, 0.5, sides[1], transform=ax.transAxes, fontsize=8, **upright)  # type: ignore[arg-type]
+        ax.plot(*surface.T, ".", ms=4, color=FOUNDATION, label="foundation")
+    ax.set_title(_sizes(extent, units), fontsize=8)
     ax.set_aspect("equal")
     ax.margins(0.03)
     ax.autoscale_view()
-    ax.set_xlabel(units.label(f"${axes[0]}$", "length"))
-    ax.set_ylabel(units.label(f"${axes[1]}$", "length"))
+    ax.set_xlabel(units.label(f"${axis}$", "length"))
+    ax.set_ylabel(units.label("$z$" if axis == "r" else "$y$", "length"))
     return figure
 
 
 def _draw_space(
-    boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
+    boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axis: str
 ) -> Figure:
     """Draw a body in 3-D by the facets of its boundary, shape (m, c, 3); see `_draw_plane`."""
     points = boundary.reshape(-1, 3)
@@ -315,31 +239,28 @@ def _draw_space(
         edges = {"show_edges": len(boundary) <= MOST_CELLS, "edge_opacity": 0.4, "line_width": 0.5}
         plotter.add_mesh(facets(boundary), color="#EEEEEE", opacity=0.3, **edges)
         for role, (start, step) in zip(roles, arrows, strict=True):
-            if role.outlined:
-                wide = 2.5 if role.colour == HELD else 6.0
-                outline = {"style": "wireframe", "line_width": wide}
-                plotter.add_mesh(facets(role.facets), color=role.colour, **outline)
-            else:
-                lit = {"opacity": 0.7, "ambient": 0.6, "diffuse": 0.4}
-                plotter.add_mesh(facets(role.facets), color=role.colour, **lit)
+            look = {"style": "wireframe", "line_width": 6.0} if role.electric else {"opacity": 0.5}
+            plotter.add_mesh(facets(role.facets), color=role.colour, lighting=False, **look)
             if start.size:
-                plotter.add_arrows(start, step, color=LOADED)
+                plotter.add_arrows(start, step, color=role.colour)
         if surface.size:
             plotter.add_points(surface, color=FOUNDATION, point_size=5.0)
 
     seen = np.concatenate([points, surface.reshape(-1, 3), *(start for start, _ in arrows)])
-    camera = Camera.of(np.array([1.0, -1.6, 0.5]), seen)
-    images = rendered(add, [camera])
     figure = Figure(figsize=(6.9, 6.0))
     ax = figure.subplots()
     ax.axis("off")
-    for image in images:
+    for image in rendered(add, [Camera.of(np.array([1.0, -1.6, 0.5]), seen)]):
         ax.imshow(image)
-    sides = r" $\times$ ".join(f"{side:.4g}" for side in extent)
-    ax.set_title(f"{sides} {units.length or ''}".rstrip(), y=-0.02, fontsize=8)
+    ax.set_title(_sizes(extent, units), y=-0.02, fontsize=8)
     for role in roles:
-        edge, face = (role.colour, "none") if role.outlined else ("0.6", role.colour)
-        ax.plot([], [], "s", color=edge, markerfacecolor=face, label=role.words)
+        ax.plot([], [], "s", color=role.colour, label=role.words)
     if surface.size:
         ax.plot([], [], "o", ms=3, color=FOUNDATION, label="foundation")
     return figure
+
+
+def _sizes(extent: Array, units: Units) -> str:
+    """Return the dimensions of a body in words."""
+    sides = r" $\times$ ".join(f"{side:.4g}" for side in extent)
+    return f"{sides} {units.length or ''}".rstrip()
