@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,54 @@ from contact.mesh.domain import ON_AXIS, Domain
 from contact.mesh.reader import convert, from_file
 from contact.ranks import on_root
 from contact.tolerances import NEGLIGIBLE
+
+CASE = """\
+# A case to begin with; every key is described in docs/case-file.md.
+# Units are yours, but all the same: with mm and N, stresses are in MPa.
+title = {title}
+
+[case]
+# units = "N-mm-MPa"          # labels of figures, and constants of materials by name
+
+[mesh]
+file = {file}
+# Parts of its boundary, to be named below:
+{parts}# Regions: {regions}.
+
+{space}{materials}
+[[fixed]]                     # the part that lies highest; "free": no support in this direction
+on = {highest}
+displacement = {pressed}
+{held}
+# [[load]]                    # a resultant on any part but those of contacts
+# on = {highest}
+# force = {load}
+
+{contacts}
+[friction]
+law = "coulomb"
+mu = 0.2
+
+[solver]
+method = "newton"
+tolerance = 1e-8
+"""
+
+MATERIAL = """\
+young = 210e3                 # Young's modulus (stress); or by name: name = "steel"
+poisson = 0.3
+"""
+
+HENCKY = """\
+# law = "log"                 # Hencky's law, plastic beyond this strain:
+# yield_strain = 0.002
+"""
+
+PAIRS = """\
+# Bodies of this mesh that can touch each other. Friction and current can be given for each; `on`
+# is the finer side here, or take the softer body. A rigid foundation instead of a body:
+# on = ..., foundation = { shape = "plane", point = [...], normal = [...] }
+"""
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -66,10 +113,8 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
 
     Of several bodies that face each other onto each other, the lowest part held.
     """
-    heights, facing = _heights(domain), facing_parts(domain)
-    pairs = [(on, against) for _, on, against in facing]
-    overlap = max(-facing[0][0], 0.0) if facing else 0.0
-    sides = {side for pair in pairs for side in pair}
+    heights, facing, d = _heights(domain), facing_parts(domain), domain.dim
+    sides = {side for _, *pair in facing for side in pair}
     order = sorted({*heights} - sides, key=lambda name: (heights[name], name))
     if len(order) < 2:
         raise InputError(
@@ -78,77 +123,44 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
             "new-parts",
         )
     lowest, highest = order[0], order[-1]
-    d = domain.dim
     step = float(f"{1e-3 * domain.size:.0e}")
     closed = np.ceil(max(facing[0][0], 0.0) / step - NEGLIGIBLE) if facing else 0.0
-    pressed = _along(d, -float(f"{(1 + closed) * step:.6g}"))
     try:
         name = str(mesh.resolve().relative_to(path.resolve().parent))
     except ValueError:
         name = str(mesh.resolve())
     parts = "".join(f"#   {part}\n" for part in sorted(domain.parts))
-    within = "".join(f"#   {part}\n" for part in sorted(domain.inside))
-    within = (
-        f"# Parts inside of it, for supports, electrodes and bolts:\n{within}" if within else ""
+    if domain.inside:
+        parts += "# Parts inside of it, for supports, electrodes and bolts:\n"
+        parts += "".join(f"#   {part}\n" for part in sorted(domain.inside))
+    space = "".join(f"{key} = {literal(value)}\n" for key, value in domain.space.items())
+    held = f"\n[[fixed]]                     # the part that lies lowest\non = {literal(lowest)}\n"
+    return CASE.format(
+        title=literal(mesh.stem),
+        file=literal(name),
+        parts=parts,
+        regions=", ".join(sorted(domain.regions)),
+        space=f"[space]                       # as the elements of the file\n{space}\n"
+        * bool(space),
+        materials=_materials(domain),
+        highest=literal(highest),
+        pressed=_along(d, -float(f"{(1 + closed) * step:.6g}")),
+        held=f"{held}displacement = {_along(d, 0.0)}\n" * bool(facing),
+        load=_along(d, -1.0),
+        contacts=_pairs(facing) if facing else _foundation(domain, lowest),
     )
-    regions = ", ".join(sorted(domain.regions))
-    keys = "".join(f"{key} = {literal(value)}\n" for key, value in domain.space.items())
-    space = f"[space]                       # as the elements of the file\n{keys}\n" if keys else ""
-    held = f"""
-[[fixed]]                     # the part that lies lowest
-on = {literal(lowest)}
-displacement = {_along(d, 0.0)}
-"""
-    return f"""\
-# A case to begin with; every key is described in docs/case-file.md.
-# Units are yours, but all the same: with mm and N, stresses are in MPa.
-title = {literal(mesh.stem)}
-
-[case]
-# units = "N-mm-MPa"          # labels of figures, and constants of materials by name
-
-[mesh]
-file = {literal(name)}
-# Parts of its boundary, to be named below:
-{parts}{within}# Regions: {regions}.
-
-{space}{_materials(domain)}
-[[fixed]]                     # the part that lies highest; "free": no support in this direction
-{f"on = {literal(highest)}":<30}# or a list of parts
-displacement = {pressed}
-{held if pairs else ""}
-# [[load]]                    # a resultant on any part but those of contacts
-# on = {literal(highest)}
-# force = {_along(d, -1.0)}
-
-{_pairs(pairs, overlap) if pairs else _foundation(domain, lowest)}
-[friction]
-law = "coulomb"
-mu = 0.2
-
-[solver]
-method = "newton"
-tolerance = 1e-8
-"""
 
 
 def _materials(domain: Domain) -> str:
     """Return a material for each region, where each cell has one; else one for all. Collective."""
     counts = [domain.comm.allreduce(cells.size, op=MPI.SUM) for cells in domain.regions.values()]
     apart = sum(counts) == domain.mesh.topology.index_map(domain.dim).size_global
-    names = sorted(domain.regions) if apart and len(counts) > 1 else [""]
-    more = """\
-# law = "log"                 # Hencky's law, plastic beyond this strain:
-# yield_strain = 0.002
-"""
-    return "\n".join(
-        f"""\
-{f"[[material]]{chr(10)}on = {literal(name)}" if name else "[material]"}
-young = 210e3                 # Young's modulus (stress); or by name: name = "steel"
-poisson = 0.3
-{more if name == names[0] else ""}"""
-        for name in names
-    )
+    if not apart or len(counts) == 1:
+        return f"[material]\n{MATERIAL}{HENCKY}"
+    first, *others = [
+        f"[[material]]\non = {literal(k)}\n{MATERIAL}" for k in sorted(domain.regions)
+    ]
+    return "\n".join([first + HENCKY, *others])
 
 
 def _foundation(domain: Domain, lowest: str) -> str:
@@ -164,29 +176,21 @@ foundation = {{ shape = "plane", point = {ground}, normal = {_along(d, 1.0)} }}
 """
 
 
-def _pairs(pairs: Sequence[tuple[str, str]], overlap: float) -> str:
-    """Return the contacts between bodies, whose meshes overlap by so much at most."""
+def _pairs(facing: list[tuple[float, str, str]]) -> str:
+    """Return the contacts between bodies, given their gaps, the least first, and sides."""
     sides: dict[str, list[str]] = {}  # contacts share no nodes: one for each `on`
-    for on, against in pairs:
+    for _, on, against in facing:
         sides.setdefault(on, []).append(against)
-    text = "".join(
-        f"""
-[[contact]]
-on = {literal(on)}
-against = {literal(against if len(against) > 1 else against[0])}
-"""
-        for on, against in sides.items()
-    )
+    text, overlap = PAIRS, -facing[0][0]
     if overlap > 0:
-        text = f"""
+        text += f"""
 # The meshes overlap, by up to {overlap:.3g}, which is refused: move a body, or, where that is an
 # interference, add overlap = "press".
-{text}"""
-    return f"""\
-# Bodies of this mesh that can touch each other. Friction and current can be given for each; `on`
-# is the finer side here, or take the softer body. A rigid foundation instead of a body:
-# on = ..., foundation = {{ shape = "plane", point = [...], normal = [...] }}
-{text}"""
+"""
+    for side, others in sides.items():
+        opposite = literal(others if len(others) > 1 else others[0])
+        text += f"\n[[contact]]\non = {literal(side)}\nagainst = {opposite}\n"
+    return text
 
 
 def _along(dim: int, value: float) -> str:
@@ -195,19 +199,15 @@ def _along(dim: int, value: float) -> str:
 
 
 def _heights(domain: Domain) -> dict[str, float]:
-    """Return the mean last coordinate of the facets of each part. Collective.
-
-    Of a body of revolution those on its axis are no parts of its boundary.
-    """
-    mesh, d = domain.mesh, domain.dim
-    revolved = domain.space.get("kinematics") == "axisymmetric"
-    found = {}
+    """Return the mean last coordinate of the facets of each part. Collective."""
+    # Of a body of revolution those on its axis are no parts of its boundary.
+    revolved, found = domain.space.get("kinematics") == "axisymmetric", {}
     for name, facets in domain.parts.items():
         middles = np.empty((0, 3))
         if facets.size > 0:  # dolfinx divides by their number
-            middles = dmesh.compute_midpoints(mesh, d - 1, facets)
-        sums = np.array([middles[:, d - 1].sum(), np.abs(middles[:, 0]).sum(), len(middles)])
-        total = domain.comm.allreduce(sums, op=MPI.SUM)
+            middles = dmesh.compute_midpoints(domain.mesh, domain.dim - 1, facets)
+        sums = [middles[:, domain.dim - 1].sum(), np.abs(middles[:, 0]).sum(), len(middles)]
+        total = domain.comm.allreduce(np.array(sums), op=MPI.SUM)
         height, radius = total[:2] / total[2] / domain.size
         if not revolved or radius > ON_AXIS:
             found[name] = round(float(height), 6)
