@@ -40,7 +40,7 @@ from contact.problem.state import State
 from contact.ranks import on_root
 from contact.results.quantities import quantities, values_of
 from contact.results.quantity import SUMMARY, SWEEP, is_of
-from contact.results.remarks import measure
+from contact.results.remarks import evaluate_extremes
 from contact.results.solution import Solution
 from contact.solving import solve_problem, step_times
 from contact.typing import Array
@@ -256,7 +256,7 @@ def sweep(
                 if solution.outcome.signal:
                     raise Interrupted(solution.outcome.signal)
                 seconds = comm.bcast(time.perf_counter() - begin)
-                measure(solution, whole=len(columns) > 0)
+                evaluate_extremes(solution, whole=len(columns) > 0)
                 row = {**point, **values_of(SWEEP, solution)}
                 more = summary_columns(solution, columns)
                 row |= {name: value for name, value in more.items() if name not in row}

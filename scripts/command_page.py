@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from contact.cli.arguments import EXIT, offered
-from contact.io.reference import files_help
 
 PAGE = Path(__file__).parents[1] / "docs" / "command-line.md"
 
@@ -33,9 +32,8 @@ def page() -> str:
         if arguments:
             lines += ["", "| argument | meaning |", "|---|---|"]
             lines += [_row(name, options) for name, options in arguments.items()]
-        if epilog is not None and files_help("sweep.csv").splitlines()[0] not in epilog:
-            text = epilog.partition("\n\nkeys of ")[0].rstrip()
-            lines += ["", "```text", text, "```"]
+        if epilog is not None:
+            lines += ["", "```text", epilog.rstrip(), "```"]
         lines.append("")
     lines += ["## Exit status", "", "| status | meaning |", "|---|---|"]
     said = " ".join(EXIT.split()).removeprefix("exit status: ")

@@ -37,7 +37,7 @@ from contact.derivatives.by_parameters import logger
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
 from contact.problem.linearised import Linearised
-from contact.results.differentiable import named_quantities
+from contact.results.quantities import named_functionals
 from scripts.studies.cattaneo import ball_values, cylinder_values, cylinders
 from scripts.studies.derivative_values import products
 from scripts.studies.derivatives import (
@@ -261,7 +261,7 @@ def test_hertz_exponents():
     keys = ["material.young"]
     found = sensitivity(run, ["contact_force_y", "max_pressure"], keys)
     for name in found:
-        value = named_quantities(run.problem)[name](run.problem, run.state)
+        value = named_functionals(run.problem)[name](run.problem, run.state)
         assert found[name]["material.young"] == pytest.approx(value, rel=1e-9)
 
 
@@ -282,7 +282,7 @@ def test_gradient_by_the_gap(family):
         jump = replace(base.nodes, gap=base.nodes.gap + way * change)
         there.interface = replace(base.interface, jump=jump)
         run = solve_steps(there, times, tight)
-        return named_quantities(there)[name](run.problem, run.state)
+        return named_functionals(there)[name](run.problem, run.state)
 
     way = 1e-7
     assert gradient @ change == pytest.approx((force(way) - force(-way)) / (2 * way), rel=1e-6)
@@ -490,7 +490,7 @@ def test_a_smoothed_pressure_that_couples_too_much_is_refused():
 @pytest.mark.parametrize(
     ("quantity", "parameter", "message"),
     [
-        ("pressure", "friction.mu", r"quantities: given 'pressure'; accepted: max_pressure, "),
+        ("pressure", "friction.mu", r"quantities: given 'pressure'; accepted: contact_force_x, "),
         ("max_pressure", "friction.nu", r"friction.nu: nothing stands there; accepted: a key with"),
         ("max_pressure", "friction.law", r"friction.law: 'coulomb' stands there; accepted"),
         ("max_pressure", "mesh.cells.0", r"mesh.cells.0: .*accepted"),

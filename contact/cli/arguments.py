@@ -11,7 +11,6 @@ from mpi4py import MPI
 
 from contact import __version__
 from contact.errors import InputError, nearest
-from contact.io.reference import files_help
 
 DESCRIPTION = """\
 Frictional contact of elasto-plastic and piezoelectric bodies. A problem is a case file;
@@ -53,12 +52,29 @@ ONE = {
 }
 
 
+#: Files whose keys and columns the help of a command lists.
+FILES = {
+    "solve": ("summary.json", "contact.csv", "steps.csv", "history.csv"),
+    "sweep": ("sweep.csv",),
+}
+
+
 class Parser(argparse.ArgumentParser):
     """A parser that raises InputError, and prints its help on one rank alone."""
+
+    files: tuple[str, ...] = ()
 
     def error(self, message: str) -> NoReturn:
         """Raise an InputError that names the command whose help has the usage."""
         raise InputError(f"{message}; accepted: as {self.prog} --help shows", "command-line")
+
+    def format_help(self) -> str:
+        """Return the help, with the keys and columns of the files that the command writes."""
+        if not self.files:
+            return super().format_help()
+        from contact.io.reference import files_help  # loads dolfinx, which options precede
+
+        return f"{super().format_help()}\n{files_help(*self.files)}\n"
 
     def _print_message(self, message: str, file: Any = None) -> None:
         if MPI.COMM_WORLD.rank == 0:
@@ -123,6 +139,7 @@ def _parser() -> Parser:
             usage=f"contact {usage}",
             **COMMON,
         )
+        command.files = FILES.get(usage.partition(" ")[0], ())
         command.add_argument("--help", action="help", help="show this help and leave")
         for name, options in arguments.items():
             command.add_argument(name, **options)
@@ -202,7 +219,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
     yield (
         "solve CASE.toml --out DIR [options] [PETSc options]",
         "solve a case and write the results",
-        f"{PETSC}\n{files_help('summary.json', 'contact.csv', 'steps.csv', 'history.csv')}",
+        PETSC,
         {
             "case": {**case, "nargs": "?"},
             "--set": replaced,
@@ -220,7 +237,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
     yield (
         "sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]",
         "solve a case for several values of some keys: sweep.csv, one row per value",
-        files_help("sweep.csv"),
+        None,
         {
             "case": case,
             "--set": replaced,

@@ -21,7 +21,7 @@ from contact.derivatives.by_parameters import LoadPath, backwards, parameters_of
 from contact.derivatives.differences import Parameter, family_of
 from contact.errors import InputError
 from contact.history import Evaluated, InternalVariables
-from contact.results.differentiable import Differentiable, Quantity
+from contact.results.quantity import Differentiable, Functional
 from contact.results.solution import Solution
 from contact.typing import Array
 
@@ -29,7 +29,7 @@ from contact.typing import Array
 MATERIAL = "material"
 
 
-def gap_gradient(solution: Solution, quantity: str | Quantity) -> Array:
+def gap_gradient(solution: Solution, quantity: str | Functional) -> Array:
     """Return the derivatives of a result by the gap at each contact node. Collective.
 
     One adjoint gives them all: the gradient for the shape of a foundation.
@@ -72,7 +72,7 @@ def gap_gradient(solution: Solution, quantity: str | Quantity) -> Array:
 
 def field_gradient(
     solution: Solution,
-    quantity: str | Quantity,
+    quantity: str | Functional,
     parameter: str | Parameter = "material.young",
     degree: int = 0,
 ) -> fem.Function:
@@ -135,7 +135,7 @@ def field_gradient(
     return gradient
 
 
-def _one(solution: Solution, quantity: str | Quantity) -> Mapping[str, Differentiable]:
+def _one(solution: Solution, quantity: str | Functional) -> Mapping[str, Differentiable]:
     """Return a quantity with a gradient, by its name. Collective."""
     given = [quantity] if isinstance(quantity, str) else {"quantity": quantity}
     ((name, found),) = quantities_of(solution, given).items()

@@ -51,13 +51,9 @@ from contact.problem.linearised import (
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import summed
-from contact.results.differentiable import (
-    Differentiable,
-    Largest,
-    Quantity,
-    Reaction,
-    named_quantities,
-)
+from contact.results.functionals import Largest, Reaction
+from contact.results.quantities import named_functionals
+from contact.results.quantity import Differentiable, Functional
 from contact.results.solution import Solution
 from contact.typing import Array
 
@@ -104,7 +100,7 @@ class Sensitivities(dict[str, dict[str, float]]):
 
 def sensitivity(
     solution: Solution,
-    quantities: Sequence[str] | Mapping[str, Quantity],
+    quantities: Sequence[str] | Mapping[str, Functional],
     parameters: Sequence[str] | Mapping[str, Parameter],
     method: str = AUTO,
 ) -> Sensitivities:
@@ -117,9 +113,10 @@ def sensitivity(
     quantities
         Columns of ``steps.csv``: ``contact_force_x``, ``max_pressure``, ``max_displacement``,
         ``reaction_x_PART``, ``driven_y``, ``rigid_x``, ``rigid_rotation``, ``rigid_force_x``,
-        ``potential_PART``, ``charge_PART``, ``charge_foundation``; and ``energy``, ``dissipation``
-        and ``driven_force_x`` by the tangent. Or functions of problem and state, by name;
-        the adjoint asks these for a `gradient` (`contact.results.differentiable`).
+        ``potential_PART``, ``charge_PART``, ``charge_foundation``, ``bolt_shortening_PART``; and
+        ``energy``, ``dissipation`` and ``driven_force_x`` by the tangent. Or functions of problem
+        and state, by name; the adjoint asks these for a `gradient`, as that of
+        `contact.results.functionals.Integral`.
     parameters
         Keys of the case with a number: ``material.young``, ``friction.mu``, ``contact.gap``,
         ``load.0.traction.1``. Or `Parameter` by name, for problems that were built in Python.
@@ -172,12 +169,12 @@ def sensitivity(
 
 
 def quantities_of(
-    solution: Solution, given: Sequence[str] | Mapping[str, Quantity]
-) -> Mapping[str, Quantity]:
+    solution: Solution, given: Sequence[str] | Mapping[str, Functional]
+) -> Mapping[str, Functional]:
     """Return quantities by name. Collective."""
     if isinstance(given, Mapping):
         return given
-    known = named_quantities(solution.problem)
+    known = named_functionals(solution.problem)
     for name in given:
         accepted = ", ".join(known) + "; or a function of problem and state"
         expect("quantities", name, accepted, name in known)
@@ -265,7 +262,7 @@ class LoadPath:
         return np.unique(np.concatenate([weakly_active(*step) for step in self.steps]), axis=0)
 
 
-def _with_gradients(quantities: Mapping[str, Quantity]) -> dict[str, Differentiable]:
+def _with_gradients(quantities: Mapping[str, Functional]) -> dict[str, Differentiable]:
     """Return the quantities with a gradient."""
     return {name: it for name, it in quantities.items() if isinstance(it, Differentiable)}
 
@@ -303,19 +300,19 @@ def _explicit_history(family: Family, sides: _Sides) -> History:
     return found[0].replaced({k: family.slope([one[k] for one in every]) for k in every[0]})
 
 
-def _slope_of(family: Family, quantity: Quantity, sides: _Sides) -> float:
+def _slope_of(family: Family, quantity: Functional, sides: _Sides) -> float:
     """Return dQ/dm by a difference quotient. Collective."""
     return float(family.slope([np.asarray(quantity(*side)) for side in sides]))
 
 
-def _located(quantity: Quantity, problem: ContactProblem, state: State) -> Quantity:
+def _located(quantity: Functional, problem: ContactProblem, state: State) -> Functional:
     """Return a largest value at its node: other nodes may be as large."""
     return quantity.located(problem, state) if isinstance(quantity, Largest) else quantity
 
 
 def _tangent(
     path: LoadPath,
-    quantities: Mapping[str, Quantity],
+    quantities: Mapping[str, Functional],
     families: Mapping[str, Family],
     found: Sensitivities,
 ) -> None:

@@ -143,7 +143,7 @@ def apart(problem: ContactProblem) -> Iterator[Remark]:
 
 
 def held_along(solution: Solution) -> Iterator[Remark]:
-    """Tell of supports that hold touching nodes along the contact, so that friction does not act there.
+    """Tell of supports that hold touching nodes along the contact: no friction acts there.
 
     Aslant to the contact direction, or moved along another body that is free there.
     """
@@ -253,7 +253,10 @@ def not_held(solution: Solution) -> Iterator[Remark]:
             why = "friction bounded by the pressures that were found does not balance"
         else:
             support = UnilateralSupport.of(group)
-            motion, why = None if support is None else support.lost(time), "no contact force balances"
+            motion, why = (
+                None if support is None else support.lost(time),
+                "no contact force balances",
+            )
         if motion is None:
             continue
         large = np.abs(motion) > 0.1 * np.abs(motion).max()
@@ -267,11 +270,9 @@ def not_held(solution: Solution) -> Iterator[Remark]:
 def _least_constrained(
     solution: Solution, group: Group, free: Array, touches: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Return relative stiffnesses of contact along free motions, ascending, and these. Collective.
-
-    That is the share of their squares at all contact nodes that is where they are resisted; the
-    motions, shape (m, k), have mean squares of 1 there.
-    """
+    """Return relative stiffnesses of contact along free motions, and these. Collective."""
+    # Ascending: shares of their squares at all contact nodes that are where they are resisted. The
+    # motions, shape (m, k), have mean squares of 1 there.
     nodes = group.problem.nodes
     normal, tangential = group.normal @ free, group.tangential @ free
     resisted = tangential.copy()

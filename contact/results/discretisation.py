@@ -14,10 +14,10 @@ from contact.body.elements import MEAN_DILATATION, unlocked
 from contact.errors import counted
 from contact.interface.mortar.search import nearest
 from contact.interface.mortar.surface import Surface, surface_of
-from contact.model.obstacle import Heights, Shape
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import ALIKE_NORMALS
 from contact.mesh.entities import cells_at, exterior_facets
+from contact.model.obstacle import Heights, Shape
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields
 from contact.results.solution import Remark, Solution
@@ -134,7 +134,7 @@ def own_shape(problem: ContactProblem) -> Iterator[Remark]:
 
 
 def beyond_part(solution: Solution) -> Iterator[Remark]:
-    """Warn of contact that goes on where the contact part, or the map of heights, ends. Collective."""
+    """Warn of contact that goes on where its part, or the map of heights, ends. Collective."""
     problem, d = solution.problem, solution.problem.dim
     if any(isinstance(contact.foundation, Heights) for contact in problem.contacts):
         yield from without_heights(problem, _touched(solution))
@@ -298,11 +298,9 @@ def _straight_edges(
 
 
 def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, float, float]:
-    """Return largest turn, waves and least cosine of directions along straight edges. Collective.
-
-    Where the curvature varies the deviation of the curve from an edge of the length h is known to
-    some u: waves of this height and the length 2 h take pressures E' pi u/(4 h).
-    """
+    """Return largest turn, waves, least cosine of directions along straight edges. Collective."""
+    # Where the curvature varies the deviation of the curve from an edge of the length h is known to
+    # some u: waves of this height and the length 2 h take pressures E' pi u/(4 h).
     domain, space = solution.problem.domain, solution.problem.equilibrium.space
     nodes = solution.problem.nodes
     numbers = nodes.nodes + space.dofmap.index_map.local_range[0]
@@ -341,14 +339,12 @@ def _touching(
 
 
 def _of_chords(solution: Solution, closed: NDArray[np.bool_]) -> float:
-    """Return by how much pressures scatter by displacements of chords (stress). Collective.
-
-    The middle of a straight edge of degree 2, f = h^2/(8 R) within the curve, moves by f eps_nn
-    less or more. Pressures that even this out are E' eps_nn h/R times some number: from .33 (rings
-    on a rigid shaft) to .5 (rings in rings, on the finer side) on triangles, a third less on
-    quadrilaterals, whatever the stiffness of the other side. Both sides' add up; where they cancel,
-    since both move alike, edges that do not meet leave half of one.
-    """
+    """Return by how much pressures scatter by displacements of chords (stress). Collective."""
+    # The middle of a straight edge of degree 2, f = h^2/(8 R) within the curve, moves by f eps_nn
+    # less or more. Pressures that even this out are E' eps_nn h/R times some number: from .33
+    # (rings on a rigid shaft) to .5 (rings in rings, on the finer side) on triangles, a third less
+    # on quadrilaterals, whatever the stiffness of the other side. Both sides' add up; where they
+    # cancel, since both move alike, edges that do not meet leave half of one.
     domain, body = solution.problem.domain, solution.problem.equilibrium
     fields = DerivedFields(body, solution.state)
     strain, d = fields.columns["strain"], domain.dim

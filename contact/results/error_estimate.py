@@ -3,12 +3,12 @@
 Degree 1: eta_K^2 = int_K (G sigma - sigma) : S : (G sigma - sigma), G sigma being the nodal means
 of the stress inside each material (Zienkiewicz and Zhu, IJNME 24, 1987); also of degree 2 with the
 mean dilatation, whose constant pressures leave the stress an error of first order. Degree 2: the
-energy of the errors of `contact.results.local_problems`. Of degree 1 the loads that nodes do not see
-are added (`contact.results.oscillation`). S is the compliance of the last
-linearisation, with the secant modulus. In a piezoelectric body sigma is the pair (sigma, D), and S
-that of [F, -e^T; e, beta], whose energy is eps : F eps + E . beta E. At the contact pressures times
-gaps between the nodes are added, and friction times slip that is not dissipated (Krause, Veeser and
-Walloth, Numer. Math. 130, 2015).
+energy of the errors of `contact.results.local_problems`. Of degree 1 the loads that nodes do not
+see are added (`oscillation`). S is the compliance of the last linearisation, with the secant
+modulus. In a piezoelectric body sigma is the pair (sigma, D), and S that of [F, -e^T; e, beta],
+whose energy is eps : F eps + E . beta E. At the contact pressures times gaps between the nodes are
+added, and friction times slip that is not dissipated (Krause, Veeser and Walloth, Numer. Math.
+130, 2015).
 """
 
 from __future__ import annotations
@@ -17,25 +17,29 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx import la
+import ufl
+from dolfinx import fem, la
 from mpi4py import MPI
+from numpy.typing import NDArray
 
+from contact import _compat
 from contact.body.description import Material
 from contact.body.elements import MEAN_DILATATION
+from contact.body.loads import expression
 from contact.body.materials import factor_of
 from contact.body.pointwise import in_chunks
-from contact.model.body import Bolt
 from contact.mesh.cells import rule, shape_of
-from contact.mesh.domain import Domain
+from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import geometry_nodes, measures
 from contact.mesh.together import members, part
-from contact.results.fields import DerivedFields
-from contact.results.local_problems import LocalProblems
-from contact.results.oscillation import oscillation
-from contact.results.recovery import nodal_means
+from contact.model.body import Bolt
+from contact.model.fields import constant
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.results.fields import DerivedFields
+from contact.results.local_problems import LocalProblems
+from contact.results.recovery import nodal_means
 from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 from forms.crystal import VOIGT
@@ -43,6 +47,9 @@ from forms.elasticity import Anisotropic, mandel, moduli
 from forms.hencky import is_linear
 from forms.history import HistoryLaw, isotropic_stiffness
 from forms.plane_stress import without_stress_across
+
+#: Degrees of the rules for loads on facets, far above their own, and in cells, which are many.
+ON_FACETS, IN_CELLS = 9, 4
 
 #: Factors of the components of a tensor in the basis of Mandel.
 MANDEL = np.array([1.0] * 3 + [np.sqrt(2.0)] * 3)
@@ -171,10 +178,8 @@ def estimated(
 
 
 def _acting_inside(problem: ContactProblem) -> list[str]:
-    """Return the parts inside of the body at which something acts, and stresses jump.
-
-    At cuts of bolts it is the displacement that jumps.
-    """
+    """Return the parts inside of the body at which something acts, and stresses jump."""
+    # At cuts of bolts it is the displacement that jumps.
     body = problem.equilibrium
     unknown = [member.description for member in body.global_unknowns.members]
     acting = [*body.body.fixed, *(one for one in unknown if not isinstance(one, Bolt))]
@@ -183,10 +188,8 @@ def _acting_inside(problem: ContactProblem) -> list[str]:
 
 
 def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
-    """Return the energy of strains that a rigid motion leaves by rounding. Collective.
-
-    They are differences of displacements over the size of a cell, in all directions.
-    """
+    """Return the energy of strains that a rigid motion leaves by rounding. Collective."""
+    # They are differences of displacements over the size of a cell, in all directions.
     body, comm, topology = problem.equilibrium, problem.comm, problem.domain.mesh.topology
     moved = float(np.abs(body.nodal(state.x)[:, : body.dim]).max(initial=0.0))
     size = body.domain.size / topology.index_map(body.dim).size_global ** (1 / body.dim)
@@ -221,18 +224,10 @@ def _bulk(material: Material) -> float:
 
 
 def _over_whole_strain(law: HistoryLaw, flux: Array, strain: Array) -> Array:
-    """Return |s|/(2 |e|) of cells, at most the shear modulus, and positive.
-
-    Volumes change wrongly with the whole strain, however many steps it has been in: the pressure
-    of that is to be seen beside s. The secant of a step is nearly elastic where the step is short.
-
-    Parameters
-    ----------
-    law
-        The law.
-    flux, strain
-        Stress, shape (cells, points, components), and |e|, shape (cells, points).
-    """
+    """Return |s|/(2 |e|) of cells, at most the shear modulus, and positive."""
+    # Volumes change wrongly with the whole strain, however many steps it has been in: the pressure
+    # of that is to be seen beside s. The secant of a step is nearly elastic where the step is
+    # short.
     stress = flux[..., :6].copy()
     stress[..., :3] -= stress[..., :3].mean(axis=-1, keepdims=True)
     modulus = moduli(float(law.young), float(law.poisson))[1]
@@ -245,19 +240,10 @@ def _over_whole_strain(law: HistoryLaw, flux: Array, strain: Array) -> Array:
 
 
 def _of_crystal(domain: Domain, material: Material, flux: Array) -> Array:
-    """Return by how much the stiffest strain is stiffer than the rest of the strain of cells.
-
-    The eigenvalue of the stiffest strain over the Rayleigh quotient of the strain without that, by
-    3/2 in 3-D, so that it is the ratio of bulk and shear modulus where the stiffness is isotropic:
-    then the stiffest strain is that of the volume, of fibres that along them.
-
-    Parameters
-    ----------
-    domain, material
-        The mesh, whose strains may all be in the plane, and the crystal.
-    flux
-        Of cells, shape (cells, 6 or 9).
-    """
+    """Return by how much the stiffest strain is stiffer than the rest of the strain of cells."""
+    # The eigenvalue of the stiffest strain over the Rayleigh quotient of the strain without that,
+    # by 3/2 in 3-D, so that it is the ratio of bulk and shear modulus where the stiffness is
+    # isotropic: then the stiffest strain is that of the volume, of fibres that along them.
     whole = _stiffness(material, np.ones(1), np.ones(1))[0]
     kept = list(range(6)) if domain.dim == 3 else [0, 1, 5]
     if domain.revolved:
@@ -292,11 +278,9 @@ def _density(material: Material, shear: Array, factor: Array) -> Callable[[Array
 
 
 def _stiffness(material: Material, shear: Array, factor: Array) -> Array:
-    """Return the stiffness of each cell, or one, shape (cells, 6, 6), with coupling (cells, 9, 9).
-
-    It maps strains to stresses in the basis of Mandel, and (eps, E) to (sigma, D); in plane stress
-    those in the plane, the strains across being those at which no stress acts.
-    """
+    """Return the stiffness of each cell, or one, shape (cells, 6, 6); with coupling 9 by 9."""
+    # It maps strains to stresses in the basis of Mandel, and (eps, E) to (sigma, D); in plane
+    # stress those in the plane, the strains across being those at which no stress acts.
     law = material.law
     if isinstance(law, Anisotropic):
         stiffness = mandel(law.stiffness)[None]
@@ -318,11 +302,9 @@ def _stiffness(material: Material, shear: Array, factor: Array) -> Array:
 
 
 def _at_contact(problem: ContactProblem, state: State) -> Array:
-    """Return the share of contact in eta_K^2 of the owned cells, shape (cells,). Collective.
-
-    Between its nodes, all values linear: p |u_n - g| and s |u_t| - lambda_f . u_t, where
-    complementarity holds at the nodes alone.
-    """
+    """Return the share of contact in eta_K^2 of the owned cells, shape (cells,). Collective."""
+    # Between its nodes, all values linear: p |u_n - g| and s |u_t| - lambda_f . u_t, where
+    # complementarity holds at the nodes alone.
     body, interface = problem.equilibrium, problem.interface
     domain, d, nodal = body.domain, body.dim, problem.nodal(state)
     sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
@@ -359,3 +341,74 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     areas = measures(domain.revolved, shape.facet, of_facet, at, weights)
     np.add.at(squares, cells, np.sum(areas * density, axis=1))
     return squares
+
+
+def oscillation(problem: ContactProblem, time: float) -> Array:
+    """Return the square of the data oscillation of the owned cells, shape (cells,). Collective.
+
+    That of the loads that the linear functions of a mesh do not see: sum over facets of
+    h |t - t_h|^2 and over cells of h^2 |f - f_h|^2 (Verfürth, A Posteriori Error Estimation
+    Techniques for Finite Element Methods, 2013, section 1.4), with t_h and f_h of the mean loads at
+    the nodes. Over a modulus it is an energy. The constants are those of Poincaré's inequality,
+    h/pi; of several loads on a part the squares are added. Charges do not count.
+    """
+    domain = problem.domain
+    mesh, d = domain.mesh, domain.dim
+    squares = np.zeros(mesh.topology.index_map(d).size_local)
+    whole = shape_of(mesh)
+    facets, x, now = whole.facet_corners, ufl.SpatialCoordinate(mesh), constant(mesh, time)
+    vertices = _compat.geometry_dofmap(mesh)[:, : whole.corners]
+    for number, load in enumerate(problem.equilibrium.body.loads):
+        varying = {
+            name: field
+            for name, field in load.named.items()
+            if not (
+                getattr(field, "is_constant", False) or name.startswith("force") or "charge" in name
+            )
+        }
+        if not varying:
+            continue
+        shape = whole
+        cells: Indices = np.arange(len(squares), dtype=np.int32)
+        place: NDArray[np.intp] = np.zeros(len(squares), dtype=np.intp)
+        if load.on is not None:
+            shape = whole.facet
+            cells, place = cells_at(mesh, domain.facets(load.on))
+        of, corners = geometry_nodes(domain, cells), vertices[cells]
+        at, weights = rule(shape, IN_CELLS if load.on is None else ON_FACETS)
+        points = at
+        if load.on is not None:
+            points = np.concatenate([whole.on_facet(k, at) for k in range(len(facets))])
+        key = f"load.{number}"
+        given = [expression(domain, f, x, now, f"{key}.{name}") for name, f in varying.items()]
+        made = fem.Expression(ufl.as_vector(given), points)
+        shown = len(cells), len(points) // len(at), len(at), len(given)
+        values = np.asarray(made.eval(mesh, cells)).reshape(shown)
+        found = load.factor(time) * values[np.arange(len(cells)), place]
+        if load.on is not None:
+            nodes = whole.facet_nodes(domain.order)[place]
+            of = np.take_along_axis(of, nodes[..., None], axis=1)
+            corners = np.take_along_axis(corners, facets[place], axis=1)
+        sizes = measures(domain.revolved, shape, of, at, weights)
+        unseen = found - _seen(domain, corners, shape.lagrange(1, at), sizes, found)
+        area = measures(False, shape, of, at, weights).sum(axis=1)
+        share = (area ** (1 / shape.dim) / np.pi) ** (1 + (load.on is None))
+        np.add.at(squares, cells, share * np.einsum("nq,nqc->n", sizes, unseen**2))
+    return squares
+
+
+def _seen(
+    domain: Domain, corners: NDArray[np.integer], hats: Array, sizes: Array, values: Array
+) -> Array:
+    """Return linear functions of mean values, (n, q, c), around vertices, (n, k). Collective."""
+    index_map = domain.mesh.geometry.index_map()
+    total = la.vector(index_map, values.shape[2] + 1)
+    sums = total.array.reshape(-1, values.shape[2] + 1)
+    with_ones = np.concatenate([values, np.ones((*sizes.shape, 1))], axis=2)
+    np.add.at(sums, corners, np.einsum("nq,qk,nqc->nkc", sizes, hats, with_ones))
+    total.scatter_reverse(la.InsertMode.add)
+    total.scatter_forward()
+    found = sums[corners]
+    # On the axis of revolution there is no area.
+    means = found[..., :-1] / np.where(found[..., -1:] > 0, found[..., -1:], 1.0)
+    return np.asarray(hats @ means)

@@ -1,13 +1,13 @@
-"""The quantities of nodes and cells: columns of the csv tables of nodes, fields of the VTU files.
+"""The quantities of nodes, cells and iterations, as in `quantities` an entry each."""
 
-As in `quantities`, an entry each.
-"""
+from typing import Any
 
 import numpy as np
 
 from contact.results.quantity import (
     AGAINST,
     BODY,
+    HISTORY,
     NODES,
     OPPOSITE,
     STATUS,
@@ -17,6 +17,12 @@ from contact.results.quantity import (
     elsewhere,
     of_law,
 )
+
+
+def _node_counts(record: Any) -> str:
+    """Return the numbers of open, stick and slip nodes after an iteration; empty if unknown."""
+    return "/".join(map(str, record.sizes or ()))
+
 
 #: Of the contact nodes; fields of the contact part are NaN, or -1, at nodes that are held.
 AT_NODES = (
@@ -147,5 +153,39 @@ FIELDS = (
         "Estimated discretisation error of the cell over the energy norm of the solution: the "
         "squares add up to that of `error` in the summary. In `fields.vtu` alone, cell by cell.",
         elsewhere, (BODY,),
+    ),
+)  # fmt: skip
+
+#: Of the outer iterations.
+OF_ITERATIONS = (
+    Quantity(
+        "iteration", "", "Number of the outer iteration; 0 is a frictionless start.",
+        files=(HISTORY,),
+    ),
+    Quantity("inner", "", "Linear solves of the iteration.", files=(HISTORY,)),
+    Quantity(
+        "equilibrium", "", "Residual after the iteration, as in `kkt`.",
+        lambda r: r.residuals.equilibrium, (HISTORY,),
+    ),
+    Quantity("contact", "", "Likewise.", lambda r: r.residuals.contact, (HISTORY,)),
+    Quantity("friction", "", "Likewise.", lambda r: r.residuals.friction, (HISTORY,)),
+    Quantity(
+        "change", "", "Relative change of the friction bound; `nan` where there is none.",
+        files=(HISTORY,),
+    ),
+    Quantity("seconds", "s", "Since the solve began.", files=(HISTORY,)),
+    Quantity("note", "", "Kind of the iteration, for instance `tangent`.", files=(HISTORY,)),
+    Quantity(
+        "contact_solves", "", "Linear solves of the condensed problem in the iteration.",
+        lambda r: r.contact_solves, (HISTORY,),
+    ),
+    Quantity(
+        "active_set", "", "Numbers of open, stick and slip nodes at its end, for instance `3/5/1`; "
+        "empty where the active set is not known.", _node_counts, (HISTORY,),
+    ),
+    Quantity(
+        "steps", "", "The active sets after each Newton iteration on the condensed problem, "
+        "separated by blanks; `-` where one is not known.",
+        lambda r: " ".join(_node_counts(step) or "-" for step in r.steps), (HISTORY,),
     ),
 )  # fmt: skip

@@ -27,10 +27,10 @@ from contact.history import BodyState, Evaluated
 from contact.mesh.cells import shape_of
 from contact.mesh.geometry import volumes
 from contact.mesh.together import pieces
-from contact.results.quantities import quantities, values_of
-from contact.results.quantity import BODY, of_law
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.results.quantities import quantities, values_of
+from contact.results.quantity import BODY, of_law
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import is_linear, stress
@@ -192,11 +192,9 @@ class Point:
 
 
 def _usual_points(body: BodyEquilibrium) -> Array:
-    """Return the nodes of a cell, of degree 1 its middle.
-
-    There strains of simplices are constant, and those of other cells most exact (Barlow, IJNME 10,
-    1976).
-    """
+    """Return the nodes of a cell, of degree 1 its middle."""
+    # There strains of simplices are constant, and those of other cells most exact (Barlow, IJNME
+    # 10, 1976).
     shape = shape_of(body.domain.mesh)
     return shape.middle if body.degree == 1 else shape.nodes(body.degree)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Annotated, Literal, Protocol, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from contact.settings import Accepted, Count, Switch
 
@@ -11,18 +11,6 @@ from contact.settings import Accepted, Count, Switch
 Quantity: TypeAlias = Literal["length", "stress", "potential", "charge"]
 
 Name: TypeAlias = Annotated[str, Accepted('a text, such as "mm"')]
-
-
-class Source(Protocol):
-    """The case of a solution, `contact.case.file.Case`, whose package imports this one."""
-
-    @property
-    def title(self) -> str:
-        """Title of the case."""
-
-    @property
-    def source(self) -> str:
-        """Name of its file, for messages."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,8 +1,12 @@
-"""The quantities of the output files: an entry each is name, unit, description and value.
+"""The registry of quantities: an entry each is name, unit, description, value and derivatives.
 
-``summary.json``, the csv tables, the fields, ``docs/output.md`` and the command line's help are
-made from these entries. Nothing is imported here that loads dolfinx: the help is shown before
-PETSc's options are read.
+``summary.json``, the csv tables, the fields, ``docs/output.md``, the command line's help,
+`sensitivity` and `identify` take them from here. An entry with a `functional` needs no value:
+
+    Quantity(
+        "sink", "length · volume", "Integral of u_y over the body.",
+        files=(SUMMARY, STEPS, SWEEP), functional=f.Integral(lambda u, phi: u[1]),
+    )
 """
 
 from __future__ import annotations
@@ -11,21 +15,30 @@ from typing import Any
 
 import numpy as np
 
+from contact.problem.energy import stored
+from contact.problem.problem import ContactProblem
+from contact.results import functionals as f
 from contact.results.environment import versions
-from contact.results.field_quantities import AT_NODES, AT_OPPOSITE_NODES, FIELDS
+from contact.results.field_quantities import (
+    AT_NODES,
+    AT_OPPOSITE_NODES,
+    FIELDS,
+    OF_ITERATIONS,
+)
 from contact.results.quantity import (
     ADAPT,
     BODY,
+    CONTACTS,
     ENDS,
-    HISTORY,
-    ROWS,
     STEPS,
     SUMMARY,
     SWEEP,
     VECTOR,
+    Functional,
     Quantity,
     elsewhere,
 )
+from contact.results.resultants import rigid_columns
 
 
 def quantities(file: str) -> list[Quantity]:
@@ -42,6 +55,64 @@ def values_of(file: str, given: Any, only: str = "") -> dict[str, Any]:
     return found
 
 
+def named_functionals(problem: ContactProblem) -> dict[str, Functional]:
+    """Return the quantities of a problem as functions of a state, by their columns. Collective.
+
+    All of these have derivatives, at least by the tangent; see `Quantity`.
+    """
+    found: dict[str, Functional] = {}
+    for quantity in QUANTITIES:
+        if quantity.functional is not None:
+            found[quantity.name] = quantity.functional
+        if quantity.functionals is None:
+            continue
+        if CONTACTS not in quantity.files:
+            found |= quantity.functionals(problem)
+        elif len(problem.contacts) > 1:
+            for number, contact in enumerate(problem.contacts):
+                own = quantity.functionals(problem, number)
+                found |= {f"{column}_{contact.name}": one for column, one in own.items()}
+    return found
+
+
+def _contact_columns(given: Any) -> dict[str, Any]:
+    """Return the results of each of several contacts, by columns with its name at the end."""
+    if len(given.problem.contacts) == 1:
+        return {}
+    return {
+        f"{column}_{name}": value
+        for name, share in given.contacts.items()
+        for column, value in values_of(CONTACTS, share).items()
+    }
+
+
+def _contact_key(quantity: Quantity) -> str:
+    """Return the key of a quantity of a contact in `contacts` of the summary."""
+    return quantity.name.removeprefix("contact_")
+
+
+def _contact_column(quantity: Quantity) -> str:
+    """Return the first column of a quantity of a contact of the name NAME."""
+    return f"{quantity.component.format(name=quantity.name, axis='x') or quantity.name}_NAME"
+
+
+def _reaction_columns(given: Any) -> dict[str, float]:
+    """Return the reactions of supports by columns, ``reaction_x_left``."""
+    return {
+        f"reaction_{axis}_{part}": float(value)
+        for part, held in given.supports.items()
+        for axis, value in zip("xyz", held.force, strict=False)
+    }
+
+
+def _charge_columns(given: Any) -> dict[str, float] | None:
+    """Return the charges of electrodes and foundation by columns; None without a potential."""
+    if given.charges is None:
+        return None
+    columns = {f"charge_{part}": charge for part, charge in given.charges.electrodes.items()}
+    return columns | {"charge_foundation": given.charges.foundation}
+
+
 def _error(given: Any) -> float:
     """Return the estimated error; no number where the equations are not solved."""
     return float("nan") if given.error is None else float(given.error.relative)
@@ -51,13 +122,33 @@ def _item(values: Any, index: int) -> Any:
     return None if values is None else values[index]
 
 
-def _node_counts(record: Any) -> str:
-    """Return the numbers of open, stick and slip nodes after an iteration; empty if unknown."""
-    return "/".join(map(str, record.sizes or ()))
-
-
 _ALL = (SUMMARY, STEPS, SWEEP)
 _MESHES = (*_ALL, ADAPT)
+_TABLES = (STEPS, SWEEP, ADAPT)
+
+#: Of each contact, which `contact_nodes.ContactShare` has in hand; `contact_` is left out of their
+#: keys in `contacts` of the summary.
+_OF_CONTACT = (
+    Quantity(
+        "contact_force", "force", "of the body on its foundation, or on the other body",
+        lambda c: c.force, (CONTACTS,), VECTOR, functionals=f.contact_forces,
+    ),
+    Quantity(
+        "contact_moment", "force · length", "its moment about the origin", lambda c: c.moment,
+        (CONTACTS,), VECTOR,
+    ),
+    Quantity("contact_area", "area", "as `contact_area`", lambda c: c.area, (CONTACTS,)),
+    Quantity(
+        "max_pressure", "stress", "the largest", files=(CONTACTS,), functionals=f.max_pressures
+    ),
+    Quantity("mean_pressure", "stress", "the mean over that area", files=(CONTACTS,)),
+    Quantity("stick", "", "share of that area", files=(CONTACTS,)),
+    Quantity("slip", "", "likewise", files=(CONTACTS,)),
+    Quantity(
+        "dissipation", "work", "by friction, in all steps", files=(CONTACTS,),
+        functionals=f.dissipations,
+    ),
+)  # fmt: skip
 
 _RUN = (
     Quantity("KEY", "", "A swept key, a column each: its value in this row.", elsewhere, (SWEEP,)),
@@ -92,7 +183,7 @@ _RUN = (
         "contact_force", "force", "Force that the body exerts on the foundation, a vector; in 2-D "
         "per unit of depth. Between bodies the one that the body with `on` exerts on the other. "
         "With several contacts their sum; `contacts` has the force of each.",
-        files=_MESHES, component=VECTOR,
+        files=_MESHES, component=VECTOR, functionals=f.contact_forces,
     ),
     Quantity(
         "contact_moment", "force · length", "Moment of the contact forces about the origin of "
@@ -100,17 +191,18 @@ _RUN = (
         "z and counter-clockwise, in 3-D a vector.", component=VECTOR,
     ),
     Quantity(
-        "contacts", "", "Results of each contact, by its `name`: `force` and `moment` as above, "
-        "`area` as `contact_area`, `max_pressure` and `mean_pressure`, the latter over that area, "
-        "`stick` and `slip` (shares of that area), `dissipation` by friction, in all steps.",
-        lambda r: {name: vars(share) for name, share in r.contacts.items()},
+        "contacts", "", "Results of each contact, by its `name`: "
+        + ", ".join(f"`{_contact_key(q)}` ({q.text})" for q in _OF_CONTACT) + ".",
+        lambda r: {
+            name: {_contact_key(q): q.of(share) for q in quantities(CONTACTS)}
+            for name, share in r.contacts.items()
+        },
     ),
     Quantity(
         "contact_force_AXIS_NAME", "", "The same of each of several contacts, in a step: "
-        "`contact_force_x_NAME`..., `contact_moment_NAME` (in 3-D `contact_moment_x_NAME`...), "
-        "`contact_area_NAME`, `max_pressure_NAME`, `mean_pressure_NAME`, `stick_NAME`, "
-        "`slip_NAME`, `dissipation_NAME`.",
-        lambda r: r.contact_columns, (STEPS, SWEEP),
+        + ", ".join(f"`{_contact_column(q)}`" for q in _OF_CONTACT)
+        + ", and other components; in 2-D `contact_moment_NAME`.",
+        _contact_columns, (STEPS, SWEEP),
     ),
     Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(
@@ -121,7 +213,7 @@ _RUN = (
     ),
     Quantity(
         "reaction_AXIS_PART", "force", "Force of each support: `reaction_x_left`, ...",
-        lambda r: r.reaction_columns, (STEPS,),
+        _reaction_columns, (STEPS,), functionals=f.reactions,
     ),
     Quantity(
         "reaction_moments", "force · length", "Moments of the reactions, as `contact_moment`.",
@@ -146,7 +238,7 @@ _RUN = (
     ),
     Quantity(
         "max_pressure", "stress", "Largest contact pressure, -σ_ν >= 0.",
-        lambda r: r.problem.nodes.maximum(r.pressure), _MESHES,
+        files=_MESHES, functional=f.MaxPressure(),
     ),
     Quantity(
         "contact_nodes", "", "Number of contact nodes that touch: sticking and sliding ones.",
@@ -159,7 +251,7 @@ _RUN = (
     ),
     Quantity(
         "max_displacement", "length", "Largest Euclidean norm of the displacement at a node.",
-        files=_MESHES,
+        files=_MESHES, functional=f.MaxDisplacement(),
     ),
     Quantity(
         "contact_area", "area",
@@ -202,16 +294,16 @@ _RUN = (
     ),
     Quantity(
         "energy", "work", "Stored in the body at the end of the step.",
-        lambda r: r.energies.energy, (STEPS,),
+        lambda r: r.energies.energy, (STEPS,), functional=stored,
     ),
     Quantity(
         "dissipation", "work", "By friction in the step; over a cycle the area of the loop.",
-        lambda r: r.energies.dissipation, (STEPS,),
+        lambda r: r.energies.dissipation, (STEPS,), functionals=f.dissipations,
     ),
     Quantity("dissipation", "work", "By friction in all steps.", files=(SWEEP,)),
     Quantity(
         "plastic_dissipation", "work", "By plastic flow in the step; in the summary in all steps.",
-        files=(SUMMARY, STEPS),
+        files=(SUMMARY, STEPS), functionals=f.plastic_dissipations,
     ),
     Quantity(
         "outer_iterations", "", "Outer iterations: rows of `history.csv`.",
@@ -243,7 +335,7 @@ _RUN = (
         "`contact` (no penetration, no tension, one of them zero), `friction` (stick or slip).",
         lambda r: {key: getattr(r.outcome.residuals, key) for key in r.floors},
     ),
-    Quantity("kkt", "", "The largest residual.", lambda r: r.outcome.residuals.largest, ROWS),
+    Quantity("kkt", "", "The largest residual.", lambda r: r.outcome.residuals.largest, _TABLES),
     Quantity(
         "rounding", "", "Rounding floors of the residuals in `kkt`, up to which they are accepted; "
         "of `equilibrium` in an evolution the largest of all steps. Larger than the tolerance in "
@@ -273,33 +365,34 @@ _RUN = (
         "Displacement of a moving foundation, or of a rigid part, `rigid_x`...; `rigid_rotation` "
         "in degrees. Names end with the part, `rigid_x_top`, of several foundations, and of rigid "
         "parts unless there is one part alone.",
-        lambda r: r.rigid["moved"], ROWS,
+        lambda r: rigid_columns(r.movements)["moved"], _TABLES, functionals=f.rigid_motions,
     ),
     Quantity(
         "rigid_force_AXIS", "force",
         "Force on it, and `rigid_moment`..., with names like the displacement.",
-        lambda r: r.rigid["acting"], ROWS,
+        lambda r: rigid_columns(r.movements)["acting"], _TABLES, functionals=f.rigid_forces,
     ),
     Quantity(
         "potential_PART", "potential", "Potential of an electrode.",
-        lambda r: r.rigid["potentials"], ROWS,
+        lambda r: rigid_columns(r.movements)["potentials"], _TABLES, functionals=f.potentials,
     ),
     Quantity(
         "bolt_KEY_PART", "length, force",
-        "Of a bolt: `bolt_shortening_shank`, `bolt_force_shank`.", lambda r: r.rigid["bolts"], ROWS
+        "Of a bolt: `bolt_shortening_shank`, `bolt_force_shank`.",
+        lambda r: rigid_columns(r.movements)["bolts"], _TABLES, functionals=f.bolt_shortenings,
     ),
     Quantity(
         "charge_PART", "charge", "Of an electrode; `charge_foundation` through the contact part.",
-        lambda r: r.charge_columns, ROWS,
+        _charge_columns, _TABLES, functionals=f.charges,
     ),
     Quantity(
         "driven", "length", "Mean displacement of the part that is moved or loaded in time.",
-        lambda r: _item(r.driven, 0), (STEPS,), VECTOR,
+        lambda r: _item(r.driven, 0), (STEPS,), VECTOR, functionals=f.driven_displacements,
     ),
     Quantity(
         "driven_force", "force",
         "Force of its own supports and loads on it: with `driven_x` it makes the loop.",
-        lambda r: _item(r.driven, 1), (STEPS,), VECTOR,
+        lambda r: _item(r.driven, 1), (STEPS,), VECTOR, functionals=f.driving_forces,
     ),
     Quantity("notes", "", "Assumptions that are met, or have not been checked, in words."),
     Quantity("warnings", "", "Reasons for care, in words."),
@@ -335,38 +428,4 @@ _RUN = (
     Quantity("input", "", "Digests of the case's files.", elsewhere, (SWEEP,)),
 )  # fmt: skip
 
-_HISTORY = (
-    Quantity(
-        "iteration", "", "Number of the outer iteration; 0 is a frictionless start.",
-        files=(HISTORY,),
-    ),
-    Quantity("inner", "", "Linear solves of the iteration.", files=(HISTORY,)),
-    Quantity(
-        "equilibrium", "", "Residual after the iteration, as in `kkt`.",
-        lambda r: r.residuals.equilibrium, (HISTORY,),
-    ),
-    Quantity("contact", "", "Likewise.", lambda r: r.residuals.contact, (HISTORY,)),
-    Quantity("friction", "", "Likewise.", lambda r: r.residuals.friction, (HISTORY,)),
-    Quantity(
-        "change", "", "Relative change of the friction bound; `nan` where there is none.",
-        files=(HISTORY,),
-    ),
-    Quantity("seconds", "s", "Since the solve began.", files=(HISTORY,)),
-    Quantity("note", "", "Kind of the iteration, for instance `tangent`.", files=(HISTORY,)),
-    Quantity(
-        "contact_solves", "", "Linear solves of the condensed problem in the iteration.",
-        lambda r: r.contact_solves, (HISTORY,),
-    ),
-    Quantity(
-        "active_set", "", "Numbers of open, stick and slip nodes at its end, for instance `3/5/1`; "
-        "empty where the active set is not known.", _node_counts, (HISTORY,),
-    ),
-    Quantity(
-        "steps", "", "The active sets after each Newton iteration on the condensed problem, "
-        "separated by blanks; `-` where one is not known.",
-        lambda r: " ".join(_node_counts(step) or "-" for step in r.steps), (HISTORY,),
-    ),
-)  # fmt: skip
-
-
-QUANTITIES = (*_RUN, *AT_NODES, *_HISTORY, *AT_OPPOSITE_NODES, *FIELDS)
+QUANTITIES = (*_RUN, *_OF_CONTACT, *AT_NODES, *OF_ITERATIONS, *AT_OPPOSITE_NODES, *FIELDS)

@@ -6,16 +6,22 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from operator import attrgetter, itemgetter
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
 SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
 ADAPT = "adapt.csv"
+#: Results of each contact: entries of `contacts` in the summary, columns with its name at the end.
+CONTACTS = "contacts.csv"
 NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
 BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
 #: Tables with a row per solution; the others have columns of arrays.
-ROWS = (STEPS, SWEEP, ADAPT)
+ROWS = (STEPS, SWEEP, ADAPT, CONTACTS)
 #: Names of the entries of a vector, and of an interval.
 AXES, ENDS = ("x", "y", "z"), ("least", "largest")
 #: Column of an entry of a vector.
@@ -24,12 +30,30 @@ VECTOR = "{name}_{axis}"
 STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
 
 
+class Functional(Protocol):
+    """A number as a function of problem and state; any callable is one."""
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return the value. Collective."""
+
+
+@runtime_checkable
+class Differentiable(Functional, Protocol):
+    """A functional that knows its derivatives, which the adjoint asks for."""
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return them by the owned unknowns, and by the forces at the nodes, shape (n, d).
+
+        Collective.
+        """
+
+
 def elsewhere(given: Any) -> None:
-    """Return nothing: the value of a quantity that is written by who knows it."""
+    """Return None, a placeholder: the writer fills this column."""
 
 
 def of_law(given: Any) -> None:
-    """Return nothing: the value of an internal variable, which laws may have by this name."""
+    """Return None, a placeholder: laws may have an internal variable of this name."""
 
 
 def is_of(column: str, key: str) -> bool:
@@ -54,16 +78,23 @@ class Quantity:
         The description, with the sign; `unit` is "length", "stress", ..., empty for none.
     value
         A function of `solution.Solution`, called on all ranks; in ``history.csv`` of
-        `methods.report.Record`, in ``contact.csv`` and ``contact.vtu`` of `surface.ContactResult`,
-        in ``fields.vtu`` of `fields.Point`, on master sides of a mapping. By default the attribute,
-        or entry, of the quantity's name. A mapping has several columns, a vector one per component;
-        None is for a quantity that a problem does not have, which has no key, column or field then.
+        `methods.report.Record`, in ``contact.csv`` and ``contact.vtu`` of
+        `contact_nodes.ContactResult`, in ``fields.vtu`` of `fields.Point`, on master sides of a
+        mapping, of each contact of `contact_nodes.ContactShare`. By default the functional, or the
+        attribute or entry of the quantity's name. A mapping has several columns, a vector one per
+        component; None is for a quantity that a problem does not have, which has no key, column or
+        field then.
     files
         Where it stands; the first has the description.
     component
         Of a list of fixed length, or of those in a table: name of the column of an entry.
     entries
         Names of the entries.
+    functional
+        The number as a function of problem and state, as which it has derivatives too.
+    functionals
+        Of a problem, those of the quantity's columns, by their names; of each contact also of its
+        number.
     """
 
     name: str
@@ -73,18 +104,30 @@ class Quantity:
     files: tuple[str, ...] = (SUMMARY,)
     component: str = ""
     entries: tuple[str, ...] = AXES
+    functional: Functional | None = None
+    functionals: Callable[..., Mapping[str, Functional]] | None = None
+
+    def of(self, given: Any) -> Any:
+        """Return the value."""
+        if self.value is not None:
+            return self.value(given)
+        if self.functional is not None:
+            return self.functional(given.problem, given.state)
+        return (itemgetter if isinstance(given, Mapping) else attrgetter)(self.name)(given)
 
     def in_file(self, file: str, given: Any) -> dict[str, Any]:
         """Return the keys, columns or field in a file; none where the quantity is absent."""
-        get = itemgetter if isinstance(given, Mapping) else attrgetter
-        value = (self.value or get(self.name))(given)
+        value = self.of(given)
         if value is None:
             return {}
         table = file.endswith(".csv")
         if table and isinstance(value, Mapping):
             return dict(value)
         if table and self.component and np.ndim(value) > (file not in ROWS):
-            names = (self.component.format(name=self.name, axis=entry) for entry in self.entries)
             parts = np.asarray(value).T
-            return dict(zip(names, parts.tolist() if file in ROWS else parts, strict=False))
+            if file not in ROWS or len(parts) > 1:  # a moment in the plane is a number
+                names = [self.component.format(name=self.name, axis=end) for end in self.entries]
+                columns = parts.tolist() if file in ROWS else parts
+                return dict(zip(names, columns, strict=False))
+            value = parts.item()
         return {self.name: value}

@@ -77,12 +77,10 @@ def _separated(
     means: Array,
     places: NDArray[np.integer],
 ) -> tuple[Array, NDArray[np.integer]]:
-    """Return means and places with those of groups at the vertices of parts. Collective.
-
-    Corners of two cells at a vertex are of one group where a facet joins the cells that has the
-    vertex and is in no part. The rank that owns a vertex is sent all corners there, and returns
-    the mean of its group to each.
-    """
+    """Return means and places with those of groups at the vertices of parts. Collective."""
+    # Corners of two cells at a vertex are of one group where a facet joins the cells that has the
+    # vertex and is in no part. The rank that owns a vertex is sent all corners there, and returns
+    # the mean of its group to each.
     mesh, comm, d = domain.mesh, domain.comm, domain.dim
     shape = shape_of(mesh)
     mesh.topology.create_connectivity(d, d - 1)

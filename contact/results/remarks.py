@@ -52,7 +52,7 @@ def announce(solution: Solution) -> None:
             logger.warning(warning)
 
 
-def measure(solution: Solution, whole: bool = True) -> list[float]:
+def evaluate_extremes(solution: Solution, whole: bool = True) -> list[float]:
     """Give a solution its extremes of stress and strain, and return |dev eps| by material.
 
     Collective.
@@ -90,7 +90,7 @@ def measure(solution: Solution, whole: bool = True) -> list[float]:
 
 def review(solution: Solution) -> None:
     """Add all remarks to the notes and warnings of a solution. Collective."""
-    strains, problem = measure(solution), solution.problem
+    strains, problem = evaluate_extremes(solution), solution.problem
     times = [record.state.time for record in solution.steps] or [problem.time]
     for identifier, remarks in {
         "unloading": unloading(solution),
@@ -119,7 +119,7 @@ def review(solution: Solution) -> None:
 
 
 def unloading(solution: Solution) -> Iterator[Remark]:
-    """Warn of the share of a body of Hencky's materials that has unloaded from the plastic range."""
+    """Warn of Hencky's materials that have unloaded from the plastic range in a step."""
     share = unloaded(solution.problem, [record.state for record in solution.steps])
     if share > 0:
         yield (

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypedDict, cast
+from typing import Any
 
 import numpy as np
 import ufl
@@ -19,13 +19,13 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.description import Body
-from contact.model.fields import constant, knows_time, steady
 from contact.body.loads import Loads, assembled, expression
-from contact.model.body import Bolt, Electrode
 from contact.errors import InputError
 from contact.mesh.compiled import compiled
 from contact.mesh.geometry import area
 from contact.mesh.together import members
+from contact.model.body import Bolt, Electrode
+from contact.model.fields import constant, knows_time, steady
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
@@ -332,52 +332,21 @@ def _sum(problem: ContactProblem, values: Array) -> float:
     return float(problem.comm.allreduce(float(np.sum(values)), op=MPI.SUM))
 
 
-class RigidMovement(TypedDict):
-    """How a rigid body has moved: displacement (length) and rotation (degrees), force and moment.
-
-    Vectors are lists of d components; rotations and moments are numbers in the plane.
-    """
-
-    displacement: list[float]
-    rotation: float | list[float]
-    force: list[float]
-    moment: float | list[float]
-
-
-class ElectrodeState(TypedDict):
-    """Potential and charge of an electrode."""
-
-    potential: float
-    charge: float
-
-
-class BoltState(TypedDict):
-    """Shortening (length) and section force of a bolt, tension positive."""
-
-    shortening: float
-    force: float
-
-
-class Movements(TypedDict, total=False):
-    """How rigid bodies have moved, and the state of electrodes and bolts, by part."""
-
-    rigid: RigidMovement | dict[str, RigidMovement]
-    rigid_parts: dict[str, RigidMovement]
-    electrodes: dict[str, ElectrodeState]
-    bolts: dict[str, BoltState]
+#: How rigid bodies have moved, and the state of electrodes and bolts, by part: see `movements`.
+Movements = dict[str, dict[str, Any]]
 
 
 def movements(problem: ContactProblem, state: State) -> Movements:
     """Return how rigid bodies have moved, and the potentials of electrodes. Collective.
 
-    ``rigid`` is the foundation that moves; of several it has one entry each, by part.
-    ``rigid_parts`` are the parts that move as rigid bodies, ``electrodes`` those of unknown
-    potential, ``bolts`` cuts; a key is absent where there are none. Rotations are in degrees.
-    Forces, moments and charges act from outside: those given, or the reactions of components that
-    are given. The force of a bolt is that in its section, tension positive.
+    ``rigid`` is the foundation that moves, its `displacement`, `rotation` (degrees), `force` and
+    `moment`; of several it has one entry each, by part. ``rigid_parts`` are the parts that move as
+    rigid bodies, ``electrodes`` those of unknown `potential`, with their `charge`, ``bolts`` cuts,
+    with `shortening` and section `force`, tension positive; a key is absent where there are none.
+    Vectors are lists; rotations and moments are numbers in the plane. Forces, moments and charges
+    act from outside: those given, or the reactions of components that are given.
     """
-    foundations, parts = dict[str, RigidMovement](), dict[str, RigidMovement]()
-    electrodes, bolts = dict[str, ElectrodeState](), dict[str, BoltState]()
+    foundations, parts, electrodes, bolts = (dict[str, Any]() for _ in range(4))
     body = problem.equilibrium
     global_unknowns, q = body.global_unknowns, body.motion(state.x)
     if global_unknowns.size == 0:
@@ -407,11 +376,11 @@ def movements(problem: ContactProblem, state: State) -> Movements:
         }
     rigid = next(iter(foundations.values())) if len(foundations) == 1 else foundations
     found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes, "bolts": bolts}
-    return cast(Movements, {key: value for key, value in found.items() if value})
+    return {key: value for key, value in found.items() if value}
 
 
-def _one_or_more(values: Array) -> float | list[float]:
-    return float(values[0]) if values.size == 1 else cast(list[float], values.tolist())
+def _one_or_more(values: Array) -> Any:
+    return float(values[0]) if values.size == 1 else values.tolist()
 
 
 def rigid_columns(moving: Movements) -> dict[str, dict[str, float]]:
@@ -421,24 +390,19 @@ def rigid_columns(moving: Movements) -> dict[str, dict[str, float]]:
     `bolts`. Of several foundations the names have that of the part behind them, and so have
     those of rigid parts, but where there is one and no foundation moves.
     """
-    electrodes = moving.get("electrodes", {})
-    bolts = cast(dict[str, dict[str, float]], moving.get("bolts", {}))
-    rigid: Mapping[str, object] = moving.get("rigid", {})
-    single = isinstance(rigid.get("displacement"), list)
-    foundations = {"": rigid} if single else rigid
-    parts: Mapping[str, object] = moving.get("rigid_parts", {})
+    electrodes, bolts, rigid = (moving.get(key, {}) for key in ("electrodes", "bolts", "rigid"))
+    foundations = {"": rigid} if isinstance(rigid.get("displacement"), list) else rigid
+    parts = moving.get("rigid_parts", {})
     found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}}
     found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
     found["bolts"] = {
         f"bolt_{key}_{part}": bolt[key] for part, bolt in bolts.items() for key in bolt
     }
-    bodies = cast(list[dict[str, list[float]]], [*foundations.values(), *parts.values()])
+    bodies = [*foundations.values(), *parts.values()]
     for body, end in zip(bodies, name_ends([*foundations], [*parts]), strict=True):
         for kind, (key, name) in zip(KINDS, NAMES.items(), strict=True):
-            for column, value in zip(
-                columns_of(name, np.size(body[key]), end), np.atleast_1d(body[key]), strict=True
-            ):
-                found[kind][column] = float(value)
+            values = [float(value) for value in np.atleast_1d(body[key])]
+            found[kind] |= zip(columns_of(name, len(values), end), values, strict=True)
     return found
 
 

@@ -18,11 +18,21 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.linear.operator import Counters
 from contact.methods.report import Outcome, Record
-from contact.results.contacts import ContactShare, contact_columns, contact_shares
+from contact.problem.energy import Balance, balance, dissipated
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.results.contact_nodes import (
+    ContactResult,
+    ContactShare,
+    Solved,
+    contact_result,
+    contact_shares,
+)
 from contact.results.error_estimate import Estimate
 from contact.results.fields import Deformation, DerivedFields, unknowns
+from contact.results.functionals import MaxDisplacement
 from contact.results.intervals import Intervals
-from contact.results.options import OutputOptions, Source, Units
+from contact.results.options import OutputOptions, Units
 from contact.results.quantities import values_of
 from contact.results.quantity import STEPS
 from contact.results.resultants import (
@@ -33,13 +43,8 @@ from contact.results.resultants import (
     charge_balance,
     contact_resultant,
     movements,
-    rigid_columns,
     supports,
 )
-from contact.results.solved import ContactResult, Solved, contact_result
-from contact.problem.energy import Balance, balance, dissipated
-from contact.problem.problem import ContactProblem
-from contact.problem.state import State
 from contact.typing import Array
 
 if TYPE_CHECKING:
@@ -55,7 +60,7 @@ Remark: TypeAlias = str
 
 
 class Note(str):
-    """A remark that is no reason for care."""
+    """Informational note, not a warning."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,7 +74,7 @@ class StepRecord:
     enthalpy
         Where the energy balance of the next step begins, see `problem.energy.Balance`.
     rounding
-        Largest `equilibrium_rounding` of the residuals of a step so far, see `problem.residuals.Residuals`.
+        Largest `equilibrium_rounding` of a step so far, see `problem.residuals.Residuals`.
     """
 
     state: State
@@ -107,9 +112,7 @@ class StepRecorder:
         """Return the record of a step that follows the last one. Collective."""
         problem = self._problem.at(state.time, state.history)
         self._before = energies = balance(problem, state, self._before)
-        solution = Solution(
-            problem, state, outcome, [*outcome.records], outcome.counters, "", {}
-        )
+        solution = Solution(problem, state, outcome, [*outcome.records], outcome.counters, "", {})
         solution.energies = energies
         if self._driven is not None:
             way, force = (find(problem, state) for find in (self._driven.way, self._driven.force))
@@ -194,7 +197,7 @@ class Solution(Solved):
     critical_factor: float = np.inf
     jammed: bool = False
     case: str = ""
-    source: Source | None = None
+    source: Any = None
     energies: Balance | None = None
     driven: tuple[Array, Array] | None = None
     title: str = ""
@@ -219,7 +222,12 @@ class Solution(Solved):
     @property
     def rounding(self) -> float:
         """Forces out of balance that count as rounding; of an evolution the most in a step."""
-        return max([self.outcome.residuals.equilibrium_rounding, *(step.rounding for step in self.steps[-1:])])
+        return max(
+            [
+                self.outcome.residuals.equilibrium_rounding,
+                *(step.rounding for step in self.steps[-1:]),
+            ]
+        )
 
     @property
     def floors(self) -> dict[str, float]:
@@ -353,11 +361,6 @@ class Solution(Solved):
         }
 
     @property
-    def contact_columns(self) -> dict[str, float]:
-        """Results of each of several contacts by their columns. Collective."""
-        return contact_columns(self.contacts) if len(self.problem.contacts) > 1 else {}
-
-    @property
     def contact_area(self) -> float:
         """The contact area: the sum of the weights of nodes in contact. Collective."""
         return self.problem.nodes.sum(np.where(self.status == "open", 0.0, 1.0))
@@ -365,9 +368,7 @@ class Solution(Solved):
     @property
     def max_displacement(self) -> float:
         """The largest Euclidean norm of the displacement over the nodes. Collective."""
-        body, comm = self.problem.equilibrium, self.problem.comm
-        u = self.state.x[: body.owned].reshape(-1, body.block_size)[:, : self.problem.dim]
-        return float(comm.allreduce(np.linalg.norm(u, axis=1).max(initial=0.0), op=MPI.MAX))
+        return MaxDisplacement()(self.problem, self.state)
 
     @cached_property
     def supports(self) -> Mapping[str, Resultant]:
@@ -414,19 +415,6 @@ class Solution(Solved):
             return None
         return charge_balance(self.problem, self.state)
 
-    @property
-    def charge_columns(self) -> Mapping[str, float] | None:
-        """Charges of the electrodes and of the contact part, by the names of their columns."""
-        if self.charges is None:
-            return None
-        columns = {f"charge_{part}": charge for part, charge in self.charges.electrodes.items()}
-        return columns | {"charge_foundation": self.charges.foundation}
-
-    @property
-    def rigid(self) -> Mapping[str, Mapping[str, float]]:
-        """The columns of rigid bodies, and of electrodes: see `rigid_columns`."""
-        return rigid_columns(self.movements)
-
     def at_step(self, state: State) -> Solution:
         """Return the solution at the end of a step, without the records of the whole.
 
@@ -441,16 +429,6 @@ class Solution(Solved):
         """
         problem = self.problem.at(state.time, state.history)
         return Solution(problem, state, self.outcome, self.history, self.counters, self.method, {})
-
-    @property
-    def reaction_columns(self) -> dict[str, float]:
-        """The reactions of supports as columns, ``reaction_x_left``. Collective."""
-        axes = "xyz"[: self.problem.dim]
-        return {
-            f"reaction_{axis}_{part}": float(value)
-            for part, held in self.supports.items()
-            for axis, value in zip(axes, held.force, strict=True)
-        }
 
     @property
     def dissipation(self) -> float:

@@ -13,11 +13,11 @@ from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import shape_of
 from contact.mesh.owners import Owners
+from contact.problem.problem import ContactProblem
 from contact.results.grid import Grid, Table, Values
 from contact.results.quantities import values_of
 from contact.results.quantity import AGAINST, NODES, SURFACE
 from contact.results.solution import Solution
-from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
 #: Nodes with less than this share of the mean area have none but by rounding.
@@ -61,15 +61,8 @@ def contact_surface(solution: Solution) -> Grid:
 def _numbered(
     owners: Owners, sides: Sequence[NDArray[np.int64]]
 ) -> tuple[list[NDArray[np.int64]], NDArray[np.int64]]:
-    """Return the nodes of this rank on facets, and the facets by numbers of them. Collective.
-
-    The nodes of each side, ascending, and those of the ranks one after the other.
-
-    Parameters
-    ----------
-    owners, sides
-        The owners of the nodes, and the nodes of the facets of this rank on each side.
-    """
+    """Return the nodes of this rank on facets, and the facets by numbers of them. Collective."""
+    # The nodes of each side, ascending, and those of the ranks one after the other.
     nodes = [owners.named(facets.ravel()) for facets in sides]
     begin, cells = owners.comm.exscan(sum(own.size for own in nodes)) or 0, []
     for own, facets in zip(nodes, sides, strict=True):
@@ -143,10 +136,8 @@ def opposite_surface(solution: Solution) -> Grid | None:
 
 
 def _acting(owners: Owners, entry: Entry, coupling: Coupling, lumped: Lumping, own: Array) -> Array:
-    """Return the stresses of all contact nodes on this rank's nodes of the other side, (m, k).
-
-    Those given are of this rank's nodes. Collective.
-    """
+    """Return the stresses of all contact nodes on this rank's nodes of the other side, (m, k)."""
+    # Those given are of this rank's nodes. Collective.
     on_nodes: Array = np.zeros((lumped.nodes.size, own.shape[1]))
     forces = coupling.other.T @ (entry.nodes.weight[:, None] * own)
     nodes, sums = owners.sums(coupling.masters, forces)

@@ -135,10 +135,8 @@ def uniqueness(
 def _free_of_contact(
     stiffness: Array, normal: Array, motions: Array, forces: Array, opening: Array, size: float
 ) -> bool:
-    """Tell whether bodies can be in balance, and nowhere meet, without these contact forces.
-
-    Free motions, shape (n, d, m), may be as large as the bodies.
-    """
+    """Tell whether bodies can be in balance, and nowhere meet, without these contact forces."""
+    # Free motions, shape (n, d, m), may be as large as the bodies.
     count, dim, many = motions.shape
     used = np.diag(stiffness) > 0
     basis = motions.reshape(count * dim, many)[used]
@@ -196,13 +194,11 @@ def _along(tangent: Array, vectors: Array) -> Array:
 
 
 def _uniform(stiffness: Array, normal: Array, tangent: Array) -> list[Array]:
-    """Return fields of unit tangential vectors, (n, d): along one direction, or around a curve.
-
-    In 3-D those that are principal for the pressures which the slips change, |S_nt d|^2, beside
-    the stiffness d S_tt d: they turn with the axes, and of one node, where S_tt is isotropic, or
-    S_nt its eigenvector, the least critical mu is along the first. Where all are alike those along
-    the axes.
-    """
+    """Return fields of unit tangential vectors, (n, d): along one direction, or around a curve."""
+    # In 3-D those that are principal for the pressures which the slips change, |S_nt d|^2, beside
+    # the stiffness d S_tt d: they turn with the axes, and of one node, where S_tt is isotropic, or
+    # S_nt its eigenvector, the least critical mu is along the first. Where all are alike those
+    # along the axes.
     if normal.shape[1] == 2:  # the tangent turns with the surface
         return [_along(tangent, np.stack([-normal[:, 1], normal[:, 0]], axis=1))]
     forces = np.einsum("nimj,mjk->nik", stiffness, tangent)
@@ -222,11 +218,9 @@ def _uniform(stiffness: Array, normal: Array, tangent: Array) -> list[Array]:
 def _factor(
     stiffness: Array, normal: Array, along: Array, mu: Array, rigid: int, largest: float
 ) -> float:
-    """Return the least |factor| at which S_tt - factor mu S_nt is singular.
-
-    S is condensed onto the nodes that touch; `largest` is its largest entry before that. Supports
-    leave `rigid` motions of the bodies free.
-    """
+    """Return the least |factor| at which S_tt - factor mu S_nt is singular."""
+    # S is condensed onto the nodes that touch; `largest` is its largest entry before that. Supports
+    # leave `rigid` motions of the bodies free.
     on = np.linalg.norm(along, axis=1) > 0.5
     if not on.any():  # supports let none of them slide
         return np.inf

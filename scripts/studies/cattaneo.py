@@ -24,7 +24,7 @@ import numpy as np
 from contact import Solution, parse_case, sensitivity
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.results.differentiable import named_quantities
+from contact.results.quantities import named_functionals
 from scripts.reporting import Report, append, options, solved
 from scripts.studies.mindlin import MU, PRESS, RADIUS, YOUNG, write_mesh
 
@@ -175,7 +175,7 @@ def run(
     share = 0.0
     while abs(share - SHARE) > NEAR:
         solution = sheared(case, [way])
-        results = {"force": named_quantities(solution.problem)["contact_force_x"]}
+        results = {"force": named_functionals(solution.problem)["contact_force_x"]}
         by_way = sensitivity(solution, results, [WAY_KEY], "tangent")["force"][WAY_KEY]
         force, normal = _forces(solution, -1)
         way, share = way + (SHARE * MU * normal - force) / by_way, force / (MU * normal)

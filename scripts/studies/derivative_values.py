@@ -18,7 +18,7 @@ from contact import field_gradient, gap_gradient, load_case, parse_case, sensiti
 from contact.case.file import Case
 from contact.case.text import number_at, to_toml, with_number
 from contact.derivatives.by_parameters import LoadPath
-from contact.results.differentiable import named_quantities
+from contact.results.quantities import named_functionals
 from contact.results.solution import Solution
 from contact.typing import Array
 from forms.elasticity import hexagonal
@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def relative(solution: Solution, name: str, keys: Sequence[str]) -> Array:
     """Return d ln Q/d ln m of a result by parameters."""
     found = sensitivity(solution, [name], keys)[name]
-    value = named_quantities(solution.problem)[name](solution.problem, solution.state)
+    value = named_functionals(solution.problem)[name](solution.problem, solution.state)
     return np.array([found[key] * number_at(solution.source, key) / value for key in keys])
 
 
@@ -178,7 +178,7 @@ def remainders(report: Report) -> None:
     def force(case: Case) -> float:
         run = solved(case)
         problem = run.problem.at(run.state.time, run.state.history)
-        return named_quantities(problem)[name](problem, run.state)
+        return named_functionals(problem)[name](problem, run.state)
 
     first, slope = force(solution.source), sensitivity(solution, [name], [key])[name][key]
     steps = [at * 2.0**-k for k in range(7, 12)]

@@ -25,7 +25,7 @@ from contact.derivatives.by_parameters import (
 from contact.derivatives.differences import Parameter
 from contact.errors import InputError
 from contact.problem.linearised import active_set
-from contact.results.differentiable import named_quantities
+from contact.results.quantities import named_functionals
 from contact.results.solution import Solution
 from contact.typing import Array
 from scripts.reporting import Report, append, options
@@ -264,7 +264,7 @@ def size_of(case: Case, key: str) -> float:
 
 def values(solution: Solution, names: list[str]) -> Array:
     """Return results of the end of a solution. Collective."""
-    known, state = named_quantities(solution.problem), solution.state
+    known, state = named_functionals(solution.problem), solution.state
     problem = solution.problem.at(state.time, state.history)
     return np.array([known[name](problem, state) for name in names])
 

@@ -18,8 +18,8 @@ from contact.interface.layer import NormalLaw
 from contact.plot.body import Picture, draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.plot.style import Look
+from contact.results.contact_nodes import tangent_of
 from contact.results.grid import Table
-from contact.results.solved import tangent_of
 from contact.results.surface import contact_table
 from contact.typing import Array
 from forms.foundation import contact_multiplier

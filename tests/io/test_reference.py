@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from contact import sensitivity
+from contact.case.text import number_at, with_number
 from contact.io.reference import files_help
 from contact.plot.run import read_grid
 from contact.results import quantities as registry
+from contact.results.functionals import Integral
 from contact.results.quantities import QUANTITIES, quantities
 from contact.results.quantity import BODY, HISTORY, NODES, STEPS, SUMMARY, SURFACE, SWEEP, Quantity
 from contact.solving import solve
@@ -110,24 +113,34 @@ def test_fields(written: list[Path]) -> None:
             }
 
 
-def test_one_entry_is_a_key_and_a_column(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A further quantity stands in the summary, the steps, a sweep, the page and the help."""
+def test_one_entry_is_a_key_a_column_and_a_derivative(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Further quantities stand in summary, steps, sweep, page, help and sensitivities."""
+    files = (SUMMARY, STEPS, SWEEP)
     mean = Quantity(
         "mean_pressure", "stress", "Mean contact pressure.",
-        lambda r: r.problem.nodes.sum(r.pressure) / r.contact_area,
-        (SUMMARY, STEPS, SWEEP),
+        lambda r: r.problem.nodes.sum(r.pressure) / r.contact_area, files,
     )  # fmt: skip
-    monkeypatch.setattr(registry, "QUANTITIES", (*QUANTITIES, mean))
+    sink = Quantity(
+        "sink", "length", "Integral of u_y.", files=files, functional=Integral(lambda u, phi: u[1])
+    )
+    monkeypatch.setattr(registry, "QUANTITIES", (*QUANTITIES, mean, sink))
     solution = solve(steps_case())
     write_outputs(solution, tmp_path)
     rows = list(csv.DictReader((tmp_path / STEPS).open()))
-    assert (
-        float(rows[-1]["mean_pressure"])
-        == json.loads((tmp_path / SUMMARY).read_text())["mean_pressure"]
-    )
+    summary = json.loads((tmp_path / SUMMARY).read_text())
+    for name in ("mean_pressure", "sink"):
+        assert float(rows[-1][name]) == summary[name] != 0
+        assert all(name in files_help(file) for file in files)
     assert "| `mean_pressure` | stress | Mean contact pressure. |" in page()
-    for name in (SUMMARY, STEPS, SWEEP):
-        assert "mean_pressure" in files_help(name)
+    key = "load.0.traction.1"
+    found = sensitivity(solution, ["sink"], [key])["sink"][key]
+    case, value = solution.source, number_at(solution.source, key)
+    ends = [
+        solve(with_number(case, key, value * way)).steps[-1].row for way in (1 + 1e-4, 1 - 1e-4)
+    ]
+    assert found == pytest.approx((ends[0]["sink"] - ends[1]["sink"]) / (2e-4 * value), rel=1e-5)
 
 
 def test_the_page_is_made_from_this() -> None:

@@ -8,13 +8,13 @@ from mpi4py import MPI
 
 from contact import parse_case
 from contact import solve as solve_case
-from contact.model.body import Load
 from contact.errors import InputError
-from contact.model.friction import Friction
 from contact.methods.options import FixedPointOptions
-from contact.thesis.fixed_point import FixedPoint
-from contact.results.resultants import charge_balance, mean_potential, sensor
+from contact.model.body import Load
+from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
+from contact.results.resultants import charge_balance, mean_potential, sensor
+from contact.thesis.fixed_point import FixedPoint
 from scripts.force_balance import force_balance
 from tests.problems.mechanics import solve
 from tests.problems.pairs import case

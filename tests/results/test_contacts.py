@@ -11,6 +11,8 @@ from mpi4py import MPI
 
 from contact import InputError, parse_case, sensitivity, solve, write_outputs
 from contact.case.file import Case
+from contact.results import quantities as registry
+from contact.results.quantity import CONTACTS, Quantity
 
 COMM = MPI.COMM_WORLD
 
@@ -54,7 +56,10 @@ def test_a_block_between_two_plates():
     assert half == pytest.approx(1.0, abs=0.1)  # p is nearly even over x from 0 to 2
 
 
-def test_they_stand_in_the_files(tmp_path: Path):
+def test_they_stand_in_the_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """And so does one that is entered for each contact."""
+    size = Quantity("size", "area", "", lambda c: c.problem.nodes.sum(c.own / 1.0), (CONTACTS,))
+    monkeypatch.setattr(registry, "QUANTITIES", (*registry.QUANTITIES, size))
     solution = solve(between_plates())
     write_outputs(solution, tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -68,6 +73,12 @@ def test_they_stand_in_the_files(tmp_path: Path):
         summary["contacts"]["lid"]["force"][1]
     )
     assert float(rows[0]["stick_lid"]) == 1.0
+    assert float(rows[0]["size_lid"]) == summary["contacts"]["lid"]["size"] == pytest.approx(2.0)
+    moment = summary["contacts"]["lid"]["moment"]
+    assert moment == [pytest.approx(float(rows[-1]["contact_moment_lid"]))]
+    assert list(summary["contacts"]["lid"])[:-1] == [
+        "force", "moment", "area", "max_pressure", "mean_pressure", "stick", "slip", "dissipation"
+    ]  # fmt: skip
 
 
 def test_a_single_contact_has_no_columns_of_its_own(tmp_path: Path):
@@ -78,13 +89,14 @@ def test_a_single_contact_has_no_columns_of_its_own(tmp_path: Path):
         evolution={"times": [0.0, 1.0], "steps": [1]},
     )
     solution = solve(case)
-    assert list(solution.contacts) == ["bottom"] and solution.contact_columns == {}
+    assert list(solution.contacts) == ["bottom"]
+    assert not any(column.endswith("_bottom") for column in solution.steps[-1].row)
     np.testing.assert_allclose(solution.contacts["bottom"].force, solution.contact_force)
 
 
 def test_the_same_name_twice_is_refused():
     contacts = [{"on": "top", "name": "side", "gap": 0.1}, {"on": "bottom", "name": "side"}]
-    with pytest.raises(InputError, match="side.*several contacts"):
+    with pytest.raises(InputError, match=r"side.*several contacts"):
         solve(between_plates(contact=contacts))
 
 
@@ -95,7 +107,7 @@ def test_derivatives_of_the_force_on_one_contact():
     names = ["contact_force_y_lid", "contact_force_y_bottom", "max_pressure_lid"]
     found = sensitivity(solution, names, ["material.young"])
     for name in names[:2]:
-        value = solution.contact_columns[name]
+        value = solution.steps[-1].row[name]
         assert found[name]["material.young"] == pytest.approx(value, rel=1e-6)
     assert found[names[2]]["material.young"] == pytest.approx(
         solution.contacts["lid"].max_pressure, rel=1e-6

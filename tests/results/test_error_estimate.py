@@ -10,7 +10,6 @@ from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
 from contact.body.description import Body, Material
-from contact.model.body import Fixed
 from contact.case.build import build_problem
 from contact.cli.solve import _results
 from contact.mesh.cells import rule, shape_of
@@ -19,14 +18,14 @@ from contact.mesh.geometry import geometry_nodes, measures
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.results.error_estimate import estimated, sampled
-from contact.results.fields import DerivedFields, Point
-from contact.results.local_problems import LocalProblems
-from contact.results.oscillation import oscillation
-from contact.results.recovery import nodal_means
+from contact.model.body import Fixed
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.results.error_estimate import estimated, oscillation, sampled
+from contact.results.fields import DerivedFields, Point
+from contact.results.local_problems import LocalProblems
+from contact.results.recovery import nodal_means
 from forms.elasticity import isotropic, mandel
 from forms.hencky import Linear, Log
 from scripts.studies.effectivity import known

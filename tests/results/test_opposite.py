@@ -11,18 +11,18 @@ from mpi4py import MPI
 
 from contact import parse_case, solve
 from contact.body.description import Body
+from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
 from contact.model.obstacle import GapFunction
-from contact.methods.options import NewtonOptions
 from contact.plot.figures import figures_of
 from contact.plot.run import read_grid, read_run
-from contact.writing import write_outputs
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.results.quantities import quantities
 from contact.results.quantity import AGAINST, OPPOSITE
 from contact.results.surface import opposite_surface
-from contact.problem.contact import Contact
-from contact.problem.problem import ContactProblem
 from contact.solving import solve_problem
+from contact.writing import write_outputs
 from forms.hencky import Linear
 from tests.io.test_reference import fits
 from tests.problems.blocks import Blocks

@@ -9,11 +9,10 @@ from mpi4py import MPI
 
 from contact import load_case, parse_case, solve
 from contact.case.build import build_problem
-from contact.io.fields import body_share, regions_of
-from contact.results.fields import DerivedFields
+from contact.io.fields import body_share, gathered, regions_of
 from contact.plot.run import read_grid
+from contact.results.fields import DerivedFields
 from contact.writing import write_outputs
-from contact.io.fields import gathered
 from forms.kinematics import principal_values
 from scripts.cases import CASES
 from tests.forms.test_elasticity import numbers

@@ -6,10 +6,10 @@ from mpi4py import MPI
 
 from contact import build_problem, solve
 from contact.case.file import parse_case
-from contact.results.uniqueness import uniqueness
 from contact.problem.residuals import evaluate
-from scripts.studies.robustness.check import Mesh, write_msh
+from contact.results.uniqueness import uniqueness
 from scripts.studies.robustness.bodies import Bodies
+from scripts.studies.robustness.check import Mesh, write_msh
 from scripts.studies.robustness.problems import problems
 from tests.problems.rings import between_plates, squeezed
 

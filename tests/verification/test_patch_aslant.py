@@ -34,7 +34,7 @@ from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
 from contact.model.obstacle import GapFunction
 from contact.model.rigid import Motion
-from contact.results.differentiable import named_quantities
+from contact.results.quantities import named_functionals
 from contact.results.resultants import contact_resultant, supports
 from forms.laws import ConstantCoefficient
 from scripts.force_balance import force_balance
@@ -328,7 +328,7 @@ def test_sensitivities(names):
         sensitivity(solution, QUANTITIES, parameters, method=method)
         for method in ("tangent", "adjoint")
     ]
-    known = named_quantities(solution.problem)
+    known = named_functionals(solution.problem)
     for name, parameter in parameters.items():
         step, ends = 1e-4 * POINT[name], []
         for sign in (1, -1):

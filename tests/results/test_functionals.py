@@ -1,12 +1,17 @@
 """The quantities with derivatives are the columns of steps.csv, value by value."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import ufl
 from mpi4py import MPI
 
 from contact import load_case, parse_case, sensitivity, solve
 from contact.case.text import number_at, with_number
-from contact.results.differentiable import Differentiable, named_quantities
+from contact.results.functionals import Integral
+from contact.results.quantities import named_functionals
+from contact.results.quantity import Differentiable
 from scripts.studies.derivatives import FAMILIES, problem
 
 SELF = MPI.COMM_SELF
@@ -36,10 +41,26 @@ def family(name):
 def energy(run):
     """Return the stored energy, of Hencky's law by a finer quadrature than that of the column."""
     here = run.problem.at(run.state.time, run.state.history)
-    return named_quantities(run.problem)["energy"](here, run.state)
+    return named_functionals(run.problem)["energy"](here, run.state)
+
+
+def bolted():
+    """Return a block that a jack, a bolt of negative force, presses on a foundation."""
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [6, 4]}
+    return parse_case({
+        "mesh": {**mesh, "inside": {"cut": "abs(y - 0.5) < 1e-6"}},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": [0.001, 0.0]}],
+        "bolt": [{"on": "cut", "force": -0.02}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.2},
+        "evolution": {"times": [0.0, 1.0], "steps": [2]},
+        "solver": {"tolerance": 1e-13},
+    })  # fmt: skip
 
 
 CASES = {
+    "bolt": bolted,
     "plate": plate,
     "slip": lambda: family("evolution, slip"),
     "log": lambda: family("evolution, log"),
@@ -53,13 +74,13 @@ CASES = {
 
 #: Columns with derivatives, at least: all but times, counts, residuals and work, which asks for
 #: two ends. A new column may be without one.
-COUNTS = {"plate": 18, "slip": 12, "log": 12, "j2": 13, "electrode": 15, "ring": 15}
+COUNTS = {"bolt": 13, "plate": 18, "slip": 12, "log": 12, "j2": 13, "electrode": 15, "ring": 15}
 
 
 @pytest.mark.parametrize(("name", "count"), COUNTS.items())
 def test_columns(name, count):
     run = solve(CASES[name](), comm=SELF)
-    known = named_quantities(run.problem)
+    known = named_functionals(run.problem)
     assert len(known) >= count
     for record in run.steps:
         here = run.problem.at(record.state.time, record.state.history)
@@ -70,13 +91,13 @@ def test_columns(name, count):
             assert value == pytest.approx(record.row[key], rel=close, abs=1e-12), key
 
 
-@pytest.mark.parametrize("name", ["plate", "slip", "log", "j2", "electrode"])
+@pytest.mark.parametrize("name", ["bolt", "plate", "slip", "log", "j2", "electrode"])
 def test_derivatives_of_all_columns(name):
     case = CASES[name]()
     key, second = ("rigid.0.centre.0" if name == "plate" else "friction.mu"), "material.young"
     key = "friction.mu.a" if name == "slip" else key
     run, keys = solve(case, comm=SELF), [key, second]
-    known = named_quantities(run.problem)
+    known = named_functionals(run.problem)
     tangent = sensitivity(run, [*known], keys, "tangent")
     smooth = [name for name, it in known.items() if isinstance(it, Differentiable)]
     adjoint = sensitivity(run, smooth, keys, "adjoint")
@@ -93,3 +114,44 @@ def test_derivatives_of_all_columns(name):
                 size = max(size, abs(run.steps[-1].row[column] / at))
                 assert adjoint[column][one] == pytest.approx(tangent[column][one], abs=1e-9 * size)
     assert np.isfinite([*tangent["energy"].values()]).all()
+
+
+@pytest.mark.core
+@pytest.mark.parallel
+@pytest.mark.parametrize("on", [None, "left"])
+def test_an_integral_of_ones_own(on):
+    """A quadratic density: central differences are exact, and its value is that of NumPy."""
+    if on is None:
+        run = solve(family("evolution, electrode"), comm=MPI.COMM_WORLD)
+    else:
+        run = solve(plate(), comm=MPI.COMM_WORLD)
+    problem, state, body = run.problem, run.state, run.problem.equilibrium
+
+    def density(u, phi):
+        found = ufl.div(u) ** 2 + u[0] * u[1] + u[1]
+        return found if phi is None else found + phi * u[1]
+
+    functional = Integral(density, on)
+    by_x, by_force = functional.gradient(problem, state)
+    assert np.all(by_force == 0) and by_x.size == body.owned + body.global_unknowns.size
+    way = np.zeros_like(by_x)
+    points = body.space.tabulate_dof_coordinates()[: body.owned // body.block_size, :2]
+    body.nodal(way)[:] = np.sin(3 * points @ np.array([[1.0, 2.0, 3.0], [2.0, 1.0, 0.5]]))[
+        :, : body.block_size
+    ]
+    ends = [
+        functional(problem, replace(state, x=body.moved(state.x, 1e-3 * sign * way)))
+        for sign in (1, -1)
+    ]
+    assert body.product(by_x, way) == pytest.approx((ends[0] - ends[1]) / 2e-3, rel=1e-8)
+
+
+def test_the_integral_of_a_linear_displacement():
+    """Of u_y = -y/100 over a block of 2 x 1, and along its left side."""
+    given = {"mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]},
+             "material": {"young": 1.0, "poisson": 0.0}, "contact": {"on": "bottom"},
+             "fixed": [{"on": "top", "displacement": [0.0, -0.01]}]}  # fmt: skip
+    run = solve(parse_case(given), comm=SELF)
+    for on, exact in ((None, -0.01), ("left", -0.005)):
+        found = Integral(lambda u, phi: u[1], on)(run.problem, run.state)
+        assert found == pytest.approx(exact, rel=1e-9)

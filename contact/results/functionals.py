@@ -1,19 +1,34 @@
-"""Named results of a state with their derivatives by unknowns and contact forces."""
+"""Functionals of a state with their derivatives by unknowns and contact forces.
+
+The entries of `contact.results.quantities` name those of columns; `Integral` makes one of a UFL
+density.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, runtime_checkable
+from itertools import chain
 
 import numpy as np
+import ufl
+from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
+from ufl.core.expr import Expr
 
+from contact.body.loads import assembled
+from contact.mesh.compiled import compiled
+from contact.model.body import Bolt, Electrode
 from contact.model.rigid import Rigid
-from contact.model.body import Electrode
+from contact.problem.energy import dissipated
+from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
+from contact.problem.state import State
+from contact.ranks import summed
+from contact.results.quantity import Functional
 from contact.results.resultants import (
     NAMES,
     DrivenPart,
@@ -22,40 +37,55 @@ from contact.results.resultants import (
     name_ends,
     nodes_of,
 )
-from contact.problem.energy import dissipated, stored
-from contact.problem.problem import ContactProblem
-from contact.problem.residuals import residual_forces
-from contact.problem.state import State
 from contact.typing import Array
+
+#: Functionals by the names of their columns.
+Functionals = Mapping[str, Functional]
 
 AXES = "xyz"
 
 
-class Quantity(Protocol):
-    """A result as a function of problem and state; any callable is one."""
+@dataclass(frozen=True)
+class Integral:
+    """The integral of a UFL density over the body, or over a part of its boundary.
+
+    Attributes
+    ----------
+    density
+        Of displacement and potential (None without one), for instance ``lambda u, phi: u[1]``;
+        products and derivatives of them too, ``ufl.div(u)``. It does not know jumps at bolts.
+    on
+        The part; None for the body. Of bodies of revolution the full turn.
+    """
+
+    density: Callable[[Expr, Expr | None], Expr]
+    on: str | None = None
+
+    def _form(self, problem: ContactProblem, at: fem.Function) -> ufl.Form:
+        domain = problem.domain
+        measure = domain.dx if self.on is None else domain.ds(self.on)
+        return self.density(*problem.equilibrium.split(at)) * measure
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
-        """Return the value. Collective."""
-
-
-@runtime_checkable
-class Differentiable(Quantity, Protocol):
-    """A result that knows its derivatives, which the adjoint asks for."""
+        """Return it. Collective."""
+        form = compiled(self._form(problem, problem.equilibrium.function(state.x)))
+        return float(summed(problem.comm, fem.assemble_scalar(form)))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
-        """Return them by the owned unknowns, and by the forces at the nodes, shape (n, d).
-
-        Collective.
-        """
+        """Return the derivatives. Collective."""
+        body, by_x = problem.equilibrium, _no_weights(problem)
+        at = body.function(state.x)
+        by_x[: body.owned] = assembled(
+            compiled(ufl.derivative(self._form(problem, at), at)), body.owned
+        )
+        return by_x, np.zeros_like(problem.nodes.normal)
 
 
 def _of_contact(problem: ContactProblem, number: int | None) -> NDArray[np.bool_]:
     """Return which owned contact nodes are those of one contact; of all for None."""
-    return (
-        np.ones(problem.nodes.weight.size, bool)
-        if number is None
-        else (problem.entry_numbers == number)
-    )
+    if number is None:
+        return np.ones(problem.nodes.weight.size, bool)
+    return problem.entry_numbers == number
 
 
 @dataclass(frozen=True)
@@ -109,7 +139,7 @@ class Largest(ABC):
         own = float(self.values(problem, state).max(initial=0.0))
         return float(problem.comm.allreduce(own, op=MPI.MAX))
 
-    def located(self, problem: ContactProblem, state: State) -> Quantity:
+    def located(self, problem: ContactProblem, state: State) -> Functional:
         """Return the value at the node that has the largest here, whatever others have. Collective.
 
         Where two nodes have the largest, a difference of the maximum would be that of the other.
@@ -168,26 +198,25 @@ class MaxDisplacement(Largest):
 
 
 @dataclass(frozen=True)
-class MeanDisplacement:
-    """A component of the mean displacement of the nodes of a part: the approach of a block."""
+class Weighted:
+    """A weighted sum of the unknowns: a mean displacement, a rigid motion, a potential.
 
-    part: str
-    axis: int
+    Attributes
+    ----------
+    weights
+        Returns those of a problem, on the owned unknowns and the global ones. Collective.
+    """
+
+    weights: Callable[[ContactProblem], Array]
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
         body = problem.equilibrium
-        return body.product(self._weights(problem), body.owned_part(state.x))
-
-    def _weights(self, problem: ContactProblem) -> Array:
-        weights, nodes = _no_weights(problem), nodes_of(problem, self.part)
-        count = problem.comm.allreduce(nodes.size, op=MPI.SUM)
-        problem.equilibrium.nodal(weights)[nodes, self.axis] = 1 / max(count, 1)
-        return weights
+        return body.product(self.weights(problem), body.owned_part(state.x))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        return self._weights(problem), np.zeros_like(problem.nodes.normal)
+        return self.weights(problem), np.zeros_like(problem.nodes.normal)
 
 
 @dataclass(frozen=True)
@@ -228,39 +257,6 @@ class Reaction:
 
 
 @dataclass(frozen=True)
-class GlobalUnknown:
-    """A motion of a rigid foundation, or the potential of an electrode.
-
-    Attributes
-    ----------
-    member, component
-        Which of the global unknowns it is.
-    unit
-        In which unit, of that of the unknowns: degrees.
-    """
-
-    member: int
-    component: int
-    unit: float = 1.0
-
-    def _place(self, problem: ContactProblem) -> tuple[int, float]:
-        member = problem.equilibrium.global_unknowns.members[self.member]
-        return member.begin + self.component, float(member.units[self.component]) * self.unit
-
-    def __call__(self, problem: ContactProblem, state: State) -> float:
-        """Return it."""
-        at, unit = self._place(problem)
-        return float(problem.equilibrium.motion(state.x)[at] * unit)
-
-    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
-        """Return the derivatives."""
-        body, (at, unit) = problem.equilibrium, self._place(problem)
-        by_x = np.zeros_like(body.owned_part(state.x))
-        body.motion(by_x)[at] = unit
-        return by_x, np.zeros_like(problem.nodes.normal)
-
-
-@dataclass(frozen=True)
 class FoundationCharge:
     """The charge that passes through the contact nodes."""
 
@@ -291,76 +287,123 @@ def _largest(problem: ContactProblem, values: Array) -> Array:
     return at
 
 
-def named_quantities(problem: ContactProblem) -> dict[str, Quantity]:
-    """Return the results of a problem that have derivatives, by their columns. Collective.
+def max_pressures(problem: ContactProblem, contact: int | None = None) -> Functionals:
+    """Return the largest pressure, of all contacts or of one."""
+    return {"max_pressure": MaxPressure(contact)}
 
-    They are columns of ``steps.csv``: no times, counts, residuals or work in a step, nor a column
-    that is not listed here.
-    """
-    axes, body = AXES[: problem.dim], problem.equilibrium
-    found: dict[str, Quantity] = {
-        "max_pressure": MaxPressure(),
-        "max_displacement": MaxDisplacement(),
-        "energy": stored,
-        "dissipation": dissipated,
+
+def contact_forces(problem: ContactProblem, contact: int | None = None) -> Functionals:
+    """Return the components of the contact force, of all contacts or of one."""
+    axes = AXES[: problem.dim]
+    return {f"contact_force_{axis}": ContactForce(i, contact) for i, axis in enumerate(axes)}
+
+
+def dissipations(problem: ContactProblem, contact: int | None = None) -> Functionals:
+    """Return the dissipation by friction, of all contacts or of one."""
+    return {"dissipation": partial(_rubbed, contact=contact)}
+
+
+def plastic_dissipations(problem: ContactProblem) -> Functionals:
+    """Return the dissipation by plastic flow, of bodies with internal variables."""
+    return {"plastic_dissipation": _lost} if problem.equilibrium.laws.initial is not None else {}
+
+
+def reactions(problem: ContactProblem) -> Functionals:
+    """Return the components of the reactions of supports. Collective."""
+    # Forces of elastic supports are no reactions: a part with both is left out.
+    elastic = {support.on for support in problem.body.elastic}
+    return {
+        f"reaction_{axis}_{part}": Reaction(partial(_on_support, part=part, axis=i))
+        for i, axis in enumerate(AXES[: problem.dim])
+        for part in holding(problem, electric=False)
+        if part not in elastic
     }
-    if body.laws.initial is not None:
-        found["plastic_dissipation"] = _lost
-    found |= {f"contact_force_{axis}": ContactForce(i) for i, axis in enumerate(axes)}
-    for number, contact in enumerate(problem.contacts if len(problem.contacts) > 1 else ()):
-        name = contact.name
-        found |= {f"contact_force_{x}_{name}": ContactForce(i, number) for i, x in enumerate(axes)}
-        found[f"max_pressure_{name}"] = MaxPressure(number)
-        found[f"dissipation_{name}"] = partial(_rubbed, contact=number)
-    driven = DrivenPart.of(problem)
-    for i, axis in enumerate(axes):
-        for part in holding(problem, electric=False):
-            found[f"reaction_{axis}_{part}"] = Reaction(partial(_on_support, part=part, axis=i))
-        if driven is not None:
-            found[f"driven_{axis}"] = MeanDisplacement(driven.on, i)
-            found[f"driven_force_{axis}"] = partial(_driving, axis=i)
+
+
+def driven_displacements(problem: ContactProblem) -> Functionals:
+    """Return the components of the displacement of the driven part. Collective."""
+    driven, axes = DrivenPart.of(problem), AXES[: problem.dim]
+    if driven is None:
+        return {}
+    return {
+        f"driven_{axis}": Weighted(partial(_mean, part=driven.on, axis=i))
+        for i, axis in enumerate(axes)
+    }
+
+
+def driving_forces(problem: ContactProblem) -> Functionals:
+    """Return the components of the force on the driven part. Collective."""
+    axes = AXES[: problem.dim] if DrivenPart.of(problem) is not None else ""
+    return {f"driven_force_{axis}": partial(_driving, axis=i) for i, axis in enumerate(axes)}
+
+
+def charges(problem: ContactProblem) -> Functionals:
+    """Return the charges of electrodes and of the foundation. Collective."""
+    found: dict[str, Functional] = {}
     if problem.piezoelectric:
         found["charge_foundation"] = FoundationCharge()
         for part in holding(problem, electric=True):
             found[f"charge_{part}"] = Reaction(partial(_on_electrode, part=part))
-    members = body.global_unknowns.members
-    rigid = [i for i, member in enumerate(members) if isinstance(member.description, Rigid)]
-    foundations = [members[i].description.on for i in rigid if members[i].foundation]
-    parts = [members[i].description.on for i in rigid if not members[i].foundation]
-    for index, end in zip(rigid, name_ends(foundations, parts), strict=True):
-        found |= _of_rigid(problem, index, end)
-    for index, member in enumerate(members):
-        part = member.description.on
-        if isinstance(member.description, Electrode):
-            found[f"potential_{part}"] = GlobalUnknown(index, 0)
-            found[f"charge_{part}"] = Reaction(
-                partial(_on_member, index=index, i=0), partial(_given, index=index, i=0)
-            )
+    for index, part in _members(problem, Electrode):
+        found[f"charge_{part}"] = _acting(index, 0)
     return found
 
 
-def _of_rigid(problem: ContactProblem, index: int, end: str) -> dict[str, Quantity]:
-    """Return the motions, forces and moments of a rigid body, given the end of their columns."""
-    member, found = problem.equilibrium.global_unknowns.members[index], dict[str, Quantity]()
-    d = problem.dim
-    for first, size, motion, force in (
-        (0, d, "displacement", "force"),
-        (d, member.free.size - d, "rotation", "moment"),
-    ):
-        unit = np.rad2deg(1.0) if first else 1.0
-        for i in range(size):
-            moved = columns_of(NAMES[motion], size, end)[i]
-            found[moved] = GlobalUnknown(index, first + i, unit)
-            acting = columns_of(NAMES[force], size, end)[i]
-            found[acting] = Reaction(
-                partial(_on_member, index=index, i=first + i),
-                partial(_given, index=index, i=first + i),
-            )
-    return found
+def potentials(problem: ContactProblem) -> Functionals:
+    """Return the potentials of electrodes where they are unknown."""
+    return {
+        f"potential_{part}": Weighted(partial(_unknown, index=i, i=0))
+        for i, part in _members(problem, Electrode)
+    }
 
 
-def _rubbed(problem: ContactProblem, state: State, contact: int) -> float:
-    """Return the energy that friction of one contact takes in the step of a state. Collective."""
+def bolt_shortenings(problem: ContactProblem) -> Functionals:
+    """Return the shortenings of bolts."""
+    return {
+        f"bolt_shortening_{part}": Weighted(partial(_unknown, index=i, i=0))
+        for i, part in _members(problem, Bolt)
+    }
+
+
+def rigid_motions(problem: ContactProblem) -> Functionals:
+    """Return displacements and rotations of moving foundations and rigid parts."""
+    return {
+        column: Weighted(partial(_unknown, index=index, i=i, turns=i >= problem.dim))
+        for column, index, i in _rigid_columns(problem, "displacement", "rotation")
+    }
+
+
+def rigid_forces(problem: ContactProblem) -> Functionals:
+    """Return forces and moments on moving foundations and rigid parts."""
+    return {
+        column: _acting(index, i) for column, index, i in _rigid_columns(problem, "force", "moment")
+    }
+
+
+def _members(problem: ContactProblem, kind: type) -> list[tuple[int, str]]:
+    """Return numbers and parts of the global unknowns of a kind."""
+    members = problem.equilibrium.global_unknowns.members
+    return [(i, m.description.on) for i, m in enumerate(members) if isinstance(m.description, kind)]
+
+
+def _rigid_columns(problem: ContactProblem, *keys: str) -> Iterator[tuple[str, int, int]]:
+    """Yield the columns of rigid bodies, and member and component of each."""
+    members, rigid = problem.equilibrium.global_unknowns.members, _members(problem, Rigid)
+    foundations = [part for i, part in rigid if members[i].foundation]
+    parts = [part for i, part in rigid if not members[i].foundation]
+    for (index, _), end in zip(rigid, name_ends(foundations, parts), strict=True):
+        sizes = problem.dim, members[index].free.size - problem.dim
+        columns = [columns_of(NAMES[k], n, end) for k, n in zip(keys, sizes, strict=True) if n]
+        yield from ((column, index, i) for i, column in enumerate(chain(*columns)))
+
+
+def _acting(index: int, i: int) -> Reaction:
+    """Return a force or moment on a rigid body, or the charge of an electrode."""
+    return Reaction(partial(_on_member, index=index, i=i), partial(_given, index=index, i=i))
+
+
+def _rubbed(problem: ContactProblem, state: State, contact: int | None) -> float:
+    """Return the energy that friction takes in the step of a state. Collective."""
     return dissipated(problem, state, _of_contact(problem, contact))
 
 
@@ -374,6 +417,23 @@ def _driving(problem: ContactProblem, state: State, axis: int) -> float:
     driven = DrivenPart.of(problem)
     assert driven is not None
     return float(driven.force(problem, state)[axis])
+
+
+def _mean(problem: ContactProblem, part: str, axis: int) -> Array:
+    """Return the weights of a component of the mean displacement of a part. Collective."""
+    weights, nodes = _no_weights(problem), nodes_of(problem, part)
+    count = problem.comm.allreduce(nodes.size, op=MPI.SUM)
+    problem.equilibrium.nodal(weights)[nodes, axis] = 1 / max(count, 1)
+    return weights
+
+
+def _unknown(problem: ContactProblem, index: int, i: int, turns: bool = False) -> Array:
+    """Return the weights of a global unknown; those of rotations in degrees."""
+    body, weights = problem.equilibrium, _no_weights(problem)
+    member = body.global_unknowns.members[index]
+    unit = float(member.units[i]) * (np.rad2deg(1.0) if turns else 1.0)
+    body.motion(weights)[member.begin + i] = unit
+    return weights
 
 
 def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:

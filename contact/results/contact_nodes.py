@@ -1,8 +1,8 @@
-"""The contact nodes of a solved problem: those of this rank, and those of all ranks in order."""
+"""Results of contact: at the nodes of this rank, of all ranks in order, and of each contact."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,10 @@ from contact.errors import InputError, counted
 from contact.interface.mortar.surface import surface_of
 from contact.interface.multipliers import Multipliers
 from contact.mesh.entities import paths
+from contact.problem.energy import dissipated
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.results.resultants import resultant
 from contact.typing import Array
 
 
@@ -256,3 +258,73 @@ def _along_chain(
     sorter = np.argsort(names)
     edges = rank[sorter[np.searchsorted(names, links[both], sorter=sorter)]]
     return np.asarray(by_position[np.concatenate(paths(edges, names.size))])
+
+
+@dataclass(frozen=True)
+class ContactShare:
+    """The results of one contact, as they stand in the summary.
+
+    Attributes
+    ----------
+    force, moment
+        Of the body on its foundation, or on the other body, see `Resultant`.
+    area
+        Tributary areas of the nodes that touch (length^(d - 1)).
+    max_pressure, mean_pressure
+        The largest contact pressure, and the mean over that area (stress).
+    stick, slip
+        Shares of that area.
+    dissipation
+        Of friction in the step (work).
+    problem, state, own
+        The problem and its solution, and which owned contact nodes are those of the contact.
+    """
+
+    problem: ContactProblem = field(repr=False)
+    state: State = field(repr=False)
+    own: NDArray[np.bool_] = field(repr=False)
+    force: Array
+    moment: Array
+    area: float
+    max_pressure: float
+    mean_pressure: float
+    stick: float
+    slip: float
+    dissipation: float
+
+
+def contact_shares(
+    problem: ContactProblem, state: State, status: NDArray[np.str_]
+) -> dict[str, ContactShare]:
+    """Return the results of each contact, by its name. Collective.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, and its solution.
+    status
+        "open", "stick" or "slip" of each owned contact node, shape (n,).
+    """
+    nodes, nodal = problem.nodes, problem.nodal(state)
+    pressure = problem.interface.pressure(nodal, state.forces)
+    forces = nodes.weight[:, None] * problem.interface.stress(nodal, state.forces)
+    found = {}
+    for number, contact in enumerate(problem.contacts):
+        own = problem.entry_numbers == number
+        total = resultant(problem, nodes.points[own], forces[own])
+        stick, slides = (nodes.sum(own & (status == name)) for name in ("stick", "slip"))
+        area = stick + slides
+        found[contact.name] = ContactShare(
+            problem,
+            state,
+            own,
+            total.force,
+            total.moment,
+            area,
+            nodes.maximum(np.where(own, pressure, 0.0)),
+            nodes.sum(np.where(own, pressure, 0.0)) / area if area > 0 else 0.0,
+            stick / area if area > 0 else 0.0,
+            slides / area if area > 0 else 0.0,
+            dissipated(problem, state, own),
+        )
+    return found
