@@ -1,26 +1,31 @@
-"""Input files of Abaqus and CalculiX: nodes, elements, sets and surfaces.
+"""Input files of Abaqus and CalculiX: nodes, elements, sets, surfaces, and assemblies of parts.
 
-meshio's reader knows no surfaces, and neither the keywords nor the elements that these files have
-in practice. A set of elements is a region, or a part if they lie on the boundary; a set of nodes
-is a part, the facets all of whose nodes it holds; a surface is a part.
+meshio's reader drops surfaces and assemblies. A set of elements is a region, or a part if they lie
+on the boundary; a set of nodes is a part, the facets all of whose nodes it has; a surface is one.
+Each instance is a copy of its part in its place, with numbers of its own, so that the nodes of
+instances that touch stay apart.
 
 References
 ----------
 CalculiX CrunchiX USER'S MANUAL, *NODE, *ELEMENT, *NSET, *ELSET, *SURFACE (numbers of faces), and
-chapter 6.2 (elements).
+chapter 6.2 (elements). Abaqus Keywords Guide, *ASSEMBLY, *PART and *INSTANCE, which CalculiX lacks.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from contact.mesh.assembly import NESTING, Assembly, Member, Scope, real
 from contact.mesh.cells import distinct, once, together
 from contact.mesh.contents import ELEMENTS, Contents, Ints, Kind, letters, same_name
+from contact.typing import Array
 
 #: Types of elements: beginnings of their names, and their dimension.
 TYPES = (
@@ -66,51 +71,87 @@ SILENT = {"HEADING", "PREPRINT", "ASSEMBLY", "END ASSEMBLY"}
 MAKING = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPORT"}
 MAKING |= {"SYMMETRIC MODEL GENERATION"}
 
-#: The files that are read.
-FLAT = "accepted: every node and element in the file"
-
 #: Keywords whose data lines may stand in a file of their own, by INPUT.
 FROM_FILES = {"NODE", "ELEMENT"}
 
+#: Keywords that begin or end a part or an instance; one ends where the next begins, too.
+NESTING = {"PART", "END PART", "INSTANCE", "END INSTANCE"}
 
-def read(file: Path) -> Contents:
+#: Numbers of nodes and elements have 32 bits: an instance's begin at a multiple of this one.
+STRIDE = 1 << 32
+
+#: A number, or the key of a set.
+Member: TypeAlias = int | str
+
+#: A keyword, its options, and its data lines.
+Block: TypeAlias = tuple[str, dict[str, str], list[str]]
+
+
+def read_abaqus(file: Path) -> Contents:
     """Read an input file, and those that it includes; raise errors of any kind if it is wrong."""
-    found = Assembly()
-    for keyword, options, lines in _blocks(file):
+    deck = Deck()
+    parts: dict[str, list[Block]] = {}
+    unused: dict[str, str] = {}
+    part: list[Block] | None = None
+    for block in _blocks(file):
+        keyword, options, lines = block
         if keyword in NESTING:
-            found.nest(keyword, options, lines)
-        else:
-            _take(found.here, keyword, options, lines)
+            part = None
+            deck.enter("")
+        if keyword in ("PART", "INSTANCE"):
+            name = options["NAME"].strip('"')
+            if name.upper() in (parts if keyword == "PART" else deck.instances):
+                raise ValueError(f"*{keyword}, NAME={name}: it is there twice; accepted: once")
+        if keyword == "PART":
+            part = parts[name.upper()] = []
+            unused[name.upper()] = name
+        elif keyword == "INSTANCE":
+            of = options["PART"].strip('"')
+            if of.upper() not in parts:
+                word = f"*INSTANCE, NAME={name}: there is no part {of!r}"
+                raise ValueError(f"{word}; accepted: those that stand above it")
+            deck.enter(name, _motion(name, lines))
+            unused.pop(of.upper(), None)
+            for inside in parts[of.upper()]:
+                deck.take(*inside)
+        elif part is not None:
+            part.append(block)
+        elif keyword not in NESTING:
+            deck.take(*block)
+    deck.other[:0] = [f"PART, NAME={name} without an instance" for name in unused.values()]
     try:
-        return _deck(found.flat())
+        return _contents(deck)
     except RecursionError:
         raise ValueError("a set holds itself") from None
 
 
-def included(file: Path) -> list[Path]:
+def included_files(file: Path) -> list[Path]:
     """Return an input file and those that it includes, each once; a ValueError without one."""
     return [*dict.fromkeys([file, *(inner for inner, _ in _lines(file))])]
 
 
-def _blocks(file: Path) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
-    """Yield keywords with their options and the values of their data lines."""
-    keyword = ""
-    options: dict[str, str] = {}
-    values: list[list[str]] = []
+def _blocks(file: Path) -> Iterator[Block]:
+    """Yield keywords with their options and data lines."""
+    block: Block | None = None
     for _, line in _lines(file):
-        if not line.startswith("*"):
-            values.append([value.strip() for value in _split(line.rstrip(","))])
-            continue
-        if keyword:
-            yield keyword, options, values
-        (keyword, options), values = _keyword(line), []
-    if keyword:
-        yield keyword, options, values
+        if line.startswith("*"):
+            if block is not None:
+                yield block
+            block = (*_keyword(line), [])
+        elif block is not None:
+            block[2].append(line)
+    if block is not None:
+        yield block
 
 
 def _split(line: str) -> list[str]:
     """Return the values of a line."""
     return COMMA.split(line) if '"' in line else line.split(",")
+
+
+def _row(line: str) -> list[str]:
+    """Return the values of a data line, without a comma at its end."""
+    return [value.strip() for value in _split(line.rstrip(","))]
 
 
 def _keyword(line: str) -> tuple[str, dict[str, str]]:
@@ -145,60 +186,170 @@ def _lines(file: Path, depth: int = 0) -> Iterator[tuple[Path, str]]:
             yield from _lines(inner, depth + 1)
 
 
-def _take(
-    found: Scope, keyword: str, options: dict[str, str], lines: Sequence[Sequence[str]]
-) -> None:
-    """Take a keyword with its data."""
-    if keyword in MAKING or (keyword == "NODE" and options.get("SYSTEM", "R").upper() != "R"):
-        word = keyword if keyword in MAKING else f"NODE, SYSTEM={options['SYSTEM']}"
-        raise ValueError(f"*{word} makes or moves nodes or elements; {FLAT}")
-    if keyword == "NODE":
-        numbers = [found.number(line[0]) for line in lines]
-        for number, line in zip(numbers, lines, strict=True):
-            found.put(number, [real(value) for value in [*line[1:4], "", ""][:3]])
+def _real(value: str) -> float:
+    """Return a number, which may have Fortran's exponent, 0 for none."""
+    try:
+        return float(value or 0)
+    except ValueError:
+        return float(re.sub(r"[Dd](?=[+-]?\d+$)", "E", value))
+
+
+def _motion(instance: str, lines: Sequence[str]) -> tuple[Array, Array]:
+    """Return R and t of x -> R x + t: a translation, then a rotation about an axis."""
+    rows = [[_real(value) for value in _row(line)] for line in lines]
+    shift, about = (*rows, [], [])[:2]
+    axis = np.subtract(about[3:6], about[:3]) if len(about) == 7 else np.zeros(3)
+    length = float(np.linalg.norm(axis))
+    known = len(rows) <= 2 and len(shift) <= 3 and len(about) in (0, 7)
+    if not known or not np.isfinite([*shift, *about]).all() or bool(about) != (length > 0):
+        raise ValueError(
+            f"*INSTANCE, NAME={instance}: given {'; '.join(lines)}; accepted: a line of its "
+            "translation, then one of two points of an axis and an angle"
+        )
+    turn = Rotation.from_rotvec(about[6] / length * axis if about else axis, degrees=True)
+    moved, start = (np.array([*row, 0.0, 0.0, 0.0][:3]) for row in (shift, about))
+    return turn.as_matrix(), turn.apply(moved - start) + start
+
+
+@dataclass
+class Deck:
+    """Nodes, elements, sets and surfaces by number and by name.
+
+    The key of a name of an instance stands behind that of the instance; ``names`` has both as they
+    were given, and ``instances`` the offset of the numbers of each. Numbers and names without an
+    instance are those of `home`, which `enter` sets, in whose place nodes are.
+    """
+
+    points: dict[int, list[float]] = field(default_factory=dict)
+    elements: dict[str, list[int]] = field(default_factory=dict)
+    nodes: dict[str, list[Member]] = field(default_factory=dict)
+    nodes_of: dict[str, list[str]] = field(default_factory=dict)
+    sets: dict[str, list[Member]] = field(default_factory=dict)
+    surfaces: dict[str, tuple[str, list[tuple[Member, str]]]] = field(default_factory=dict)
+    names: dict[str, tuple[str, str]] = field(default_factory=dict)
+    instances: dict[str, int] = field(default_factory=dict)
+    other: list[str] = field(default_factory=list)
+    home: str = ""
+    motion: tuple[Array, Array] | None = None
+
+    def enter(self, home: str, motion: tuple[Array, Array] | None = None) -> None:
+        """Let the next keywords be those of a new instance, moved; of the assembly for ""."""
+        if home:
+            self.instances[home.upper()] = STRIDE * (len(self.instances) + 1)
+        self.home, self.motion = home, motion
+
+    def take(self, keyword: str, options: Mapping[str, str], lines: Sequence[str]) -> None:
+        """Take a keyword with its data."""
+        if keyword in MAKING or (keyword == "NODE" and options.get("SYSTEM", "R").upper() != "R"):
+            word = keyword if keyword in MAKING else f"NODE, SYSTEM={options['SYSTEM']}"
+            every = "accepted: every node and element in the file"
+            raise ValueError(f"*{word} makes or moves nodes or elements; {every}")
+        if keyword == "NODE":
+            self._take_nodes(options, lines)
+        elif keyword == "ELEMENT":
+            self._take_elements(options, lines)
+        elif keyword in ("NSET", "ELSET"):
+            self._take_set(keyword, options, lines)
+        elif keyword == "SURFACE":
+            if "COMBINE" in options:
+                word = f"*SURFACE, COMBINE={options['COMBINE']}: no surfaces are made of others"
+                raise ValueError(f"{word}; accepted: faces of elements")
+            instance, kind = options.get("INSTANCE", ""), options.get("TYPE", "ELEMENT").upper()
+            rows = [(*_row(line), "")[:2] for line in lines]
+            faces = [(self.member(own, instance), label.upper()) for own, label in rows]
+            self.surfaces.setdefault(self.key(options["NAME"]), (kind, []))[1].extend(faces)
+        elif keyword not in SILENT and keyword not in self.other:
+            self.other.append(keyword)
+
+    def _take_nodes(self, options: Mapping[str, str], lines: Sequence[str]) -> None:
+        rows = [_row(line) for line in lines]
+        numbers = [self.number(row[0]) for row in rows]
+        points = [[_real(value) for value in [*row[1:4], "", ""][:3]] for row in rows]
+        if self.motion is not None and points:
+            turn, shift = self.motion
+            with np.errstate(invalid="ignore"):  # infinite ones are refused with all others
+                points = (np.array(points) @ turn.T + shift).tolist()
+        for number, point in zip(numbers, points, strict=True):
+            if self.points.setdefault(number, point) != point and not np.isnan(point).any():
+                raise ValueError(f"*NODE: node {number % STRIDE} is at two places; accepted: one")
         if "NSET" in options:
-            found.nodes.setdefault(found.name(options["NSET"]), []).extend(numbers)
-    elif keyword == "ELEMENT":
+            self.nodes.setdefault(self.key(options["NSET"]), []).extend(numbers)
+
+    def _take_elements(self, options: Mapping[str, str], lines: Sequence[str]) -> None:
         kind = options.get("TYPE", "").upper()
         if NO_CELLS.match(kind):
-            found.other.append(f"ELEMENT, TYPE={kind}")
-            found.sets.setdefault(found.name(options.get("ELSET", kind)), [])
+            if f"ELEMENT, TYPE={kind}" not in self.other:
+                self.other.append(f"ELEMENT, TYPE={kind}")
+            self.sets.setdefault(self.key(options.get("ELSET", kind)), [])
             return
-        numbers = found.elements.setdefault(kind, [])
-        count = _known(kind).nodes + 1
-        values = [found.number(value) for line in lines for value in line if value]
+        count = _element_type(kind).nodes + 1
+        values = [self.number(value) for line in lines for value in _row(line) if value]
         if len(values) % count:
             raise ValueError(f"*ELEMENT, TYPE={kind}: {len(values)} numbers, {count} an element")
-        numbers.extend(values)
+        self.elements.setdefault(kind, []).extend(values)
         if "ELSET" in options:
-            found.sets.setdefault(found.name(options["ELSET"]), []).extend(values[::count])
-    elif keyword in ("NSET", "ELSET"):
-        into = found.nodes if keyword == "NSET" else found.sets
-        instance = options.get("INSTANCE", "")
-        key = found.name(options[keyword])
-        members = into.setdefault(key, [])
+            self.sets.setdefault(self.key(options["ELSET"]), []).extend(values[::count])
+
+    def _take_set(self, keyword: str, options: Mapping[str, str], lines: Sequence[str]) -> None:
+        instance, key = options.get("INSTANCE", ""), self.key(options[keyword])
+        members = (self.nodes if keyword == "NSET" else self.sets).setdefault(key, [])
         if keyword == "NSET" and "ELSET" in options:
-            found.nodes_of.setdefault(key, []).append(found.name(options["ELSET"], instance))
+            self.nodes_of.setdefault(key, []).append(self.key(options["ELSET"], instance))
         elif "GENERATE" in options:
-            for line in lines:
-                first, last = (found.number(value, instance) for value in line[:2])
-                members.extend(range(first, last + 1, int((*line, "", "")[2] or 1)))
+            for row in map(_row, lines):
+                first, last = (self.number(value, instance) for value in row[:2])
+                members.extend(range(first, last + 1, int((*row, "", "")[2] or 1)))
         else:
-            every = (value for line in lines for value in line if value)
-            members.extend(found.member(value, instance) for value in every)
-    elif keyword == "SURFACE":
-        instance = options.get("INSTANCE", "")
-        rows = [(found.member(line[0], instance), (*line, "")[1].upper()) for line in lines]
-        kind = options.get("TYPE", "ELEMENT").upper()
-        if "COMBINE" in options:
-            word = f"*SURFACE, COMBINE={options['COMBINE']}"
-            raise ValueError(f"{word}: no surfaces are made of others; accepted: faces of elements")
-        found.surfaces.setdefault(found.name(options["NAME"]), (kind, []))[1].extend(rows)
-    elif keyword not in SILENT and keyword not in found.other:
-        found.other.append(keyword)
+            every = (value for line in lines for value in _row(line) if value)
+            members.extend(self.member(value, instance) for value in every)
+
+    def key(self, given: str, instance: str = "") -> str:
+        """Return the key of a name, of an instance where one is given: capitals do not matter."""
+        home, own = self._resolve(given, instance)
+        key = f"{home}.{own}".upper() if home else own.upper()
+        self.names.setdefault(key, (home, own))
+        return key
+
+    def member(self, given: str, instance: str = "") -> Member:
+        """Return the number that a word stands for, or the key of a set."""
+        # Most are plain numbers, and files have millions of them.
+        plain = given.isdigit() and not instance
+        home, own = (self.home, given) if plain else self._resolve(given, instance)
+        if not own.lstrip("+-").isdigit():
+            return self.key(given, instance)
+        return int(own) + self.instances[home.upper()] if home else int(own)
+
+    def number(self, given: str, instance: str = "") -> int:
+        """Return the number that a word stands for."""
+        member = self.member(given, instance)
+        if isinstance(member, str):
+            raise ValueError(f"{given!r} where a number belongs")
+        return member
+
+    def _resolve(self, given: str, instance: str) -> tuple[str, str]:
+        """Return the instance of a name or a number, "" for none, and its own name or number."""
+        before, _, own = (word.strip('"') for word in given.strip().rpartition("."))
+        if before.upper() in self.instances:
+            return before, own
+        home = instance.strip('"') or self.home
+        if home and home.upper() not in self.instances:
+            raise ValueError(f"there is no instance {home}; accepted: those that have ended above")
+        return home, given.strip().strip('"')
+
+    def as_given(self, member: Member) -> Member:
+        """Return a number or a key as it stands in the file."""
+        return member % STRIDE if isinstance(member, int) else self.names[member][1]
+
+    def names_by_key(self) -> dict[str, str]:
+        """Return the names by key: those of instances behind them where others have them."""
+        count = Counter(own.upper() for _, own in self.names.values())
+        return {
+            key: f"{home}.{own}" if home and count[own.upper()] > 1 else own
+            for key, (home, own) in self.names.items()
+        }
 
 
-def _known(kind: str) -> Kind:
+def _element_type(kind: str) -> Kind:
     """Return the shape and the number of nodes of a type of elements."""
     for pattern, dim in TYPES:
         if match := pattern.match(kind):
@@ -213,13 +364,14 @@ def _known(kind: str) -> Kind:
     raise ValueError(f"*ELEMENT, TYPE={kind}: elements that are not known")
 
 
-def _deck(found: Scope) -> Contents:
+def _contents(found: Deck) -> Contents:
+    """Return nodes, elements by block, sets and surfaces as contents of a mesh file."""
     tags = np.array(sorted(found.points), dtype=np.int64)
     points = np.array([found.points[tag] for tag in tags], dtype=float).reshape(-1, 3)
     blocks: list[tuple[str, Ints]] = []
     homes = [np.zeros((0, 3), dtype=np.int64)]
     for block, (kind, values) in enumerate(found.elements.items()):
-        known = _known(kind)
+        known = _element_type(kind)
         rows = np.array(values, dtype=np.int64).reshape(-1, known.nodes + 1)
         nodes = np.minimum(np.searchsorted(tags, rows[:, 1:]), max(tags.size - 1, 0))
         if tags.size == 0 or np.any(tags[nodes] != rows[:, 1:]):
@@ -235,49 +387,49 @@ def _deck(found: Scope) -> Contents:
     elements = elements[np.argsort(elements[:, 0], kind="stable")]
     twice = elements[1:, 0][np.diff(elements[:, 0]) == 0]
     if twice.size:
-        number = found.said(int(twice[0]))
+        number = found.as_given(int(twice[0]))
         raise ValueError(f"*ELEMENT: element {number} is there twice; accepted: once")
-    deck, names = Contents(points, blocks), found.shown()
+    made, names = Contents(points, blocks), found.names_by_key()
     for key in found.sets:
         members = _members(found.sets, key)
-        deck.groups[names[key]] = _by_block(members, elements)
+        made.groups[names[key]] = _by_block(members, elements)
     for key, sets in found.nodes_of.items():
         chosen = [number for name in sets for number in _members(found.sets, name)]
         for block, within in _by_block(chosen, elements).items():
             found.nodes[key] += map(int, tags[np.unique(blocks[block][1][within])])
     for key in found.nodes:
         numbers = _members(found.nodes, key)
-        deck.nodes[names[key]] = np.flatnonzero(np.isin(tags, numbers))
-    dim, twice = max((kind.dim for kind in deck.kinds), default=0), []
+        made.nodes[names[key]] = np.flatnonzero(np.isin(tags, numbers))
+    dim, twice = max((kind.dim for kind in made.kinds), default=0), []
     for key, (sort, lines) in found.surfaces.items():
         name = names[key]
         if sort == "NODE":
-            numbers = _named(found.nodes, [member for member, _ in lines])
+            numbers = _numbers(found.nodes, [member for member, _ in lines])
             own = np.flatnonzero(np.isin(tags, numbers))
-            if not np.array_equal(deck.nodes.setdefault(name, own), own):
+            if not np.array_equal(made.nodes.setdefault(name, own), own):
                 twice.append(name)
-            deck.nodes[name] = own
+            made.nodes[name] = own
         elif sort == "ELEMENT":
-            deck.surfaces[name] = _faces(found, lines, elements, blocks, dim)
+            made.surfaces[name] = _faces(found, lines, elements, blocks, dim)
     if twice:
-        deck.notes.append(same_name(twice))
-    plane = [kind for kind in found.elements if dim == 2 and _known(kind).dim == 2]
+        made.notes.append(same_name(twice))
+    plane = [kind for kind in found.elements if dim == 2 and _element_type(kind).dim == 2]
     made_for = {own for kind in plane for of, own in KINEMATICS.items() if kind.startswith(of)}
     if len(made_for) == 1 and made_for != {"plane_strain"}:
-        deck.space["kinematics"] = made_for.pop()
+        made.space["kinematics"] = made_for.pop()
     if found.other:
-        deck.notes.append(f"left out: {', '.join(f'*{word}' for word in found.other)}")
-    return deck
+        made.notes.append(f"left out: {', '.join(f'*{word}' for word in found.other)}")
+    return made
 
 
 def _members(sets: dict[str, list[Member]], key: str) -> list[int]:
     """Return the numbers of a set, those of sets in it too."""
     if key not in sets:
         raise ValueError(f"there is no set {key}")
-    return _named(sets, sets[key])
+    return _numbers(sets, sets[key])
 
 
-def _named(sets: dict[str, list[Member]], given: Sequence[Member]) -> list[int]:
+def _numbers(sets: dict[str, list[Member]], given: Sequence[Member]) -> list[int]:
     """Return the numbers of members, each a number or a set."""
     numbers: list[int] = []
     for member in given:
@@ -292,7 +444,7 @@ def _by_block(numbers: Sequence[int], elements: Ints) -> dict[int, Ints]:
 
 
 def _faces(
-    found: Scope,
+    found: Deck,
     rows: Sequence[tuple[Member, str]],
     elements: Ints,
     blocks: Sequence[tuple[str, Ints]],
@@ -302,7 +454,7 @@ def _faces(
     faces: list[Ints] = []
     whole: dict[str, list[Ints]] = {}
     for given, label in rows:
-        for block, members in _by_block(_named(found.sets, [given]), elements).items():
+        for block, members in _by_block(_numbers(found.sets, [given]), elements).items():
             name, nodes = blocks[block]
             of, corners = ELEMENTS[name][0], FACES.get(name, ())
             number = int(label[1]) if re.fullmatch(r"[SE]\d", label) else 0
@@ -313,7 +465,7 @@ def _faces(
             elif of == dim and label == "":
                 whole.setdefault(name, []).append(nodes[members])
             elif of == dim or not (number or label in SIDES):
-                word = f"*SURFACE: elements {found.said(given)} have"
+                word = f"*SURFACE: elements {found.as_given(given)} have"
                 raise ValueError(f"{word} no face {label!r}")
     every: list[Ints] = []
     for name, alike in whole.items():

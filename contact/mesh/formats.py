@@ -31,7 +31,7 @@ def program(file: Path) -> str:
 
 def read(file: Path) -> Contents:
     """Read a mesh file; raise errors of any kind if it is damaged."""
-    readers = {"Abaqus": abaqus.read, "MED": med.read, "Exodus": exodus.read, "VTK": _vtu}
+    readers = {"Abaqus": abaqus.read_abaqus, "MED": med.read, "Exodus": exodus.read, "VTK": _vtu}
     readers |= {"Gmsh": gmsh_model.read, "XDMF": xdmf.read}
     return readers[program(file)](file)
 
@@ -39,7 +39,7 @@ def read(file: Path) -> Contents:
 def files(file: Path) -> list[Path]:
     """Return the files of a mesh: its own, and those that it names; an error if one is missing."""
     if program(file) == "Abaqus":
-        return abaqus.included(file)
+        return abaqus.included_files(file)
     return [file, *(xdmf.heavy(file) if program(file) == "XDMF" else ())]
 
 
