@@ -14,7 +14,7 @@ from urllib.parse import quote
 from contact.case.file import Case
 from contact.errors import InputError
 from contact.library.materials import PACKAGED
-from contact.mesh.formats import files
+from contact.mesh.reader import mesh_files
 from contact.model.messages import shown
 from contact.model.section import FilePath, walk
 
@@ -46,7 +46,7 @@ def digest(case: Case) -> dict[str, str]:
     found = {}
     for key, path in given:
         try:
-            for file in files(path) if key == MESH else [path]:
+            for file in mesh_files(path) if key == MESH else [path]:
                 # No spaces: the table of a sweep separates digests by them.
                 inner = "" if file == path else f"/{quote(os.path.relpath(file, path.parent))}"
                 with open(file, "rb") as stream:

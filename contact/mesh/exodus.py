@@ -56,7 +56,7 @@ SIDES = {
 SHELLS = {"triangle": ((0, 1, 2), (0, 2, 1)), "quad": ((0, 1, 2, 3), (0, 3, 2, 1))}
 
 
-def read(file: Path) -> Contents:
+def read_exodus(file: Path) -> Contents:
     """Read an Exodus file; raise errors of any kind if it is damaged."""
     import netCDF4
 

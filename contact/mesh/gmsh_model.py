@@ -43,7 +43,7 @@ def session() -> Iterator[Any]:
             gmsh.finalize()
 
 
-def read(file: Path) -> Contents:
+def read_msh(file: Path) -> Contents:
     """Read a .msh file. Nothing in it, or beside it, is executed.
 
     Gmsh takes a file that begins otherwise for a script; some endings have readers of their own, or
@@ -73,10 +73,10 @@ def read(file: Path) -> Contents:
             gmsh.merge(str(plain))
         finally:
             gmsh.option.setNumber("Mesh.SwitchElementTags", 0)
-        return contents(gmsh.model, entities_are_groups=switch)
+        return model_contents(gmsh.model, entities_are_groups=switch)
 
 
-def contents(model: Any, entities_are_groups: bool = False) -> Contents:
+def model_contents(model: Any, entities_are_groups: bool = False) -> Contents:
     """Return nodes, elements and physical groups of ``gmsh.model``.
 
     A group without a name goes by its number.

@@ -18,7 +18,7 @@ KINDS = {"SE": "line", "TR": "triangle", "QU": "quad", "TE": "tetra", "T": "tetr
 KINDS |= {"HE": "hexahedron", "H": "hexahedron", "PE": "wedge", "P": "wedge", "PY": "pyramid"}
 
 
-def read(file: Path) -> Contents:
+def read_med(file: Path) -> Contents:
     """Read a MED file of one mesh; raise errors of any kind if it is damaged."""
     import h5py
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +18,60 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.mesh import formats, gmsh_model, shared
+from contact.mesh.abaqus import included_files, read_abaqus
 from contact.mesh.contents import Contents
 from contact.mesh.domain import Domain, Indices, exterior_facets, with_names
+from contact.mesh.exodus import read_exodus
+from contact.mesh.gmsh_model import model_contents, read_msh, session
+from contact.mesh.med import read_med
 from contact.mesh.validity import Cells, Groups, check
+from contact.mesh.xdmf import (
+    array_files,
+    distributed_arrays,
+    read_distributed,
+    read_xdmf,
+    write_distributed,
+)
 from contact.ranks import on_all_ranks, on_root
 
 logger = logging.getLogger("contact.mesh")
 
-#: Cells from which a mesh that one rank reads for all is worth a word: it takes some 1.4 GB.
-MANY = 5_000_000
+
+def _by_meshio(module: str, file: Path) -> Contents:
+    """Read a file by a module of meshio: its cells, sets, and whole numbers of cells and nodes."""
+    mesh = import_module(f"meshio.{module}").read(file)
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points
+    made = Contents(points, [(block.type, block.data.astype(np.int64)) for block in mesh.cells])
+    for key, arrays in mesh.cell_data.items():
+        made.add_groups(key, arrays)
+    for key, values in mesh.point_data.items():
+        made.add_nodes(key, values)
+    return made
+
+
+#: Ending of a file's name -> its program or format, and how it is read.
+FORMATS: dict[str, tuple[str, Callable[[Path], Contents]]] = {
+    ".msh": ("Gmsh", read_msh),
+    ".inp": ("Abaqus", read_abaqus),
+    ".vtu": ("VTK", partial(_by_meshio, "vtu")),
+    ".xdmf": ("XDMF", read_xdmf),
+    ".med": ("MED", read_med),
+    ".rmed": ("MED", read_med),
+    ".e": ("Exodus", read_exodus),
+    ".exo": ("Exodus", read_exodus),
+    ".ex2": ("Exodus", read_exodus),
+}
+
+ACCEPTED = "mesh files of " + ", ".join(f"{made} ({end})" for end, (made, _) in FORMATS.items())
+
+
+def mesh_files(file: Path) -> list[Path]:
+    """Return the files of a mesh: its own, and those that it names; an error if one is missing."""
+    ending = file.suffix.lower()
+    if ending == ".inp":
+        return included_files(file)
+    return [file, *(array_files(file) if ending == ".xdmf" else ())]
 
 
 def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
@@ -55,15 +101,15 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
         If the file is missing, damaged or no mesh, has no boundary groups, or degenerate, folded or
         overlapping cells. The message names the file.
     """
-    return _from_rank_0(comm, lambda: _read(Path(path), gmsh_model.read), f"mesh file {path}")
+    return _from_rank_0(comm, lambda: _read(Path(path), ".msh"), f"mesh file {path}")
 
 
 def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
     """Read a mesh file of one of several formats, by the ending of its name. Collective.
 
-    Input files of Abaqus and CalculiX (.inp), and, by meshio, VTK (.vtu), XDMF (.xdmf), MED (.med)
-    and Exodus (.e, .exo, .ex2); any other is one for `from_msh`. Sets of cells are regions; sets of
-    facets, surfaces, and sets of nodes (the facets of the boundary all of whose nodes they hold)
+    Input files of Abaqus and CalculiX (.inp), VTK (.vtu), XDMF (.xdmf), MED (.med) and Exodus (.e,
+    .exo, .ex2); any other is one for `from_msh`. Sets of cells are regions; sets of
+    facets, surfaces, and sets of nodes (the facets of the boundary all of whose nodes they have)
     are parts. Whole numbers of cells or nodes in VTK's files and XDMF mark sets, 0 none. Of XDMF
     that `convert` has written each rank reads its share; other files are read on rank 0.
 
@@ -84,10 +130,10 @@ def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
         As `from_msh`, and if a set has no meaning.
     """
     file, source = Path(path), f"mesh file {path}"
-    heavy = on_root(comm, lambda: shared.heavy_file(file))
-    if heavy is None:
-        return _from_rank_0(comm, lambda: _read(file), source)
-    return _distribute(comm, shared.read(comm, heavy), source)
+    arrays = on_root(comm, lambda: distributed_arrays(file))
+    if arrays is None:
+        return _from_rank_0(comm, lambda: _read(file, file.suffix.lower()), source)
+    return _distribute(comm, read_distributed(comm, arrays), source)
 
 
 def convert(file: Path, to: Path) -> Cells:
@@ -109,15 +155,16 @@ def convert(file: Path, to: Path) -> Cells:
     InputError
         As `from_file`, and if one of the new files is there already.
     """
-    cells = _checked(lambda: _read(file), f"mesh file {file}")
-    shared.write(cells, to)
+    cells = _checked(lambda: _read(file, file.suffix.lower()), f"mesh file {file}")
+    write_distributed(cells, to)
     return cells
 
 
-def _read(file: Path, read: Callable[[Path], Contents] = formats.read) -> Contents:
-    """Read a file; any error of a library becomes one message."""
+def _read(file: Path, ending: str) -> Contents:
+    """Read a file in the format of an ending; any error of a library becomes one message."""
     if not file.is_file():
         raise InputError("no such file", "file-name")
+    program, read = FORMATS.get(ending, FORMATS[".msh"])
     try:
         return read(file)
     except InputError:
@@ -125,8 +172,8 @@ def _read(file: Path, read: Callable[[Path], Contents] = formats.read) -> Conten
     except Exception as error:
         said = " ".join(str(error).split()) or type(error).__name__
         said = f"not found: {said}" if isinstance(error, KeyError) else said
-        accepted = "" if "accepted:" in said else f"; accepted: {formats.ACCEPTED}"
-        words = f"the {formats.program(file)} reader says of it: {said}{accepted}"
+        accepted = "" if "accepted:" in said else f"; accepted: {ACCEPTED}"
+        words = f"the {program} reader says of it: {said}{accepted}"
         raise InputError(words, "mesh-file") from error
 
 
@@ -150,9 +197,9 @@ def from_generator(
     import meshes
 
     def build() -> Contents:
-        with gmsh_model.session() as gmsh:
+        with session() as gmsh:
             meshes.build(name, cell, order, **parameters)
-            return gmsh_model.contents(gmsh.model)
+            return model_contents(gmsh.model)
 
     return _from_rank_0(comm, build, f"mesh generator {name!r}")
 
@@ -161,13 +208,6 @@ def _from_rank_0(comm: MPI.Intracomm, load: Callable[[], Contents], source: str)
     """Check on rank 0 the contents that ``load`` returns there, and distribute them."""
     with on_all_ranks(comm):
         raw = _checked(load, source) if comm.rank == 0 else None
-    if raw is not None and comm.size > 1 and len(raw.regions.rows) >= MANY:
-        logger.info(
-            "%s: one rank has read all %d cells; of a file that contact mesh writes each reads its "
-            "share",
-            source,
-            len(raw.regions.rows),
-        )
     names = comm.bcast(None if raw is None else raw.without_rows())
     return _distribute(comm, names if raw is None else raw, source)
 
@@ -181,6 +221,7 @@ def _checked(load: Callable[[], Contents], source: str) -> Cells:
 
 
 def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
+    """Distribute a checked mesh over the ranks, and name its parts and regions. Collective."""
     dim = raw.points.shape[1]
     order = raw.shape.degree_of(raw.regions.rows.shape[1])
     element = basix.ufl.element("Lagrange", raw.shape.name, order, shape=(dim,), dtype=np.float64)

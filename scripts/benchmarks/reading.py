@@ -20,8 +20,8 @@ from mpi4py import MPI
 from contact.mesh.cells import TETRAHEDRON
 from contact.mesh.geometry import area, volume
 from contact.mesh.reader import from_file
-from contact.mesh.shared import write
 from contact.mesh.validity import Cells, Groups
+from contact.mesh.xdmf import write_distributed
 from scripts.benchmarks.bench_one import memory
 
 
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     made.add_argument("n", type=int, nargs="?", default=20)
     given, comm = made.parse_args(arguments), MPI.COMM_WORLD
     if given.action == "make":
-        write(cube(given.n), given.file)
+        write_distributed(cube(given.n), given.file)
         return
     before, begin = memory(), time.perf_counter()
     domain = from_file(comm, given.file)

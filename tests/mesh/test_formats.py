@@ -9,8 +9,7 @@ from mpi4py import MPI
 import meshes
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
-from contact.mesh.formats import files
-from contact.mesh.reader import from_file
+from contact.mesh.reader import from_file, mesh_files
 from contact.mesh.validity import SERENDIPITY
 from tests.problems.sizes import integral, measures
 
@@ -426,9 +425,9 @@ def test_data_lines_from_another_file(tmp_path):
     whole, split = (from_file(MPI.COMM_SELF, tmp_path / f"{n}.inp") for n in ("plate", "split"))
     assert measures(split) == measures(whole) and regions(split) == regions(whole)
     assert np.array_equal(split.mesh.geometry.x, whole.mesh.geometry.x)
-    found = [path.name for path in files(tmp_path / "split.inp")]
+    found = [path.name for path in mesh_files(tmp_path / "split.inp")]
     assert found == ["split.inp", "nodes.inc", "elements.inc"]
-    assert files(tmp_path / "plate.inp") == [tmp_path / "plate.inp"]
+    assert mesh_files(tmp_path / "plate.inp") == [tmp_path / "plate.inp"]
 
 
 def test_binary_arrays_are_beside_their_xdmf(tmp_path, monkeypatch):
@@ -442,6 +441,6 @@ def test_binary_arrays_are_beside_their_xdmf(tmp_path, monkeypatch):
     monkeypatch.chdir("/")
     domain = from_file(MPI.COMM_SELF, tmp_path / "part.xdmf")
     assert measures(domain) == pytest.approx({"set 1": 1.0})
-    assert {path.name for path in files(tmp_path / "part.xdmf")} == {
+    assert {path.name for path in mesh_files(tmp_path / "part.xdmf")} == {
         path.name for path in tmp_path.iterdir()
     }

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact import solve
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
-from contact.mesh import shared
+from contact.mesh import xdmf
 from contact.mesh.reader import from_file
 from tests.mesh.test_formats import PLATE, bricks, regions
 from tests.problems.sizes import integral, measures
@@ -176,7 +176,7 @@ def test_damaged_shares_are_refused(harm, shared_tmp_path, capsys):
 def test_no_rank_takes_more_than_its_share(tmp_path, monkeypatch, capsys):
     """Of three ranks each gets a third of points, cells and facets."""
     _, made = written(tmp_path, "bricks.inp")
-    heavy = shared.heavy_file(made)
+    heavy = xdmf.distributed_arrays(made)
 
     class Rank:
         size = 3
@@ -184,8 +184,8 @@ def test_no_rank_takes_more_than_its_share(tmp_path, monkeypatch, capsys):
         def __init__(self, rank):
             self.rank = rank
 
-    monkeypatch.setattr(shared, "on_root", lambda comm, action: action())
-    shares = [shared.read(Rank(rank), heavy) for rank in range(3)]
+    monkeypatch.setattr(xdmf, "on_root", lambda comm, action: action())
+    shares = [xdmf.read_distributed(Rank(rank), heavy) for rank in range(3)]
     for rows in ([s.points for s in shares], [s.parts.rows for s in shares]):
         sizes = [len(own) for own in rows]
         assert max(sizes) - min(sizes) <= 1
