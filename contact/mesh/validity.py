@@ -21,9 +21,6 @@ from contact.typing import Array
 #: say whether cells overlap.
 FLAT = 1e-10
 
-#: Points along each edge at which the Jacobian of straight hexahedra that may be folded is taken.
-POINTS = 9
-
 #: Nodes of degree 2 this near to where straight edges have them, over these, are there (rounding).
 STRAIGHT = 1e-5
 
@@ -165,7 +162,10 @@ def check(contents: Contents) -> Cells:
     points, rows = _flatten(points[used], dim), new[rows]
     parts = {name: new[facets][:, shape.facet.around] for name, facets in parts.items()}
 
-    reasons, inside = _check_cells(shape, points, rows, parts)
+    # Without a unit of length, so that no volume overflows or vanishes.
+    unit = np.ptp(points, axis=0).max() or 1.0
+    _check_volumes(shape, points[rows] / unit, unit)
+    reasons, inside = _check_facets(shape, points / unit, rows[:, : shape.corners], parts)
     usable = {name: facets for name, facets in parts.items() if name not in reasons}
     if not usable:
         if reasons:
@@ -296,11 +296,6 @@ def _join(groups: Mapping[str, Ints]) -> Groups:
     return Groups(tuple(groups), rows[first], labels, sets)
 
 
-def _first(wrong: npt.NDArray[np.bool_], corners: Array) -> str:
-    """Return where the first wrong cell is, given the corners of all, shape (m, corners, d)."""
-    return "(" + ", ".join(f"{v:g}" for v in corners[wrong][0].mean(axis=0)) + ")"
-
-
 def _may_fold(shape: Shape, x: Array) -> npt.NDArray[np.bool_]:
     """Return which straight cells, (m, corners, d), may be folded though not at corners."""
     # The Jacobian matrix is affine along each coordinate: a mean of those at the corners. Where
@@ -317,56 +312,43 @@ def _least_volume(shape: Shape, nodes: Array, at: Array) -> Array:
     return reduce(np.minimum, (volume * np.sign(first) for volume in each), np.abs(first))
 
 
-def _check_cells(
+def _check_volumes(shape: Shape, nodes: Array, unit: float) -> None:
+    """Refuse flat and folded cells, given their nodes, (m, nodes, d), in a unit of length."""
+    x = nodes[:, : shape.corners]
+
+    def refuse(wrong: npt.NDArray[np.bool_], fault: str, identifier: str) -> None:
+        if np.any(wrong):
+            place = ", ".join(f"{v:g}" for v in x[wrong][0].mean(axis=0) * unit)
+            words = f"it has {wrong.sum()} cell(s) {fault}, the first near ({place})"
+            raise InputError(words, identifier)
+
+    longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=-1).max(axis=(1, 2))
+    least = FLAT * longest**shape.dim
+    volume = determinant(jacobians(shape, x, shape.nodes(1)))
+    refuse(~(np.abs(volume).min(axis=1) > least), "of zero volume", "mesh-geometry")
+    turned = np.abs(np.sign(volume).sum(axis=1)) < volume.shape[1]
+    refuse(turned, "with a corner of 180 degrees or more", "folded-cells")
+    curved = nodes.shape[1] > shape.corners
+    suspect = np.full(len(nodes), curved)
+    if not curved and shape.dim == 3 and not shape.simplex:
+        suspect = _may_fold(shape, x)
+    # At the corners, between them, and where integrals are taken.
+    at = np.concatenate([shape.nodes(2), rule(shape, 4)[0]])
+    suspect[suspect] = ~(_least_volume(shape, nodes[suspect], at) > least[suspect])
+    if curved:
+        refuse(suspect, "that are folded by their curved edges", "folded-edges")
+    refuse(suspect, "that are folded inside", "folded-cells")
+
+
+def _check_facets(
     shape: Shape, points: Array, cells: Ints, parts: Mapping[str, Ints]
 ) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return names that cannot be parts -> why, and those inside; refuse wrong cells."""
-    # Without a unit of length, so that no volume overflows or vanishes.
-    unit = np.ptp(points, axis=0).max() or 1.0
-    nodes, cells = points[cells] / unit, cells[:, : shape.corners]
-    x = nodes[:, : shape.corners]
-    longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=-1).max(axis=(1, 2))
-    volume = determinant(jacobians(shape, x, shape.nodes(1)))
-    flat = ~(np.abs(volume).min(axis=1) > FLAT * longest ** points.shape[1])
-    if np.any(flat):
-        where = _first(flat, x * unit)
-        raise InputError(
-            f"it has {flat.sum()} cell(s) of zero volume, the first near {where}", "mesh-geometry"
-        )
-    folded = np.abs(np.sign(volume).sum(axis=1)) < volume.shape[1]
-    if np.any(folded):
-        raise InputError(
-            f"it has {folded.sum()} cell(s) with a corner of 180 degrees or more, the first near "
-            f"{_first(folded, x * unit)}",
-            "folded-cells",
-        )
-    curved = nodes.shape[1] > shape.corners
-    bent = np.full(len(cells), curved)
-    limit = FLAT * longest ** points.shape[1]
-    if curved:  # at the corners, between them, and where integrals are taken
-        at = np.concatenate([shape.nodes(2), rule(shape, 4)[0]])
-        bent[:] = ~(_least_volume(shape, nodes, at) > limit)
-    elif shape.dim == 3 and not shape.simplex:
-        at = np.moveaxis(np.indices((POINTS,) * 3) / (POINTS - 1), 0, -1).reshape(-1, 3)
-        bent[:] = _may_fold(shape, x)
-        bent[bent] = ~(_least_volume(shape, x[bent], at) > limit[bent])
-    if np.any(bent) and curved:
-        raise InputError(
-            f"it has {bent.sum()} cell(s) that are folded by their curved edges, the first near "
-            f"{_first(bent, x * unit)}",
-            "folded-edges",
-        )
-    if np.any(bent):
-        raise InputError(
-            f"it has {bent.sum()} cell(s) that are folded inside, the first near "
-            f"{_first(bent, x * unit)}",
-            "folded-cells",
-        )
-
+    """Return names that cannot be parts -> why, and those inside; refuse cells that overlap."""
     cell_facets = np.sort(cells[:, shape.facet_corners], axis=2)
     # Three corners of a facet, two in 2-D, the same for both of its cells, and one inside.
-    corners = points[cell_facets[:, :, : points.shape[1]]] / unit
-    inside = np.broadcast_to(x.mean(axis=1)[:, None, None], corners[:, :, :1].shape)
+    corners = points[cell_facets[:, :, : shape.dim]]
+    middles = points[cells].mean(axis=1)[:, None, None]
+    inside = np.broadcast_to(middles, corners[:, :, :1].shape)
     edges = np.concatenate([corners[:, :, 1:], inside], axis=2) - corners[:, :, :1]
     sides = np.sign(np.linalg.det(edges))
 
