@@ -1,16 +1,19 @@
-"""Deviation of a curved surface from the straight facets that approximate it.
+"""Reconstruction of a curved surface from straight facets: its height h above them.
 
-At each vertex a quadratic surface is fitted to the vertices around it. An edge e is the chord of
-an arc that is, to second order, lambda_i lambda_j c_ij above it, c = -e.K e/2 with the curvature K
-of the fits at its ends, and c/4 in its middle; so is a triangle with the sum over its edges, in
-barycentric coordinates. Circles are reproduced, spheres and cylinders to third order, and a flat
-side has no deviation.
+A least-squares fit of a quadratic surface to the vertices around each vertex gives the curvature
+tensor K there. In barycentric coordinates lambda the height above a facet is the sum over its edges
+
+    h = sum_ij lambda_i lambda_j c_ij,    c_ij = -e.K e/2    (e the edge between i and j),
+
+and c/4 in the middle of an edge (the sagitta). K of an edge is the mean of the fits at the corners
+of its facet, weighted against those beyond which the curvature jumps. Circles are reproduced,
+spheres and cylinders to third order; flat sides have h = 0.
 
 References
 ----------
 Max, J. Graphics Tools 4 (1999) 1 (normals at vertices, exact on spheres); Cazals and Pouget,
 Comput. Aided Geom. Design 22 (2005) 121 (fits of vertices); Jiang and Shu, J. Comput. Phys. 126
-(1996) 202 (weights where something jumps).
+(1996) 202 (weights at jumps).
 """
 
 from __future__ import annotations
@@ -29,16 +32,16 @@ from contact.mesh.owners import ALONE, Owners
 from contact.ranks import exchanged
 from contact.typing import Array
 
-#: Least cosine between the normals of a surface and of its facets; corners of bodies have less.
+#: Least cosine between the normals at a vertex and of the facets around it, on a smooth surface.
 SMOOTH = 0.9
 
-#: That between normals at both ends of an edge, which differ by its turn, twice as much.
+#: Least cosine between the normals at both ends of an edge: of twice the angle.
 ALIKE_NORMALS = 2 * SMOOTH**2 - 1
 
-#: Weight of the neighbours of neighbours, which decide only where there are too few neighbours.
+#: Weight in a fit of vertices two edges away, for vertices with too few neighbours.
 FAR = 1e-3
 
-#: Relative differences of curvature up to which both ends of an edge count alike.
+#: Relative difference of curvature up to which both ends of an edge have the same weight.
 ALIKE = 0.4
 
 #: Numbers of vertices.
@@ -53,11 +56,11 @@ def deviations(
     levels: int = 0,
     values: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Return c of the edges of each facet, positive outwards, and how well it is known. Collective.
+    """Return c of the edges of each facet, positive outwards, and its uncertainty. Collective.
 
-    The second is how much the fits that count differ, which near a jump of the curvature are those
-    of both sides, and a quarter of how much c would differ with the curvature one edge farther on,
-    as it is seen on ellipses and waves. Circles have none of them. Both have the shape (f, edges).
+    The uncertainty is the spread of c among the fits at the corners, large where the curvature
+    jumps, plus a quarter of the change of c from one edge to the next; it is zero on circles.
+    Both have the shape (f, edges).
 
     Parameters
     ----------
@@ -68,24 +71,21 @@ def deviations(
     owners
         The owners of the nodes; the facets are those of this rank.
     levels
-        How often straight edges have been cut in two: c is then that of the edges at first, beside
-        those of their ends at which the polygon turns.
+        How often straight edges have been cut in two (`Domain.levels`): c is then that of the
+        edges before, taken at their ends, where all of the turn is.
     values
-        Of a function at the corners, shape (f, c), infinite where it has none: c is then how far
-        it is above that interpolated between the ends of an edge.
+        Of a function at the corners, shape (f, c), infinite where it has none: c is then of its
+        height above linear interpolation along the edges.
     """
     count = len(names)
     arrays = (names, corners, normal, *([] if values is None else [values]))
-    found, unknown = _deviations(levels, *_with_rings(owners, *arrays))
-    return found[:count], unknown[:count]
+    found, uncertain = _deviations(levels, *_with_rings(owners, *arrays))
+    return found[:count], uncertain[:count]
 
 
 def _with_rings(owners: Owners, *arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """Return facets, and behind them those of other ranks in the rings around them. Collective.
-
-    The first array has the numbers of their corners. The owner of a vertex knows which ranks have
-    facets there.
-    """
+    """Append the facets of other ranks up to four edges away, corner numbers first. Collective."""
+    # The owner of a vertex is told which ranks have facets there.
     comm, own = owners.comm, arrays[0]
     vertices = np.unique(own)
     holder, held = exchanged(comm, owners.ranks(vertices), vertices)
@@ -95,8 +95,7 @@ def _with_rings(owners: Owners, *arrays: NDArray[Any]) -> tuple[NDArray[Any], ..
     at = own.ravel()[by_vertex]
     every, asked = [arrays], np.zeros(0, dtype=np.int64)
     sent = np.zeros((0, 2), dtype=np.intp)
-    # A fit takes vertices two edges away with their normals, and an edge those of its ends'
-    # neighbours.
+    # An edge needs the fits at its ends' neighbours, and a fit the normals two edges away.
     for _ in range(4):
         fresh = np.setdiff1d(np.concatenate([facets[0].ravel() for facets in every]), asked)
         asked = np.union1d(asked, fresh)
@@ -117,7 +116,7 @@ def _with_rings(owners: Owners, *arrays: NDArray[Any]) -> tuple[NDArray[Any], ..
 def _runs(
     known: NDArray[np.int64], asked: NDArray[np.int64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return all pairs of an asked value and a place of it among ascending ones."""
+    """Return all pairs (row of `asked`, place in the ascending `known`) of equal values."""
     begin, end = (np.searchsorted(known, asked, side=side) for side in ("left", "right"))  # type: ignore[call-overload]
     counts = end - begin
     row = np.repeat(np.arange(asked.size), counts)
@@ -131,7 +130,7 @@ def _deviations(
     normal: Array,
     values: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Return them, given all facets on which they depend."""
+    """Return c and its uncertainty, given all facets on which they depend."""
     vertices, place = np.unique(names, return_inverse=True)
     place = place.reshape(names.shape)
     points = np.zeros((vertices.size, normal.shape[1]))
@@ -139,7 +138,7 @@ def _deviations(
     own = np.zeros_like(points)
     np.add.at(own, place, _weights(corners)[:, :, None] * normal[:, None, :])
     own /= np.linalg.norm(own, axis=1)[:, None]
-    # An edge or a corner of the body has no normal.
+    # No normal at edges and corners of the body.
     known = np.ones(vertices.size, dtype=bool)
     np.logical_and.at(known, place, np.einsum("fcd,fd->fc", own[place], normal) > SMOOTH)
     heights = None
@@ -154,29 +153,29 @@ def _deviations(
     curvature = _curvatures(points, own, pairs, np.where(near, 1.0, FAR), heights)
     pairs = pairs[:, near & known[pairs[1]]]
     edges = facet_with(points.shape[1] - 1, names.shape[1]).edges
-    found, unknown = np.zeros((2, len(names), len(edges)))
+    found, uncertain = np.zeros((2, len(names), len(edges)))
     for k, (i, j) in enumerate(edges):
         others = [c for c in range(names.shape[1]) if c not in (i, j)]
         around = place[:, [i, j, *others]]
         edge = points[around[:, 1]] - points[around[:, 0]]
         value = np.where(known[around], _sagitta(edge[:, None], curvature[around]), 0.0)
         if levels == 0:
-            flat, unknown[:, k] = _between(points, curvature, pairs, around, known, edge, value)
+            flat, uncertain[:, k] = _between(points, curvature, pairs, around, known, edge, value)
             if values is not None:
                 found[:, k] = flat
                 continue
-            # Of an arc of this curvature, for its parabola is off by the square of a quarter turn.
+            # From the parabola's sagitta to that of the arc of the same curvature.
             turn = np.minimum(np.abs(flat) / np.linalg.norm(edge, axis=1), 1.0)
             found[:, k] = 2 * flat / (1 + np.sqrt(1 - turn**2))
         else:
-            # All of the turn of the first edges is at their ends.
+            # The polygon turns at the ends of the first edges alone.
             larger = np.argmax(np.abs(value), axis=1)[:, None]
             found[:, k] = 2.0**levels * np.take_along_axis(value, larger, axis=1)[:, 0]
-    return found, unknown
+    return found, uncertain
 
 
 def _weights(corners: Array) -> Array:
-    """Return the weights of facets at their corners, shape (f, c)."""
+    """Return Max's weights of facets in the normals at their corners, shape (f, c)."""
     edges = facet_with(corners.shape[2] - 1, corners.shape[1]).edges
     around = [[a + b - c for a, b in edges if c in (a, b)] for c in range(corners.shape[1])]
     # (f, c, d, d - 1): the edges from each corner.
@@ -187,8 +186,8 @@ def _weights(corners: Array) -> Array:
 
 
 def _around(place: Numbers, count: int) -> tuple[Numbers, NDArray[np.bool_]]:
-    """Return vertices with those up to two edges away, shape (2, p), and which are neighbours."""
-    # All corners of a facet are neighbours, be they opposite to each other.
+    """Return pairs of vertices at most two edges apart, shape (2, p), and which are neighbours."""
+    # All corners of a facet are neighbours, opposite ones too.
     pairs = combinations(range(place.shape[1]), 2)
     ends = np.concatenate([place[:, pair] for pair in pairs])
     rows, columns = np.concatenate([ends, ends[:, ::-1]]).T
@@ -201,10 +200,7 @@ def _around(place: Numbers, count: int) -> tuple[Numbers, NDArray[np.bool_]]:
 def _curvatures(
     points: Array, normal: Array, pairs: Numbers, weight: Array, values: Array | None = None
 ) -> Array:
-    """Return the curvature tensors at vertices, negative where convex, shape (v, d, d).
-
-    Of values at the vertices their second derivatives along the surface.
-    """
+    """Return curvature tensors, < 0 where convex, or second derivatives of values, (v, d, d)."""
     count, d = points.shape
     # The last vectors of an orthonormal basis that begins with the normal.
     tangent = np.linalg.svd(normal[:, None, :])[2][:, 1:]
@@ -223,8 +219,8 @@ def _curvatures(
         form = _form(_fits(at, count, weight, columns, change), mixed)
         form /= np.where(longest > 0, longest, 1.0)[:, None, None]
         return np.asarray(np.einsum("via,vij,vjb->vab", tangent, form, tangent))
-    # A part of z^2 beside the squares makes spheres exact, and the curvature along the normal of
-    # the first fit cylinders too.
+    # z^2 beside the squares makes the fit exact on spheres; a second fit with the curvature
+    # along the normal of the first makes it exact on cylinders.
     shared = columns.copy()
     shared[:, d - 1 : 2 * (d - 1)] += 0.5 * (z**2 / (d - 1))[:, None]
     form = _form(_fits(at, count, weight, shared, z), mixed)
@@ -237,7 +233,7 @@ def _curvatures(
 
 
 def _form(fit: Array, mixed: Sequence[tuple[int, int]]) -> Array:
-    """Return the second derivatives of fits, shape (v, d - 1, d - 1)."""
+    """Return the matrices of second derivatives from the coefficients, (v, d - 1, d - 1)."""
     count, k = fit.shape[0], (fit.shape[1] - len(mixed)) // 2
     form = np.zeros((count, k, k))
     diagonal = np.arange(k)
@@ -248,17 +244,14 @@ def _form(fit: Array, mixed: Sequence[tuple[int, int]]) -> Array:
 
 
 def _along_normal(form: Array) -> Array:
-    """Return the curvature K:K/tr K along the normal of second derivatives K, shape (v,).
-
-    With it the tensor of a sphere is a multiple of the identity, and that of a cylinder one across
-    the axis: how far the normal is off then does not matter.
-    """
+    """Return the curvature K:K/tr K along the normal of second derivatives K, shape (v,)."""
+    # With it e.K e of spheres and cylinders does not depend on the error of the normal.
     trace, size = np.trace(form, axis1=1, axis2=2), np.linalg.norm(form, axis=(1, 2))
     return np.asarray(np.clip(size**2 / np.where(trace == 0, np.inf, trace), -size, size))
 
 
 def _fits(at: Numbers, count: int, weight: Array, columns: Array, right: Array) -> Array:
-    """Return the coefficients of columns by weighted least squares at each vertex, (count, k)."""
+    """Return the weighted least-squares coefficients at each vertex, (count, k)."""
     k = columns.shape[1]
     weighted = weight[:, None] * columns
     matrix, vector = np.zeros((count, k, k)), np.zeros((count, k))
@@ -277,11 +270,9 @@ def _between(
     edge: Array,
     value: Array,
 ) -> tuple[Array, Array]:
-    """Return c of an edge of each facet, given that by each corner, its ends first, shape (f,).
-
-    Beside it, how well it is known (`deviations`). Where the curvature jumps, as from
-    a side to a rounded edge, the corner counts beyond which it stays as it is.
-    """
+    """Return c of one edge of each facet from `value` by each corner, and its uncertainty, (f,)."""
+    # Where the curvature jumps, as from a side to a fillet, corners on the near side of the jump
+    # have nearly all of the weight: those beyond which the curvature does not change.
     largest = np.abs(value).max(axis=1)
     largest[largest == 0] = 1.0
     begin = np.searchsorted(pairs[0], np.arange(len(points) + 1))
@@ -289,7 +280,7 @@ def _between(
     weights, jumps, totals, changes = (np.zeros_like(value) for _ in range(4))
     for k in range(corners.shape[1]):
         corner = corners[:, k]
-        # All neighbours of a corner, facet by facet, of which those beyond it count.
+        # The neighbours of the corner, facet by facet; those away from the edge have a share.
         counts = np.diff(begin)[corner]
         of = np.repeat(np.arange(len(corners)), counts)
         last = np.cumsum(counts)
@@ -309,16 +300,16 @@ def _between(
         changes[:, k] = further / np.where(total > 0, total, 1.0)
     weight = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
     found, further = (np.sum(weights * given, axis=1) / weight for given in (value, jumps))
-    # Beside a jump, a corner beyond which nothing changes differs from the mean with the others.
-    unlike = np.maximum(np.abs(value - found[:, None]) - jumps, 0.0)
-    unknown = 2 * np.sum(weights * unlike, axis=1) / weight + further / 4
+    # What a corner on one side of a jump differs from the mean more than by its own change.
+    spread = np.maximum(np.abs(value - found[:, None]) - jumps, 0.0)
+    uncertain = 2 * np.sum(weights * spread, axis=1) / weight + further / 4
     for k, end in ((0, 1), (1, 0)):
-        # With no vertex beyond, the end of a side has the fit of its neighbour: half an edge off.
+        # With no vertex beyond it, the fit at the end of a side is that of half an edge away.
         last = (totals[:, end] == 0) & (totals[:, k] > 0) & (jumps[:, k] < ALIKE * largest)
         found -= np.where(last, 0.5 * changes[:, k], 0.0)
-    return found, unknown
+    return found, uncertain
 
 
 def _sagitta(edge: Array, curvature: Array) -> Array:
-    """Return c = -e.K e/2 of edges, shape (..., d), with curvature tensors, shape (..., d, d)."""
+    """Return c = -e.K e/2 of edges e, (..., d), and curvature tensors K, (..., d, d)."""
     return np.asarray(-0.5 * np.einsum("...i,...ij,...j->...", edge, curvature, edge))

@@ -1,8 +1,7 @@
-"""From one mesh of a body to another: refinement, and functions carried over.
+"""From one mesh of a body to another: refinement, and interpolation of functions.
 
-New nodes of curved boundaries go to the curve that old ones tell where cells are marked. On
-straight facets that are cut, a curve would remain the polygon of the first mesh: pressures would
-stand at its vertices, and the estimated error would not say so.
+Local refinement moves new nodes of a curved boundary onto the curve of `deviation`: on a polygon
+that is only cut, the pressure would concentrate at its vertices, unseen by the error estimate.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from contact._compat import lasting
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.mesh.deviation import deviations
-from contact.mesh.domain import Domain, exterior_facets, with_names
+from contact.mesh.domain import Domain, exterior_facets
 from contact.mesh.entities import Indices, cell_facets, cells_at
 from contact.mesh.geometry import determinant, jacobians, unit_normals
 from contact.mesh.owners import Owners
@@ -30,10 +29,7 @@ from contact.typing import Array
 
 
 def refined(domain: Domain, marked: Indices | None = None) -> Domain:
-    """Cut every edge, or those of marked cells, in two; names are inherited. Collective.
-
-    As `with_parents`.
-    """
+    """Return the mesh of `with_parents`. Collective."""
     return with_parents(domain, marked)[0]
 
 
@@ -83,20 +79,12 @@ def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain,
         name: np.flatnonzero(np.isin(owned, old)).astype(np.int32)
         for name, old in domain.regions.items()
     }
-    made_of = with_names(fine, parts, regions, domain.size)
-    made_of = replace(
-        made_of,
-        levels=domain.levels + (marked is None),
-        unusable=domain.unusable,
-        notes=domain.notes,
-        revolved=domain.revolved,
-        inside=inside,
-    )
-    return made_of, owned
+    named = replace(domain, mesh=fine, parts=parts, regions=regions, inside=inside)
+    return replace(named, levels=domain.levels + (marked is None)), owned
 
 
 def _with_ghosts(mesh: dmesh.Mesh, owned: Indices) -> Indices:
-    """Return all local facets that are among those that some rank owns. Collective."""
+    """Add to a set of owned facets their ghosts on all ranks. Collective."""
     marks = la.vector(mesh.topology.index_map(mesh.topology.dim - 1))
     marks.array[owned] = 1.0
     marks.scatter_forward()
@@ -104,10 +92,8 @@ def _with_ghosts(mesh: dmesh.Mesh, owned: Indices) -> Indices:
 
 
 def _cut(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indices, Indices]:
-    """Cut cells; return the mesh, and parents: of cells, and of their facets within these.
-
-    Collective. The refined cells stay on the rank of their parent.
-    """
+    """Return the refined mesh, cells on the rank of their parents, and its parents. Collective."""
+    # Parents of the cells, and of each of their facets its place in the parent cell, -1 for none.
     if not shape_of(coarse).simplex and marked is None:
         _check_straight(coarse)
         return _halved(coarse)
@@ -172,10 +158,10 @@ def _halved(coarse: dmesh.Mesh) -> tuple[dmesh.Mesh, Indices, Indices]:
     return fine, parents, facets
 
 
-#: How far outside of a mesh a node may lie, over the extent of the mesh, and over its largest cell.
+#: Largest distance of a node outside of a mesh, over its extent and over its largest cell.
 OUTSIDE, NEAR = 1e-3, 0.1
 
-#: Times that cells apart from each other are looked for: more find hardly any.
+#: Rounds in which cells without common nodes are chosen; further ones find hardly any.
 ROUNDS = 3
 
 
@@ -191,10 +177,8 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
 
     Notes
     -----
-    Where the meshes are nested the new function is the old one, for its values at the nodes of
-    the fine element are then all there is to know; elsewhere it differs by the fine mesh's
-    interpolation error. A node of the new mesh that lies slightly outside of the old one, as on
-    a curved boundary, gets the value of the closest cell.
+    On nested meshes the new function equals the old one. A node of the new mesh slightly outside
+    of the old one, as on a curved boundary, gets the value of the closest cell.
     """
     made = fem.Function(space, name=coarse.name)
     cells = _covering(space)
@@ -205,7 +189,7 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
     largest = float(mesh.h(mesh.topology.dim, everywhere).max(initial=0.0))
     extent = float(np.ptp(space.mesh.geometry.x, axis=0).max(initial=0.0))
     largest, extent = (comm.allreduce(size, op=MPI.MAX) for size in (largest, extent))
-    # More cells would have to be looked at.
+    # A larger padding makes dolfinx search more cells.
     padding = min(OUTSIDE * extent, NEAR * largest)
     data = fem.create_interpolation_data(space, source, cells, padding=padding)
     made.interpolate_nonmatching(coarse, cells, interpolation_data=data)
@@ -214,11 +198,8 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
 
 
 def _covering(space: fem.FunctionSpace) -> NDArray[np.int32]:
-    """Return owned cells that have all nodes among theirs, few of them twice.
-
-    Each point of each of them is looked for. First cells that share no node, by chance; then
-    any for the nodes that are left.
-    """
+    """Return owned cells that contain all nodes, few of them twice: dolfinx searches each node."""
+    # Random cells without common nodes first, then any cell of each node that is left.
     topology = space.mesh.topology
     nodes = space.dofmap.list[: topology.index_map(topology.dim).size_local]
     cells = np.random.default_rng(0).permutation(nodes.shape[0]).astype(np.int32)
@@ -236,35 +217,25 @@ def _covering(space: fem.FunctionSpace) -> NDArray[np.int32]:
     return np.unique(np.concatenate([*found, last[uncovered]]))
 
 
-#: Distance between a node and the middle of its edge, over the length of that.
+#: Largest distance between a node and the middle of its edge, over the length of the edge.
 SAME = 1e-6
 
-#: Least eigenvalue of the normals at a node, over the largest, of facets that are not alike.
+#: Least eigenvalue of sum n n^T at a node, over the largest, for directions with a height.
 APART = 0.1
 
-#: Differences of normals on a flat part.
+#: Largest difference of normals on a flat part.
 FLAT = 1e-9
 
-#: Share of its size that a cell must keep: else no node is moved.
+#: Least ratio of the volume of a cell after and before its nodes move; else none moves.
 KEPT = 0.2
 
 
 def _follow(coarse: Domain, fine: dmesh.Mesh, facets: Indices, parents: Indices) -> None:
-    """Move new nodes of curved boundaries from chords to arcs, see `deviation`. Collective.
-
-    Parameters
-    ----------
-    coarse
-        The mesh before, of straight simplices.
-    fine
-        The mesh after, whose new nodes are in the middles of edges.
-    facets, parents
-        Its owned facets of the boundary, and that of the mesh before in which each lies.
-    """
+    """Move new nodes in the middles of boundary edges onto the curve (`deviation`). Collective."""
     d, of_fine = coarse.dim, fine.geometry.index_map()
     every = exterior_facets(coarse.mesh)
     rest = np.setdiff1d(every, np.concatenate([every[:0], *coarse.parts.values()]))
-    # By parts: at an edge between two there is no common normal.
+    # Part by part: at an edge between two there is no common normal.
     sums = la.vector(of_fine, d * d + d)
     values = sums.array.reshape(-1, d + 1, d)
     for part in (*coarse.parts.values(), rest):
@@ -274,7 +245,7 @@ def _follow(coarse: Domain, fine: dmesh.Mesh, facets: Indices, parents: Indices)
         np.add.at(values[:, 1:], nodes, normal[:, :, None] * normal[:, None, :])
     sums.scatter_reverse(la.InsertMode.add)
     sums.scatter_forward()
-    # The shortest move that has the height of each facet, of alike facets their mean.
+    # The shortest shift s with n.s = h for the facets' normals n, in the least-squares sense.
     sizes, vectors = np.linalg.eigh(values[:, 1:])
     kept = sizes > APART * sizes[:, -1:]
     along = np.einsum("nik,ni->nk", vectors, values[:, 0]) / np.where(kept, sizes, 1.0)
@@ -292,10 +263,7 @@ def _follow(coarse: Domain, fine: dmesh.Mesh, facets: Indices, parents: Indices)
 def _heights(
     coarse: Domain, part: Indices, fine: dmesh.Mesh, facets: Indices, parents: Indices
 ) -> tuple[NDArray[np.int32], Array, Array]:
-    """Return new nodes of a part, each as often as it has facets, the normals and heights there.
-
-    Collective.
-    """
+    """Return the new nodes of a part, once a facet, with normals and heights. Collective."""
     mesh = coarse.mesh
     part, facet = np.sort(part), shape_of(mesh).facet
     edges = np.array(facet.edges)
