@@ -1,4 +1,4 @@
-"""Checks of arguments in Python: kinds, ranges, names, a user's functions and derivatives."""
+"""Checks of arguments in Python: types, ranges, a user's functions and their derivatives."""
 
 from __future__ import annotations
 
@@ -15,27 +15,26 @@ from contact.typing import Array
 
 T = TypeVar("T")
 
-#: Elastic constants that a law has; sizes and starts are taken from them.
+#: Elastic constants of a law, from which scales and initial guesses are computed.
 CONSTANTS = ("young", "poisson", "bulk", "shear")
 
-#: Most letters of a given value that a message repeats.
+#: Largest length of a given value in a message.
 LONGEST = 80
 
-
-#: Step of differences over the argument; how far a derivative may be off them, and one-sided
-#: differences from each other where the function counts as smooth.
+#: Relative step of finite differences; relative error of a derivative that is refused, and relative
+#: difference of one-sided differences below which a function is smooth.
 STEP, OFF, SMOOTH = 1e-5, 0.02, 0.01
 
-#: Share of the places at which a derivative must be off to be refused, and their least number.
+#: Share of the samples with a wrong derivative that is refused, and their least number.
 SHARE, LEAST = 0.1, 3
 
-#: Change of a value over its rounding from which on differences say something.
+#: Change of a value over its rounding above which differences are significant.
 SEEN = 1e4
 
 #: A bound above zero.
 TINY = np.finfo(float).tiny
 
-#: Slips, and potential differences, at which laws are looked at; pressures beside them.
+#: Samples of laws: slips or potential differences, and pressures.
 SAMPLES = np.logspace(-9, 3, 49, dtype=np.float64)
 PRESSURES = np.logspace(-6, 6, 13, dtype=np.float64)
 
@@ -43,20 +42,20 @@ PRESSURES = np.logspace(-6, 6, 13, dtype=np.float64)
 def expect(
     name: str, given: object, accepted: str, fits: object, identifier: str = "value"
 ) -> None:
-    """Raise an InputError that shows a value and the accepted ones in words, unless it fits."""
+    """Raise an InputError with the given and the accepted values unless the value fits."""
     if not fits:
         words = f"{name}: given {shorten(repr(given))}; accepted: {accepted}"
         raise InputError(words, identifier)
 
 
 def fill(made: object, **values: object) -> None:
-    """Set the attributes of a frozen object that is being made."""
+    """Set attributes of a frozen dataclass in its ``__post_init__``."""
     for name, value in values.items():
         object.__setattr__(made, name, value)
 
 
 def check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
-    """Refuse a size whose square is no number any more, or nothing."""
+    """Refuse a size whose square overflows or underflows."""
     if not least <= value <= HUGE:
         raise InputError(
             f"{key}: a size of {value:.3g} leads to numbers that overflow; accepted: units that "
@@ -66,13 +65,13 @@ def check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
 
 
 def shorten(text: str) -> str:
-    """Return a text in one line, as far as messages repeat it."""
+    """Return a text as one line of at most `LONGEST` characters."""
     line = " ".join(text.split())
     return line if len(line) <= LONGEST else f"{line[:LONGEST]}..."
 
 
 def several(name: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...]:
-    """Return one object of a kind, or several, as a tuple; anything else is an InputError."""
+    """Return an object of a type, or a list of them, as a tuple; else raise an InputError."""
     every = tuple(given) if isinstance(given, list | tuple) else (given,)
     for one in every:
         expect(name, one, accepted, isinstance(one, kind))
@@ -80,40 +79,33 @@ def several(name: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...
 
 
 def one_of(name: str, /, **given: T | None) -> T | None:
-    """Return which of several names for the same is given; of more than one an InputError."""
+    """Return the value of the one keyword that is given, if any; else raise an InputError."""
     names = [key for key, value in given.items() if value is not None]
     expect(name, names, f"one of {', '.join(given)}", len(names) < 2)
     return given[names[0]] if names else None
 
 
 def is_law(given: object) -> bool:
-    """Tell whether an object has the constants of a law of the stress."""
+    """Tell whether an object has the `CONSTANTS` of a law."""
     try:
         return all(np.isfinite(float(getattr(given, name))) for name in CONSTANTS)
-    except ZeroDivisionError:  # a law with constants that are none: `Body.check` names them
+    except ZeroDivisionError:  # a law with wrong constants, which `Body.check` names
         return True
     except (AttributeError, TypeError, ValueError):
         return False
 
 
 class Returned(InputError):
-    """A function has returned a value that is not accepted; `naming` says whose."""
+    """Wrong value of a user's function, whose name `naming` adds."""
 
     def __init__(self, words: str, identifier: str = "own-function") -> None:
         super().__init__(words, identifier)
 
 
 def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
-    """Return the value of a function as numbers, inside `naming`.
+    """Return the value of a function as an array of a shape, by broadcasting, inside `naming`.
 
-    Parameters
-    ----------
-    values
-        The value; a number stands for itself everywhere.
-    shape
-        The shape to broadcast it to.
-    each
-        The accepted values in words: "one number ...".
+    `each` has the accepted values in words: "one number ...".
     """
     if type(values) is np.ndarray and values.dtype == float and values.shape == shape:
         return values.copy()
@@ -133,7 +125,7 @@ def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
 
 
 def check_finite(values: Array, where: Callable[[int], str]) -> None:
-    """Refuse infinity and NaN, shape (n,), inside `naming`; ``where(i)`` names the i-th place."""
+    """Refuse infinity and NaN in values, (n,), at places ``where(i)``, inside `naming`."""
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size > 0:
         raise Returned(
@@ -144,7 +136,7 @@ def check_finite(values: Array, where: Callable[[int], str]) -> None:
 
 @contextmanager
 def naming(name: str) -> Iterator[None]:
-    """Let errors in a user's function name the argument."""
+    """Add the name of the argument to the errors of a user's function."""
     try:
         yield
     except Returned as error:
@@ -195,24 +187,9 @@ class OfTime:
 
 
 def sampled(name: str, shape: tuple[int, ...], *calls: Callable[[], Any]) -> list[Array] | None:
-    """Return values of a user's law at samples; None where it raises something at one.
+    """Return values of a user's law at samples, each of a shape; None if one raises an error.
 
-    Such a law is not judged by its samples: it may never be asked there, and where it is used its
-    errors are named.
-
-    Parameters
-    ----------
-    name
-        In messages.
-    shape
-        Of each value.
-    calls
-        The values, unevaluated.
-
-    Raises
-    ------
-    InputError
-        If the law lacks an attribute.
+    The law may never be evaluated there: a missing attribute alone is an InputError, with `name`.
     """
     try:
         with np.errstate(all="ignore"):
@@ -230,10 +207,7 @@ def check_slope(
     slope: Callable[[Array], Array | float],
     at: Array,
 ) -> None:
-    """Refuse a derivative that the differences of its function contradict.
-
-    At kinks, and where differences cannot tell, anything is accepted, as where `sampled` has no
-    values.
+    """Compare a derivative with finite differences where the function is smooth.
 
     Parameters
     ----------
@@ -247,7 +221,7 @@ def check_slope(
     Raises
     ------
     InputError
-        If the derivative is off, or the object has none.
+        If they differ at more than `SHARE` of the samples, or the object has no derivative.
     """
     h = STEP * np.abs(at)
     arguments = [at + step for step in (-h, -h / 2, 0, h / 2, h)]

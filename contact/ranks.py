@@ -1,4 +1,4 @@
-"""Work and errors of one rank for all, which else wait for ever; sums; values of neighbours."""
+"""Collective helpers: run on the root, re-raise errors on all ranks, reduce, exchange rows."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ S = TypeVar("S", bound=OnRanks)
 
 @contextmanager
 def on_all_ranks(comm: MPI.Intracomm) -> Iterator[None]:
-    """Raise on all ranks the error of one of them. Collective."""
+    """Raise the error of one rank on all, which else wait for it for ever. Collective."""
     failure = None
     try:
         yield
@@ -45,8 +45,8 @@ def on_all_ranks(comm: MPI.Intracomm) -> Iterator[None]:
             raise known
 
 
-def together(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[S, P], T]:
-    """Let the error of a method on one rank be that of all, which makes it collective."""
+def collective(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[S, P], T]:
+    """Decorate a method of which each rank does a part: errors of one are raised on all."""
 
     @wraps(method)
     def called(self: S, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -57,24 +57,24 @@ def together(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[S, 
 
 
 def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
-    """Do something on rank 0; its result, or its error, is that of all ranks. Collective.
+    """Run an action on rank 0; broadcast its result, or raise its error on all. Collective.
 
     Raises
     ------
     InputError
-        Also where the system refuses something: see `refused`.
+        Also for an OSError: see `refused`.
     """
     result = on_each(comm, lambda: action() if comm.rank == 0 else None)
     return comm.bcast(result)  # type: ignore[no-any-return]
 
 
 def on_each(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
-    """Do something on each rank; the error of one of them is that of all. Collective.
+    """Run an action on each rank; raise the error of one on all. Collective.
 
     Raises
     ------
     InputError
-        Also where the system refuses something: see `refused`.
+        Also for an OSError: see `refused`.
     """
     result: Any = None
     with on_all_ranks(comm):
@@ -86,9 +86,9 @@ def on_each(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
 
 
 def summed(comm: MPI.Comm, values: ArrayLike) -> Array:
-    """Return the sums over all ranks of values of the same shape on each. Collective.
+    """Return the sums of an array over all ranks. Collective.
 
-    They are sent as they are: pickled, a number of NumPy takes twenty times as long.
+    As a buffer: pickled, a number of NumPy takes twenty times as long.
     """
     sums = np.array(values, dtype=np.float64, order="C")
     comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
@@ -96,7 +96,7 @@ def summed(comm: MPI.Comm, values: ArrayLike) -> Array:
 
 
 def largest(comm: MPI.Comm, value: float) -> float:
-    """Return the largest number over all ranks, NaN on all where it is on one. Collective."""
+    """Return the largest number over all ranks, NaN if one has NaN. Collective."""
     found = np.array([-np.inf if np.isnan(value) else value, np.isnan(value)])
     comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
     return float(np.nan if found[1] else found[0])
@@ -105,23 +105,21 @@ def largest(comm: MPI.Comm, value: float) -> float:
 def exchanged(
     comm: MPI.Comm, ranks: NDArray[np.integer[Any]], *arrays: NDArray[Any]
 ) -> tuple[NDArray[Any], ...]:
-    """Send rows of arrays to ranks, and return those that this rank is sent. Collective.
-
-    Ranks that nothing is sent to get no message but its length.
+    """Send rows of arrays to ranks, and return the received rows. Collective.
 
     Parameters
     ----------
     comm
         Communicator.
     ranks
-        Where each row goes, shape (n,).
+        Destination of each row, shape (n,).
     arrays
-        Of the same kinds and shapes of rows on all ranks, shapes (n, ...).
+        Shapes (n, ...); types and shapes of the rows are the same on all ranks.
 
     Returns
     -------
-    The rank that sent each row, ascending, shape (m,), and the rows in the order in which it sent
-    them, shapes (m, ...).
+    The source of each row, ascending, shape (m,), and the rows in the order in which they were
+    sent, shapes (m, ...).
     """
     counts = np.bincount(ranks, minlength=comm.size)
     coming = np.empty_like(counts)
@@ -138,10 +136,10 @@ def exchanged(
     return tuple(found)
 
 
-def boxes(comm: MPI.Comm, points: Array) -> Array:
-    """Return the lower and upper corners of the boxes around the points of each rank. Collective.
+def bounding_boxes(comm: MPI.Comm, points: Array) -> Array:
+    """Return the lower and upper corners of the points of each rank, (ranks, 2, d). Collective.
 
-    Of shape (ranks, 2, d); around no points, upper corners are below lower ones.
+    Without points, upper corners are below lower ones.
     """
     none = np.full(points.shape[1], np.inf)
     own = [points.min(axis=0), points.max(axis=0)] if len(points) else [none, -none]
@@ -150,41 +148,10 @@ def boxes(comm: MPI.Comm, points: Array) -> Array:
     return found
 
 
-def near_boxes(
-    comm: MPI.Comm, points: Array, asked: Array, reach: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the ranks that ask for points near theirs, and which these are. Collective.
-
-    Each rank tells the others a box, and gets the points in it alone.
-
-    Parameters
-    ----------
-    comm
-        Communicator.
-    points
-        Those of this rank that others may ask for, shape (n, d).
-    asked
-        Those that this rank asks for, shape (m, d).
-    reach
-        How far around the box of these (length).
-
-    Returns
-    -------
-    The rank and the row of each point to be sent, in the order of the ranks, shape (k,).
-    """
-    rows = [
-        np.flatnonzero(np.all((points >= lower - reach) & (points <= upper + reach), axis=1))
-        for lower, upper in boxes(comm, asked)
-    ]
-    return np.repeat(np.arange(comm.size), [some.size for some in rows]), np.concatenate(rows)
-
-
 def neighbours(
     comm: MPI.Comm, points: Array, values: Array, reach: float, asked: Array | None = None
 ) -> Array:
-    """Return the values at points near those of this rank, from the ranks that have them.
-
-    Collective.
+    """Return values at points of any rank in the bounding box of this one's. Collective.
 
     Parameters
     ----------
@@ -193,20 +160,24 @@ def neighbours(
     points, values
         Those of this rank, shapes (n, d) and (n, k).
     reach
-        How far around the box of its points a rank asks (length).
+        Width by which the box is enlarged (length).
     asked
-        Points that this rank asks for instead, shape (m, d).
+        Points of this rank whose box it is; by default `points`.
 
     Returns
     -------
     In the order of the ranks, shape (near, k).
     """
-    ranks, rows = near_boxes(comm, points, points if asked is None else asked, reach)
-    return exchanged(comm, ranks, values[rows])[1]
+    rows = [
+        np.flatnonzero(np.all((points >= lower - reach) & (points <= upper + reach), axis=1))
+        for lower, upper in bounding_boxes(comm, points if asked is None else asked)
+    ]
+    ranks = np.repeat(np.arange(comm.size), [some.size for some in rows])
+    return exchanged(comm, ranks, values[np.concatenate(rows)])[1]
 
 
 def refused(error: OSError) -> InputError:
-    """Return a refusal of the system in words."""
+    """Return an OSError as an InputError."""
     where = "a file" if error.filename is None else error.filename
     return InputError(
         f"{where}: {error.strerror or error}; accepted: a place to write to, with room for the "

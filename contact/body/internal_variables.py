@@ -27,7 +27,7 @@ from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.geometry import geometry_nodes, measures
-from contact.ranks import on_all_ranks, together
+from contact.ranks import collective, on_all_ranks
 from contact.typing import Array
 from forms.hencky import FormLaw, Graded, Law
 from forms.history import (
@@ -234,7 +234,7 @@ class QuadratureLaws:
             by_cell = self.by_cell(into[name])
             by_cell[cells] = found.reshape(by_cell[cells].shape)
 
-    @together
+    @collective
     def set(self, state: Evaluated, kind: str = "") -> None:
         """Let the forms of the laws look at the response at a state from now on. Collective."""
         before = self.of(state)
@@ -252,7 +252,7 @@ class QuadratureLaws:
                 _fill(self._stiffness, cells, response.stiffness)
         self._seen = before, kind, state.x.copy()
 
-    @together
+    @collective
     def commit(self, state: Evaluated) -> InternalVariables | None:
         """Return the variables at the end of the step that led to a state. Collective."""
         before = self.of(state)
@@ -274,7 +274,7 @@ class QuadratureLaws:
             changed = self._at(change.arrays, law, cells)
             yield cells, differential(law, strains, variables, way, changed)
 
-    @together
+    @collective
     def commit_along(
         self, state: Evaluated, along: Array, change: InternalVariables
     ) -> InternalVariables:
@@ -292,7 +292,7 @@ class QuadratureLaws:
             self._put(arrays, cells, found.variables)
         return change.replaced(arrays)
 
-    @together
+    @collective
     def before_along(self, state: Evaluated, change: InternalVariables) -> None:
         """Let the forms look at how stresses change with the variables before a step. Collective.
 
@@ -306,7 +306,7 @@ class QuadratureLaws:
         for cells, found in self._differentials(state, np.zeros_like(state.x), change):
             _fill(self._stress, cells, found.stress)
 
-    @together
+    @collective
     def commit_transposed(self, state: Evaluated, after: InternalVariables) -> None:
         """Let the forms look at the stresses whose forces are those of the variables' derivatives.
 
@@ -329,7 +329,7 @@ class QuadratureLaws:
             volume = volumes[cells].ravel()
             _fill(self._stress, cells, by_strain / volume[:, None])
 
-    @together
+    @collective
     def before_transposed(
         self, state: Evaluated, along: Array, after: InternalVariables | None
     ) -> InternalVariables | None:
@@ -429,7 +429,7 @@ class QuadratureLaws:
         element = basix.ufl.element("DG", cell, self._fitted)
         return np.linalg.pinv(element.tabulate(0, self.points)[0])
 
-    @together
+    @collective
     def secant_shear(self, state: Evaluated) -> Array:
         """Return the mean secant shear moduli of owned cells, 0 without history. Collective."""
         found = np.zeros(self._owned)
@@ -438,7 +438,7 @@ class QuadratureLaws:
             found[cells] = response.stiffness[:, -1, -1].reshape(cells.size, -1).mean(axis=1) / 2
         return found
 
-    @together
+    @collective
     def fit(self, state: Evaluated) -> None:
         """Let `fits` be those at the end of the step that led to a state. Collective."""
         fits = self.fits

@@ -217,7 +217,12 @@ def plan(
     low = np.asarray(origin, dtype=np.float64)
     extent = np.asarray(size, dtype=np.float64)
     grid = low, low + extent, extent / np.asarray(cells)
-    _check_sizes(grid, size)
+    if not np.all(grid[1] - grid[0] > SHORTEST) or np.max(grid[2]) > STRETCHED * np.min(grid[2]):
+        accepted = (
+            f"sizes above {SHORTEST:.2g}, also beside the origin, and cells of which no edge "
+        )
+        accepted += f"is more than {STRETCHED:g} times as long as another"
+        raise GridError("size", list(size), accepted)
     patches = {side: [_patch("", Piece(side), grid, sides)] for side in sides}
     for name, pieces in parts.items():
         key = f"parts.{name}"
@@ -228,26 +233,6 @@ def plan(
         else:
             patches[name] = [_patch(f"{key}.{i}", p, grid, sides) for i, p in enumerate(pieces)]
     return grid, patches
-
-
-def _check_sizes(grid: _Grid, size: Sequence[float]) -> None:
-    """Refuse edges from which no mesh can be made, before they are blamed on its parts."""
-    low, high, h = grid
-    if not np.all(high - low > SHORTEST):
-        i = int(np.argmin(high - low))
-        raise GridError(
-            f"size.{i}",
-            size[i],
-            f"sizes above {SHORTEST:.2g}, also beside the origin; choose another unit of length",
-        )
-    odd = int(np.argmax(np.abs(np.log10(h))))  # the one to blame is not of the size of 1
-    if np.max(h) > STRETCHED * np.min(h):
-        raise GridError(
-            f"size.{odd}",
-            size[odd],
-            f"cells of which one edge is at most {STRETCHED:g} times as long as another; here it "
-            f"is {np.max(h) / np.min(h):.2g}",
-        )
 
 
 def _patch(key: str, piece: Piece, grid: _Grid, sides: Mapping[str, tuple[int, int]]) -> _Patch:

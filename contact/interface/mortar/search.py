@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from contact.body.pointwise import CHUNK
 from contact.interface.mortar.surface import Surface
-from contact.ranks import boxes, exchanged
+from contact.ranks import bounding_boxes, exchanged
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
@@ -57,7 +57,7 @@ class Opposite:
         near = np.flatnonzero(distance <= reach + widest + slave.radii)
         radius = (slave.radii + widest + DETOUR * distance)[near]
         centres = slave.centres[near]
-        ball, rank = _meeting(boxes(comm, master.centres), centres, radius)
+        ball, rank = _meeting(bounding_boxes(comm, master.centres), centres, radius)
         asked = exchanged(comm, rank, centres[ball], radius[ball])
         facets, ranks = _within(master.centres, *asked)
         return Opposite(master.sent(facets, ranks), near, radius, reach)
@@ -98,7 +98,7 @@ def nearest(comm: MPI.Intracomm, points: Array, places: Array) -> Array:
     comm, points, places
         Communicator, and those of this rank, shapes (n, d) and (m, d).
     """
-    point, rank = _holders(boxes(comm, places), points)
+    point, rank = _holders(bounding_boxes(comm, places), points)
     asked_by, asked = exchanged(comm, rank, points[point])
     found = cKDTree(places).query(asked)[0] if len(places) else np.full(len(asked), np.inf)
     _, distance = exchanged(comm, asked_by, found)
@@ -118,7 +118,7 @@ def nearest_named(
     least = nearest(comm, points, places)
     among = np.flatnonzero(np.isfinite(least))
     radius = least[among] * (1 + 100 * ROUNDING)
-    ball, rank = _meeting(boxes(comm, places), points[among], radius)
+    ball, rank = _meeting(bounding_boxes(comm, places), points[among], radius)
     source, number, centre, size = exchanged(
         comm, rank, among[ball], points[among][ball], radius[ball]
     )
