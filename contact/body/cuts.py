@@ -26,8 +26,8 @@ from contact.body.global_unknowns import GlobalUnknowns
 from contact.body.loads import Loads
 from contact.errors import InputError
 from contact.mesh.domain import Domain
-from contact.mesh.entities import Indices, cell_facets, connected
-from contact.mesh.together import members
+from contact.mesh.entities import Indices, cell_facets, distributed_components
+from contact.mesh.parts import members
 from contact.model.body import Bolt
 from contact.model.fields import constant
 from contact.ranks import summed
@@ -135,7 +135,7 @@ class Cuts:
         cells.ravel()[at] = size + of.ravel()
         nodes, moved = doubles[:, 0].astype(np.int32), doubles[:, 1:]
         keys = np.column_stack([index_map.local_to_global(nodes), moved])
-        labels, count = connected(space, cells, keys)
+        labels, count = distributed_components(space, cells, keys)
         normals = np.stack([self._ends[k][1] for k in self._free], axis=1)
         return Pieces(
             [self.places[k] for k in self._free],

@@ -10,7 +10,7 @@ from dolfinx import fem
 from contact.errors import InputError
 from contact.mesh.cells import Shape, rule, shape_of
 from contact.mesh.domain import Domain
-from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures
+from contact.mesh.geometry import geometry_nodes, integration_weights, inverse, jacobians
 from contact.typing import Array
 from forms.kinematics import (
     Axisymmetric,
@@ -103,7 +103,7 @@ def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean
     corners = shape.nodes(1)
     # Volumes and derivatives of the corners' functions are quadratic along each axis at most.
     at, weights = rule(shape, 3)
-    extent = measures(domain.revolved, shape, of, at, weights)
+    extent = integration_weights(domain.revolved, shape, of, at, weights)
     slopes = shape.gradients(1, at) @ inverse(jacobians(shape, of, at))
     mean = np.einsum("cq,cqkd->ckd", extent, slopes)
     if domain.revolved:

@@ -42,7 +42,7 @@ from contact.linear.layout import Layout, congruent, masked, projectors, times
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
-from contact.mesh.entities import components
+from contact.mesh.entities import connected_components
 from contact.ranks import summed
 from contact.tolerances import MOST_ROUNDING
 from contact.typing import Array
@@ -93,7 +93,7 @@ class BodyEquilibrium:
         self.rollers = Rollers(domain, self.space, body, self.unsupported)
         self.global_unknowns = make_global_unknowns(domain, self.space, body, self.unsupported)
         #: Which forces are compared with each other.
-        self.components = components(self.space)
+        self.components = connected_components(self.space)
         self.component_norms = component_norms_of(
             domain, self.space, self.global_unknowns, self.components
         )

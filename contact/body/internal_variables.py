@@ -26,7 +26,7 @@ from contact.errors import InputError
 from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
-from contact.mesh.geometry import geometry_nodes, measures
+from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.ranks import collective, on_all_ranks
 from contact.typing import Array
 from forms.hencky import FormLaw, Graded, Law
@@ -163,7 +163,7 @@ class QuadratureLaws:
     def volumes(self) -> Array:
         """The volume of the body that each place stands for, shape (places,)."""
         shape, of = shape_of(self._domain.mesh), geometry_nodes(self._domain)
-        return measures(self._domain.revolved, shape, of, *self._rule).ravel()
+        return integration_weights(self._domain.revolved, shape, of, *self._rule).ravel()
 
     def law(self, law: Law | Graded) -> FormLaw:
         """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""

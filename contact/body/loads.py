@@ -19,9 +19,9 @@ from ufl.corealg.traversal import traverse_unique_terminals
 from contact.arguments import check_finite, naming, real
 from contact.body.description import Body
 from contact.errors import InputError
-from contact.mesh.compiled import compiled
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import area, volume
+from contact.mesh.integrals import compiled
 from contact.model.body import Load
 from contact.model.fields import Amplitude, Field, Moving, at_time, constant
 from contact.ranks import on_all_ranks

@@ -23,9 +23,9 @@ from contact.body.materials import in_parts, material_measures
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
-from contact.mesh.compiled import compiled
 from contact.mesh.domain import Domain, Measure
 from contact.mesh.entities import Indices
+from contact.mesh.integrals import compiled
 from contact.model.fields import constant
 from contact.model.formula import Expression
 from contact.ranks import on_all_ranks

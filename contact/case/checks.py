@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 from contact.body.elements import needed
 from contact.case.units import check_units
 from contact.errors import nearest
-from contact.mesh.together import meet, members
+from contact.mesh.parts import meet, members
 from contact.model.body import ZERO
 from contact.model.fields import CONSTANT
 from contact.model.formula import Expression

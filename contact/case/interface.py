@@ -13,7 +13,7 @@ from contact.interface.law import Conductor
 from contact.interface.layer import Layer
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import area, volume
-from contact.mesh.together import meet
+from contact.mesh.parts import meet
 from contact.model import obstacle
 from contact.model.fields import steady
 from contact.model.formula import Expression, as_number

@@ -19,7 +19,7 @@ from contact.errors import InputError
 from contact.mesh import grid
 from contact.mesh.cells import SHAPES, Shape
 from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_further_names
-from contact.mesh.geometry import shares, volumes
+from contact.mesh.geometry import volume_fractions, volumes
 from contact.mesh.grid import rotate
 from contact.mesh.reader import from_file, from_generator
 from contact.mesh.transfer import check_adaptable, refined
@@ -344,7 +344,7 @@ class Mesh(Section):
         with on_all_ranks(domain.comm):  # a formula may have no value on one of them
             facets = {name: facets_inside(mesh, marker) for name, marker in markers("inside")}
             cells = {name: cells_in(mesh, marker) for name, marker in markers("regions")}
-            sides = {name: shares(domain, marker) for name, marker in markers("regions")}
+            sides = {name: volume_fractions(domain, marker) for name, marker in markers("regions")}
         return straddled(with_further_names(domain, facets, cells), sides)
 
     def _check_memory(self, comm: MPI.Intracomm, cells: int, dim: int) -> None:

@@ -12,7 +12,7 @@ from contact.errors import counted
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cells_at
-from contact.mesh.geometry import geometry_nodes, measures, outward, volumes
+from contact.mesh.geometry import geometry_nodes, integration_weights, outward, volumes
 from contact.typing import Array
 
 #: Length of the mean of a part's normals from which on the part counts as flat, and below which
@@ -58,7 +58,7 @@ def _sizes(domain: Domain, facets: Indices) -> tuple[int, float, Array, Array]:
     shape, order, behind = shape_of(domain.mesh), domain.order, geometry_nodes(domain, cells)
     nodes = np.take_along_axis(behind, shape.facet_nodes(order)[place][:, :, None], axis=1)
     at, weights = rule(shape.facet, 4 * order)
-    areas = measures(domain.revolved, shape.facet, nodes, at, weights)
+    areas = integration_weights(domain.revolved, shape.facet, nodes, at, weights)
     points = np.einsum("qk,fkd->fqd", shape.facet.lagrange(order, at), nodes)
     normal = outward(shape.facet, nodes, behind.mean(axis=1), at)
     normal = normal / np.linalg.norm(normal, axis=2, keepdims=True)

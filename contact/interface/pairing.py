@@ -18,7 +18,7 @@ from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, contact_directions
 from contact.interface.placing import check_gap
 from contact.mesh.domain import Domain
-from contact.mesh.entities import cells_at, components, owned_among
+from contact.mesh.entities import cells_at, connected_components, owned_among
 from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle
 from contact.model.obstacle.protocol import measured
@@ -110,14 +110,14 @@ def _coupled(
         The part that the slave side is, if there is friction.
     """
     owners = slave.owners
-    one, other = (owners.named(side.nodes.ravel()) for side in (slave, master))
+    one, other = (owners.requested(side.nodes.ravel()) for side in (slave, master))
     if body.comm.allreduce(np.intersect1d(one, other).size, op=MPI.SUM) > 0:
         raise InputError(
             f"{label} share nodes; accepted: parts of two bodies whose meshes are apart", "pair"
         )
     reach = REACH * body.domain.size
     coupling = couple(slave, master, reach)
-    on_axis = owners.named(pairs_at_axis(slave, slave.nodes)[:, 0])
+    on_axis = owners.requested(pairs_at_axis(slave, slave.nodes)[:, 0])
     stuck = np.union1d(_stuck(body, coupling), on_axis)
     if rough is not None:
         one_sided = _one_sided(body, coupling, owners)
@@ -139,7 +139,7 @@ def _coupled(
 
 def _check_apart(body: BodyEquilibrium, coupling: Coupling, owners: Owners, label: str) -> None:
     """Refuse jumps of nodes that follow something rigid or an electrode. Collective."""
-    local = owners.named(np.concatenate([coupling.slaves, coupling.masters])) - owners.begin
+    local = owners.requested(np.concatenate([coupling.slaves, coupling.masters])) - owners.begin
     if body.comm.allreduce(bool(body.global_unknowns.tied[local].any()), op=MPI.LOR):
         raise InputError(
             f"{label}: their nodes follow a rigid part or an electrode of unknown potential; "
@@ -247,7 +247,7 @@ def _connected(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> boo
     piece, count = body.components
     found = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):
-        found[k, piece[owners.named(nodes) - owners.begin]] = 1
+        found[k, piece[owners.requested(nodes) - owners.begin]] = 1
     body.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
     return bool(found.all(axis=0).any())
 
@@ -259,7 +259,7 @@ def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
     first of a pair. Parts that belong to several bodies are left out.
     """
     space = fem.functionspace(domain.mesh, ("Lagrange", 1))
-    piece, count = components(space)
+    piece, count = connected_components(space)
     if count == 1:
         return []
     comm = domain.comm
@@ -267,7 +267,7 @@ def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
     for name in sorted(domain.parts):
         side = surface_of(domain, space, name)
         there = np.zeros(count, dtype=np.intc)
-        there[piece[side.owners.named(side.nodes.ravel()) - side.owners.begin]] = 1
+        there[piece[side.owners.requested(side.nodes.ravel()) - side.owners.begin]] = 1
         comm.Allreduce(MPI.IN_PLACE, there, op=MPI.MAX)
         total = comm.allreduce(np.array([side.radii.sum(), side.count]), op=MPI.SUM)
         thinnest = comm.allreduce(float(_heights(domain, side, name).min(initial=np.inf)), MPI.MIN)

@@ -1,10 +1,12 @@
 """Meshes with names: parts of their boundary and regions of their cells.
 
-`domain`: `Domain`, `from_mesh` for a dolfinx mesh, and `revolved`; `grid`: `rectangle`, `box`,
-their `Piece`; `reader`: `from_file` for files, `from_msh` for those of Gmsh, and `from_generator`
-for the package `meshes`; `cells`, `geometry`: the shapes of cells, and their sizes; `transfer`:
-`refined` and `carry`; `entities`: facets, connected components; `owners`: values of
-nodes that other ranks own.
+- `domain`: `Domain`, `from_mesh`, `revolved`; `parts`: names of parts; `integrals`: measures and
+  forms over them; `grid`: `rectangle`, `box`.
+- `cells`: reference cells, by basix; `geometry`: Jacobians, normals, volumes; `entities`: facets,
+  connected components; `owners`: nodes of other ranks.
+- `transfer`: `refined`, `carry`; `deviation`: curved surfaces from straight facets.
+- `reader`: `from_file` and its table of formats, `from_generator` for the package `meshes`; one
+  file a format; `contents`: what these return; `validity`: checks of that.
 
 Imports: `contact.errors`, `contact.typing`, `contact.ranks`, `contact._compat`.
 """

@@ -23,8 +23,8 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from contact.mesh.cells import distinct, once, together
-from contact.mesh.contents import ELEMENTS, Contents, Ints, Kind, letters, same_name
+from contact.mesh.cells import joined_facets, single_facets, unique_rows
+from contact.mesh.contents import ELEMENTS, Contents, Ints, Kind, decoded, name_clash
 from contact.typing import Array
 
 #: Types of elements: beginnings of their names, and their dimension.
@@ -167,7 +167,7 @@ def _lines(file: Path, depth: int = 0) -> Iterator[tuple[Path, str]]:
     if depth > 10:
         raise ValueError(f"*INCLUDE: {file.name} includes itself")
     pending = ""
-    for raw in letters(file.read_bytes()).splitlines():
+    for raw in decoded(file.read_bytes()).splitlines():
         line = pending + raw.strip()
         pending = ""
         if not line or line.startswith("**"):
@@ -412,7 +412,7 @@ def _contents(found: Deck) -> Contents:
         elif sort == "ELEMENT":
             made.surfaces[name] = _faces(found, lines, elements, blocks, dim)
     if twice:
-        made.notes.append(same_name(twice))
+        made.notes.append(name_clash(twice))
     plane = [kind for kind in found.elements if dim == 2 and _element_type(kind).dim == 2]
     made_for = {own for kind in plane for of, own in KINEMATICS.items() if kind.startswith(of)}
     if len(made_for) == 1 and made_for != {"plane_strain"}:
@@ -469,6 +469,6 @@ def _faces(
                 raise ValueError(f"{word} no face {label!r}")
     every: list[Ints] = []
     for name, alike in whole.items():
-        cells = distinct(np.concatenate(alike))
+        cells = unique_rows(np.concatenate(alike))
         every += [cells[:, list(face)] for face in FACES[name]]
-    return together([*faces, once(together(every))] if every else faces)
+    return joined_facets([*faces, single_facets(joined_facets(every))] if every else faces)

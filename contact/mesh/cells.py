@@ -292,30 +292,30 @@ def simplices(rows: Nodes, dim: int) -> Nodes:
     return made
 
 
-def together(faces: Sequence[Nodes]) -> Nodes:
+def joined_facets(faces: Sequence[Nodes]) -> Nodes:
     """Return facets of one dimension as one array, without those that have collapsed.
 
     They are cut into triangles where they are unlike, or two corners of one are one node.
     """
     unlike = len({face.shape[1] for face in faces}) > 1
-    if unlike or any(face.shape[1] > 3 and not proper(face).all() for face in faces):
+    if unlike or any(face.shape[1] > 3 and not uncollapsed(face).all() for face in faces):
         faces = [simplices(face, 2).reshape(-1, 3) for face in faces]
     found = np.concatenate(faces) if faces else np.zeros((0, 1), dtype=np.int64)
-    return found[proper(found)]
+    return found[uncollapsed(found)]
 
 
-def proper(rows: Nodes) -> NDArray[np.bool_]:
+def uncollapsed(rows: Nodes) -> NDArray[np.bool_]:
     """Return which cells or facets have no node twice, shape (n,)."""
     return np.asarray(np.all(np.diff(np.sort(rows, axis=1), axis=1) != 0, axis=1))
 
 
-def distinct(rows: Nodes) -> Nodes:
+def unique_rows(rows: Nodes) -> Nodes:
     """Return cells or facets without those that have the nodes of one before."""
     first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)[1]
     return rows[np.sort(first)]
 
 
-def once(faces: Nodes) -> Nodes:
+def single_facets(faces: Nodes) -> Nodes:
     """Return the facets that are there once."""
     _, first, count = np.unique(
         np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True

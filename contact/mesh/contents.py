@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from contact.errors import InputError
-from contact.mesh.cells import SHAPES, Shape, proper, simplices, together
+from contact.mesh.cells import SHAPES, Shape, joined_facets, simplices, uncollapsed
 from contact.typing import Array
 
 Ints = npt.NDArray[np.int64]
@@ -135,7 +135,7 @@ class Contents:
             self.nodes[name] = np.union1d(self.nodes.get(name, members), members)
 
 
-def letters(given: bytes) -> str:
+def decoded(given: bytes) -> str:
     """Return a text of a file, in the letters of Western Europe (Latin-1) if it is not UTF-8."""
     try:
         return given.decode("utf-8-sig")
@@ -158,12 +158,12 @@ def _by_number(key: str, arrays: Sequence[Array]) -> Iterator[tuple[str, int, In
             yield names.get(number, f"{before}{number}"), block, np.flatnonzero(values == number)
 
 
-def same_name(names: Sequence[str]) -> str:
+def name_clash(names: Sequence[str]) -> str:
     """Return the note on sets of nodes that are left out, as a surface has their name."""
     return f"sets left out, as a surface of other facets has their name: {', '.join(names)}"
 
 
-def in_one_shape(contents: Contents) -> Contents:
+def with_one_shape(contents: Contents) -> Contents:
     """Return contents whose cells have one shape of ours: they are cut into simplices if need be.
 
     Cells that are not known, or of higher order, stay.
@@ -174,7 +174,7 @@ def in_one_shape(contents: Contents) -> Contents:
     if dim < 2 or not all(kind.known for kind in cells):
         return contents
     collapsed = sum(
-        int(np.count_nonzero(~proper(rows[:, : kind.corners])))
+        int(np.count_nonzero(~uncollapsed(rows[:, : kind.corners])))
         for kind, (_, rows) in zip(kinds, contents.blocks, strict=True)
         if kind.dim == dim and kind.corners > dim + 1
     )
@@ -202,7 +202,7 @@ def _cut(contents: Contents, kinds: Sequence[Kind], dim: int, note: str) -> Cont
         if kind.dim >= dim - 1 and kind.known:
             made = simplices(nodes[:, : kind.corners], kind.dim)
             # Those of no volume are no part of a cell that has collapsed; no simplex may have.
-            full = proper(made.reshape(-1, kind.dim + 1)).reshape(made.shape[:2])
+            full = uncollapsed(made.reshape(-1, kind.dim + 1)).reshape(made.shape[:2])
             full |= made.shape[1] == 1
             count = full.sum(axis=1)
             if kind.dim == dim and not count.all():
@@ -216,14 +216,14 @@ def _cut(contents: Contents, kinds: Sequence[Kind], dim: int, note: str) -> Cont
                 chosen[members[b]] = True
                 groups[name][b] = np.flatnonzero(np.repeat(chosen, count))
     surfaces = {
-        name: together([simplices(faces, dim - 1).reshape(-1, dim)]) if len(faces) else faces
+        name: joined_facets([simplices(faces, dim - 1).reshape(-1, dim)]) if len(faces) else faces
         for name, faces in contents.surfaces.items()
     }
     notes = [*contents.notes, note]
     return replace(contents, blocks=blocks, groups=groups, surfaces=surfaces, notes=notes)
 
 
-def in_order(shape: Shape, points: Array, rows: Ints) -> Ints:
+def in_dolfinx_order(shape: Shape, points: Array, rows: Ints) -> Ints:
     """Return cells whose nodes are in the order of dolfinx, those that a serendipity cell has.
 
     Programs number nodes between corners in ways of their own: of hexahedra Exodus has the upright

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.mesh.cells import facet_with
-from contact.mesh.geometry import across
+from contact.mesh.geometry import area_vectors
 from contact.mesh.owners import ALONE, Owners
 from contact.ranks import exchanged
 from contact.typing import Array
@@ -182,7 +182,7 @@ def _weights(corners: Array) -> Array:
     sides = [np.swapaxes(corners[:, ends] - corners[:, [c]], 1, 2) for c, ends in enumerate(around)]
     every = np.stack(sides, axis=1)
     lengths = np.linalg.norm(every, axis=2).prod(axis=2)
-    return np.asarray(np.linalg.norm(across(every), axis=2) / lengths**2)
+    return np.asarray(np.linalg.norm(area_vectors(every), axis=2) / lengths**2)
 
 
 def _around(place: Numbers, count: int) -> tuple[Numbers, NDArray[np.bool_]]:

@@ -18,14 +18,14 @@ import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from numpy.typing import NDArray
-from ufl.core.expr import Expr
 
 from contact import _compat
 from contact.errors import InputError
 from contact.mesh.cells import SHAPES, shape_of
 from contact.mesh.contents import BODY
 from contact.mesh.entities import Indices, extent, exterior_facets
-from contact.mesh.together import known, members, pieces
+from contact.mesh.integrals import ExtendedMeasure, Measure
+from contact.mesh.parts import disjoint_pieces, known_name, members
 from contact.typing import Array
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
 
@@ -36,37 +36,7 @@ UNLESS = (
 )
 
 
-@dataclass(frozen=True)
-class ExtendedMeasure:
-    """A measure of UFL over a half plane, times the extent of the body there.
-
-    It is used like a measure of UFL: it multiplies an integrand from the right.
-
-    Attributes
-    ----------
-    measure
-        dx or ds of the mesh.
-    extent
-        2 pi r, the length of the ring through a point.
-    """
-
-    measure: ufl.Measure
-    extent: Expr
-
-    def __call__(self, *arguments: Any, **settings: Any) -> ExtendedMeasure:
-        """Return the measure with a subdomain or metadata of its own."""
-        return ExtendedMeasure(self.measure(*arguments, **settings), self.extent)
-
-    def __rmul__(self, integrand: Any) -> ufl.Form:
-        """Return the integral over the whole body."""
-        return (self.extent * integrand) * self.measure
-
-
-#: Measure of a body or of a part of its boundary.
-Measure: TypeAlias = ufl.Measure | ExtendedMeasure
-
-
-#: Indices of facets or cells that this rank owns, ascending.
+#: Function of x, shape (3, n), that is true at places, shape (n,).
 Marker: TypeAlias = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
 
 
@@ -187,7 +157,7 @@ class Domain:
         Parameters
         ----------
         name
-            Name of the part; several may stand `together.Together`.
+            Name of the part; several may stand `parts.Together`.
 
         Returns
         -------
@@ -209,7 +179,7 @@ class Domain:
         for one in members(name):
             if one in self.unusable and one not in self.inside:
                 raise InputError(self.unusable[one], "part-facets")
-        found = [names[known("part", one, names)] for one in members(name)]
+        found = [names[known_name("part", one, names)] for one in members(name)]
         return found[0] if len(found) == 1 else np.unique(np.concatenate(found))
 
     def cells(self, name: str) -> Indices:
@@ -229,7 +199,7 @@ class Domain:
         InputError
             If there is no such region, likewise.
         """
-        return self.regions[known("region", name, self.regions)]
+        return self.regions[known_name("region", name, self.regions)]
 
     @property
     def kinematics(self) -> Kinematics:
@@ -293,7 +263,7 @@ class Domain:
     @cached_property
     def _pieces(self) -> list[tuple[tuple[int, ...], Indices]]:
         count = self.mesh.topology.index_map(self.dim - 1).size_local
-        return pieces(self.comm, count, self.parts.values())
+        return disjoint_pieces(self.comm, count, self.parts.values())
 
     @cached_property
     def _facet_data(self) -> list[tuple[int, Indices]]:

@@ -1,4 +1,4 @@
-"""Facets, entities of this rank, groups of indices, connected components, and extents."""
+"""Facets and their cells, overlapping groups of indices, connected components, extents."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dolfinx import mesh as dmesh
 from dolfinx.common import IndexMap
 from mpi4py import MPI
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components, depth_first_order
+from scipy.sparse import csgraph
 
 from contact._compat import lasting
 from contact.mesh.cells import shape_of
@@ -24,12 +24,11 @@ Indices: TypeAlias = npt.NDArray[np.int32]
 def combinations(
     count: int, groups: Iterable[npt.NDArray[np.integer[Any]]]
 ) -> tuple[Indices, tuple[tuple[int, ...], ...]]:
-    """Write groups of indices that may overlap as one number an index.
+    """Return overlapping groups of indices as one label an index.
 
     Returns
     -------
-    For each of the indices 0, ..., count - 1 a number, and for each number the groups, by their
-    positions, that the index is in.
+    The labels of the indices 0, ..., count - 1, and for each label the groups by their positions.
     """
     numbers = np.zeros(count, dtype=np.int32)
     combined: list[tuple[int, ...]] = [()]
@@ -45,7 +44,7 @@ def combinations(
 def owned_among(
     index_map: IndexMap, numbers: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.intp], Indices]:
-    """Return which of global numbers are those of this rank, and the local numbers of these."""
+    """Return the places of owned ones among global numbers, and their local numbers."""
     begin, end = index_map.local_range
     here = np.flatnonzero((numbers >= begin) & (numbers < end))
     return here, (numbers[here] - begin).astype(np.int32)
@@ -70,10 +69,9 @@ def cells_at(mesh: dmesh.Mesh, facets: Indices) -> tuple[Indices, npt.NDArray[np
 
 
 def elongation(mesh: dmesh.Mesh, facets: Indices) -> float:
-    """Return how many times longer than twice their facets the cells behind are, at most; 1 if not.
+    """Return the largest ratio, at least 1, of the diameter of cells to twice their facets' edge.
 
-    Collective. Twice as long is usual, of cells as a mesh generator makes them. Facets are as long
-    as their shortest edge: across it a node has its neighbour.
+    Collective. The edge is the shortest one of the facet; a ratio of 1 is usual.
     """
     behind, _ = cells_at(mesh, facets)
     dim, found = mesh.topology.dim, 1.0
@@ -105,28 +103,28 @@ def exterior_facets(mesh: dmesh.Mesh) -> Indices:
     return np.sort(dmesh.exterior_facet_indices(mesh.topology))
 
 
-def components(space: fem.FunctionSpace) -> tuple[Indices, int]:
+def connected_components(space: fem.FunctionSpace) -> tuple[Indices, int]:
     """Return the connected component of each owned node, shape (n,), and how many there are.
 
     Collective. Nodes of one cell are connected; regions that share no nodes are not.
     """
-    labels, count = connected(space, space.dofmap.list)
+    labels, count = distributed_components(space, space.dofmap.list)
     return labels[: space.dofmap.index_map.size_local], count
 
 
-def connected(
+def distributed_components(
     space: fem.FunctionSpace, cells: Indices, keys: npt.NDArray[np.int64] | None = None
 ) -> tuple[Indices, int]:
-    """Return the connected component of each vertex of a graph, and how many there are. Collective.
+    """Return the connected component of each vertex of a distributed graph. Collective.
 
     Parameters
     ----------
     space
-        A space: the first vertices are its local nodes.
+        A space, whose local nodes are the first vertices.
     cells
-        Vertices of each local cell, shape (cells, n): they are connected.
+        Vertices of each local cell, shape (cells, n), which are connected.
     keys
-        Of the further vertices, by which several ranks know them, shape (further, k).
+        Of further vertices, the same on each rank that has them, shape (further, k).
 
     Returns
     -------
@@ -157,24 +155,23 @@ def connected(
 def component_sums(
     comm: MPI.Intracomm, component: npt.NDArray[Any], values: npt.NDArray[np.float64], count: int
 ) -> npt.NDArray[np.float64]:
-    """Return the sums of the values of all ranks over each component, (count,). Collective."""
+    """Return the sums of values over each component, (count,). Collective."""
     return summed(comm, np.bincount(component, values, minlength=count))
 
 
 def graph_components(
     one: npt.NDArray[Any], other: npt.NDArray[Any], size: int
 ) -> tuple[int, Indices]:
-    """Return the number of components of a graph given by its edges, and that of each vertex."""
+    """Return the number of components of a graph, given its edges, and that of each vertex."""
     graph = sparse.coo_array((np.ones(one.size, dtype=bool), (one, other)), shape=(size, size))
-    count, labels = connected_components(graph, directed=False)
+    count, labels = csgraph.connected_components(graph, directed=False)
     return int(count), labels
 
 
 def paths(edges: npt.NDArray[np.integer[Any]], count: int) -> list[npt.NDArray[np.intp]]:
-    """Return the vertices of each component of a graph of lines, from end to end.
+    """Return the vertices of each polyline of a graph, in the order of their first vertices.
 
-    Each begins at its end with the smaller number; a closed curve has none, and begins at its
-    first vertex. They come in the order of their first vertices.
+    An open one begins at its end of the smaller number, a closed one at its smallest vertex.
 
     Parameters
     ----------
@@ -183,10 +180,10 @@ def paths(edges: npt.NDArray[np.integer[Any]], count: int) -> list[npt.NDArray[n
     """
     graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(count, count)).tocsr()
     graph = graph + graph.T
-    pieces, piece = connected_components(graph, directed=False)
+    pieces, piece = csgraph.connected_components(graph, directed=False)
     first = np.lexsort((np.arange(count), np.diff(graph.indptr) > 1, piece))
     starts = first[np.searchsorted(piece[first], np.arange(pieces))]
     return [
-        depth_first_order(graph, start, directed=False, return_predecessors=False)
+        csgraph.depth_first_order(graph, start, directed=False, return_predecessors=False)
         for start in np.sort(starts)
     ]

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from contact.mesh.cells import together
-from contact.mesh.contents import Contents, Ints, letters
+from contact.mesh.cells import joined_facets
+from contact.mesh.contents import Contents, Ints, decoded
 
 #: Beginnings of the names of elements, and meshio's names without a number; "" for points.
 KINDS = {
@@ -122,7 +122,7 @@ def _names(data: Any, kind: str, count: int) -> list[str]:
     for k in range(count):
         said = b"" if names is None else b"".join(names[k])
         number = k + 1 if numbers is None else int(numbers[k])
-        found.append(letters(said.split(b"\0")[0]).strip() or str(number))
+        found.append(decoded(said.split(b"\0")[0]).strip() or str(number))
     return found
 
 
@@ -140,4 +140,4 @@ def _facets(contents: Contents, elements: Ints, sides: Ints) -> Ints:
                 rows = nodes[elements[here & (sides == side)] - first]
                 found.append(rows[:, list(table[side])])
         first += len(nodes)
-    return together(found)
+    return joined_facets(found)

@@ -1,4 +1,4 @@
-"""The sizes of cells and facets: maps from the reference cell, volumes, areas, integrals."""
+"""Geometry of cells and facets: Jacobians, normals, quadrature weights, volumes and areas."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from contact.mesh.domain import Domain, Indices, Marker
 from contact.mesh.entities import cells_at
 from contact.typing import Array
 
-#: Places of the corners of cells, over their distance from the middle, that no edge of a region
-#: beside them reaches; and the degree of the rule for integrands that are no polynomials: cells on
-#: both sides of such an edge, areas of curved facets.
+#: Relative distance from the middle of cells of the points near corners at which `volume_fractions`
+#: tries a marker; degree of the rule for integrands that are no polynomials.
 INWARD, FINE = 0.99, 20
 
 
@@ -47,7 +46,7 @@ def jacobians(shape: Shape, of: Array, at: Array) -> Array:
 
 
 def outward(shape: Shape, points: Array, inside: Array, at: Array) -> Array:
-    """Return normals of facets at points, away from the body and as long as facets are large.
+    """Return the outward area vectors of facets at points, shape (f, q, d).
 
     Parameters
     ----------
@@ -58,7 +57,7 @@ def outward(shape: Shape, points: Array, inside: Array, at: Array) -> Array:
     at
         Points of the reference facet, shape (q, d - 1); of straight simplices one vector for all.
     """
-    normal = across(jacobians(shape, points, at))
+    normal = area_vectors(jacobians(shape, points, at))
     away = points.mean(axis=1) - inside
     return np.asarray(normal * np.sign(np.einsum("fqd,fd->fq", normal, away))[..., None])
 
@@ -69,19 +68,16 @@ def unit_normals(shape: Shape, points: Array, inside: Array) -> Array:
     return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
 
 
-def sizes(shape: Shape, of: Array, at: Array) -> Array:
-    """Return the size of each over that of the reference one at points, (n, q) or (n, 1).
-
-    As `jacobians`; of facets it is sqrt(det J^T J).
-    """
+def volume_factors(shape: Shape, of: Array, at: Array) -> Array:
+    """Return |det J| of cells, sqrt(det J^T J) of facets at points, (n, q); as `jacobians`."""
     jacobian = jacobians(shape, of, at)
     if jacobian.shape[2] == jacobian.shape[3]:
         return np.abs(determinant(jacobian))
-    return np.asarray(np.linalg.norm(across(jacobian), axis=-1))
+    return np.asarray(np.linalg.norm(area_vectors(jacobian), axis=-1))
 
 
-def across(jacobian: Array) -> Array:
-    """Return vectors normal to facets, as long as these are large, shape (..., d).
+def area_vectors(jacobian: Array) -> Array:
+    """Return area vectors of facets: normal, of the length sqrt(det J^T J), shape (..., d).
 
     Parameters
     ----------
@@ -97,12 +93,12 @@ def across(jacobian: Array) -> Array:
 def facet_normals(
     domain: Domain, part: str, degree: int
 ) -> tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]], Array]:
-    """Return the normals of the facets of a part at their nodes of a degree, out of the body.
+    """Return the outward area vectors of the facets of a part at their nodes of a degree.
 
     Returns
     -------
-    The cells of the facets, (f,), the numbers of these in their cells, (f,), and vectors as long as
-    the facets are large, (f, q, d), q = 1 for straight simplices.
+    The cells of the facets, (f,), the numbers of these in their cells, (f,), and the vectors,
+    (f, q, d), q = 1 for straight simplices.
     """
     mesh, d, shape = domain.mesh, domain.dim, shape_of(domain.mesh)
     cells, place = cells_at(mesh, domain.facets(part))
@@ -137,21 +133,23 @@ def inverse(matrix: Array) -> Array:
     return np.asarray(np.stack(rows, axis=-2) / det)
 
 
-def measures(revolved: bool, shape: Shape, of: Array, at: Array, weights: Array) -> Array:
-    """Return the weights of points in integrals over the body, (n, q): of a revolved one, of rings.
+def integration_weights(
+    revolved: bool, shape: Shape, of: Array, at: Array, weights: Array
+) -> Array:
+    """Return w_q |J| at quadrature points, (n, q); of a body of revolution 2 pi r w_q |J|.
 
     Parameters
     ----------
     revolved
-        Whether the cells or facets stand for the rings through them.
+        Whether the cells or facets are those of the half plane of a body of revolution.
     shape
-        Of its cells or facets.
+        Of the cells or facets.
     of
-        Nodes of some of them, shape (n, nodes, d).
+        Their nodes, shape (n, nodes, d).
     at, weights
         Points, shape (q, dim), and weights, (q,), of a rule.
     """
-    found = sizes(shape, of, at) * weights
+    found = volume_factors(shape, of, at) * weights
     if not revolved:
         return found
     return found * 2 * np.pi * (of[..., 0] @ shape.lagrange(shape.degree_of(of.shape[1]), at).T)
@@ -184,21 +182,22 @@ def area(domain: Domain, part: str) -> float:
     nodes = np.take_along_axis(geometry_nodes(domain, cells), ends[:, :, None], axis=1)
     straight = shape.facet.simplex and domain.order == 1
     points, weights = rule(shape.facet, 1 if straight else FINE)
-    own = measures(domain.revolved, shape.facet, nodes, points, weights)
+    own = integration_weights(domain.revolved, shape.facet, nodes, points, weights)
     return float(domain.comm.allreduce(float(own.sum()), op=MPI.SUM))
 
 
 def volumes(domain: Domain) -> Array:
-    """Return the volumes of the owned cells, or of the rings that they are, shape (cells,)."""
+    """Return the volumes of the owned cells, in a body of revolution of rings, shape (cells,)."""
     shape = shape_of(domain.mesh)
     points, weights = rule(shape, 1 if shape.simplex and domain.order == 1 else 3 * domain.order)
-    return measures(domain.revolved, shape, geometry_nodes(domain), points, weights).sum(axis=1)
+    nodes = geometry_nodes(domain)
+    return integration_weights(domain.revolved, shape, nodes, points, weights).sum(axis=1)
 
 
-def shares(domain: Domain, marker: Marker) -> Array:
-    """Return the shares of the owned cells in which a function of x is true, shape (cells,).
+def volume_fractions(domain: Domain, marker: Marker) -> Array:
+    """Return the volume fractions of the owned cells in which a function of x is true, (cells,).
 
-    Cells at whose corners it is as in their middle are taken for one side of its boundary.
+    They are 0 or 1 for cells where it is the same in the middle and near all corners.
     """
     shape, of = shape_of(domain.mesh), geometry_nodes(domain)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from contact.mesh.contents import Contents, Ints, letters
+from contact.mesh.contents import Contents, Ints, decoded
 
 #: Letters of the kinds of elements, behind which is their number of nodes, and meshio's names.
 KINDS = {"SE": "line", "TR": "triangle", "QU": "quad", "TE": "tetra", "T": "tetra"}
@@ -63,7 +63,7 @@ def _names(families: Any) -> dict[int, list[str]]:
     for family in families.values():
         none = np.zeros((0, 80), dtype=np.uint8)
         given = np.asarray(family["GRO/NOM"][()]).view(np.uint8) if "GRO" in family else none
-        texts = [letters(bytes(row).split(b"\0")[0]) for row in given]
+        texts = [decoded(bytes(row).split(b"\0")[0]) for row in given]
         found[int(family.attrs["NUM"])] = [text.strip() for text in texts]
     return found
 

@@ -1,4 +1,4 @@
-"""Which rank owns a node, given its global number, and values of nodes that other ranks own."""
+"""Owners of nodes by their global numbers, and values at nodes of other ranks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Owners:
-    """Who owns the nodes: their numbers follow each other from rank to rank.
+    """Owners of nodes, whose global numbers are contiguous on each rank.
 
     Attributes
     ----------
@@ -66,8 +66,8 @@ class Owners:
         ranks, given = exchanged(self.comm, self.ranks(asked), asked)
         return exchanged(self.comm, ranks, of(given))[1][place]
 
-    def named(self, numbers: Numbers) -> Numbers:
-        """Return the nodes of this rank that any rank names, ascending. Collective."""
+    def requested(self, numbers: Numbers) -> Numbers:
+        """Return the nodes of this rank that any rank requests, ascending. Collective."""
         asked = np.unique(numbers)
         return np.unique(exchanged(self.comm, self.ranks(asked), asked)[1])
 
@@ -85,15 +85,12 @@ class Owners:
         return np.unique(np.concatenate([own, numbers[inside]]))
 
     def sums(self, numbers: Numbers, values: Array) -> tuple[Numbers, Array]:
-        """Return the nodes of this rank that got contributions, ascending, and the sums of these.
-
-        Collective.
+        """Return the nodes of this rank with contributions, and their sums. Collective.
 
         Parameters
         ----------
         numbers, values
-            Nodes of any ranks, which may be there several times, shape (n,), and the contributions
-            there, shape (n, k).
+            Nodes of any ranks, some several times, shape (n,), and contributions, shape (n, k).
         """
         asked, totals = _summed(numbers, values)
         _, given, parts = exchanged(self.comm, self.ranks(asked), asked, totals)
@@ -102,10 +99,7 @@ class Owners:
     def entries(
         self, rows: Numbers, columns: Numbers, values: Array
     ) -> tuple[Numbers, Numbers, Array]:
-        """Return the entries of a matrix, whose rows are nodes, in the rows of this rank.
-
-        Several may be at one place. Collective.
-        """
+        """Return the entries, not summed, of a matrix in the rows of this rank. Collective."""
         return exchanged(self.comm, self.ranks(rows), rows, columns, values)[1:]  # type: ignore[return-value]
 
 
@@ -116,19 +110,19 @@ def _summed(numbers: Numbers, values: Array) -> tuple[Numbers, Array]:
     return found, total
 
 
-#: Of facets that no other rank has a share in.
+#: Owners on one rank alone.
 ALONE = Owners(MPI.COMM_SELF, np.array([0, np.iinfo(np.int64).max]))
 
 
 class Halo:
-    """Values at the nodes of this rank, and behind them at some nodes of other ranks. Collective.
+    """Values at the nodes of this rank, and then at its ghosts. Collective.
 
     Parameters
     ----------
     owners, count
-        The owners of all nodes, and how many this rank owns.
+        The owners of all nodes, and the number of those of this rank.
     numbers
-        The nodes whose values this rank asks for.
+        Nodes of this or other ranks whose values are needed here.
     """
 
     def __init__(self, owners: Owners, count: int, numbers: Numbers) -> None:
@@ -146,12 +140,12 @@ class Halo:
 
     @property
     def numbers(self) -> Numbers:
-        """The global numbers of all these nodes."""
+        """The global numbers of the nodes and ghosts."""
         own = np.arange(self.begin, self.begin + self.count)
         return np.concatenate([own, self._ghosts])
 
     def places(self, numbers: Numbers) -> NDArray[np.intp]:
-        """Return where nodes are among these."""
+        """Return the places of nodes among these."""
         own = self._owners.ranks(numbers) == self._owners.comm.rank
         ghost = self.count + np.searchsorted(self._ghosts, numbers)
         return np.where(own, numbers - self.begin, ghost)
@@ -162,24 +156,24 @@ class Halo:
         return self._vectors[size]
 
     def forward(self, values: Array) -> Array:
-        """Return the values at all of them, (nodes, k), given those of this rank. Collective."""
+        """Update the ghosts of own values; return all, shape (nodes, k). Collective."""
         vector = self._vector(values.shape[1])
         vector.array[: values.size] = values.ravel()
         vector.scatter_forward()
         return vector.array.reshape(-1, values.shape[1]).copy()
 
     def reverse(self, values: Array) -> Array:
-        """Return the sums of all ranks' values at nodes of this rank, (count, k). Collective."""
+        """Add values at ghosts to those of their owners; return these, (count, k). Collective."""
         vector = self._vector(values.shape[1])
         vector.array[:] = values.ravel()
         vector.scatter_reverse(la.InsertMode.add)
         return vector.array[: self.count * values.shape[1]].reshape(-1, values.shape[1]).copy()
 
 
-def matrix(
+def sparse_rows(
     rows: Numbers, entries: tuple[Numbers, Numbers, Array]
 ) -> tuple[Numbers, sparse.csr_array]:
-    """Return the columns and the matrix of entries in some of their rows; the sum at each place.
+    """Return rows of a matrix of which entries are given, summed at each place.
 
     Parameters
     ----------

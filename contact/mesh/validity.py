@@ -10,8 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from contact.errors import InputError
-from contact.mesh.cells import SHAPES, Shape, distinct, once, rule
-from contact.mesh.contents import BODY, Contents, Ints, Kind, in_one_shape, in_order, same_name
+from contact.mesh.cells import SHAPES, Shape, rule, single_facets, unique_rows
+from contact.mesh.contents import (
+    BODY,
+    Contents,
+    Ints,
+    Kind,
+    in_dolfinx_order,
+    name_clash,
+    with_one_shape,
+)
 from contact.mesh.domain import UNLESS
 from contact.mesh.entities import combinations
 from contact.mesh.geometry import determinant, inverse, jacobians
@@ -113,12 +121,12 @@ def check(contents: Contents) -> Cells:
     for _, nodes in contents.blocks:
         if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(contents.points):
             raise InputError("it has elements whose nodes it does not have", "mesh-file")
-    contents = in_one_shape(contents)
+    contents = with_one_shape(contents)
     shape = _check_kinds([kind for kind in contents.kinds if kind.dim == dim], dim)
     blocks, kinds = contents.blocks, contents.kinds
     whole = [b for b, kind in enumerate(kinds) if kind.dim == dim]
     points = np.asarray(contents.points, dtype=float)
-    rows = in_order(shape, points, np.concatenate([blocks[b][1] for b in whole]))
+    rows = in_dolfinx_order(shape, points, np.concatenate([blocks[b][1] for b in whole]))
     corners = rows[:, : shape.corners]
     curved = _curved(points, rows, shape)
     rows = rows if curved else corners
@@ -130,7 +138,7 @@ def check(contents: Contents) -> Cells:
 
     parts, left, without = _parts(contents, shape, corners[first])
     if left:
-        notes.append(same_name(left))
+        notes.append(name_clash(left))
     if without:
         notes.append(f"sets of nodes that hold no facet of the boundary: {', '.join(without)}")
 
@@ -215,7 +223,7 @@ def _parts(
 
     def add(name: str, facets: Ints) -> None:
         there = parts.setdefault(name, facets)
-        if len(distinct(np.concatenate([there, facets]))) > len(distinct(there)):
+        if len(unique_rows(np.concatenate([there, facets]))) > len(unique_rows(there)):
             left.append(name)
 
     kinds = contents.kinds
@@ -229,7 +237,7 @@ def _parts(
             add(name, np.concatenate(sides))
     if contents.nodes:
         facets = corners[:, shape.facet_corners[:, shape.facet.around]]
-        outside = once(facets.reshape(-1, of))
+        outside = single_facets(facets.reshape(-1, of))
     for name, nodes in contents.nodes.items():
         found = outside[np.isin(outside, nodes).all(axis=1)]
         if len(found):

@@ -28,7 +28,7 @@ from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Operator
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import component_sums
-from contact.mesh.geometry import geometry_nodes, measures
+from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.methods.report import Outcome
 from contact.problem.condensed import CondensedProblem
 from contact.problem.limit_analysis import Overload
@@ -246,7 +246,7 @@ def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array
     shape, nodes = shape_of(domain.mesh), geometry_nodes(domain)
     straight = shape.simplex and domain.order == 1
     points, weights = rule(shape, 2 * body.degree + (1 if straight else 3 * domain.order))
-    size = measures(domain.revolved, shape, nodes, points, weights)
+    size = integration_weights(domain.revolved, shape, nodes, points, weights)
     functions, cells = shape.lagrange(body.degree, points), body.space.dofmap.list[: len(size)]
     rows = []
     for x in vectors:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import PrivateAttr, model_validator
 
 from contact.arguments import OfTime, expect, fill
-from contact.mesh.together import part
+from contact.mesh.parts import part
 from contact.model.body import ZERO
 from contact.model.fields import Amplitude, GivenAmplitude, GivenTimed, amplitude_of
 from contact.model.formula import Expression, as_number

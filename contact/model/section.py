@@ -53,7 +53,7 @@ from ufl.core.expr import Expr
 from contact import settings
 from contact.arguments import OfTime
 from contact.errors import InputError
-from contact.mesh import together
+from contact.mesh import parts as mesh_parts
 from contact.model.fields import Amplitude, Field, GivenAmplitude, Moving, field, own_amplitude
 from contact.model.formula import Expression, of_time
 from contact.model.messages import (
@@ -335,7 +335,7 @@ def _not_negative(expression: Any) -> Any:
 
 def _part(given: Any) -> str:
     try:
-        return together.part(given)
+        return mesh_parts.part(given)
     except InputError:
         raise PydanticCustomError("part", "part") from None
 
@@ -404,7 +404,7 @@ Part: TypeAlias = Annotated[
     PlainValidator(_part),
     PlainSerializer(lambda name: [*getattr(name, "members", ())] or name),
     PART,
-    Accepted(together.ACCEPTED),
+    Accepted(mesh_parts.ACCEPTED),
     _NAMES,
 ]
 AmplitudeName: TypeAlias = Annotated[

@@ -10,7 +10,7 @@ import numpy as np
 from contact.arguments import expect, fill
 from contact.interface.law import Conductor
 from contact.interface.layer import Layer
-from contact.mesh.together import part
+from contact.mesh.parts import part
 from contact.model.fields import Static
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Obstacle

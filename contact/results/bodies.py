@@ -132,7 +132,7 @@ def apart(problem: ContactProblem) -> Iterator[Remark]:
     for entry in problem.entries:
         if entry.coupling is not None:
             both = np.concatenate([entry.coupling.slaves, entry.coupling.masters])
-            met[piece[owners.named(both) - owners.begin]] = 1
+            met[piece[owners.requested(both) - owners.begin]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.MAX)
     alone = count - int(np.count_nonzero(met))
     if alone:

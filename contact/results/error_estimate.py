@@ -31,8 +31,8 @@ from contact.body.pointwise import in_chunks
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cells_at
-from contact.mesh.geometry import geometry_nodes, measures
-from contact.mesh.together import members, part
+from contact.mesh.geometry import geometry_nodes, integration_weights
+from contact.mesh.parts import members, part
 from contact.model.body import Bolt
 from contact.model.fields import constant
 from contact.problem.problem import ContactProblem
@@ -145,7 +145,7 @@ def estimated(
             of, raw = geometry_nodes(body.domain, chosen), flux[chosen]
             if len(fields.points) > 1:  # else constant in a cell
                 raw = shapes @ raw
-            volumes = measures(body.domain.revolved, shape, of, at, weights)
+            volumes = integration_weights(body.domain.revolved, shape, of, at, weights)
             volume += float(volumes.sum())
             if means is not None and places is not None:
                 smooth = linear @ means[places[some]]
@@ -338,7 +338,7 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     behind = geometry_nodes(domain, cells)
     ends = shape.facet_nodes(domain.order)[place]
     of_facet = np.take_along_axis(behind, ends[..., None], axis=1)
-    areas = measures(domain.revolved, shape.facet, of_facet, at, weights)
+    areas = integration_weights(domain.revolved, shape.facet, of_facet, at, weights)
     np.add.at(squares, cells, np.sum(areas * density, axis=1))
     return squares
 
@@ -389,9 +389,9 @@ def oscillation(problem: ContactProblem, time: float) -> Array:
             nodes = whole.facet_nodes(domain.order)[place]
             of = np.take_along_axis(of, nodes[..., None], axis=1)
             corners = np.take_along_axis(corners, facets[place], axis=1)
-        sizes = measures(domain.revolved, shape, of, at, weights)
+        sizes = integration_weights(domain.revolved, shape, of, at, weights)
         unseen = found - _seen(domain, corners, shape.lagrange(1, at), sizes, found)
-        area = measures(False, shape, of, at, weights).sum(axis=1)
+        area = integration_weights(False, shape, of, at, weights).sum(axis=1)
         share = (area ** (1 / shape.dim) / np.pi) ** (1 + (load.on is None))
         np.add.at(squares, cells, share * np.einsum("nq,nqc->n", sizes, unseen**2))
     return squares

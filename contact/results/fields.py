@@ -26,7 +26,7 @@ from contact.body.stress_updates import NAME, name_of
 from contact.history import BodyState, Evaluated
 from contact.mesh.cells import shape_of
 from contact.mesh.geometry import volumes
-from contact.mesh.together import pieces
+from contact.mesh.parts import disjoint_pieces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.quantities import quantities, values_of
@@ -331,7 +331,7 @@ class DerivedFields:
         """
         domain = self.body.domain
         count = domain.mesh.topology.index_map(domain.dim).size_local
-        found = pieces(domain.comm, count, domain.regions.values())
+        found = disjoint_pieces(domain.comm, count, domain.regions.values())
         groups = np.full(count, len(found), dtype=np.int32)
         for k, (_, cells) in enumerate(found):
             groups[cells] = k

@@ -32,7 +32,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.cells import INTERVAL, Shape, barycentric, rule, shape_of
 from contact.mesh.domain import Indices
 from contact.mesh.entities import cell_facets
-from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures
+from contact.mesh.geometry import geometry_nodes, inverse, jacobians, integration_weights
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.tolerances import ROUNDING
@@ -279,7 +279,7 @@ class LocalProblems:
         degree = (4 if shape.simplex else 6) + 2 * (order - 1) + body.domain.revolved
         at, weights = rule(shape, degree)
         values, derivatives = basis.values(shape, at), basis.derivatives(shape, at)
-        volumes = measures(body.domain.revolved, shape, of, at, weights)
+        volumes = integration_weights(body.domain.revolved, shape, of, at, weights)
         back = np.broadcast_to(inverse(jacobians(shape, of, at)), (len(of), len(at), d, d))
         gradients = derivatives @ back
         strains = np.zeros((*gradients.shape[:3], body.block_size, len(kept)))
@@ -314,7 +314,7 @@ class LocalProblems:
         at, weights = rule(shape.facet, 5)
         for facet, ends in enumerate(shape.facet_nodes(body.domain.order)):
             values = basis.values(shape, shape.on_facet(facet, at))
-            areas = measures(body.domain.revolved, shape.facet, of[:, ends], at, weights)
+            areas = integration_weights(body.domain.revolved, shape.facet, of[:, ends], at, weights)
             flux = shape.facet.lagrange(2, at) @ self._through[cells, facet]
             right += values.T @ (areas[..., None] * flux)
             acts = np.abs(values).max(axis=0) > ROUNDING
@@ -427,7 +427,7 @@ def balancing(body: BodyEquilibrium, residual: Array, unknown: NDArray[np.bool_]
     hats = shape.facet.lagrange(1, at)
     areas = np.stack(
         [
-            measures(body.domain.revolved, shape.facet, of[:, ends], at, weights)
+            integration_weights(body.domain.revolved, shape.facet, of[:, ends], at, weights)
             for ends in shape.facet_nodes(body.domain.order)
         ],
         axis=1,

@@ -90,9 +90,9 @@ def _separated(
     local = cell_facets(mesh)[cells]
     facets = of_facets.local_to_global(local.ravel()).reshape(local.shape)
     nodes = of_nodes.local_to_global(places.ravel()).reshape(places.shape)
-    within = facet_owners.named(of_facets.local_to_global(own.astype(np.int32)))
+    within = facet_owners.requested(of_facets.local_to_global(own.astype(np.int32)))
     cut = np.isin(facets, facet_owners.among(within, facets.ravel()))
-    named = owners.named(nodes[:, shape.facet_corners][cut].ravel())
+    named = owners.requested(nodes[:, shape.facet_corners][cut].ravel())
     chosen = np.isin(nodes, owners.among(named, nodes.ravel()))
     joins = np.zeros((len(shape.facet_corners), shape.corners), dtype=bool)
     np.put_along_axis(joins, shape.facet_corners, True, axis=1)

@@ -63,7 +63,7 @@ def _numbered(
 ) -> tuple[list[NDArray[np.int64]], NDArray[np.int64]]:
     """Return the nodes of this rank on facets, and the facets by numbers of them. Collective."""
     # The nodes of each side, ascending, and those of the ranks one after the other.
-    nodes = [owners.named(facets.ravel()) for facets in sides]
+    nodes = [owners.requested(facets.ravel()) for facets in sides]
     begin, cells = owners.comm.exscan(sum(own.size for own in nodes)) or 0, []
     for own, facets in zip(nodes, sides, strict=True):
 

@@ -22,7 +22,7 @@ from contact import Domain, Fixed, Sphere
 from contact.body.description import Body
 from contact.mesh.cells import SHAPES, Shape, rule, shape_of
 from contact.mesh.domain import from_mesh
-from contact.mesh.geometry import geometry_nodes, sizes
+from contact.mesh.geometry import geometry_nodes, volume_factors
 from contact.mesh.grid import SIDES, box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -132,7 +132,7 @@ def l2_error(
     domain, space, degree = body.domain, body.space, body.degree
     shape, of = shape_of(domain.mesh), geometry_nodes(domain)
     points, weights = rule(shape, 8)
-    measure = sizes(shape, of, points) * weights
+    measure = volume_factors(shape, of, points) * weights
     place = np.einsum("qk,nkd->dnq", shape.lagrange(domain.order, points), of)
     measure = measure * (place[-1] >= above)
     nodal = x.reshape(-1, domain.dim)[space.dofmap.list[: len(of)]]

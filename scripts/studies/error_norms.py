@@ -18,7 +18,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import Indices
-from contact.mesh.geometry import geometry_nodes, measures
+from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.model.fields import constant
 from contact.typing import Array
 from forms.elasticity import Anisotropic, mandel
@@ -98,7 +98,9 @@ def errors(
             if known is not None:
                 exact = _sampled(known, mesh, cells, len(at))
                 e, eps = e - exact, eps - _strains(exact[..., gradient], d)
-            volumes = measures(domain.revolved, shape, geometry_nodes(domain, cells), at, weights)
+            volumes = integration_weights(
+                domain.revolved, shape, geometry_nodes(domain, cells), at, weights
+            )
             energy = _elastic(body, material, cells, at, all_of[..., count:], eps)
             if material.piezo is not None:
                 beta = np.asarray(material.piezo.beta)[:d, :d]

@@ -145,8 +145,8 @@ MUTANTS = (
         "dilatation-by-area",
         "the mean dilatation of rings: weights of their volume",
         "contact/body/elements.py",
-        "extent = measures(domain.revolved, shape, of, at, weights)",
-        "extent = measures(False, shape, of, at, weights)",
+        "extent = integration_weights(domain.revolved, shape, of, at, weights)",
+        "extent = integration_weights(False, shape, of, at, weights)",
         ("tests/body/test_mean_dilatation.py", "tests/verification/test_patch_cells.py"),
     ),
     Mutant(

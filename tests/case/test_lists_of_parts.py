@@ -12,7 +12,7 @@ from mpi4py import MPI
 from contact import Body, Contact, Fixed, InputError, Linear, Load, Problem, parse_case, solve
 from contact.case.text import to_toml
 from contact.mesh.grid import rectangle
-from contact.mesh.together import Together, members, part
+from contact.mesh.parts import Together, members, part
 
 BLOCK = """
 [mesh]

@@ -15,19 +15,19 @@ from vtkmodules import vtkCommonDataModel
 import contact
 from contact.errors import InputError
 from contact.mesh.cells import SHAPES, Shape, rule, shape_of
-from contact.mesh.compiled import compiled
 from contact.mesh.domain import revolved
 from contact.mesh.geometry import (
     area,
     geometry_nodes,
+    integration_weights,
     inverse,
     jacobians,
-    measures,
-    sizes,
     volume,
+    volume_factors,
     volumes,
 )
 from contact.mesh.grid import box, rectangle
+from contact.mesh.integrals import compiled
 from contact.mesh.transfer import refined
 from tests.problems.quadrilaterals import unit_block
 from tests.problems.sizes import integral
@@ -118,7 +118,7 @@ def test_volumes_are_those_of_dolfinx(name):
     if domain.dim == 2:
         ring = revolved(domain)
         assert COMM.allreduce(volumes(ring).sum()) == pytest.approx(np.pi, rel=1e-13)
-        found = measures(
+        found = integration_weights(
             True, shape_of(ring.mesh), geometry_nodes(ring), *rule(shape_of(ring.mesh), 4)
         )
         assert COMM.allreduce(found.sum()) == pytest.approx(np.pi, rel=1e-13)
@@ -136,12 +136,12 @@ def test_sizes_of_facets_and_their_normals_close_the_cell(shape):
         on_cell = shape.on_facet(facet, points)
         normal = shape.facet_normals[facet] @ inverse(jacobians(shape, of, on_cell))
         normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-        area = (sizes(shape.facet, of[:, corners], points) * weights)[..., None]
+        area = (volume_factors(shape.facet, of[:, corners], points) * weights)[..., None]
         x = shape.lagrange(1, on_cell) @ of
         total += (area * normal).sum(axis=1)
         through += (area * normal * x).sum(axis=(1, 2))
     np.testing.assert_allclose(total, 0, atol=1e-14)
-    size = measures(False, shape, of, *at).sum(axis=1)
+    size = integration_weights(False, shape, of, *at).sum(axis=1)
     np.testing.assert_allclose(through, shape.dim * size, rtol=1e-12)
 
 

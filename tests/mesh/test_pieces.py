@@ -10,7 +10,7 @@ from mpi4py import MPI
 from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.mesh.entities import components
+from contact.mesh.entities import connected_components
 
 COMM = MPI.COMM_WORLD
 
@@ -56,7 +56,7 @@ def squares(folder: Path, *, share: bool, friction: bool = True) -> dict:
 @pytest.mark.parametrize("share", [True, False])
 def test_nodes_of_one_piece(share: bool, shared_tmp_path: Path) -> None:
     problem = build_problem(parse_case(squares(shared_tmp_path, share=share)), COMM)
-    labels, count = components(problem.equilibrium.space)
+    labels, count = connected_components(problem.equilibrium.space)
     assert count == (1 if share else 2)
     x = problem.equilibrium.space.tabulate_dof_coordinates()[: labels.size, 0]
     inner = np.abs(x - 1) > 1e-9

@@ -81,7 +81,7 @@ def test_values_of_nodes_of_other_ranks():
     taken[halo.places(np.array([3, 11, 17]))] = 1.0
     expected = COMM.size * np.isin(np.arange(20), [3, 11, 17])
     np.testing.assert_array_equal(halo.reverse(taken)[:, 0], expected[begin:end])
-    assert owners.named(asked).tolist() == [n for n in (0, 7, 19) if begin <= n < end]
+    assert owners.requested(asked).tolist() == [n for n in (0, 7, 19) if begin <= n < end]
     nodes, sums = owners.sums(asked, np.ones((4, 1)))
     np.testing.assert_array_equal(sums[:, 0], COMM.size * np.where(nodes == 19, 2.0, 1.0))
 

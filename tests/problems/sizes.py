@@ -6,7 +6,7 @@ from mpi4py import MPI
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import area, geometry_nodes, outward
-from contact.mesh.geometry import measures as weights_of
+from contact.mesh.geometry import integration_weights as weights_of
 
 #: Degree of the rule.
 DEGREE = 8

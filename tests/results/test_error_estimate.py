@@ -14,7 +14,7 @@ from contact.case.build import build_problem
 from contact.cli.solve import _results
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import from_mesh
-from contact.mesh.geometry import geometry_nodes, measures
+from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -119,7 +119,7 @@ def test_wrong_pressures_in_the_fluxes_are_overestimated():
     assert np.abs(off).max() > 10 * abs(2 * law.bulk * tube.constants[0])
     shape, of = shape_of(problem.domain.mesh), geometry_nodes(problem.domain)
     at, weights = rule(shape, 4)
-    volumes = measures(True, shape, of, at, weights)
+    volumes = integration_weights(True, shape, of, at, weights)
     total = np.sum(volumes * (off @ shape.lagrange(2, at).T) ** 2) / law.bulk
     flux[..., :3] -= off[..., None]
     cells = np.arange(len(flux), dtype=np.int32)

@@ -15,7 +15,15 @@ from contact.body.description import Body
 from contact.errors import InputError
 from contact.interface import pairing
 from contact.mesh.cells import SHAPES, rule, shape_of
-from contact.mesh.geometry import area, geometry_nodes, inverse, jacobians, sizes, volume, volumes
+from contact.mesh.geometry import (
+    area,
+    geometry_nodes,
+    inverse,
+    jacobians,
+    volume,
+    volume_factors,
+    volumes,
+)
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -142,7 +150,7 @@ def test_sizes_of_curved_facets_and_their_normals_close_the_cell(shape) -> None:
         on_cell = shape.on_facet(facet, points)
         normal = shape.facet_normals[facet] @ inverse(jacobians(shape, of, on_cell))
         normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-        area = (sizes(shape.facet, of[:, nodes], points) * weights)[..., None]
+        area = (volume_factors(shape.facet, of[:, nodes], points) * weights)[..., None]
         total += (area * normal).sum(axis=1)
         through += (area * normal * (shape.lagrange(2, on_cell) @ of)).sum(axis=(1, 2))
     np.testing.assert_allclose(total, 0, atol=1e-13)

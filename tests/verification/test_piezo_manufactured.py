@@ -7,7 +7,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.mesh.cells import rule, shape_of
-from contact.mesh.geometry import geometry_nodes, measures
+from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.methods.options import FixedPointOptions
 from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Hencky, Log
@@ -32,7 +32,7 @@ def errors(dim: int, degree: int, n: int, law: Hencky) -> np.ndarray:
     of = geometry_nodes(problem.domain)
     values = fem.Expression(ufl.as_vector(every), at).eval(mesh, np.arange(len(of), dtype=np.int32))
     squares = np.reshape(values, (len(of), len(at), -1)) ** 2
-    sums = np.einsum("cq,cqk->k", measures(False, shape, of, at, weights), squares)
+    sums = np.einsum("cq,cqk->k", integration_weights(False, shape, of, at, weights), squares)
     ends = np.cumsum([0, dim, 1, dim * dim, dim])
     l2_u, l2_phi, h1_u, h1_phi = np.sqrt(np.add.reduceat(COMM.allreduce(sums), ends[:-1]))
     return np.array([h1_u, l2_u, h1_phi, l2_phi])

@@ -33,7 +33,7 @@ from contact.interface.mortar.lumping import Mixing, integrals
 from contact.interface.mortar.search import Opposite, nearest_named
 from contact.interface.mortar.segments import Points, common_points
 from contact.interface.mortar.surface import Surface, dual_basis_transformation
-from contact.mesh.owners import Owners, matrix
+from contact.mesh.owners import Owners, sparse_rows
 from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 
@@ -326,8 +326,8 @@ def _assembled(parts: Parts, owners: Owners, back: Array, without: NDArray[np.in
     # Each facet with a node has all of the node's row of S.
     rows, columns = np.broadcast_arrays(parts.carriers[:, :, None], parts.nodes[:, None, :])
     values = parts.own @ back
-    slaves, own = matrix(nodes, owners.entries(rows.ravel(), columns.ravel(), values.ravel()))
-    masters, other = matrix(nodes, owners.entries(parts.rows, parts.columns, parts.values))
+    slaves, own = sparse_rows(nodes, owners.entries(rows.ravel(), columns.ravel(), values.ravel()))
+    masters, other = sparse_rows(nodes, owners.entries(parts.rows, parts.columns, parts.values))
     jumps = nodes, slaves, sparse.csr_array(divide @ own), masters, sparse.csr_array(divide @ other)
     depth = owners.comm.allreduce(parts.depth, op=MPI.MAX)
     return Coupling(*jumps, weight, normal, gap, apart, covered[kept], depth)

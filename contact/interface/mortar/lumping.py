@@ -18,7 +18,7 @@ from scipy import sparse
 from contact.interface.mortar.surface import Surface, dual_basis_transformation
 from contact.mesh.cells import rule
 from contact.mesh.geometry import jacobians
-from contact.mesh.owners import Owners, matrix
+from contact.mesh.owners import Owners, sparse_rows
 from contact.typing import Array
 
 
@@ -155,7 +155,7 @@ class Lumping:
             # Facets that share nodes say the same of them: any of them may be heard.
             _, first = np.unique(np.column_stack(entries[:2]), axis=0, return_index=True)
             row, column, value = entries[0][first], entries[1][first], entries[2][first]
-            mixing = Mixing.alone(nodes, *matrix(nodes, (row, column, value)))
+            mixing = Mixing.alone(nodes, *sparse_rows(nodes, (row, column, value)))
         return Lumping(nodes, weight[:, 0], normal, deviation, least, mixing)
 
     def without_axis(self, surface: Surface) -> Lumping:
@@ -183,7 +183,9 @@ class Lumping:
             np.concatenate([alone, axis, beside]),
             np.concatenate([np.ones(alone.size), *(weights / total[:, None]).T]),
         )
-        return replace(self, weight=weight, mixing=Mixing.alone(nodes, *matrix(nodes, entries)))
+        return replace(
+            self, weight=weight, mixing=Mixing.alone(nodes, *sparse_rows(nodes, entries))
+        )
 
 
 def pairs_at_axis(surface: Surface, numbers: NDArray[Any]) -> NDArray[Any]:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from contact.interface.mortar.surface import Surface
 from contact.mesh.cells import INTERVAL, LARGEST, QUADRILATERAL, TRIANGLE, rule
-from contact.mesh.geometry import across, determinant, inverse, jacobians
+from contact.mesh.geometry import area_vectors, determinant, inverse, jacobians
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
@@ -168,7 +168,7 @@ def common_points(
     clear[cut] += np.maximum(most, 0.0)
     gradients, d = slave.shape.gradients(slave.order, on_slave), slave.shape.dim
     slopes, turned = slave.slopes(i[pair], on_slave), _slopes(gradients, own[pair, :, :d])
-    size = np.linalg.norm(across(slopes), axis=1) / np.abs(determinant(turned))
+    size = np.linalg.norm(area_vectors(slopes), axis=1) / np.abs(determinant(turned))
     if slave.revolved:
         functions = slave.shape.lagrange(slave.order, on_slave)
         size *= 2 * np.pi * np.einsum("pk,pk->p", functions, slave.points[i[pair], :, 0])

@@ -18,7 +18,13 @@ from contact.mesh.cells import Shape, facet_with, rule, shape_of
 from contact.mesh.deviation import deviations
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
-from contact.mesh.geometry import across, inverse, jacobians, measures, unit_normals
+from contact.mesh.geometry import (
+    area_vectors,
+    integration_weights,
+    inverse,
+    jacobians,
+    unit_normals,
+)
 from contact.mesh.owners import ALONE, Owners
 from contact.ranks import exchanged
 from contact.tolerances import NEGLIGIBLE
@@ -330,7 +336,7 @@ class Surface:
 
     def measures(self, at: Array, weights: Array) -> Array:
         """Return the weights of a rule's points in integrals over facets or rings, (f, q)."""
-        return measures(self.revolved, self.shape, self.points, at, weights)
+        return integration_weights(self.revolved, self.shape, self.points, at, weights)
 
     def slopes(self, facets: NDArray[np.intp], at: Array) -> Array:
         """Return dx/dxi at a point of each of some facets, shape (p, d, dim)."""
@@ -345,7 +351,7 @@ class Surface:
         facets, slopes
             The facets, shape (...), and dx/dxi there, shape (..., d, dim).
         """
-        found = across(slopes)
+        found = area_vectors(slopes)
         found /= np.linalg.norm(found, axis=-1, keepdims=True)
         sign = np.sign(np.einsum("...d,...d->...", found, self.normal[facets]))
         return np.asarray(found * sign[..., None])

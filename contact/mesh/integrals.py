@@ -1,4 +1,4 @@
-"""Forms over parts and regions, compiled once for all of these.
+"""Measures over the whole body, and forms compiled once for all parts and regions.
 
 UFL's signature of a form, by which FFCx finds compiled code, contains the numbers of subdomains: an
 integrand on another part would be compiled again.
@@ -7,13 +7,45 @@ integrand on another part would be compiled again.
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from ufl.core.expr import Expr
 
 from contact.mesh.entities import Indices
+
+
+@dataclass(frozen=True)
+class ExtendedMeasure:
+    """A measure of UFL over a half plane, times the extent of the body there.
+
+    It is used like a measure of UFL: it multiplies an integrand from the right.
+
+    Attributes
+    ----------
+    measure
+        dx or ds of the mesh.
+    extent
+        2 pi r, the length of the ring through a point.
+    """
+
+    measure: ufl.Measure
+    extent: Expr
+
+    def __call__(self, *arguments: Any, **settings: Any) -> ExtendedMeasure:
+        """Return the measure with a subdomain or metadata of its own."""
+        return ExtendedMeasure(self.measure(*arguments, **settings), self.extent)
+
+    def __rmul__(self, integrand: Any) -> ufl.Form:
+        """Return the integral over the whole body."""
+        return (self.extent * integrand) * self.measure
+
+
+#: Measure of a body or of a part of its boundary.
+Measure: TypeAlias = ufl.Measure | ExtendedMeasure
 
 
 def compiled(form: ufl.Form) -> fem.Form:

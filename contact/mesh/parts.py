@@ -1,4 +1,4 @@
-"""Several parts of a boundary under one name, and facets by the parts that they are in."""
+"""Names of parts: several parts under one name, and facets by the parts that they are in."""
 
 from __future__ import annotations
 
@@ -64,10 +64,10 @@ def meet(one: str, other: str) -> bool:
     return not set(members(one)).isdisjoint(members(other))
 
 
-def pieces(
+def disjoint_pieces(
     comm: MPI.Intracomm, count: int, parts: Iterable[Indices]
 ) -> list[tuple[tuple[int, ...], Indices]]:
-    """Divide facets into pieces that are in the same parts. Collective.
+    """Divide facets into disjoint pieces, each in the same parts. Collective.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ def pieces(
 
     Returns
     -------
-    The parts, by their positions, with the facets in these and no other: the same ones in the
-    same order on all ranks, be it with no facet here.
+    The parts by their positions, and the facets in exactly these: the same pieces in the same
+    order on all ranks, some without facets here.
     """
     numbers, combined = combinations(count, parts)
     own = {combined[k]: np.flatnonzero(numbers == k).astype(np.int32) for k in np.unique(numbers)}
@@ -87,7 +87,7 @@ def pieces(
     return [(found, own.get(found, np.empty(0, dtype=np.int32))) for found in there]
 
 
-def known(kind: str, name: str, names: Mapping[str, Indices]) -> str:
+def known_name(kind: str, name: str, names: Mapping[str, Indices]) -> str:
     """Return a name that is one of some names.
 
     Raises

@@ -8,9 +8,9 @@ from mpi4py import MPI
 from contact import Body, Fixed, Linear, Load
 from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
-from contact.mesh.compiled import compiled
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle
+from contact.mesh.integrals import compiled
 from tests.problems.sizes import integral
 
 COMM = MPI.COMM_WORLD
