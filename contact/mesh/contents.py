@@ -1,4 +1,4 @@
-"""The contents of a mesh file, whatever its format, and its cells as those of one shape."""
+"""Contents of a mesh file of any format, and its cells brought to one shape."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contact.typing import Array
 
 Ints = npt.NDArray[np.int64]
 
-#: The region of a mesh whose cells nothing tells apart.
+#: The region of a mesh without named regions.
 BODY = "body"
 
 #: Names of shapes in meshio that are not those of basix.
@@ -36,21 +36,21 @@ ELEMENTS: dict[str, tuple[int, int, tuple[int, ...]]] = {
 }
 
 
-#: Arrays that hold tags of groups, and those of a program's own.
-TAGS = {"gmsh:physical", "cell_tags", "point_tags", "medit:ref"}
+#: Endings of the names of arrays of tags, whose groups go by the number alone; arrays of no groups.
+TAGS = (":physical", ":ref", ":index", "_tags")
 INNER = {"gmsh:geometrical", "gmsh:bounding_entities", "GlobalElementId", "GlobalNodeId"}
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A type of elements: a name in basix, or one that is not known, and a number of nodes."""
+    """A type of elements: a shape by its name in basix, or an unknown one, and nodes."""
 
     name: str
     nodes: int
 
     @staticmethod
     def of(name: str, nodes: int) -> Kind:
-        """Return the type of elements with a name of meshio or basix, digits behind it or not."""
+        """Return the type of a name of meshio or basix, with or without digits at its end."""
         stem = name.rstrip("0123456789")
         found = NAMES.get(stem, stem)
         return Kind(found if found in ELEMENTS else name, nodes)
@@ -61,12 +61,12 @@ class Kind:
 
     @property
     def known(self) -> bool:
-        """Whether it is of order 1 or 2, and can be cut into simplices."""
+        """Whether it has a shape of basix and the order 1 or 2."""
         return self.name in ELEMENTS and self.order < 3
 
     @property
     def dim(self) -> int:
-        """Its dimension; of those that are not known 3."""
+        """Its dimension; 3 for unknown ones."""
         return ELEMENTS[self.name][0] if self.name in ELEMENTS else 3
 
     @property
@@ -76,7 +76,7 @@ class Kind:
 
     @property
     def order(self) -> int:
-        """Order of its geometry; 3 for all above 2."""
+        """Order of its geometry; 3 stands for all above 2."""
         _, corners, second = ELEMENTS.get(self.name, (3, self.nodes, ()))
         return 1 if self.nodes == corners else 2 if self.nodes in second else 3
 
@@ -124,19 +124,19 @@ class Contents:
         return [Kind.of(name, nodes.shape[1]) for name, nodes in self.blocks]
 
     def add_groups(self, key: str, arrays: Sequence[Array], first: int = 0) -> None:
-        """Add the groups that whole numbers of elements mark, an array each block from one on."""
+        """Add the groups of whole numbers of elements, an array each block from `first` on."""
         for name, block, members in _by_number(key, arrays):
             group = self.groups.setdefault(name, {})
             group[first + block] = np.union1d(group.get(first + block, members), members)
 
     def add_nodes(self, key: str, values: Array) -> None:
-        """Add the sets of nodes that whole numbers mark."""
+        """Add the sets of whole numbers of nodes."""
         for name, _, members in _by_number(key, [values]):
             self.nodes[name] = np.union1d(self.nodes.get(name, members), members)
 
 
 def decoded(given: bytes) -> str:
-    """Return a text of a file, in the letters of Western Europe (Latin-1) if it is not UTF-8."""
+    """Return a text of a file, in UTF-8 or else Latin-1."""
     try:
         return given.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -144,29 +144,29 @@ def decoded(given: bytes) -> str:
 
 
 def _by_number(key: str, arrays: Sequence[Array]) -> Iterator[tuple[str, int, Ints]]:
-    """Yield groups that whole numbers mark, 0 none: name, block and members."""
+    """Yield the groups of positive whole numbers: name, block and members."""
     whole = [np.asarray(array) for array in arrays]
     if key in INNER or any(v.dtype.kind not in "iub" or v.ndim != 1 for v in whole):
         return
     several, names = key.split("-"), {}
     if len(several) > 1 and max(v.max(initial=0) for v in whole) == len(several) - 1:
-        # Sets that meshio has written as one array: their names, and -1 for none.
+        # Sets that meshio has written as one array, -1 for none, with their names in the key.
         names, whole = dict(enumerate(several, 1)), [v + 1 for v in whole]
-    before = "" if key in TAGS else f"{key} "  # in front of the number
+    before = "" if key.endswith(TAGS) else f"{key} "
     for block, values in enumerate(whole):
         for number in map(int, np.unique(values[values > 0])):
             yield names.get(number, f"{before}{number}"), block, np.flatnonzero(values == number)
 
 
 def name_clash(names: Sequence[str]) -> str:
-    """Return the note on sets of nodes that are left out, as a surface has their name."""
+    """Return the note on sets of nodes that are left out for a surface of the same name."""
     return f"sets left out, as a surface of other facets has their name: {', '.join(names)}"
 
 
 def with_one_shape(contents: Contents) -> Contents:
-    """Return contents whose cells have one shape of ours: they are cut into simplices if need be.
+    """Return contents with cells of one of `SHAPES`: others, or several, are cut into simplices.
 
-    Cells that are not known, or of higher order, stay.
+    Unknown cells, and those of higher order, are left for `validity` to refuse.
     """
     kinds = contents.kinds
     dim = max((kind.dim for kind in kinds), default=0)
@@ -201,7 +201,7 @@ def _cut(contents: Contents, kinds: Sequence[Kind], dim: int, note: str) -> Cont
         count = np.ones(len(nodes), dtype=np.int64)
         if kind.dim >= dim - 1 and kind.known:
             made = simplices(nodes[:, : kind.corners], kind.dim)
-            # Those of no volume are no part of a cell that has collapsed; no simplex may have.
+            # A collapsed cell loses its flat simplices; a simplex of the file must not be flat.
             full = uncollapsed(made.reshape(-1, kind.dim + 1)).reshape(made.shape[:2])
             full |= made.shape[1] == 1
             count = full.sum(axis=1)
@@ -224,13 +224,12 @@ def _cut(contents: Contents, kinds: Sequence[Kind], dim: int, note: str) -> Cont
 
 
 def in_dolfinx_order(shape: Shape, points: Array, rows: Ints) -> Ints:
-    """Return cells whose nodes are in the order of dolfinx, those that a serendipity cell has.
+    """Return cells with their nodes in the order of dolfinx, as far as serendipity cells have them.
 
-    Programs number nodes between corners in ways of their own: of hexahedra Exodus has the upright
-    edges in front of the upper ones, Abaqus the middle in front of the faces, MED the lower face
-    first. A file has one order; it is the one in which the nodes are nearest to the places of
-    straight edges, and then to those within faces and the cell that the edges tell: an assignment
-    problem.
+    Programs number the nodes between corners differently: of hexahedra Exodus has the vertical
+    edges before the upper ones, Abaqus the middle before the faces, MED the lower face first. The
+    order of a file is the one with the least distance of all nodes from the middles of straight
+    edges, and then from the interpolated nodes in faces and cells: an assignment problem.
     """
     count = rows.shape[1]
     second = count > shape.corners
@@ -252,7 +251,7 @@ def in_dolfinx_order(shape: Shape, points: Array, rows: Ints) -> Ints:
         middle = at.mean(axis=1, keepdims=True)
         places = weights[:, known] @ (at - middle) / size
         given = (points[ordered[:, nodes]] - middle) / size
-        # The part of the squares of distances that depends on the order.
+        # The terms of the squared distances that depend on the order.
         costs = -np.einsum("cid,cjd->ij", places, given)
         ordered[:, nodes] = ordered[:, nodes[linear_sum_assignment(costs)[1]]]
     return ordered

@@ -38,7 +38,7 @@ logger = logging.getLogger("contact.mesh")
 
 
 def _by_meshio(module: str, file: Path) -> Contents:
-    """Read a file by a module of meshio: its cells, sets, and whole numbers of cells and nodes."""
+    """Read a file by a module of meshio: cells, sets, and whole numbers of cells and nodes."""
     mesh = import_module(f"meshio.{module}").read(file)
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
@@ -47,6 +47,9 @@ def _by_meshio(module: str, file: Path) -> Contents:
         made.add_groups(key, arrays)
     for key, values in mesh.point_data.items():
         made.add_nodes(key, values)
+    for name, sets in mesh.cell_sets.items():
+        made.groups[name] = {b: np.asarray(own) for b, own in enumerate(sets) if own is not None}
+    made.nodes |= {name: np.asarray(own) for name, own in mesh.point_sets.items()}
     return made
 
 
@@ -55,6 +58,7 @@ FORMATS: dict[str, tuple[str, Callable[[Path], Contents]]] = {
     ".msh": ("Gmsh", read_msh),
     ".inp": ("Abaqus", read_abaqus),
     ".vtu": ("VTK", partial(_by_meshio, "vtu")),
+    ".bdf": ("Nastran", partial(_by_meshio, "nastran")),
     ".xdmf": ("XDMF", read_xdmf),
     ".med": ("MED", read_med),
     ".rmed": ("MED", read_med),
@@ -107,11 +111,11 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
 def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
     """Read a mesh file of one of several formats, by the ending of its name. Collective.
 
-    Input files of Abaqus and CalculiX (.inp), VTK (.vtu), XDMF (.xdmf), MED (.med) and Exodus (.e,
-    .exo, .ex2); any other is one for `from_msh`. Sets of cells are regions; sets of
-    facets, surfaces, and sets of nodes (the facets of the boundary all of whose nodes they have)
-    are parts. Whole numbers of cells or nodes in VTK's files and XDMF mark sets, 0 none. Of XDMF
-    that `convert` has written each rank reads its share; other files are read on rank 0.
+    Abaqus and CalculiX (.inp), VTK (.vtu), XDMF (.xdmf), MED (.med), Exodus (.e, .exo, .ex2) and
+    Nastran (.bdf); any other is one for `from_msh`. Sets of cells are regions; sets of facets,
+    surfaces, and sets of nodes (the facets of the boundary all of whose nodes they have) are
+    parts. Positive whole numbers of cells or nodes in files of VTK, XDMF and Nastran are sets. Of
+    XDMF that `convert` has written each rank reads its share; other files are read on rank 0.
 
     Parameters
     ----------

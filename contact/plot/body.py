@@ -22,7 +22,7 @@ from contact.errors import InputError
 from contact.mesh.cells import LINEAR
 from contact.plot.foundation import HATCHED, magnification, profiles
 from contact.plot.run import Run
-from contact.plot.space import Scene, Zone, show_body
+from contact.plot.space import Scene, Zone, foundation, show_body
 from contact.plot.style import (
     NARROW,
     PAGE,
@@ -130,7 +130,8 @@ class Picture:
         """The body in 3-D."""
         ends = [self.norm.vmin, self.norm.vmax]
         colours = {"scalars": "values", "cmap": self.colours, "clim": ends}
-        return Scene(self.body, colours, Zone.of(self.run))
+        shapes = foundation(self.run, self.scale)
+        return Scene(self.body, colours, Zone.of(self.run), foundation=shapes)
 
     @property
     def colours(self) -> Any:

@@ -1,4 +1,7 @@
-"""Rigid foundations in pictures of deformed bodies, and how far displacements are magnified."""
+"""Rigid foundations in pictures of deformed bodies, and how far displacements are magnified.
+
+A foundation is known by the gaps and directions of the contact nodes, which the files of a run have.
+"""
 
 from __future__ import annotations
 
@@ -107,8 +110,7 @@ def magnification(*runs: Run, box: Array | None = None) -> float:
     wanted = 0.05 * diameter / largest
     for run in runs:
         for table in run.contacts:
-            if run.plane or not np.all(table["rigid"]):  # else none is drawn
-                wanted = min(wanted, max(each.largest for each in scalings(run, table, box)))
+            wanted = min(wanted, max(each.largest for each in scalings(run, table, box)))
     if wanted < 1:
         return 1.0
     power = 10.0 ** np.floor(np.log10(wanted))

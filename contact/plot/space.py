@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from contact.plot.camera import SNAPPED, Camera, rendered, scale_bar, triad
-from contact.plot.foundation import magnification
+from contact.plot.foundation import BEYOND, magnification, scalings
 from contact.plot.run import Run
-from contact.plot.style import NARROW, ORANGE, ZONES, Look, page_width, sheet
+from contact.plot.style import BLUE, NARROW, ORANGE, ZONES, Look, page_width, sheet
 from contact.results.quantity import STATUS
 from contact.typing import Array
 
@@ -148,6 +148,25 @@ def _polygons(corners: Array) -> Any:
     return pyvista.PolyData.from_regular_faces(corners.reshape(-1, 3), numbers)
 
 
+def foundation(run: Run, scale: float) -> Any:
+    """Return the parts of rigid shapes that face the body beside displacements times a scale.
+
+    They are the contact facets moved by their gaps, as far as these are not large.
+    """
+    distance = np.full(len(run.table["gap"]), np.nan)
+    for table in run.contacts:
+        if np.all(table["rigid"]):
+            way = scalings(run, table, None)[0]
+            drawn = way.distance + (scale - 1) * way.more
+            far = drawn - scale * way.approach > BEYOND * run.diameter
+            distance[run.table["entry"] == table["entry"][0]] = np.where(far, np.nan, drawn)
+    skin = linear(run.surface)
+    row = np.asarray(skin["row"])
+    places = skin.points + np.where(row < 0, np.nan, distance[row])[:, None] * skin["normal"]
+    faces = skin.regular_faces[np.isfinite(places[skin.regular_faces]).all(axis=(1, 2))]
+    return pyvista.PolyData.from_regular_faces(np.nan_to_num(places), faces).clean()
+
+
 @dataclass(frozen=True)
 class Scene:
     """A deformed body in 3-D, as windows and figures show it.
@@ -162,6 +181,8 @@ class Scene:
         The contact zone, and the touching facets of the deformed part, drawn on the body.
     norm
         The range of the pressures on that.
+    foundation
+        Rigid shapes, drawn translucent.
     """
 
     body: Any
@@ -169,6 +190,7 @@ class Scene:
     zone: Zone
     painted: Any = None
     norm: Normalize = field(default_factory=Normalize)
+    foundation: Any = None
 
     @staticmethod
     def of(run: Run) -> Scene:
@@ -180,7 +202,9 @@ class Scene:
         painted["pressure"] = np.nan_to_num(part["pressure"])
         body = run.body.warp_by_vector("displacement", factor=scale)
         norm = Normalize(0.0, float(np.max(run.table["pressure"], initial=0.0)) or 1.0)
-        return Scene(body, {"color": PLAIN}, Zone.of(run), painted if touched.any() else None, norm)
+        painted = painted if touched.any() else None
+        shapes = foundation(run, scale)
+        return Scene(body, {"color": PLAIN}, Zone.of(run), painted, norm, shapes)
 
     @property
     def shades(self) -> dict[str, Any]:
@@ -206,6 +230,11 @@ class Scene:
             away = self.zone.normal if view is None else view
             lifted = self.painted.translate(2e-3 * size * away)
             plotter.add_mesh(lifted, show_scalar_bar=False, **self.shades)
+        if self.foundation is not None and self.foundation.n_cells:
+            clear = {"color": BLUE, "opacity": 0.18, "lighting": False}
+            plotter.add_mesh(self.foundation, **clear)
+            rim = self.foundation.extract_feature_edges(feature_edges=False, manifold_edges=False)
+            plotter.add_mesh(rim, color=BLUE, line_width=2.0)
 
     def window(self, label: str) -> Any:
         """Return a plotter that shows the scene in a window to turn it in, or in a notebook."""

@@ -109,7 +109,8 @@ def write_other(path, name: str) -> None:
         )
     else:
         tags = [np.array([6, 6]), np.array([8, 8, 9, 9])]
-        made = meshio.Mesh(points, [quads, lines], cell_data={"cell_tags": tags})
+        key = "nastran:ref" if name.endswith(".bdf") else "cell_tags"
+        made = meshio.Mesh(points, [quads, lines], cell_data={key: tags})
     more = {"data_format": "XML"} if name == "text.xdmf" else {}
     if name.endswith(".xdmf"):
         pytest.importorskip("h5py")
@@ -186,6 +187,7 @@ FILES = {
     "plate.vtu": ({"ground": 2.0, "top": 2.0}, {"steel": 2.0}),
     "plate.e": ({"ground": 2.0, "top": 2.0}, {"0": 2.0}),
     "plate.med": ({"ground": 2.0, "top": 2.0, "left": 1.0}, {"steel": 2.0, "soft": 1.0}),
+    "plate.bdf": ({"8": 2.0, "9": 2.0}, {"6": 2.0}),
     "text.xdmf": ({"8": 2.0, "9": 2.0}, {"6": 2.0}),
     "heavy.xdmf": ({"8": 2.0, "9": 2.0}, {"6": 2.0}),
 }
