@@ -1,7 +1,7 @@
 """Exodus files: their blocks, node sets and side sets.
 
-meshio's reader leaves out side sets and names, and knows neither elements of MOOSE, such as TET10,
-nor node sets without names.
+meshio's reader drops side sets and names, and refuses elements of MOOSE, such as TET10, and node
+sets without names.
 
 References
 ----------
@@ -52,7 +52,7 @@ SIDES = {
     ),
 }
 
-#: Sides of shells in 3-D, whose first two are the whole; their edges are no facets of solids.
+#: The first two sides of shells in 3-D, the whole cell; the others are edges, no facets of solids.
 SHELLS = {"triangle": ((0, 1, 2), (0, 2, 1)), "quad": ((0, 1, 2, 3), (0, 3, 2, 1))}
 
 

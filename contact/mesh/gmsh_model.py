@@ -1,4 +1,4 @@
-"""Gmsh's files and models as contents of a mesh file, with physical groups as groups."""
+"""Models and .msh files of Gmsh as contents of a mesh file, by their physical groups."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def session() -> Iterator[Any]:
     started = not gmsh.isInitialized()
     if started:
         gmsh.initialize(readConfigFiles=False, interruptible=False)
-    # Gmsh's own messages would mix with ours; its errors come as exceptions.
+    # Gmsh's errors are exceptions, too: no need to print them.
     terminal = gmsh.option.getNumber("General.Terminal")
     gmsh.option.setNumber("General.Terminal", 0)
     gmsh.model.add("contact")
     try:
         yield gmsh
     except Exception as error:
-        # Gmsh's errors are of this very class; anything else is a fault of the program.
+        # The class of Gmsh's errors; others are faults of the program.
         if type(error) is not Exception:
             raise
         raise InputError(f"Gmsh says: {error}", "mesh-file") from error
@@ -44,10 +44,10 @@ def session() -> Iterator[Any]:
 
 
 def read_msh(file: Path) -> Contents:
-    """Read a .msh file. Nothing in it, or beside it, is executed.
+    """Read a .msh file; execute nothing in it or beside it.
 
-    Gmsh takes a file that begins otherwise for a script; some endings have readers of their own, or
-    programs that unpack the file first; and options are read from another file beside it.
+    Gmsh executes files of another beginning as scripts, unpacks those of some endings by other
+    programs, and reads options from a file beside: the file is checked, and read by another name.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """MED files of Salome and code_aster: their groups of cells, facets and nodes.
 
-Each cell and node belongs to a family, and a family to groups; those of family 0 to none. Where all
-are in it the array of families may be missing, which other readers take for damage.
+Each cell and node is in a family, and a family in groups; family 0 is in none. Where all are in it
+the array of families may be missing, which meshio's reader refuses.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from contact.mesh.contents import Contents, Ints, decoded
 
-#: Letters of the kinds of elements, behind which is their number of nodes, and meshio's names.
+#: Names of elements in MED without their number of nodes, and in meshio.
 KINDS = {"SE": "line", "TR": "triangle", "QU": "quad", "TE": "tetra", "T": "tetra"}
 KINDS |= {"HE": "hexahedron", "H": "hexahedron", "PE": "wedge", "P": "wedge", "PY": "pyramid"}
 

@@ -1,4 +1,4 @@
-"""Checks of a mesh given as arrays, before it is distributed."""
+"""Checks of the contents of a mesh file, and parts and regions of its cells, on one rank."""
 
 from __future__ import annotations
 
@@ -25,11 +25,10 @@ from contact.mesh.entities import combinations
 from contact.mesh.geometry import determinant, inverse, jacobians
 from contact.typing import Array
 
-#: A cell is degenerate if its volume is below this times (longest edge)^d: the signs of the volumes
-#: say whether cells overlap.
+#: Least volume of a cell over (longest edge)^d: the signs of volumes tell whether cells overlap.
 FLAT = 1e-10
 
-#: Nodes of degree 2 this near to where straight edges have them, over these, are there (rounding).
+#: Largest distance of nodes of degree 2 from those of straight edges, over their length (rounding).
 STRAIGHT = 1e-5
 
 
@@ -42,11 +41,11 @@ class Groups:
     names
         Names of the groups.
     rows
-        Their corners, no two the same, shape (k, n).
+        Their nodes, each row once, shape (k, n).
     labels
-        Which of the ``sets`` holds the groups that a row belongs to, shape (k,).
+        Position in ``sets`` of each row, shape (k,).
     sets
-        Positions in ``names``.
+        Groups of the rows of a label, as positions in ``names``.
     """
 
     names: tuple[str, ...]
@@ -73,13 +72,11 @@ class Cells:
         Groups of cells; their rows, shape (m, k), are all cells of the mesh by the nodes of the
         Lagrange element of degree 1, or of degree 2 where some are curved.
     parts
-        Groups of facets on its boundary.
-    unusable, notes
+        Groups of facets by their corners, on the boundary or of `inside`.
+    unusable, notes, space
         As in `Domain`.
     inside
-        Which of the parts have facets inside of the body; these are unusable too, but for supports.
-    space
-        As of a `Model`.
+        The unusable parts of facets inside of the body, which may be fixed, or electrodes.
     """
 
     shape: Shape
@@ -105,16 +102,16 @@ SERENDIPITY = (
 
 
 def check(contents: Contents) -> Cells:
-    """Check a mesh and bring it into the form in which it is distributed.
+    """Check a mesh, and return it in the form in which it is distributed.
 
     Groups may overlap. A group of facets that are not all on the boundary of the body can be
-    fixed, or an electrode, but is no part of the boundary; one without a cell is set aside.
+    fixed, or an electrode, but nothing else; one without a cell is left out.
 
     Raises
     ------
     InputError
-        For other meshes than of triangles or quadrilaterals in a plane z = const, or of solids, of
-        order 1 or 2, for cells without volume or that overlap, and if no part is left.
+        For cells other than triangles or quadrilaterals in a plane z = const, or solids, of order 1
+        or 2; for flat, folded or overlapping cells; and if no part is left.
     """
     given = contents.kinds
     dim = max((kind.dim for kind in given), default=0)
@@ -163,7 +160,7 @@ def check(contents: Contents) -> Cells:
             notes.append(SERENDIPITY)
     if others and body.size < first.size:
         notes.append(f"{others} cell(s) in no physical group are no part of the body")
-    # The nodes of the body alone; others may be centres of circles.
+    # Nodes of the body only; others may be centres of circles.
     used = np.unique(rows)
     new = np.full(len(points), -1)
     new[used] = np.arange(used.size)
@@ -195,7 +192,7 @@ def check(contents: Contents) -> Cells:
 
 
 def _check_kinds(kinds: Sequence[Kind], dim: int) -> Shape:
-    """Return the shape of the cells, which must have one, and nodes up to degree 2."""
+    """Return the one shape of the cells; refuse others, and orders above 2."""
     if dim < 2:
         raise InputError(
             "it has no triangles, quadrilaterals, tetrahedra or hexahedra (Gmsh saves the elements "
@@ -216,7 +213,7 @@ def _check_kinds(kinds: Sequence[Kind], dim: int) -> Shape:
 def _parts(
     contents: Contents, shape: Shape, corners: Ints
 ) -> tuple[dict[str, Ints], list[str], list[str]]:
-    """Return parts by corners, and names that a surface has too, or without facets."""
+    """Return parts by their corners, names of surfaces and other sets, and names without facets."""
     of, left, without = shape.facet.corners, list[str](), list[str]()
     none = np.zeros((0, of), dtype=np.int64)
     parts = {name: v if v.shape[1] == of else none for name, v in contents.surfaces.items()}
@@ -248,7 +245,7 @@ def _parts(
 
 
 def _curved(points: Array, cells: Ints, shape: Shape) -> bool:
-    """Tell whether some nodes of cells, (m, k), are not where straight edges have them."""
+    """Tell whether some cells, (m, k), have nodes of degree 2 off those of straight edges."""
     count = cells.shape[1]
     if count == shape.corners:
         return False
@@ -260,7 +257,7 @@ def _curved(points: Array, cells: Ints, shape: Shape) -> bool:
 
 
 def _filled(points: Array, cells: Ints, shape: Shape) -> tuple[Array, Ints]:
-    """Return serendipity cells, (m, k), as those of degree 2, with the points added to them."""
+    """Return points and cells of degree 2 of serendipity cells, (m, k)."""
     rows = cells
     for _, ends, weights in shape.serendipity:
         number = _number(cells[:, ends].reshape(-1, ends.shape[1]))
@@ -271,7 +268,7 @@ def _filled(points: Array, cells: Ints, shape: Shape) -> tuple[Array, Ints]:
 
 
 def _flatten(points: Array, dim: int) -> Array:
-    """Return the coordinates in 2-D or in 3-D."""
+    """Return the coordinates, in 2-D without z."""
     extent = np.ptp(points, axis=0)
     if not np.all(np.isfinite(extent)):
         raise InputError("it has nodes whose coordinates are no numbers, or too large", "mesh-file")
@@ -285,7 +282,7 @@ def _flatten(points: Array, dim: int) -> Array:
 
 
 def _number(rows: Ints) -> Ints:
-    """Return the number of each row, shape (n,), equal for equal ones: 0, 1, 2, ..."""
+    """Return a number of each row, shape (n,), from 0, equal for rows of the same nodes."""
     rows = np.sort(rows, axis=1)
     order = np.lexsort(rows.T)
     new = np.any(rows[order][1:] != rows[order][:-1], axis=1)
@@ -295,7 +292,7 @@ def _number(rows: Ints) -> Ints:
 
 
 def _join(groups: Mapping[str, Ints]) -> Groups:
-    """Make one list of the rows of groups that may share some, or name some twice."""
+    """Return overlapping groups of rows as `Groups`."""
     rows = np.vstack(list(groups.values()))
     number = _number(rows)
     first = np.unique(number, return_index=True)[1]
@@ -305,18 +302,17 @@ def _join(groups: Mapping[str, Ints]) -> Groups:
 
 
 def _may_fold(shape: Shape, x: Array) -> npt.NDArray[np.bool_]:
-    """Return which straight cells, (m, corners, d), may be folded though not at corners."""
-    # The Jacobian matrix is affine along each coordinate: a mean of those at the corners. Where
-    # these are nearer to that in the middle than it is to a singular one, none is singular.
+    """Return which straight cells, (m, corners, d), may have det J <= 0 between their corners."""
+    # J is a mean of those at the corners: det J > 0 everywhere if |J_m^-1 J_c - I| < 1 at these.
     middle = inverse(jacobians(shape, x, shape.middle))
     change = middle @ jacobians(shape, x, shape.nodes(1)) - np.eye(shape.dim)
     return np.asarray(~(np.linalg.norm(change, axis=(2, 3)).max(axis=1) < 1))
 
 
 def _least_volume(shape: Shape, nodes: Array, at: Array) -> Array:
-    """Return the least Jacobian at points, by the sign at the first one, shape (m,)."""
+    """Return the least det J at points, times its sign at the first one, shape (m,)."""
     each = (determinant(jacobians(shape, nodes, point[None]))[:, 0] for point in at)
-    first = next(each)  # one at a time, for all at once take kilobytes a cell
+    first = next(each)  # point by point: all at once take kilobytes a cell
     return reduce(np.minimum, (volume * np.sign(first) for volume in each), np.abs(first))
 
 
@@ -353,7 +349,7 @@ def _check_facets(
 ) -> tuple[dict[str, str], tuple[str, ...]]:
     """Return names that cannot be parts -> why, and those inside; refuse cells that overlap."""
     cell_facets = np.sort(cells[:, shape.facet_corners], axis=2)
-    # Three corners of a facet, two in 2-D, the same for both of its cells, and one inside.
+    # The orientation of d corners of each facet, the same for both cells, with the cell's middle.
     corners = points[cell_facets[:, :, : shape.dim]]
     middles = points[cells].mean(axis=1)[:, None, None]
     inside = np.broadcast_to(middles, corners[:, :, :1].shape)
@@ -364,7 +360,7 @@ def _check_facets(
     inner, outer = number[: sides.size], number[sides.size :]
     total = int(number.max()) + 1
     count = np.bincount(inner, minlength=total)
-    # Two cells that share a facet must lie on either side of it.
+    # Two cells with a common facet must lie on either side of it.
     side = np.bincount(inner, weights=sides.ravel(), minlength=total)
     wrong = (count > 2) | ((count == 2) & (side != 0.0))
     if np.any(wrong):

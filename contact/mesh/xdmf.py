@@ -73,10 +73,10 @@ MIXED = {
     50: ("hexahedron", 27),
 }
 
-#: Those with the number of their nodes in front of these.
+#: Cells of mixed topologies whose number of nodes stands before these.
 COUNTED = (1, 2)
 
-#: Cells of a mixed topology that are looked at together.
+#: Cells of a mixed topology that are read at once.
 WINDOW = 10_000
 
 #: NumPy's letters of types of numbers.
@@ -123,7 +123,7 @@ def read_xdmf(file: Path) -> Contents:
 
 
 def array_files(file: Path) -> list[Path]:
-    """Return the files with the arrays of an XDMF file, each once; none of one that is damaged."""
+    """Return the files of the arrays of an XDMF file, each once; none if it is damaged."""
     with suppress(ElementTree.ParseError):
         items = [item for _, item in ElementTree.iterparse(file) if item.tag == "DataItem"]
         texts = [(item.get("Format"), (item.text or "").strip()) for item in items]
@@ -159,7 +159,7 @@ def _blocks(grid: Element, root: Element, file: Path) -> list[tuple[str, Ints]]:
 
 
 def _mixed(data: Ints) -> list[tuple[str, Ints]]:
-    """Return the cells of a mixed topology: number of a kind, nodes, and so on."""
+    """Return the cells of a mixed topology, a list of type, nodes, type, nodes, ..."""
     runs: list[tuple[tuple[str, int], list[Ints]]] = []
     at = 0
     while at < len(data):
@@ -260,7 +260,7 @@ def write_distributed(cells: Cells, path: Path) -> None:
 def _grid(
     name: str, shape: Shape, rows: tuple[int, ...], points: tuple[int, ...], heavy: str
 ) -> str:
-    """Return the XDMF of the cells, or of the facets of parts, with the labels of their groups."""
+    """Return the XDMF of cells, or of facets of parts, with the labels of their groups."""
     n, corners = rows
     kind = NAMES.get(shape.name, shape.name.capitalize())
     kind += f"_{corners}" if corners > shape.corners else ""
@@ -281,7 +281,7 @@ def _grid(
 
 
 def _vtk_order(shape: Shape, nodes: int) -> list[int]:
-    """Return where VTK, and thus XDMF, has the nodes of a cell or facet."""
+    """Return the order of VTK, and thus XDMF, of the nodes of a cell or facet."""
     return list(shape.vtk(shape.degree_of(nodes))[1])
 
 
