@@ -6,7 +6,7 @@
   connected components; `owners`: nodes of other ranks.
 - `transfer`: `refined`, `carry`; `deviation`: curved surfaces from straight facets.
 - `reader`: `from_file` and its table of formats, `from_generator` for the package `meshes`; one
-  file a format; `contents`: what these return; `validity`: checks of that.
+  file a format; `contents`: their results; `validity`: checks of these.
 
 Imports: `contact.errors`, `contact.typing`, `contact.ranks`, `contact._compat`.
 """

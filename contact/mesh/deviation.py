@@ -300,7 +300,7 @@ def _between(
         changes[:, k] = further / np.where(total > 0, total, 1.0)
     weight = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
     found, further = (np.sum(weights * given, axis=1) / weight for given in (value, jumps))
-    # What a corner on one side of a jump differs from the mean more than by its own change.
+    # The difference of a corner on one side of a jump from the mean, beyond its own change.
     spread = np.maximum(np.abs(value - found[:, None]) - jumps, 0.0)
     uncertain = 2 * np.sum(weights * spread, axis=1) / weight + further / 4
     for k, end in ((0, 1), (1, 0)):

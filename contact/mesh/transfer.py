@@ -177,7 +177,7 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
 
     Notes
     -----
-    On nested meshes the new function equals the old one. A node of the new mesh slightly outside
+    On a refined mesh the new function equals the old one. A node of the new mesh slightly outside
     of the old one, as on a curved boundary, gets the value of the closest cell.
     """
     made = fem.Function(space, name=coarse.name)

@@ -286,7 +286,7 @@ def _vtk_order(shape: Shape, nodes: int) -> list[int]:
 
 
 def distributed_arrays(path: Path) -> Path | None:
-    """Return the HDF5 file of what `write_distributed` has written; else None. On one rank."""
+    """Return the HDF5 file of a mesh by `write_distributed`; else None. On one rank."""
     if path.suffix.lower() != ".xdmf" or not path.is_file():
         return None
     with open(path, errors="replace") as file:
