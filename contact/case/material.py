@@ -252,7 +252,7 @@ class Material(Section):
         """Return the system of units of a material by name, the labels those of the case."""
         if isinstance(self.units, UnitSystem):
             return self.units.system
-        return systems.named(self.units or "SI", labels)
+        return systems.system_named(self.units or "SI", labels)
 
     @property
     def piezoelectric(self) -> bool:

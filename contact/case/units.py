@@ -47,7 +47,7 @@ class UnitSystem(Section):
     def _check(self) -> Self:
         for quantity, base in (("length", "m"), ("force", "N"), ("potential", "V")):
             given = getattr(self, quantity)
-            if systems.size(given, quantity) is None:
+            if systems.unit_in_si(given, quantity) is None:
                 accepted = f'{base} with a prefix of SI, such as "m{base}" or "k{base}"'
                 raise fault(quantity, given, accepted)
         return self
@@ -64,7 +64,7 @@ SystemOfUnits: TypeAlias = Annotated[
 def _labels(given: Any) -> Any:
     """Return the names of the units of a system that is given by its own name."""
     if isinstance(given, str) and given in systems.SYSTEMS:
-        return systems.named(given, {}).labels
+        return systems.system_named(given, {}).labels
     return given
 
 
@@ -103,25 +103,21 @@ def check_units(case: Case) -> None:
         own = material.system(labels)
         quantities = ELECTRIC if material.piezoelectric else ELASTIC
         for known in quantities:
-            if known in labels and systems.foreign(labels[known], known):
+            if known in labels and systems.is_unknown_unit(labels[known], known):
                 words = Words(f'the unit "{labels[known]}" is not known')
                 accepted = (
                     "beside materials by name those of SI with a prefix, and force/area, such as "
                     "mm, MPa, N/mm^2"
                 )
                 raise fault(f"case.units.{known}", words, accepted, "units")
-        quantity = systems.contradiction(own, labels, quantities)
+        quantity = systems.contradicted(own, labels, quantities)
         if quantity is not None:
             words = Words(
                 f"{_shown(material)} has {own.labels[quantity]} for {quantity}, and "
                 f'case.units.{quantity} = "{labels[quantity]}"'
             )
-            found = [*map(shown, systems.fitting(labels, quantities))]
-            table = systems.table(labels, quantities)
-            if not found and table is not None:
-                pairs = (f"{key} = {shown(unit)}" for key, unit in table.items())
-                found = [f"{{ {', '.join(pairs)} }}"]
-            accepted = listed(found) or (
+            fitting = systems.systems_fitting(labels, quantities)
+            accepted = listed([*map(shown, fitting)]) or (
                 "labels of one system: stress = force / length^2, charge = force length / potential"
             )
             raise fault(f"{path}.units", words, accepted, "units")

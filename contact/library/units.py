@@ -27,7 +27,7 @@ SYSTEMS = {
     "GPa": ("m", "GN", "GV"),
 }
 
-#: Its numbers are those of any length: stresses in GPa, fields in GV/m, charges an area in C/m2.
+#: The system without a unit of length: stress in GPa, field in GV/m, charge per area in C/m2.
 ANY_LENGTH = "GPa"
 
 
@@ -67,36 +67,36 @@ class System:
     def labels(self) -> dict[str, str]:
         """Names of the units of length, stress, potential and charge, as they are printed."""
         quantities = ("length", "stress", "potential", "charge")
-        named = {name: _named(getattr(self, name), BASES[name]) for name in quantities}
-        return {name: re.sub("^u(?=.)", "µ", unit) for name, unit in named.items()}
+        units = {name: _unit_name(getattr(self, name), BASES[name]) for name in quantities}
+        return {name: re.sub("^u(?=.)", "µ", unit) for name, unit in units.items()}
 
 
-def size(name: str, quantity: str) -> float | None:
-    """Return a unit of a quantity in SI by its name; None for one that is not known.
+def unit_in_si(name: str, quantity: str) -> float | None:
+    """Return the value in SI of a unit of a quantity, None if it is unknown.
 
     Known are m, N, Pa, V and C with the prefixes of SI, and force/area, such as ``daN/mm2``.
     """
     area = re.fullmatch(r"(.+)/(.+?)(?:\^?2|²)", name.strip())
     if quantity == "stress" and area is not None:
-        force, length = size(area[1], "force"), size(area[2], "length")
+        force, length = unit_in_si(area[1], "force"), unit_in_si(area[2], "length")
         return None if force is None or length is None else force / length**2
     base = BASES[quantity]
     text = name.strip()
     return PREFIXES.get(text.removesuffix(base)) if text.endswith(base) else None
 
 
-#: Units, in small letters, that nothing is converted to. Other words name numbers without units.
+#: Units, in lower case, without a conversion. Other words are labels of dimensionless numbers.
 FOREIGN = frozenset(
     "in inch inches ft foot feet mil micron microns psi ksi msi bar kbar atm".split()
 )
 
 
-def foreign(name: str, quantity: str) -> bool:
-    """Tell whether a name is a unit that is not known, such as ``psi`` or ``MM``."""
+def is_unknown_unit(name: str, quantity: str) -> bool:
+    """Tell whether a name is that of a unit, but unknown, such as ``psi`` or ``MM``."""
     lower = name.strip().lower()
     known = (prefix + BASES[quantity] for prefix in PREFIXES)
     alike = lower in FOREIGN or any(lower == unit.lower() for unit in known)
-    return alike and size(name, quantity) is None
+    return alike and unit_in_si(name, quantity) is None
 
 
 def system(units: tuple[str, str, str]) -> System:
@@ -109,56 +109,45 @@ def system(units: tuple[str, str, str]) -> System:
     """
     found = {}
     for quantity, name in zip(("length", "force", "potential"), units, strict=True):
-        unit = size(name, quantity)
+        unit = unit_in_si(name, quantity)
         if unit is None:
             raise KeyError(quantity)
         found[quantity] = unit
     return System(**found)
 
 
-def named(name: str, labels: Mapping[str, str]) -> System:
-    """Return a system by its name; that of any length has the one of the labels."""
-    length = size(labels.get("length", "m"), "length") if name == ANY_LENGTH else None
+def system_named(name: str, labels: Mapping[str, str]) -> System:
+    """Return a system by its name; that of any length with the length of the labels."""
+    length = unit_in_si(labels.get("length", "m"), "length") if name == ANY_LENGTH else None
     found = system(SYSTEMS[name])
     if length is None:
         return found
     return System(length, found.stress * length**2, found.potential * length)
 
 
-def contradiction(
+def contradicted(
     given: System, labels: Mapping[str, str], quantities: Collection[str]
 ) -> str | None:
-    """Return the first of some quantities whose label is of another unit; None where all fit."""
+    """Return the first of some quantities whose label is another unit, or None."""
     for quantity in quantities:
-        unit = size(labels[quantity], quantity) if quantity in labels else None
+        unit = unit_in_si(labels[quantity], quantity) if quantity in labels else None
         if unit is not None and not isclose(unit, getattr(given, quantity), rel_tol=1e-9):
             return quantity
     return None
 
 
-def fitting(labels: Mapping[str, str], quantities: Collection[str]) -> list[str]:
-    """Return the names of the systems that do not contradict labels."""
-    return [k for k in SYSTEMS if contradiction(named(k, labels), labels, quantities) is None]
-
-
-def table(labels: Mapping[str, str], quantities: Collection[str]) -> dict[str, str] | None:
-    """Return the units of length, force and potential that labels ask for; None if none do."""
-    length, potential = labels.get("length", "m"), labels.get("potential", "V")
-    force = force_of(labels.get("stress", "Pa"), length)
-    if force is None or size(force, "force") is None or size(potential, "potential") is None:
-        return None
-    found = {"length": length, "force": force, "potential": potential}
-    fits = contradiction(system((length, force, potential)), labels, quantities) is None
-    return found if fits else None
+def systems_fitting(labels: Mapping[str, str], quantities: Collection[str]) -> list[str]:
+    """Return the names of the systems that agree with labels."""
+    return [k for k in SYSTEMS if contradicted(system_named(k, labels), labels, quantities) is None]
 
 
 def force_of(stress: str, length: str) -> str | None:
-    """Return the name of the unit of force that goes with two units; None where it has none."""
-    pressure, side = size(stress, "stress"), size(length, "length")
-    return None if pressure is None or side is None else _named(pressure * side**2, "N")
+    """Return the unit of force, stress times length^2, by its name; None for unknown units."""
+    pressure, side = unit_in_si(stress, "stress"), unit_in_si(length, "length")
+    return None if pressure is None or side is None else _unit_name(pressure * side**2, "N")
 
 
-def _named(value: float, base: str) -> str:
-    """Return the name of a unit of SI's."""
+def _unit_name(value: float, base: str) -> str:
+    """Return the name of a unit: a value in SI and its base."""
     prefix = next((p for p, factor in PREFIXES.items() if isclose(factor, value)), None)
     return f"{value:g} {base}" if prefix is None else f"{prefix}{base}"
