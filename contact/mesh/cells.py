@@ -1,7 +1,7 @@
-"""The shapes of cells: nothing else knows how corners and facets lie, or how cells are integrated.
+"""Reference cells, by basix: corners, facets, Lagrange elements, quadrature, cuts into simplices.
 
-Points are those of the reference cell of basix, shape (q, dim); nodes are numbered as dolfinx does,
-corners first.
+Points are in the reference cell, shape (q, dim); nodes are in the order of dolfinx, corners first.
+Other modules do not ask for a shape by its name.
 
 References
 ----------
@@ -28,7 +28,7 @@ Nodes = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape of cells, or of facets.
+    """A reference cell, or facet.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Shape:
 
     @property
     def plural(self) -> str:
-        """Several of them in words."""
+        """The plural of its name."""
         return {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra"}.get(
             self.name, f"{self.name}s"
         )
@@ -100,7 +100,7 @@ class Shape:
         return np.asarray(_element(self, degree).points)
 
     def facet_nodes(self, degree: int) -> Nodes:
-        """Return the nodes of each facet in the order of the facet's element, (facets, nodes)."""
+        """Return the nodes of each facet in the order of the facet's nodes, (facets, nodes)."""
         closures = _element(self, degree).entity_closure_dofs[self.dim - 1]
         corners = basix.geometry(self.kind)[self.facet_corners]
         functions = self.facet.lagrange(1, self.facet.nodes(degree))
@@ -121,10 +121,10 @@ class Shape:
 
     @property
     def serendipity(self) -> list[tuple[Nodes, Nodes, Array]]:
-        """The nodes of degree 2 within faces, (k,), corners there, and weights of other nodes.
+        """The nodes of degree 2 in faces, (k,), their corners, and weights of the other nodes.
 
-        Then those within the cell. With them a serendipity cell is one of degree 2, whose
-        functions contain its own.
+        Then those in the cell. With values interpolated there a serendipity function is one of
+        degree 2.
         """
         found: list[tuple[Nodes, Nodes, Array]] = []
         dofs = _element(self, 2).entity_dofs
@@ -143,17 +143,14 @@ class Shape:
 
     @property
     def children(self) -> Nodes:
-        """Corners of the halves along each axis as nodes of degree 2, (children, corners)."""
+        """Corners of the halves along each axis, as nodes of degree 2, (children, corners)."""
         corners = basix.geometry(self.kind)
         places = (corners[:, None] + corners[None]) / 2
         distance = np.linalg.norm(places[:, :, None] - self.nodes(2), axis=3)
         return np.asarray(distance.argmin(axis=2))
 
     def pieces(self, degree: int) -> Nodes:
-        """Return the corners of straight pieces of a facet whose geometry has a degree.
-
-        Those of degree 2 are the halves along each axis, by its nodes, (pieces, corners).
-        """
+        """Return the corners of straight pieces of a facet of a degree, (pieces, corners)."""
         if degree == 1:
             return np.arange(self.corners)[None]
         # Of a triangle the one in the middle, too.
@@ -166,7 +163,7 @@ class Shape:
         return self._tabulated(degree, at, 0)[0]
 
     def gradients(self, degree: int, at: Array) -> Array:
-        """Return their derivatives by the coordinates of the reference cell, (q, nodes, dim)."""
+        """Return their derivatives in the reference cell, (q, nodes, dim)."""
         return np.moveaxis(self._tabulated(degree, at, 1)[1:], 0, -1)
 
     def _tabulated(self, degree: int, at: Array, derivatives: int) -> Array:
@@ -176,7 +173,7 @@ class Shape:
         return np.asarray(_element(self, degree).tabulate(derivatives, at)[..., 0])
 
     def vtk(self, degree: int) -> tuple[int, tuple[int, ...]]:
-        """Return VTK's number of cells of a degree, and where it has dolfinx's nodes."""
+        """Return VTK's number of cells of a degree, and the nodes in VTK's order."""
         *numbers, order = VTK[self.name]
         return numbers[degree - 1], order[: len(self.nodes(degree))]
 
@@ -202,7 +199,7 @@ def rule(shape: Shape, degree: int) -> tuple[Array, Array]:
 #: Largest degree of a rule where integrands are no polynomials.
 LARGEST = 40
 
-#: VTK's number of a shape, of degree 1 and 2, and where it has the nodes of degree 2.
+#: VTK's number of a shape, of degree 1 and 2, and the nodes of degree 2 in VTK's order.
 VTK: dict[str, tuple[int, int, tuple[int, ...]]] = {
     "interval": (3, 21, (0, 1, 2)),
     "triangle": (5, 22, (0, 1, 2, 5, 3, 4)),
@@ -252,7 +249,7 @@ def barycentric(points: Array) -> Array:
     return np.column_stack([1 - points.sum(axis=1), points])
 
 
-#: Corners, in VTK's order, of the faces of a cell in 3-D, around them, by its number of corners.
+#: Number of corners of a cell in 3-D -> corners around its faces, all in VTK's order.
 FACES: dict[int, tuple[tuple[int, ...], ...]] = {
     5: ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
     6: ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
@@ -266,8 +263,8 @@ FACES: dict[int, tuple[tuple[int, ...], ...]] = {
 def simplices(rows: Nodes, dim: int) -> Nodes:
     """Return cells or facets cut into simplices, shape (cells, simplices, dim + 1).
 
-    A cell is the cone of its smallest corner over the faces without it, and so is each of these:
-    the diagonal of a face begins at its smallest corner on either side (Dompierre et al.).
+    A cell is the cone of its smallest corner over the faces without it, and so are these: the
+    diagonal of a face begins at its smallest corner on both sides (Dompierre et al.).
 
     Parameters
     ----------
@@ -293,10 +290,7 @@ def simplices(rows: Nodes, dim: int) -> Nodes:
 
 
 def joined_facets(faces: Sequence[Nodes]) -> Nodes:
-    """Return facets of one dimension as one array, without those that have collapsed.
-
-    They are cut into triangles where they are unlike, or two corners of one are one node.
-    """
+    """Return facets as one array, without collapsed ones, of several shapes cut into triangles."""
     unlike = len({face.shape[1] for face in faces}) > 1
     if unlike or any(face.shape[1] > 3 and not uncollapsed(face).all() for face in faces):
         faces = [simplices(face, 2).reshape(-1, 3) for face in faces]
@@ -305,18 +299,18 @@ def joined_facets(faces: Sequence[Nodes]) -> Nodes:
 
 
 def uncollapsed(rows: Nodes) -> NDArray[np.bool_]:
-    """Return which cells or facets have no node twice, shape (n,)."""
+    """Return whether cells or facets have different nodes, shape (n,)."""
     return np.asarray(np.all(np.diff(np.sort(rows, axis=1), axis=1) != 0, axis=1))
 
 
 def unique_rows(rows: Nodes) -> Nodes:
-    """Return cells or facets without those that have the nodes of one before."""
+    """Return the different cells or facets, as sets of nodes, in their order."""
     first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)[1]
     return rows[np.sort(first)]
 
 
 def single_facets(faces: Nodes) -> Nodes:
-    """Return the facets that are there once."""
+    """Return the facets that occur once: the boundary of all facets of cells."""
     _, first, count = np.unique(
         np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
     )

@@ -29,7 +29,7 @@ from contact.mesh.parts import disjoint_pieces, known_name, members
 from contact.typing import Array
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
 
-#: Where facets inside of the body may be a part all the same.
+#: Uses of facets inside of the body.
 UNLESS = (
     ", unless components of its displacement or its potential are given, it is an electrode, or a "
     "bolt is cut there"
@@ -58,21 +58,20 @@ class Domain:
         Largest extent of the bounding box of the whole mesh (of a generated one: before its
         rotation, so that lengths derived from it do not depend on the rotation).
     levels
-        How often the mesh has been refined: 2**levels of its edges make up one straight edge of
-        the mesh that met a curved boundary.
+        Number of uniform refinements: 2**levels edges of the boundary are one straight edge of the
+        first mesh, whose vertices alone lie on a curved boundary.
     unusable
         Name of a group of facets that cannot be a part -> the reason.
     notes
-        Other contents of the source of the mesh, one sentence each.
+        Notes on the source of the mesh, one sentence each.
     revolved
-        Whether the mesh is the half plane of a body of revolution, x the radius and y along the
-        axis. Measures then are those of the whole body.
+        Whether the mesh is the half plane of a body of revolution, x the radius and y the axis.
+        Measures are then those of the whole body.
     inside
-        Name of a group with facets inside of the body -> its facets that this rank owns, as of
-        parts. Nothing acts on these, but they may be fixed, or electrodes; they are unusable else.
+        Name of a group of facets inside of the body -> those that this rank owns. They may be
+        fixed, or electrodes, and are unusable otherwise.
     space
-        Keys of a case's ``[space]`` for which the elements of the mesh's file were made: degree,
-        kinematics. A new case has them.
+        Keys of ``[space]`` of a new case by the elements of a mesh file: degree, kinematics.
     """
 
     mesh: dmesh.Mesh
@@ -148,7 +147,7 @@ class Domain:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names that `facets` and `ds` know, also of groups that cannot be parts."""
+        """Names of parts and unusable groups."""
         return (*self.parts, *self.unusable)
 
     def facets(self, name: str) -> Indices:
@@ -203,7 +202,7 @@ class Domain:
 
     @property
     def kinematics(self) -> Kinematics:
-        """How displacements of the mesh deform the body."""
+        """Gradient of displacements, in a plane, in 3-D or of a body of revolution."""
         return Axisymmetric() if self.revolved else CARTESIAN
 
     def ds(self, name: str) -> Measure:
@@ -240,10 +239,7 @@ class Domain:
         return measure if extent is None else ExtendedMeasure(measure, extent)
 
     def resultant(self, vector: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Return sums of forces, shape (..., d), as those on the whole body.
-
-        Over the full turn radial forces cancel, and so do moments about a point of the axis.
-        """
+        """Return a resultant force, shape (..., d), without the radial one of a full turn: 0."""
         return np.where([self.revolved, *[False] * (self.dim - 1)], 0.0, vector)
 
     def dx_in(self, name: str) -> Measure:
@@ -252,13 +248,12 @@ class Domain:
         return self.dx(list(self.regions).index(name))
 
     def dx_over(self, cells: Indices) -> Measure:
-        """Measure over some owned cells, for forms whose other integrals are over the same."""
+        """Measure over some owned cells, for forms with no other cell integrals."""
         data = [(0, cells)]
         return self._extended(ufl.Measure("dx", domain=self.mesh, subdomain_data=data)(0))
 
-    # The integrals of a form must share one object of subdomain data for each kind of integral.
-
-    # Parts may overlap: a measure is over pieces that do not.
+    # The integrals of a form must share one object of subdomain data for each kind of integral;
+    # parts may overlap, their disjoint pieces do not.
 
     @cached_property
     def _pieces(self) -> list[tuple[tuple[int, ...], Indices]]:
@@ -327,14 +322,14 @@ def from_mesh(
 
 
 def facets_inside(mesh: dmesh.Mesh, given: Marker | npt.NDArray[np.integer[Any]]) -> Indices:
-    """Return the owned ones of given facets that are not on the boundary, ascending."""
+    """Return the owned facets inside of the body among given ones, ascending."""
     dim = mesh.topology.dim - 1
     found = dmesh.locate_entities(mesh, dim, given) if callable(given) else given
     return np.setdiff1d(_owned(mesh, dim, found), exterior_facets(mesh)).astype(np.int32)
 
 
 def cells_in(mesh: dmesh.Mesh, marker: Marker) -> Indices:
-    """Return the owned cells in whose middle a function of x is true, ascending."""
+    """Return the owned cells in whose middles a function of x is true, ascending."""
     dim = mesh.topology.dim
     cells = np.arange(mesh.topology.index_map(dim).size_local, dtype=np.int32)
     if not cells.size:  # dolfinx divides by their number
@@ -345,7 +340,7 @@ def cells_in(mesh: dmesh.Mesh, marker: Marker) -> Indices:
 def with_further_names(
     domain: Domain, inside: Mapping[str, Indices], regions: Mapping[str, Indices]
 ) -> Domain:
-    """Return a domain with further names, of owned facets inside of the body and cells. Collective.
+    """Add names of owned facets inside of the body, and of cells, to a domain. Collective.
 
     Raises
     ------
@@ -371,7 +366,7 @@ def _tagged(tags: dmesh.MeshTags, wanted: int | Sequence[int]) -> Indices:
 
 
 def _owned(mesh: dmesh.Mesh, dim: int, given: Marker | npt.NDArray[np.integer[Any]]) -> Indices:
-    """Return the owned ones of given entities, ascending."""
+    """Return the owned entities among given ones, ascending."""
     if not callable(given):
         entities = np.asarray(given, dtype=np.int32)
     elif dim == mesh.topology.dim:
@@ -415,7 +410,7 @@ def with_names(
     return Domain(mesh, parts, regions, extent(mesh) if size is None else size)
 
 
-#: Nodes nearer to the axis than this, in units of the size of the body, are on it.
+#: Largest distance from the axis, over the size of the body, of nodes on it.
 ON_AXIS = 1e-9
 
 
@@ -425,9 +420,7 @@ def on_axis(domain: Domain, points: Array) -> NDArray[np.bool_]:
 
 
 def revolved(domain: Domain) -> Domain:
-    """Return the body of revolution whose half plane a domain is. Collective.
-
-    Nodes that lie on the axis up to rounding are moved onto it.
+    """Return the body of revolution of a half plane; nodes near the axis move onto it. Collective.
 
     Raises
     ------
