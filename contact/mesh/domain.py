@@ -340,13 +340,7 @@ def cells_in(mesh: dmesh.Mesh, marker: Marker) -> Indices:
 def with_further_names(
     domain: Domain, inside: Mapping[str, Indices], regions: Mapping[str, Indices]
 ) -> Domain:
-    """Add names of owned facets inside of the body, and of cells, to a domain. Collective.
-
-    Raises
-    ------
-    InputError
-        If one is empty.
-    """
+    """Add names of owned facets inside of the body, and of cells, none empty. Collective."""
     for name, own in (*inside.items(), *regions.items()):
         if domain.comm.allreduce(own.size, op=MPI.SUM) == 0:
             entity = "facet inside of the body" if name in inside else "cell"
@@ -382,19 +376,9 @@ def with_names(
     regions: Mapping[str, Indices],
     size: float | None = None,
 ) -> Domain:
-    """Make a domain of a mesh and its named exterior facets and cells. Collective.
+    """Make a domain of owned exterior facets and cells by name, none empty. Collective.
 
-    Parameters
-    ----------
-    parts, regions
-        As in `Domain`; without regions, all cells are the region ``body``.
-    size
-        Largest extent of the body; computed if not given.
-
-    Raises
-    ------
-    InputError
-        If a part or a region is empty on all ranks.
+    Without regions, all cells are the region ``body``.
     """
     exterior_facets(mesh)
     if not regions:

@@ -24,12 +24,7 @@ Indices: TypeAlias = npt.NDArray[np.int32]
 def combinations(
     count: int, groups: Iterable[npt.NDArray[np.integer[Any]]]
 ) -> tuple[Indices, tuple[tuple[int, ...], ...]]:
-    """Return overlapping groups of indices as one label an index.
-
-    Returns
-    -------
-    The labels of the indices 0, ..., count - 1, and for each label the groups by their positions.
-    """
+    """Return one label for each index below `count`, and the groups of each label by positions."""
     numbers = np.zeros(count, dtype=np.int32)
     combined: list[tuple[int, ...]] = [()]
     for position, group in enumerate(groups):
@@ -169,14 +164,9 @@ def graph_components(
 
 
 def paths(edges: npt.NDArray[np.integer[Any]], count: int) -> list[npt.NDArray[np.intp]]:
-    """Return the vertices of each polyline of a graph, in the order of their first vertices.
+    """Return the polylines of edges, (m, 2), between vertices, ordered by their first vertices.
 
     An open one begins at its end of the smaller number, a closed one at its smallest vertex.
-
-    Parameters
-    ----------
-    edges, count
-        Pairs of vertices, shape (m, 2), and the number of vertices.
     """
     graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(count, count)).tocsr()
     graph = graph + graph.T

@@ -28,16 +28,9 @@ def geometry_nodes(domain: Domain, cells: Indices | None = None) -> Array:
 
 
 def jacobians(shape: Shape, of: Array, at: Array) -> Array:
-    """Return dx/dxi at points, shape (n, q, d, dim); of simplices q = 1, for all points.
+    """Return dx/dxi, (n, q, d, dim), of cells or facets by their nodes, (n, nodes, d), at points.
 
-    Parameters
-    ----------
-    shape
-        Of the cells, or of facets.
-    of
-        Nodes of each, shape (n, nodes, d).
-    at
-        Points, shape (q, dim).
+    Of straight simplices q = 1, for all points.
     """
     degree = shape.degree_of(of.shape[1])
     if shape.simplex and degree == 1:
@@ -48,14 +41,8 @@ def jacobians(shape: Shape, of: Array, at: Array) -> Array:
 def outward(shape: Shape, points: Array, inside: Array, at: Array) -> Array:
     """Return the outward area vectors of facets at points, shape (f, q, d).
 
-    Parameters
-    ----------
-    shape
-        Of the facets.
-    points, inside
-        Their nodes, shape (f, nodes, d), and points of the body behind them, (f, d).
-    at
-        Points of the reference facet, shape (q, d - 1); of straight simplices one vector for all.
+    The nodes of the facets are `points`, (f, nodes, d); `inside` are points of the body behind
+    them, (f, d). Of straight simplices q = 1, for all points.
     """
     normal = area_vectors(jacobians(shape, points, at))
     away = points.mean(axis=1) - inside
@@ -77,13 +64,7 @@ def volume_factors(shape: Shape, of: Array, at: Array) -> Array:
 
 
 def area_vectors(jacobian: Array) -> Array:
-    """Return area vectors of facets: normal, of the length sqrt(det J^T J), shape (..., d).
-
-    Parameters
-    ----------
-    jacobian
-        dx/dxi of facets, shape (..., d, d - 1).
-    """
+    """Return normals of length sqrt(det J^T J), (..., d), of J of facets, (..., d, d - 1)."""
     columns = np.moveaxis(jacobian, -1, 0)
     if len(columns) == 2:
         return np.asarray(np.cross(*columns))
@@ -136,18 +117,9 @@ def inverse(matrix: Array) -> Array:
 def integration_weights(
     revolved: bool, shape: Shape, of: Array, at: Array, weights: Array
 ) -> Array:
-    """Return w_q |J| at quadrature points, (n, q); of a body of revolution 2 pi r w_q |J|.
+    """Return w_q |J| at points of a rule, (n, q); of a body of revolution 2 pi r w_q |J|.
 
-    Parameters
-    ----------
-    revolved
-        Whether the cells or facets are those of the half plane of a body of revolution.
-    shape
-        Of the cells or facets.
-    of
-        Their nodes, shape (n, nodes, d).
-    at, weights
-        Points, shape (q, dim), and weights, (q,), of a rule.
+    Of cells or facets by their nodes, shape (n, nodes, d).
     """
     found = volume_factors(shape, of, at) * weights
     if not revolved:

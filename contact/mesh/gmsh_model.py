@@ -77,16 +77,9 @@ def read_msh(file: Path) -> Contents:
 
 
 def model_contents(model: Any, entities_are_groups: bool = False) -> Contents:
-    """Return nodes, elements and physical groups of ``gmsh.model``.
+    """Return nodes, elements and groups, physical ones or entities, of ``gmsh.model``.
 
     A group without a name goes by its number.
-
-    Parameters
-    ----------
-    model
-        The model.
-    entities_are_groups
-        Whether its entities are the groups themselves.
     """
     tags, points, _ = model.mesh.getNodes()
     order = np.argsort(tags)

@@ -50,15 +50,7 @@ SIDES = {"rectangle": RECTANGLE_SIDES, "box": BOX_SIDES}
 
 
 class GridError(InputError):
-    """A grid that cannot be.
-
-    Parameters
-    ----------
-    key
-        The wrong key of ``[mesh]``.
-    given, accepted
-        The value, and in words the accepted ones.
-    """
+    """A wrong key of ``[mesh]``, with the given value, and the accepted ones in words."""
 
     def __init__(self, key: str, given: Any, accepted: str) -> None:
         super().__init__(f"mesh.{key}: given {given}; accepted: {accepted}", "value")
@@ -189,22 +181,7 @@ def plan(
     cells: Sequence[int],
     parts: Mapping[str, Piece | Sequence[Piece]],
 ) -> tuple[_Grid, dict[str, list[_Patch]]]:
-    """Return the grid and the patches of its boundary that its sides and parts consist of.
-
-    Nothing is made yet: this is also how a case is checked before its mesh is.
-
-    Parameters
-    ----------
-    kind
-        ``rectangle`` or ``box``.
-    origin, size, cells, parts
-        See `rectangle`.
-
-    Raises
-    ------
-    GridError
-        On wrong sizes or pieces.
-    """
+    """Check the arguments of `rectangle` or `box`; return the grid and the patches of parts."""
     sides = SIDES[kind]
     dim = len(sides) // 2
     for key, given in (("origin", origin), ("size", size), ("cells", cells)):

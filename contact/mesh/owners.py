@@ -53,15 +53,7 @@ class Owners:
         return np.searchsorted(self.begins[1:], numbers, side="right")
 
     def values(self, numbers: Numbers, of: Callable[[Numbers], NDArray[Any]]) -> NDArray[Any]:
-        """Return values at nodes of any ranks, shape (n, ...). Collective.
-
-        Parameters
-        ----------
-        numbers
-            Which nodes, shape (n,).
-        of
-            Returns the values at nodes that this rank owns.
-        """
+        """Return values at any nodes, (n, ...); `of` returns those of own ones. Collective."""
         asked, place = np.unique(numbers, return_inverse=True)
         ranks, given = exchanged(self.comm, self.ranks(asked), asked)
         return exchanged(self.comm, ranks, of(given))[1][place]
@@ -72,26 +64,12 @@ class Owners:
         return np.unique(exchanged(self.comm, self.ranks(asked), asked)[1])
 
     def among(self, own: Numbers, numbers: Numbers) -> Numbers:
-        """Return those of some nodes that are of a set, ascending. Collective.
-
-        Parameters
-        ----------
-        own
-            The nodes of the set that this rank owns.
-        numbers
-            Nodes of any ranks.
-        """
+        """Return own nodes of a set, and others of it among `numbers`, ascending. Collective."""
         inside = self.values(numbers, lambda given: np.isin(given, own))
         return np.unique(np.concatenate([own, numbers[inside]]))
 
     def sums(self, numbers: Numbers, values: Array) -> tuple[Numbers, Array]:
-        """Return the nodes of this rank with contributions, and their sums. Collective.
-
-        Parameters
-        ----------
-        numbers, values
-            Nodes of any ranks, some several times, shape (n,), and contributions, shape (n, k).
-        """
+        """Return the nodes of this rank with contributions, (n, k), and their sums. Collective."""
         asked, totals = _summed(numbers, values)
         _, given, parts = exchanged(self.comm, self.ranks(asked), asked, totals)
         return _summed(given, parts)

@@ -39,13 +39,7 @@ class Together(str):
 
 
 def part(given: str | Sequence[str]) -> str:
-    """Return the name of a part, or of several together, of a name or a list of names.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """Return the name of a part, or of several together, of a name or a list of names."""
     names = [given] if isinstance(given, str) else given
     named = isinstance(names, list | tuple) and all(isinstance(n, str) and n for n in names)
     if not named or not names:
@@ -67,19 +61,10 @@ def meet(one: str, other: str) -> bool:
 def disjoint_pieces(
     comm: MPI.Intracomm, count: int, parts: Iterable[Indices]
 ) -> list[tuple[tuple[int, ...], Indices]]:
-    """Divide facets into disjoint pieces, each in the same parts. Collective.
+    """Divide the facets 0, ..., count - 1 into pieces in the same of some parts. Collective.
 
-    Parameters
-    ----------
-    count
-        Number of facets of this rank.
-    parts
-        Those of each part; they may overlap.
-
-    Returns
-    -------
-    The parts by their positions, and the facets in exactly these: the same pieces in the same
-    order on all ranks, some without facets here.
+    A piece is the parts by their positions, and the facets in exactly these; all ranks have the
+    same ones in the same order, some without facets.
     """
     numbers, combined = combinations(count, parts)
     own = {combined[k]: np.flatnonzero(numbers == k).astype(np.int32) for k in np.unique(numbers)}
@@ -88,13 +73,7 @@ def disjoint_pieces(
 
 
 def known_name(kind: str, name: str, names: Mapping[str, Indices]) -> str:
-    """Return a name that is one of some names.
-
-    Raises
-    ------
-    InputError
-        If it is not; the message names the nearest one and lists all.
-    """
+    """Return a name, or raise an InputError with the nearest one and all names."""
     if name in names:
         return name
     hint = nearest(str(name), names, "; did you mean '{}'?")

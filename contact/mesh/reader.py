@@ -184,20 +184,7 @@ def _read(file: Path, ending: str) -> Contents:
 def from_generator(
     comm: MPI.Intracomm, name: str, cell: str | None = None, order: int = 1, **parameters: Any
 ) -> Domain:
-    """Build a generator of the package `meshes`, by name. Collective.
-
-    Parameters
-    ----------
-    comm
-        Communicator.
-    name, cell, order, parameters
-        As `meshes.build` takes them.
-
-    Raises
-    ------
-    InputError
-        For an unknown generator or wrong parameters.
-    """
+    """Mesh the geometry of a generator of the package `meshes`, as `meshes.build`. Collective."""
     import meshes
 
     def build() -> Contents:

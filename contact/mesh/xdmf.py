@@ -211,13 +211,7 @@ def _array(item: Element, root: Element, file: Path) -> Any:
 
 
 def write_distributed(cells: Cells, path: Path) -> None:
-    """Write a checked mesh to ``path``, an .xdmf file, and an .h5 file beside it. On one rank.
-
-    Raises
-    ------
-    InputError
-        If the name ends otherwise, or one of the files is there already.
-    """
+    """Write a checked mesh to ``path``, a new .xdmf file, and an .h5 file. On one rank."""
     import h5py
 
     heavy = path.with_suffix(".h5")
@@ -295,13 +289,7 @@ def distributed_arrays(path: Path) -> Path | None:
 
 
 def read_distributed(comm: MPI.Intracomm, heavy: Path) -> Cells:
-    """Return this rank's share of a mesh, by the file of `distributed_arrays`. Collective.
-
-    Raises
-    ------
-    InputError
-        If the file is missing or damaged.
-    """
+    """Return this rank's share of a mesh, by the file of `distributed_arrays`. Collective."""
     import h5py
 
     def opened() -> None:
