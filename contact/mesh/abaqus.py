@@ -268,7 +268,7 @@ class Deck:
         if self.motion is not None and points:
             turn, shift = self.motion
             with np.errstate(invalid="ignore"):  # infinite ones are refused with all others
-                points = (np.array(points) @ turn.T + shift).tolist()
+                points = [[*map(float, x)] for x in np.array(points) @ turn.T + shift]
         for number, point in zip(numbers, points, strict=True):
             if self.points.setdefault(number, point) != point and not np.isnan(point).any():
                 raise ValueError(f"*NODE: node {number % STRIDE} is at two places; accepted: one")

@@ -120,10 +120,10 @@ def check(contents: Contents) -> Cells:
             raise InputError("it has elements whose nodes it does not have", "mesh-file")
     contents = with_one_shape(contents)
     shape = _check_kinds([kind for kind in contents.kinds if kind.dim == dim], dim)
-    blocks, kinds = contents.blocks, contents.kinds
-    whole = [b for b, kind in enumerate(kinds) if kind.dim == dim]
     points = np.asarray(contents.points, dtype=float)
-    rows = in_dolfinx_order(shape, points, np.concatenate([blocks[b][1] for b in whole]))
+    pairs = zip(contents.blocks, contents.kinds, strict=True)
+    rows = np.concatenate([nodes for (_, nodes), kind in pairs if kind.dim == dim])
+    rows = in_dolfinx_order(shape, points, rows)
     corners = rows[:, : shape.corners]
     curved = _curved(points, rows, shape)
     rows = rows if curved else corners
@@ -139,26 +139,17 @@ def check(contents: Contents) -> Cells:
     if without:
         notes.append(f"sets of nodes that hold no facet of the boundary: {', '.join(without)}")
 
-    starts = dict(zip(whole, np.cumsum([0, *(len(blocks[b][1]) for b in whole)]), strict=False))
-    regions = {
-        name: np.concatenate([starts[b] + members for b, members in group.items() if b in starts])
-        for name, group in contents.groups.items()
-        if any(b in starts and len(members) for b, members in group.items())
-    }
-    body = np.unique(number[np.concatenate([*regions.values()])]) if regions else np.arange(0)
-    others = first.size - body.size
-    if not regions or (others and not contents.by_groups):
-        regions[BODY], body = np.arange(len(rows)), np.arange(first.size)
+    regions, body = _regions(contents, dim, number)
     new = np.full(first.size, -1)
     new[body] = np.arange(body.size)
-    labels, sets = combinations(body.size, [new[number[cells]] for cells in regions.values()])
+    labels, sets = combinations(body.size, [new[cells] for cells in regions.values()])
     rows = rows[first[body]]
 
     if curved and rows.shape[1] < len(shape.nodes(2)):
         points, rows = _filled(points, rows, shape)
         if dim == 3:
             notes.append(SERENDIPITY)
-    if others and body.size < first.size:
+    if others := first.size - body.size:
         notes.append(f"{others} cell(s) in no physical group are no part of the body")
     # Nodes of the body only; others may be centres of circles.
     used = np.unique(rows)
@@ -208,6 +199,26 @@ def _check_kinds(kinds: Sequence[Kind], dim: int) -> Shape:
                 "cell-kinds",
             )
     return Shape(kinds[0].name)
+
+
+def _regions(contents: Contents, dim: int, number: Ints) -> tuple[dict[str, Ints], Ints]:
+    """Return regions and the whole body by the numbers of their cells."""
+    starts: dict[int, int] = {}
+    end = 0
+    for b, ((_, nodes), kind) in enumerate(zip(contents.blocks, contents.kinds, strict=True)):
+        if kind.dim == dim:
+            starts[b] = end
+            end += len(nodes)
+    groups = {
+        name: [starts[b] + own for b, own in group.items() if b in starts and len(own)]
+        for name, group in contents.groups.items()
+    }
+    regions = {name: number[np.concatenate(own)] for name, own in groups.items() if own}
+    body = np.unique(np.concatenate([number[:0], *regions.values()]))
+    every = np.unique(number)
+    if not regions or (body.size < every.size and not contents.by_groups):
+        regions[BODY] = body = every
+    return regions, body
 
 
 def _parts(
@@ -333,7 +344,7 @@ def _check_volumes(shape: Shape, nodes: Array, unit: float) -> None:
     turned = np.abs(np.sign(volume).sum(axis=1)) < volume.shape[1]
     refuse(turned, "with a corner of 180 degrees or more", "folded-cells")
     curved = nodes.shape[1] > shape.corners
-    suspect = np.full(len(nodes), curved)
+    suspect: npt.NDArray[np.bool_] = np.full(len(nodes), curved)
     if not curved and shape.dim == 3 and not shape.simplex:
         suspect = _may_fold(shape, x)
     # At the corners, between them, and where integrals are taken.
