@@ -1,4 +1,4 @@
-"""Errors that a user can mend, and counts and suggestions in messages."""
+"""Errors of the input, and counts, values and suggestions in messages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-#: How NumPy writes a number where Python's own writing is asked for.
+#: A number of NumPy as its repr.
 NUMBER = re.compile(r"\bnp\.(?:u?int|float|bool|str)\d*_?\(([^()]*)\)|\bnp\.(True|False)_?\b")
 
 #: Most characters of a quoted value.
@@ -22,7 +22,7 @@ def counted(number: float, noun: str) -> str:
 
 
 def clipped(text: str, length: int = 100) -> str:
-    """Cut a text that is too long, and show characters that are not printable by their codes."""
+    """Return a text of at most a length, characters that are not printable as their codes."""
     text = text if len(text) <= length else text[: length - 3] + "..."
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
@@ -40,7 +40,7 @@ def shown(given: Any) -> str:
 
 
 def nearest(name: str, options: Iterable[str], words: str = " (did you mean {}?)") -> str:
-    """Return a suggestion of the name nearest to a wrong one; nothing if none is near."""
+    """Return a suggestion of the nearest name; an empty text if none is near."""
     near = difflib.get_close_matches(name, list(options), n=1)
     return words.format(clipped(near[0])) if near else ""
 
@@ -74,4 +74,4 @@ class InputError(ValueError):
 
 
 class SingularError(InputError):
-    """A linear system has no solution, for nothing holds the body where it is linearised."""
+    """A singular linear system: a rigid-body mode is unconstrained where it is linearised."""

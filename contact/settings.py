@@ -1,9 +1,8 @@
-"""Settings: kinds of values with their bounds in words, and the settings of a class of options.
+"""Types of settings with their bounds, and the accepted values in words.
 
 A class of options is a frozen dataclass that states each setting once: name, type with bounds and
-default in its field, the meaning under "Attributes" in its docstring. Python builds it without
-any check; the case file reads it with the bounds, and makes its messages and its reference page
-from the same statement.
+default in its field, the meaning under "Attributes" in its docstring. Python makes it unchecked;
+the case file checks the bounds, and has its messages and its reference page from the same place.
 """
 
 from __future__ import annotations
@@ -19,14 +18,14 @@ from contact.tolerances import PRECISION
 
 @dataclass(frozen=True)
 class Accepted:
-    """The accepted values of a kind, in words."""
+    """The accepted values of a type in words."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class ReadWith:
-    """The values that another setting must have for this one to be read at all.
+    """Condition on another setting for this one to be read.
 
     Attributes
     ----------
@@ -43,7 +42,7 @@ class ReadWith:
     required: bool = False
 
     def met(self, value: object) -> bool:
-        """Tell whether a value of the other setting is one of these."""
+        """Tell whether a value of the other setting meets the condition."""
         if self.value is None:
             return value is not None
         return value in self.value if isinstance(self.value, tuple) else value == self.value
@@ -58,7 +57,7 @@ class ReadWith:
 
 @dataclass(frozen=True)
 class Internal:
-    """Marks a setting that is for Python alone: the case file does not offer it."""
+    """Mark of a setting for Python alone, not in the case file."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class Required:
     """Marks a setting that the case file requires, where Python has another one for it."""
 
 
-#: Marks a list with as many numbers as space.
+#: Mark of a list with one number a dimension.
 SPATIAL = "spatial"
 
 Positive: TypeAlias = Annotated[float, Gt(0), Accepted("a number > 0")]
@@ -75,7 +74,7 @@ Number: TypeAlias = Annotated[float, Accepted("a number")]
 Vector: TypeAlias = Annotated[
     tuple[Number, ...], Len(2, 3), SPATIAL, Accepted("a list of 2 numbers in 2-D, 3 in 3-D")
 ]
-#: A vector along which something points: of any length.
+#: A direction, of any length but zero.
 Direction: TypeAlias = Annotated[
     tuple[Number, ...],
     Len(2, 3),

@@ -2,31 +2,31 @@
 
 import sys
 
-#: Residual of contact and friction above which a penalised solution approximates nothing.
+#: Largest residual of contact and friction of a useful penalised solution.
 LARGEST_VIOLATION = 0.1
 
-#: Distance of 1 from the next larger number.
+#: Machine epsilon.
 EPS = sys.float_info.epsilon
 
-#: Rounding of a result of many operations, over its terms: 1e-13.
+#: Relative rounding error of a sum of many terms: 1e-13.
 ROUNDING = 500 * EPS
 
-#: Share of a length, of a motion or of an overlap that is taken for none. Positions in files have
-#: ten digits and more, and an orthogonal basis knows a motion to some root of `EPS`.
+#: Relative length, motion or overlap that counts as zero: positions in files have ten digits and
+#: more, and rigid-body modes from an orthogonal basis an error of about a root of `EPS`.
 NEGLIGIBLE = 1e-9
 
-#: Overlap of two bodies, over the size of the mesh, that is rounding of positions in files.
+#: Overlap of two bodies, over the size of the mesh, that is rounding of the positions in files.
 TOUCHING = 1e-6
 
-#: The least tolerance: rounding keeps relative residuals from falling below.
+#: The least tolerance of relative residuals: the size of their rounding errors.
 PRECISION = 1e-15
 
-#: Share of loads, of their work or of displacements that is taken for none where bodies balance.
+#: Relative imbalance of loads, of their work or of displacements that counts as zero.
 BALANCED = 1e-6
 
-#: Numbers beyond this one, or below its inverse, are too near to those whose squares overflow.
+#: Largest number, and inverse of the least one, whose squares neither overflow nor underflow.
 HUGE = 1e150
 
-#: Most that counts as rounding, over loads, contact forces and reactions. A beam 1000 times as
-#: long as thick has 6e-6 of its loads; where it is more, too little is known of the forces.
+#: Largest error of forces, over loads, contact forces and reactions, that counts as rounding: of a
+#: beam 1000 times as long as thick it is 6e-6.
 MOST_ROUNDING = 1e-5
