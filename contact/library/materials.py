@@ -1,4 +1,4 @@
-"""Materials by name: the constants of libraries, TOML files, and the constants that follow."""
+"""Materials by name: constants of TOML files, and derived piezoelectric constants."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from forms.piezo import Piezo, from_voigt, hexagonal_voigt
 #: The library of the package.
 PACKAGED = Path(__file__).with_name("materials.toml")
 
-#: Texts of every entry, and all keys.
+#: Keys of texts, of stiffness, of coupling; all keys.
 WORDS = ("class", "source", "temperature", "condition")
 ELASTIC, ELECTRIC = ("young", "c", "stiffness"), ("e", "coupling", "permittivity")
 KEYS = (*WORDS, *ELASTIC, "poisson", *ELECTRIC, "d", "within", "checked")
 
-#: Classes that are the same however they are turned about X3.
-ROUND = ("isotropic", "6mm")
+#: Classes whose constants do not change with a rotation about X3.
+AXISYMMETRIC = ("isotropic", "6mm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Entry:
     Attributes
     ----------
     name, source, temperature, condition
-        Its name, the source of its constants, and the temperature and conditions of these.
+        Name, source of the constants, and their temperature and conditions.
     symmetry
         Crystal class, or "isotropic".
     stiffness
@@ -45,15 +45,15 @@ class Entry:
     isotropic
         Young's modulus (Pa) and Poisson's ratio; None for crystals.
     coupling
-        e, shape (3, 6) (C/m2); None for a material that is not piezoelectric.
+        e, shape (3, 6) (C/m2); None if it is not piezoelectric.
     permittivity
-        At constant strain, shape (3, 3) (F/m); None likewise.
+        At constant strain, shape (3, 3) (F/m), or None.
     published
         Indices (i, J) of d_iJ -> published value (C/N).
     within
-        By which share d = e s may differ from these.
+        Largest relative difference of d = e s from these.
     checked
-        Where else the constants were found, and how they differ there; empty where nobody looked.
+        Other sources of the constants, and differences there; may be empty.
     """
 
     name: str
@@ -71,13 +71,7 @@ class Entry:
 
     @staticmethod
     def of(name: str, table: Mapping[str, Any]) -> Entry:
-        """Read a table of a library.
-
-        Raises
-        ------
-        ValueError, KeyError, TypeError, AttributeError, IndexError
-            If it is none.
-        """
+        """Read a table of a library; raise errors of several classes if it is wrong."""
         unknown = [key for key in table if key not in KEYS]
         if unknown:
             raise ValueError(f"{unknown[0]}: unknown key")
@@ -104,7 +98,7 @@ class Entry:
 
     @property
     def piezo(self) -> Piezo | None:
-        """The piezoelectric tensors in the axes of the crystal, SI."""
+        """The piezoelectric tensors in the axes of the crystal, in SI."""
         if self.coupling is None or self.permittivity is None:
             return None
         return from_voigt(self.coupling, self.permittivity)
@@ -137,20 +131,19 @@ class Entry:
         return float(abs(self.charge_constants[field, strain]) / np.sqrt(free))
 
     def check(self) -> None:
-        """Check that the constants are those of a material.
+        """Check the constants: definiteness, symmetry about X3, published d = e s, k_33 < 1.
 
         Raises
         ------
         ValueError
-            If stiffness or permittivity are not positive definite, a crystal of class 6mm is not
-            the same all around, d = e s differs from the published values, or k_33 is not below 1.
+            With the constant.
         """
         Anisotropic(self.stiffness).check()
         tensors = [stiffness_tensor(self.stiffness)]
         if self.coupling is not None and self.permittivity is not None:
             from_voigt(self.coupling, self.permittivity)
             tensors += [coupling_tensor(self.coupling), self.permittivity]
-        if self.symmetry in ROUND and not isotropic_about_x3(*tensors):
+        if self.symmetry in AXISYMMETRIC and not isotropic_about_x3(*tensors):
             raise ValueError(f"class {self.symmetry}: the constants change with a turn about X3")
         for (i, j), given in self.published.items():
             found = float(self.charge_constants[i, j])
