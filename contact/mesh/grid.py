@@ -196,9 +196,9 @@ def plan(
     grid = low, low + extent, extent / np.asarray(cells)
     if not np.all(grid[1] - grid[0] > SHORTEST) or np.max(grid[2]) > STRETCHED * np.min(grid[2]):
         accepted = (
-            f"sizes above {SHORTEST:.2g}, also beside the origin, and cells of which no edge "
+            f"sizes above {SHORTEST:.2g}, also beside the origin, and cells of which no edge is "
+            f"more than {STRETCHED:g} times as long as another"
         )
-        accepted += f"is more than {STRETCHED:g} times as long as another"
         raise GridError("size", list(size), accepted)
     patches = {side: [_patch("", Piece(side), grid, sides)] for side in sides}
     for name, pieces in parts.items():
