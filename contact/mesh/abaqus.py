@@ -217,7 +217,7 @@ class Deck:
 
     The key of a name of an instance stands behind that of the instance; ``names`` has both as they
     were given, and ``instances`` the offset of the numbers of each. Numbers and names without an
-    instance are those of `home`, which `enter` sets, in whose place nodes are.
+    instance are those of `home`, which `enter` sets, with its motion and their `offset`.
     """
 
     points: dict[int, list[float]] = field(default_factory=dict)
@@ -230,13 +230,15 @@ class Deck:
     instances: dict[str, int] = field(default_factory=dict)
     other: list[str] = field(default_factory=list)
     home: str = ""
+    offset: int = 0
     motion: tuple[Array, Array] | None = None
 
     def enter(self, home: str, motion: tuple[Array, Array] | None = None) -> None:
         """Let the next keywords be those of a new instance, moved; of the assembly for ""."""
-        if home:
-            self.instances[home.upper()] = STRIDE * (len(self.instances) + 1)
         self.home, self.motion = home, motion
+        self.offset = STRIDE * (len(self.instances) + 1) if home else 0
+        if home:
+            self.instances[home.upper()] = self.offset
 
     def take(self, keyword: str, options: Mapping[str, str], lines: Sequence[str]) -> None:
         """Take a keyword with its data."""
@@ -312,9 +314,9 @@ class Deck:
 
     def member(self, given: str, instance: str = "") -> Member:
         """Return the number that a word stands for, or the key of a set."""
-        # Most are plain numbers, and files have millions of them.
-        plain = given.isdigit() and not instance
-        home, own = (self.home, given) if plain else self._resolve(given, instance)
+        if given.isdigit() and not instance:  # most of them, millions in a file
+            return int(given) + self.offset
+        home, own = self._resolve(given, instance)
         if not own.lstrip("+-").isdigit():
             return self.key(given, instance)
         return int(own) + self.instances[home.upper()] if home else int(own)
