@@ -32,7 +32,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.cells import INTERVAL, Shape, barycentric, rule, shape_of
 from contact.mesh.domain import Indices
 from contact.mesh.entities import cell_facets
-from contact.mesh.geometry import geometry_nodes, inverse, jacobians, integration_weights
+from contact.mesh.geometry import geometry_nodes, integration_weights, inverse, jacobians
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.tolerances import ROUNDING
