@@ -5,59 +5,127 @@ Other tests assert no counts, but of the thesis's algorithms, whose counts are r
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import product
+from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, nesting
-from contact.case.file import parse_case
+from contact import Bolt, build_problem, nesting
+from contact.case.file import Case, parse_case
 from contact.errors import InputError
 from contact.history import BodyState
 from contact.linear import multigrid
-from contact.linear.operator import SparseOperator
+from contact.linear.operator import Counters, SparseOperator
+from contact.methods import fallbacks
 from contact.methods.options import NewtonOptions
+from contact.model.friction import Friction
+from contact.problem.problem import ContactProblem
 from contact.results.solution import Solution
 from contact.solving import solve
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
 from scripts.benchmarks.bench_one import block
 from scripts.cases import bar
 from scripts.studies.cantilevers import UNIFORM as PUSHED
 from scripts.studies.cantilevers import cantilever
+from scripts.studies.indentation_in_space import punch
 from scripts.studies.robustness.problems import problems
-from tests.methods.test_nothing_touches import CASE as BLOCKS
+from tests.interface.test_compliance import COLUMNS
+from tests.linear.test_two_bodies import balls
+from tests.methods.test_belt import STRAPS, around_a_drum
+from tests.methods.test_chord import followed, yielding
+from tests.methods.test_curved import flattened
+from tests.methods.test_free_body import between_jaws, pads
+from tests.methods.test_newton import bar_case
+from tests.methods.test_nothing_touches import (
+    APPROACH,
+    LIFTED,
+    SIXTHS,
+    TENTHS,
+    above_a_ball,
+    leaves_let_go,
+    stepped,
+    unloaded,
+)
 from tests.methods.test_overload import wall
-from tests.methods.test_slender import TIP, UNIFORM, beam
+from tests.methods.test_slender import LIGHT, TIP, UNIFORM, beam, bent, on_the_ground
+from tests.problem.test_bolts import tightened
+from tests.problem.test_moved_nodes import halved
+from tests.problem.test_rigid_pairs import stacked
 from tests.problems import pairs
+from tests.problems.mechanics import bar as short_bar
+from tests.problems.mechanics import leaning_block, newton
 from tests.problems.rigid import indented
 from tests.problems.rings import between_plates, squeezed
+from tests.verification.test_punch import SUNK, TILTED, punched
+from tests.verification.test_quadratic_space import quadratic
 
-SELF = MPI.COMM_SELF
+COMM = MPI.COMM_WORLD
 CASE = -0.05, 1e5, "friction.mu=0.5"
 
 #: Largest displacement of the block, found by a direct solver.
 LARGEST = 0.0366836772
 
+#: Solves a problem and counts; meshes that are read from a file are written to a folder first.
+Counted = Callable[[Path], Counters]
 
-def of_case(case: dict[str, Any], *options: NewtonOptions, **given: Any) -> Callable[[], Solution]:
-    return lambda: solve(parse_case(case), *options, comm=SELF, **given)
+
+def of_case(case: dict[str, Any] | Case, **options: Any) -> Counted:
+    """Solve a case, by other options than its own if some are given."""
+    read = parse_case(case) if isinstance(case, dict) else case
+    given = [NewtonOptions(**options)] if options else []
+    return lambda _: solve(read, *given, comm=COMM).counters
 
 
-def drawn(name: str, kind: str = "hard", **mesh: str) -> Callable[[], Solution]:
-    """Return the solution of a random problem."""
+def by_newton(problem: Callable[[], ContactProblem], **options: Any) -> Counted:
+    """Solve a problem by Newton's method, to 1e-10 if no other tolerance is given."""
+    return lambda _: newton(problem(), **options).counters
 
-    def solution() -> Solution:
-        tables = next(problems(kind, name)).tables
+
+def drawn(name: str, kind: str = "hard", **mesh: str) -> Counted:
+    """Solve a random problem."""
+
+    def counted(folder: Path) -> Counters:
+        tables = next(problems(kind, name, folder=folder)).tables
         case = parse_case({**tables, "mesh": tables["mesh"] | mesh})
-        return solve(build_problem(case, SELF), NewtonOptions())
+        return solve(build_problem(case, COMM), NewtonOptions()).counters
 
-    return solution
+    return counted
 
 
-def evolution(**more: Any) -> dict[str, Any]:
-    """Return blocks that move in time."""
-    return {**BLOCKS, **more}
+def largest_of(counts: Iterable[Counters]) -> Counters:
+    """Return the largest count of each kind."""
+    every = [vars(one) for one in counts]
+    return Counters(**{kind: max(one[kind] for one in every) for kind in every[0]})
+
+
+def steps(case: dict[str, Any], times: list[float], **options: Any) -> list[Counters]:
+    """Return the counts of each load step."""
+    problem = build_problem(parse_case(case), COMM)
+    return [outcome.counters for _, outcome in stepped(problem, times, **options)]
+
+
+def largest_step(case: dict[str, Any], times: list[float]) -> Counted:
+    return lambda _: largest_of(steps(case, times))
+
+
+def last_step(case: dict[str, Any], **options: Any) -> Counted:
+    return lambda _: steps(case, TENTHS, **options)[-1]
+
+
+def before_proximal_points(counted: Counted) -> Counted:
+    """Leave the last fallback out."""
+
+    def without(folder: Path) -> Counters:
+        with patch.object(fallbacks, "proximal_points", return_value=None):
+            return counted(folder)
+
+    return without
 
 
 def clamped(case: dict[str, Any]) -> dict[str, Any]:
@@ -65,84 +133,284 @@ def clamped(case: dict[str, Any]) -> dict[str, Any]:
     return case
 
 
-def ring() -> Solution:
+def linear_bar() -> ContactProblem:
+    return short_bar(COMM, 8, law=Linear(1.0, 0.3), friction=Friction(ConstantCoefficient(0.5)))
+
+
+def columns(_: Path) -> Counters:
+    every = COLUMNS.values()
+    return largest_of(newton(one.problem(), tolerance=1e-11).counters for one in every)
+
+
+def ring(seed: int) -> Counted:
     case = squeezed("newton", way=0.3, traction=(0.0, -1e-3))
-    return solve(case, domain=between_plates(SELF, 1))
+    return lambda _: solve(case, domain=between_plates(COMM, seed)).counters
 
 
-TOUCH = {"on": "upper_bottom", "against": "lower_top"}
-LIFTED = {"on": "upper_top", "displacement": ["0.0003*t", "-0.001*sin(pi*t)"]}
-LIGHT = {"on": "top", "traction": [0.0, -1e-13]}
+def ball_on_ball(linear: str, mu: float, push: float) -> Counted:
+    def counted(_: Path) -> Counters:
+        # Small systems have no coarse levels otherwise.
+        with patch.dict(multigrid.DEFAULTS, {"pc_gamg_coarse_eq_limit": "200"}):
+            return solve(balls(linear, mu, push)).counters
+
+    return counted
+
+
+def lifted(seed: int) -> Counted:
+    return lambda folder: solve(pads(folder, seed)).counters
+
+
+def lost(dim: int) -> Counted:
+    return lambda _: solve(wall(dim, 1.01)).counters
+
+
+def jaws(weight: float) -> Counted:
+    return lambda folder: solve(between_jaws(folder, weight)).counters
+
+
+def indenter(dim: int, n: int, *, degree: int = 1, **last: float | str) -> Counted:
+    """Indent a block by a ball, whose motion or force along the last axis is given."""
+    rigid = {name: [*[0.0] * (dim - 1), value] for name, value in last.items()}
+    return of_case(quadratic(n, **rigid) if degree == 2 else indented(dim, n, **rigid), **EXACT)
+
+
+def bolted(_: Path) -> Counters:
+    options = NewtonOptions(tolerance=1e-12, linear="lu")
+    bolts = Bolt("shank", shortening=0.004), Bolt("shank", force=0.01)
+    every = product(bolts, (0.4, 0.8))
+    return largest_of(solve(tightened(bolt, cut=cut), options).counters for bolt, cut in every)
+
+
+def tilted_punch(linear: str) -> Counted:
+    def counted(_: Path) -> Counters:
+        pytest.importorskip("gmsh")
+        return solve(punch(0.25, f"solver.linear={linear}")).counters
+
+    return counted
+
+
+EXACT = {"tolerance": 1e-10}
 LONG = {"space": {"degree": 2}}
+ITERATIVE = {"solver": {"linear": "iterative"}}
+PRESSED = {"on": "top", "traction": [0.0, -3.90625e-5]}
+HEAVY = {"on": "top", "traction": [0.0, -1e-3]}
 
-#: Problem -> (solution, what is seen: solves of the whole body, factorisations, and Newton
+#: Problem -> (what solves it, what is seen: solves of the whole body, factorisations, and Newton
 #: iterations on the condensed problem).
-SEEN: dict[str, tuple[Callable[[], Solution], tuple[int, int, int]]] = {
+SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
+    # Slender bodies
     "beam on a stop": (of_case(beam(100.0, [200, 2], TIP, 0.5)), (1, 1, 3)),
     "beam on a stop, friction": (of_case(beam(100.0, [200, 2], TIP, 0.5, 0.3)), (1, 1, 3)),
-    "beam on the ground": (of_case(beam(100.0, [400, 4], UNIFORM, 0.5)), (1, 1, 24)),
-    "long beam": (of_case(beam(1000.0, [400, 1], LIGHT, 0.1, 0.8, **LONG)), (6, 4, 0)),
-    "beam, iterative": (
-        of_case(beam(100.0, [200, 2], TIP, 0.5, solver={"linear": "iterative"})),
+    "beam on a stop, coarse": (of_case(beam(100.0, [100, 1], TIP, 0.5, 0.3)), (1, 1, 3)),
+    "beam, iterative": (of_case(beam(100.0, [200, 2], TIP, 0.5, **ITERATIVE)), (4, 2, 0)),
+    "beam, iterative, friction": (
+        of_case(beam(100.0, [200, 2], TIP, 0.5, 0.3, **ITERATIVE)),
         (4, 2, 0),
     ),
+    "beam on the ground": (of_case(beam(100.0, [400, 4], UNIFORM, 0.5)), (1, 1, 24)),
+    "beam, sparse interior point": (of_case(beam(100.0, [600, 2], UNIFORM, 0.5)), (27, 14, 0)),
+    "beam, sparse interior point, friction": (
+        of_case(beam(100.0, [600, 2], UNIFORM, 0.5, 0.3)),
+        (33, 20, 0),
+    ),
+    "long beam": (of_case(beam(1000.0, [400, 1], LIGHT, 0.1, 0.8, **LONG)), (6, 4, 0)),
+    "long beam, rounding": (
+        of_case(beam(1000.0, [100, 1], LIGHT, 0.1, 0.8, **LONG, solver=EXACT)),
+        (1, 1, 5),
+    ),
     "beam clamped at both ends": (
-        of_case(clamped(beam(40.0, [160, 4], {"on": "top", "traction": [0.0, -3.9e-5]}, 0.3, 0.3))),
-        (1, 1, 34),
+        of_case(clamped(beam(40.0, [160, 4], PRESSED, 0.3, 0.3))),
+        (1, 1, 32),
     ),
-    "beam on all of its length": (
-        of_case(beam(600.0, [1200, 2], {"on": "top", "traction": [0.0, -1e-3]}, 0.0, 0.3)),
-        (2, 2, 0),
-    ),
-    "beam, sparse interior point": (of_case(beam(100.0, [600, 2], UNIFORM, 0.5, 0.3)), (33, 20, 0)),
+    # Not condensed onto most of its nodes
+    "beam on all of its length": (of_case(beam(600.0, [1200, 2], HEAVY, 0.0, 0.3)), (2, 2, 0)),
+    "beam whose tip is pressed": (of_case(on_the_ground()), (1, 1, 81)),
+    "beam whose tip is pressed, whole": (of_case(on_the_ground(), condense=False), (74, 54, 0)),
+    "beam pressed along the ground": (drawn("lifted-4"), (7, 7, 0)),
+    **{
+        f"half ring pressed flat, {thickness} thick, mu {mu}": (
+            lambda _, given=(thickness, mu): flattened("ring", *given).counters,
+            (1, 1, seen),
+        )
+        for thickness, mu, seen in [(0.1, 0.0, 42), (0.1, 0.3, 44), (1.0, 0.0, 38), (1.0, 0.3, 40)]
+    },
+    **{
+        f"arch pressed flat, {thickness} thick, mu {mu}": (
+            lambda _, given=(thickness, mu): flattened("arch", *given).counters,
+            (1, 1, seen),
+        )
+        for thickness, mu, seen in [(0.1, 0.0, 20), (0.1, 0.3, 22), (1.0, 0.0, 12), (1.0, 0.3, 13)]
+    },
+    **{
+        f"strap around a drum, ratio {given[1]}": (
+            lambda _, given=given: solve(around_a_drum(*given)).counters,
+            (1, 1, seen),
+        )
+        for given, seen in zip(STRAPS, [170, 230, 243], strict=True)
+    },
+    # Voltage, current and compliant layers
+    "bent beam on a conductor": (of_case(bent()), (1, 1, 18)),
     "bimorph on a conductor": (drawn("bimorph-3"), (1, 1, 19)),
     "bimorph on a good conductor": (drawn("bimorph-8"), (1, 1, 33)),
-    "unsupported block": (drawn("unsupported-5"), (1, 1, 4)),
-    "beam pressed along the ground": (drawn("lifted-4"), (7, 7, 0)),
+    "columns on a layer": (columns, (1, 1, 6)),
+    # Materials
+    "linear bar": (of_case(bar(16, *CASE, "material.law=linear")), (1, 1, 6)),
+    "short linear bar": (by_newton(linear_bar), (1, 1, 5)),
+    "short linear bar, whole": (by_newton(linear_bar, condense=False), (5, 4, 0)),
+    "bar that yields": (of_case(bar(16, *CASE)), (9, 1, 15)),
+    "fine bar that yields": (of_case(bar_case(32)), (6, 2, 11)),
+    "fine bar that yields, nested": (of_case(bar_case(32, "solver.nested=true")), (8, 1, 10)),
+    **{
+        f"bar that yields at {strain}, a tangent is kept {keep}": (
+            by_newton(lambda strain=strain: yielding(yield_strain=strain), keep=keep),
+            seen,
+        )
+        for strain, keep, seen in [
+            (0.02, "never", (4, 4, 8)),
+            (0.02, "within", (8, 2, 14)),
+            (0.004, "never", (8, 8, 21)),
+            (0.004, "within", (9, 6, 23)),
+        ]
+    },
+    "loads that follow each other": (lambda _: followed()[0].counters, (52, 3, 75)),
+    "loads that follow each other, largest": (lambda _: largest_of(followed()[1][1:]), (11, 1, 15)),
     "far in the plastic range": (drawn("yielding-0"), (10, 6, 24)),
     "farther in the plastic range": (drawn("yielding-1"), (15, 10, 44)),
+    "block that leans and yields": (by_newton(lambda: leaning_block(COMM, 4)), (8, 2, 17)),
     "falling friction": (drawn("bar-67", "plain", cell="quadrilateral"), (2, 1, 16)),
-    "blocks that approach each other": (of_case(evolution()), (2, 1, 2)),
-    "blocks that part": (
-        of_case(
-            evolution(
-                fixed=[BLOCKS["fixed"][0], LIFTED],
-                contact=TOUCH,
-                evolution={"times": [0.0, 1.8], "steps": [6]},
-            )
-        ),
-        (6, 1, 15),
-    ),
+    # Several bodies
     "block on a block": (of_case(pairs.case()), (1, 1, 3)),
-    # From 16 to 231 in 170 runs with moduli that differ by rounding.
-    "ring between plates": (ring, (2, 1, 231)),
-    # From 47 to 381 in 120 runs with moduli that differ by 1e-12: all nodes slide. Proximal points,
-    # tried after that, take as many.
-    "block that friction cannot hold": (
-        lambda: solve(wall(2, 1.01), comm=SELF),
-        (1, 1, 844),
+    "box on a box": (lambda _: halved("over", "under").counters, (1, 1, 2)),
+    "box under a box": (lambda _: halved("under", "over").counters, (1, 1, 2)),
+    "ball on a ball": (ball_on_ball("lu", 0.0, 0.0), (1, 1, 4)),
+    "ball on a ball, friction": (ball_on_ball("lu", 0.3, 0.5), (1, 1, 9)),
+    "ball on a ball, iterative": (ball_on_ball("iterative", 0.0, 0.0), (7, 2, 0)),
+    "ball on a ball, iterative, friction": (ball_on_ball("iterative", 0.3, 0.5), (10, 2, 0)),
+    # Bodies that supports do not hold. Rounding decides: these are the largest counts of runs with
+    # moduli that differ by 1e-12, of 170 with the ring, of 6 with the others.
+    **{f"ring on a plate, {seed}": (ring(seed), (2, 1, 231)) for seed in (1, 2, 6, 8)},
+    "ring in its clearance": (drawn("rings-24", "bodies"), (2, 1, 206)),
+    "unsupported block": (drawn("unsupported-5"), (1, 1, 4)),
+    "beam that is let go": (drawn("snap_fits-0", "bodies"), (2, 1, 3)),
+    "another beam that is let go": (drawn("snap_fits-1", "bodies"), (2, 1, 4)),
+    # In most runs (4, 1, 43); some go on with the whole bodies
+    **{f"pads that are lifted off, {seed}": (lifted(seed), (112, 70, 43)) for seed in range(3)},
+    # Loads that friction cannot hold, likewise: all nodes slide
+    **{
+        f"block that friction cannot hold, {dim}-D": (before_proximal_points(lost(dim)), seen)
+        for dim, seen in [(2, (11, 1, 352)), (3, (106, 74, 93))]
+    },
+    **{
+        f"block that falls out of jaws, {weight:g}": (
+            before_proximal_points(jaws(weight)),
+            (1, 1, seen),
+        )
+        for weight, seen in [(1e-5, 108), (1e-3, 89)]
+    },
+    # The last fallback finds nothing there
+    **{
+        f"proximal points in vain, {dim}-D": (lost(dim), seen)
+        for dim, seen in [(2, (11, 1, 856)), (3, (220, 188, 849))]
+    },
+    **{
+        f"proximal points in vain, jaws, {weight:g}": (jaws(weight), (1, 1, seen))
+        for weight, seen in [(1e-5, 433), (1e-3, 519)]
+    },
+    # Evolutions: all steps, the largest one, or the last one, which ends at rest
+    "blocks that approach each other": (of_case(APPROACH), (2, 1, 2)),
+    "blocks that approach each other, largest": (largest_step(APPROACH, TENTHS), (1, 1, 1)),
+    "block above a ball": (of_case(above_a_ball("0.003*t")), (2, 1, 2)),
+    "block above a ball, free": (of_case(above_a_ball("free")), (2, 1, 3)),
+    "blocks that part": (of_case(LIFTED), (6, 1, 15)),
+    "blocks that part, largest": (largest_step(LIFTED, SIXTHS), (1, 1, 5)),
+    "blocks unloaded by supports, last": (last_step(unloaded("supports")), (1, 0, 3)),
+    "blocks unloaded by a traction, last": (last_step(unloaded("traction")), (1, 0, 3)),
+    "whole blocks unloaded by supports, last": (
+        last_step(unloaded("supports"), condense=False),
+        (3, 2, 0),
     ),
-    "indenter under a force": (
-        lambda: solve(indented(2, 10, displacement=[0.0, "free"], force=[0.0, -0.01]), comm=SELF),
-        (1, 1, 4),
+    "whole blocks unloaded by a traction, last": (
+        last_step(unloaded("traction"), condense=False),
+        (3, 2, 0),
     ),
-    "indenter under a force, 3-D": (
-        lambda: solve(
-            indented(3, 4, displacement=[0.0, 0.0, "free"], force=[0.0, 0.0, -0.01]), comm=SELF
-        ),
-        (1, 1, 2),
+    "leaves let go, largest": (
+        lambda _: largest_of(outcome.counters for _, outcome in leaves_let_go()),
+        (1, 1, 7),
     ),
-    "bar that yields": (lambda: solve(bar(16, *CASE), comm=SELF), (9, 1, 15)),
-    "linear bar": (lambda: solve(bar(16, *CASE, "material.law=linear"), comm=SELF), (1, 1, 6)),
+    # Rigid bodies and bolts
+    "indenter under a force": (indenter(2, 10, displacement="free", force=-0.01), (1, 1, 5)),
+    "indenter that is moved": (indenter(2, 10, displacement=-0.0075), (1, 1, 4)),
+    "indenter under a force, 3-D": (indenter(3, 4, displacement="free", force=-0.01), (1, 1, 3)),
+    "indenter that is moved, 3-D": (indenter(3, 4, displacement=-0.0075), (1, 1, 3)),
+    "indenter under a force, degree 2": (
+        indenter(3, 2, degree=2, displacement="free", force=-0.02),
+        (1, 1, 5),
+    ),
+    "indenter that is moved, degree 2": (indenter(3, 2, degree=2, displacement=-0.02), (1, 1, 4)),
+    "tilted punch": (lambda _: punched(7, 20.0, False, TILTED).counters, (1, 1, 3)),
+    "circular punch": (lambda _: punched(6, 20.0, True, SUNK).counters, (1, 1, 3)),
+    "tilted punch, 3-D": (tilted_punch("auto"), (1, 1, 2)),
+    "tilted punch, 3-D, direct": (tilted_punch("lu"), (1, 1, 2)),
+    "plate on two blocks": (by_newton(stacked), (1, 1, 2)),
+    "bolt and flanges": (bolted, (1, 1, 3)),
 }
 
+#: Problems that ranks solve too.
+ON_RANKS = [
+    "beam on a stop, coarse",
+    "bimorph on a good conductor",
+    "block that leans and yields",
+    "box on a box",
+    "box under a box",
+    "block that friction cannot hold, 2-D",
+    "block that friction cannot hold, 3-D",
+    "bolt and flanges",
+]
 
-@pytest.mark.parametrize("name", SEEN)
-def test_at_most_twice_what_is_seen(name: str) -> None:
-    make, seen = SEEN[name]
-    counters = make().counters
+#: Beginnings of the names of problems that take about a second or more.
+SLOW = "half ring", "strap around a drum, ratio 1.1", "proximal points"
+
+
+def check(name: str, folder: Path) -> None:
+    """Compare counts with twice those that are seen; what is done once is done once."""
+    counted, seen = SEEN[name]
+    counters = counted(folder)
     counts = (counters.linear_solves, counters.factorizations, counters.contact_solves)
-    assert all(count <= 2 * most for count, most in zip(counts, seen, strict=True)), counts
+    most = [2 * count if count > 1 else count for count in seen]
+    assert all(count <= bound for count, bound in zip(counts, most, strict=True)), (counts, most)
+
+
+@pytest.mark.core(
+    "beam on a stop",
+    "beam on a stop, friction",
+    "beam on the ground",
+    "strap around a drum, ratio 1.2",
+    "columns on a layer",
+    "short linear bar",
+    "short linear bar, whole",
+    "bar that yields",
+    "fine bar that yields, nested",
+    "ring on a plate, 1",
+    "blocks that part, largest",
+    "indenter under a force",
+    "indenter that is moved",
+    "indenter under a force, 3-D",
+    "tilted punch",
+    "plate on two blocks",
+)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name.startswith(SLOW) else ()) for name in SEEN],
+)
+def test_at_most_twice_what_is_seen(name: str, tmp_path: Path) -> None:
+    check(name, tmp_path)
+
+
+@pytest.mark.core("beam on a stop, coarse", "block that leans and yields", "bolt and flanges")
+@pytest.mark.parallel(alone=False)
+@pytest.mark.parametrize("name", ON_RANKS)
+def test_ranks_take_as_many(name: str, shared_tmp_path: Path) -> None:
+    check(name, shared_tmp_path)
 
 
 def test_a_large_body_that_yields_is_factorised_once(monkeypatch: pytest.MonkeyPatch) -> None:

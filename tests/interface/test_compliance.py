@@ -119,23 +119,24 @@ def test_a_stiff_column_does_not_cycle_between_open_and_saturated():
     assert check_column(STIFF) == "linear"
 
 
+#: Columns that Newton's method and the penalty method solve.
+COLUMNS = {
+    **REGIMES,
+    **{f"piezo-{regime}": column for regime, column in PIEZO_REGIMES.items()},
+    "stiff": STIFF,
+    "endless": replace(STIFF, gap=np.inf),
+}
+
+
 @pytest.mark.core
-@pytest.mark.parametrize(
-    "column",
-    [*REGIMES.values(), *PIEZO_REGIMES.values(), STIFF, replace(STIFF, gap=np.inf)],
-    ids=[*REGIMES, *(f"piezo-{regime}" for regime in PIEZO_REGIMES), "stiff", "endless"],
-)
+@pytest.mark.parametrize("column", COLUMNS.values(), ids=COLUMNS)
 def test_newton_on_columns(column):
     newton = Newton(column.problem(), NewtonOptions(tolerance=1e-11))
     assert newton.solve()[1].converged
     check_solution(column, newton)
 
 
-@pytest.mark.parametrize(
-    "column",
-    [*REGIMES.values(), *PIEZO_REGIMES.values(), STIFF, replace(STIFF, gap=np.inf)],
-    ids=[*REGIMES, *(f"piezo-{regime}" for regime in PIEZO_REGIMES), "stiff", "endless"],
-)
+@pytest.mark.parametrize("column", COLUMNS.values(), ids=COLUMNS)
 def test_penalty_on_columns(column):
     # Full steps would cycle between the open and the saturated layer.
     eps = 1e-7

@@ -62,6 +62,23 @@ def test_it_converges_as_fast_as_for_one_body(held, monkeypatch):
     assert np.allclose(state.x, direct.x, rtol=0, atol=1e-6 * scale)
 
 
+def balls(linear, mu, push):
+    """Return half a ball that is pressed on another, and pushed aside."""
+    return parse_case({
+        "mesh": {"generator": "two_spheres", "quarters": 2, "size": 25.0, "contact_size": 2.5,
+                 "contact_width": 5.0},
+        "material": {"young": 20e3, "poisson": 0.3},
+        "fixed": [
+            {"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},
+            {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
+        ],
+        "load": [{"on": "upper_cut", "traction": [push, 0.0, -8.0]}],
+        "contact": {"on": "upper_round", "against": "lower_round"},
+        "friction": {"law": "coulomb", "mu": mu} if mu else {"law": "none"},
+        "solver": {"linear": linear, "tolerance": 1e-8},
+    })  # fmt: skip
+
+
 @pytest.mark.parametrize(("mu", "push"), [(0.0, 0.0), (0.3, 0.5)])
 def test_a_ball_that_only_another_ball_holds(mu, push, monkeypatch):
     """It touches it at one node at first; the preconditioner's norm saw nothing but its rolling."""
@@ -78,26 +95,9 @@ def test_a_ball_that_only_another_ball_holds(mu, push, monkeypatch):
         return x
 
     monkeypatch.setattr(SparseOperator, "solve", measured)
-    section = {
-        "mesh": {
-            "generator": "two_spheres",
-            "quarters": 2,
-            "size": 25.0,
-            "contact_size": 2.5,
-            "contact_width": 5.0,
-        },
-        "material": {"young": 20e3, "poisson": 0.3},
-        "fixed": [
-            {"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},
-            {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
-        ],
-        "load": [{"on": "upper_cut", "traction": [push, 0.0, -8.0]}],
-        "contact": {"on": "upper_round", "against": "lower_round"},
-        "friction": {"law": "coulomb", "mu": mu} if mu else {"law": "none"},
-    }
     found = {}
     for linear in ("iterative", "lu"):
-        case = parse_case(section | {"solver": {"linear": linear, "tolerance": 1e-8}})
+        case = balls(linear, mu, push)
         problem = build_problem(case, SELF)
         found[linear] = solve(problem, case.solver)
         assert found[linear].converged

@@ -7,6 +7,7 @@ from mpi4py import MPI
 from contact import Solution, build_problem, parse_case, solve
 from contact.mesh.domain import Domain
 from contact.mesh.grid import rectangle
+from contact.problem.problem import ContactProblem
 
 #: Tension at the end that is pulled more, and Young's modulus.
 PULL, YOUNG = 0.005, 1.0
@@ -24,16 +25,10 @@ def strap(cells: int, thickness: float) -> Domain:
     return domain
 
 
-@pytest.mark.core
-@pytest.mark.parametrize(
-    ("cells", "ratio", "mu", "degree", "thickness"),
-    [(37, 1.2, 0.4, 1, 0.08), (53, 1.5, 0.3, 1, 0.2), (50, 1.1, 0.4, 2, 0.08)],
-)
-def test_a_strap_around_a_drum(cells, ratio, mu, degree, thickness):
-    """Friction bounds of Newton's cycling active sets came back for ever: residuals up to 0.8."""
-    size = {"generator": "rectangle", "size": [np.pi + 1, thickness], "cells": [cells, 1]}
+def around_a_drum(cells, ratio, mu, degree, thickness) -> ContactProblem:
+    """Return the problem of a strap whose one end is pulled `ratio` times as much."""
     case = {
-        "mesh": size,
+        "mesh": {"generator": "rectangle", "size": [np.pi + 1, thickness], "cells": [cells, 1]},
         "space": {"degree": degree},
         "material": {"young": YOUNG, "poisson": 0.2},
         "fixed": [{"on": "right", "displacement": [0.0, "free"]}],
@@ -48,8 +43,18 @@ def test_a_strap_around_a_drum(cells, ratio, mu, degree, thickness):
         },
         "friction": {"law": "coulomb", "mu": mu},
     }
-    problem = build_problem(parse_case(case), MPI.COMM_SELF, domain=strap(cells, thickness))
-    solution = solve(problem)
+    return build_problem(parse_case(case), MPI.COMM_SELF, domain=strap(cells, thickness))
+
+
+#: Cells, ratio of the pulls, coefficient of friction, degree and thickness of straps.
+STRAPS = [(37, 1.2, 0.4, 1, 0.08), (53, 1.5, 0.3, 1, 0.2), (50, 1.1, 0.4, 2, 0.08)]
+
+
+@pytest.mark.core
+@pytest.mark.parametrize(("cells", "ratio", "mu", "degree", "thickness"), STRAPS)
+def test_a_strap_around_a_drum(cells, ratio, mu, degree, thickness):
+    """Friction bounds of Newton's cycling active sets came back for ever: residuals up to 0.8."""
+    solution = solve(around_a_drum(cells, ratio, mu, degree, thickness))
     assert solution.converged, solution.outcome.reason
     # The drum bears both pulls, and the moment of friction their difference.
     force = -solution.contact_force

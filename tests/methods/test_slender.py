@@ -148,10 +148,13 @@ def test_a_beam_clamped_at_both_ends_is_pressed_to_the_ground():
     assert np.allclose(solution.contact_force[1], other.contact_force[1], rtol=2e-2)
 
 
+#: A load that rounding of a long beam is not small beside.
+LIGHT = {"on": "top", "traction": [0.0, -1e-13]}
+
+
 def test_rounding_does_not_keep_a_long_beam_from_its_solution():
     """It cancels to 1e-5 of the loads: the condensed beam went on to the block relaxation."""
-    load = {"on": "top", "traction": [0.0, -1e-13]}
-    case = beam(1000.0, [100, 1], load, 0.1, 0.8, space={"degree": 2})
+    case = beam(1000.0, [100, 1], LIGHT, 0.1, 0.8, space={"degree": 2})
     solution = solve(parse_case({**case, "solver": {"tolerance": 1e-10}}), comm=SELF)
     assert solution.converged, solution.outcome.reason
     assert 1e-10 < solution.outcome.residuals.equilibrium_rounding < 1e-7
@@ -160,8 +163,7 @@ def test_rounding_does_not_keep_a_long_beam_from_its_solution():
 
 def test_an_end_that_rounding_alone_grants_is_said_to_be_to_rounding():
     """It was called converged at 1e-12, with all residuals 0."""
-    load = {"on": "top", "traction": [0.0, -1e-13]}
-    case = beam(1000.0, [100, 1], load, 0.1, 0.8, space={"degree": 2})
+    case = beam(1000.0, [100, 1], LIGHT, 0.1, 0.8, space={"degree": 2})
     solution = solve(parse_case({**case, "solver": {"tolerance": 1e-12}}), comm=SELF)
     kkt = solution.outcome.residuals
     assert solution.converged
@@ -190,14 +192,20 @@ def test_slender_bodies_are_not_condensed_onto_most_of_their_nodes():
     assert solution.counters.contact_solves == 0
 
 
-def test_a_bent_piezoelectric_beam_meets_a_conductor():
-    """Voltage and load bend it onto the foundation; all methods agree where they converge."""
+def bent() -> dict:
+    """Return a piezoelectric beam that voltage and load bend onto a conducting foundation."""
     pzt = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
     load = {"on": "right", "traction": [0.0, -58.7 * 0.2 / 20.0**3]}
     case = beam(20.0, [80, 4], load, 0.05, 0.3)
     case["material"] = {"young": 58.7102, "poisson": 0.3912, "piezo": pzt}
     case["fixed"].append({"on": "top", "potential": 0.1})
     case["electric"] = {"k_e": 1.0, "phi_f": 0.0, "delta": 10.0}
+    return case
+
+
+def test_a_bent_piezoelectric_beam_meets_a_conductor():
+    """All methods agree where they converge."""
+    case = bent()
     solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
     assert solution.contact_force[1] < 0
@@ -226,16 +234,25 @@ def test_a_beam_with_many_contact_nodes_takes_the_sparse_interior_point(mu):
     assert np.allclose(sparse.contact_force, dense.contact_force, rtol=0, atol=1e-7 * size)
 
 
+#: Force at the tip of a beam on the ground.
+PRESSED = 9.25925926e-11
+
+
+def on_the_ground() -> dict:
+    """Return a beam on the ground whose tip is pressed."""
+    case = beam(300.0, [60, 3], {"on": "right", "traction": [0.0, -PRESSED]}, 0.0)
+    case |= {"space": {"degree": 2}, "friction": {"law": "tresca", "bound": 8.23045267e-12}}
+    case["material"]["poisson"] = 0.0
+    return case
+
+
 @pytest.mark.parametrize("condense", [True, False])
 def test_a_beam_on_the_ground_whose_tip_is_pressed(condense):
     """From the gaps of its working set the interior point took all its steps in vain."""
-    force = 9.25925926e-11
-    case = beam(300.0, [60, 3], {"on": "right", "traction": [0.0, -force]}, 0.0)
-    case |= {"space": {"degree": 2}, "friction": {"law": "tresca", "bound": 8.23045267e-12}}
-    case["material"]["poisson"] = 0.0
+    case = on_the_ground()
     solution = solve(parse_case(case), NewtonOptions(condense=condense), comm=SELF)
     assert solution.converged, solution.outcome.reason
-    assert solution.contact_force[1] == pytest.approx(-force, rel=1e-4)
+    assert solution.contact_force[1] == pytest.approx(-PRESSED, rel=1e-4)
 
 
 @pytest.mark.parametrize("most", [4, 20])

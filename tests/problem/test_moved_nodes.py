@@ -91,6 +91,14 @@ def test_a_block_that_slides_over_held_nodes():
     assert abs(across) == pytest.approx(MU * abs(down), rel=1e-6)
 
 
+def halved(on, against):
+    """Return the solution of a box that is pressed on another; a side of both is a symmetry."""
+    sides = ["lower_left", "upper_left"]
+    supports = {"bottom": [0.0] * 3, "top": ["free", "free", -0.02]}
+    supports |= {side: [0.0, "free", "free"] for side in sides}
+    return moved(Blocks(3).domain(COMM), Contact(on, against=against), supports)
+
+
 @pytest.mark.parallel
 @pytest.mark.parametrize(("on", "against"), [("over", "under"), ("under", "over")])
 def test_a_plane_of_symmetry_between_boxes(on, against):
@@ -98,11 +106,7 @@ def test_a_plane_of_symmetry_between_boxes(on, against):
 
     With friction along it there Newton's method did not converge in 350 solves.
     """
-    sides = ["lower_left", "upper_left"]
-    supports = {"bottom": [0.0] * 3, "top": ["free", "free", -0.02]}
-    supports |= {side: [0.0, "free", "free"] for side in sides}
-    solution = moved(Blocks(3).domain(COMM), Contact(on, against=against), supports)
-    contact = solution.contact
+    contact = halved(on, against).contact
     plane = contact.points[:, 0] < contact.points[:, 0].min() + 1e-9
     assert contact.slip[plane, 0] == pytest.approx(0.0, abs=1e-15)
     assert (contact.pressure[plane] > 0).any()

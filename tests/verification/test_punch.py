@@ -11,7 +11,6 @@ from contact.errors import InputError
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
 from contact.model.obstacle import Plane
 from contact.model.rigid import Motion, Rigid
@@ -21,10 +20,14 @@ from contact.results.resultants import movements
 from contact.solving import solve
 from forms.hencky import Linear
 from scripts.studies.indentation_in_space import punch, rotation
-from tests.problems.mechanics import constant
+from tests.problems.mechanics import constant, newton
 
 SELF = MPI.COMM_SELF
 NU, FORCE, MOMENT = 0.3, 0.01, 0.002
+
+#: Motions of a punch under a force, and under a moment too.
+SUNK = Motion([0.0, None], [0.0], [0.0, -FORCE], [0.0], [0.0, 0.0])
+TILTED = Motion([0.0, None], [None], [0.0, -FORCE], [MOMENT], [0.0, 0.0])
 
 
 def growing(first, far):
@@ -50,22 +53,26 @@ def half_space(n: int, far: float, revolved: bool) -> Domain:
         left = np.zeros_like(p[0], dtype=bool) if revolved else p[0] < -far + 1e-9
         return (p[1] < -far + 1e-9) | (p[0] > far - 1e-9) | left
 
-    def punched(p):
+    def under_punch(p):
         return (p[1] > -1e-9) & (np.abs(p[0]) < 1 + 1e-9)
 
-    domain = from_mesh(mesh, {"punch": punched, "far": distant})
+    domain = from_mesh(mesh, {"punch": under_punch, "far": distant})
     return replace(domain, revolved=revolved)
 
 
-def pressed(n: int, far: float, revolved: bool, motion: Motion):
-    """Return how a punch moves, and its problem."""
+def punched(n: int, far: float, revolved: bool, motion: Motion) -> Newton:
+    """Return the method that has solved for a punch."""
     fixed = [Fixed("far", [constant(0.0, 2), constant(0.0, 2)])]
     body = Body(Linear(1.0, NU), fixed, (), rigid=(Rigid("punch", motion, foundation=True),))
     contact = Contact("punch", Plane((0.0, 0.0), (0.0, -1.0)))
     problem = ContactProblem(half_space(n, far, revolved), body, contact, degree=2)
-    method = Newton(problem, NewtonOptions(tolerance=1e-9))
-    state, outcome = method.solve()
-    assert outcome.converged
+    return newton(problem, tolerance=1e-9)
+
+
+def pressed(n: int, far: float, revolved: bool, motion: Motion):
+    """Return how a punch moves, and its problem."""
+    method = punched(n, far, revolved, motion)
+    problem, state = method.problem, method.state
     # Nothing lifts off.
     assert np.all(state.forces.pressure > 0)
     return problem, state, movements(problem, state)["rigid"]
@@ -74,8 +81,7 @@ def pressed(n: int, far: float, revolved: bool, motion: Motion):
 @pytest.mark.core
 def test_a_moment_tilts_a_flat_punch():
     """M = pi a^2 E theta/(4 (1 - nu^2)) a unit length; the force does not tilt it."""
-    motion = Motion([0.0, None], [None], [0.0, -FORCE], [MOMENT], [0.0, 0.0])
-    problem, state, moved = pressed(7, 20.0, False, motion)
+    problem, state, moved = pressed(7, 20.0, False, TILTED)
     theta = 4 * (1 - NU**2) * MOMENT / np.pi
     assert np.deg2rad(moved["rotation"]) == pytest.approx(theta, rel=5e-3)
     nodes, pressure = problem.nodes, state.forces.pressure
@@ -102,8 +108,7 @@ def test_a_circular_punch_has_no_way_but_along_its_axis():
 @pytest.mark.core
 def test_a_circular_punch_sinks_by_its_force():
     """P = 2 E* a delta; what the far supports take off falls like the inverse of their distance."""
-    motion = Motion([0.0, None], [0.0], [0.0, -FORCE], [0.0], [0.0, 0.0])
-    depths = [-pressed(6, far, True, motion)[2]["displacement"][1] for far in (10.0, 20.0)]
+    depths = [-pressed(6, far, True, SUNK)[2]["displacement"][1] for far in (10.0, 20.0)]
     stiffness = [FORCE / (2 * depth) * (1 - NU**2) for depth in depths]
     assert 2 * stiffness[1] - stiffness[0] == pytest.approx(1.0, rel=5e-3)
 
