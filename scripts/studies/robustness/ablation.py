@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
+from itertools import islice, product
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -155,6 +155,15 @@ OWN: dict[str, dict[str, Any]] = {
         "friction": COULOMB,
         "solver": {"linear": "iterative"},
     },
+    # A block pressed to a wall, and along it by 1 % more than friction can bear.
+    "wall": {
+        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
+        "material": ELASTIC | {"poisson": 0.0},
+        "fixed": [{"on": "right", "displacement": [-1e-3, "free"]}],
+        "load": [{"everywhere": True, "body_force": [0.0, -1.01 * 0.3e-3]}],
+        "contact": {"on": "left"},
+        "friction": COULOMB,
+    },
     # Two piezoelectric bodies below a plate, with a current across both contacts.
     "piezoelectric-pair": {
         "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.22},
@@ -213,6 +222,34 @@ def _belt() -> Case:
     return parse_case(tables, source="belt")
 
 
+def _pads() -> Case:
+    """Return two pads between a base and a lid that presses them and is lifted off."""
+    bodies = Bodies(np.random.default_rng(1))
+    places = {"base": (-2.0, 2.0, -1.0, 0.0), "p0": (-1.4, -0.8, 0.0, 0.4),
+              "p1": (0.8, 1.4, 0.0, 0.4), "lid": (-2.0, 2.0, 0.4, 1.0)}  # fmt: skip
+    for name, (left, right, low, high) in places.items():
+        bodies.block(name, [[left, low], [right, low], [right, high], [left, high]], 0.2)
+    folder = Path(tempfile.mkdtemp())
+    write_msh(bodies.mesh(), folder / "pads.msh")
+    sides = ("bottom", "base_top"), ("top", "lid_bottom")
+    lid = {"on": "lid_top", "displacement": [0.0021, -0.003], "amplitude": "d"}
+    tables = {
+        "mesh": {"file": str(folder / "pads.msh")},
+        "material": ELASTIC,
+        "fixed": [{"on": "base_bottom", "displacement": [0.0, 0.0]}, lid],
+        "contact": [
+            {"on": f"{pad}_{side}", "against": other, "friction": COULOMB | {"mu": 0.2}}
+            for pad, (side, other) in product(("p0", "p1"), sides)
+        ],
+        "evolution": {
+            "times": [0.0, 1.0, 2.0],
+            "steps": [1, 3],
+            "amplitudes": {"d": {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, -0.3]}},
+        },
+    }
+    return parse_case(tables, source="pads")
+
+
 def _steep(cells: tuple[int, int], k_e: str, delta: str) -> Case:
     """Return Example 8.4 with a steep ramp of the conductivity."""
     changes = "solver.method=newton", f"electric.k_e={k_e}", f"electric.delta={delta}"
@@ -250,6 +287,10 @@ DEVICES = (
            ((fallbacks, "interior_point", _no_fallback),)),
     Device("updates of the friction bound", (), "Haslinger 1983",
            ((interior_point, "UPDATES", 1),)),
+    Device("limit analysis of the friction bound", (UnconstrainedModes.overload,), "Drucker 1954",
+           ((UnconstrainedModes, "overload", lambda *_: 1.0),), (), _own("wall")),
+    Device("rigid motion to a state without contact", (UnconstrainedModes.separated,),
+           "Lawson and Hanson 1974", ((fallbacks, "_separated", _nothing),), (), _pads),
     Device("sticking start where friction alone restrains", (UnconstrainedModes.stuck_bound,), "-",
            ((UnconstrainedModes, "stuck_bound", _nothing),), (), _own("dragged-strip")),
     Device("proximal points", (fallbacks.proximal_points,), "Rockafellar 1976",
