@@ -16,8 +16,8 @@ from petsc4py import PETSc
 from contact._compat import keeps_inverted_blocks
 from contact.linear.aggregation import AGGREGATES, Aggregation, rows_of, tentative
 from contact.linear.faults import petsc_options
-from contact.linear.krylov import Subsystems, refine
 from contact.linear.layout import Layout, hidden, options, set_defaults
+from contact.linear.refinement import Subsystems, refine
 from contact.typing import Array
 
 #: Unknowns from which an iterative solver pays, by dimension and whether there is a potential

@@ -23,7 +23,6 @@ from contact.linear.faults import (
     petsc_options,
     set_up_with_workspace,
 )
-from contact.linear.krylov import Subsystems, refine
 from contact.linear.layout import (
     Layout,
     balance,
@@ -33,6 +32,7 @@ from contact.linear.layout import (
     times,
 )
 from contact.linear.multigrid import TOUCH, Hierarchy, held_motions
+from contact.linear.refinement import Subsystems, refine
 from contact.ranks import summed
 from contact.typing import Array
 

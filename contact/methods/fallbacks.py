@@ -14,7 +14,7 @@ more in turn (`working_set`). If neither is a solution these follow, in this ord
    unconstrained, although friction could constrain it;
 4. where friction has to constrain a rigid-body mode, proximal points: an elastic bed about the last
    iterate, which becomes softer (`proximal_points`);
-5. the condensed body, where its many contact nodes spoke against it before.
+5. steps on the condensed body, where it has too many contact nodes for these to pay.
 
 The notes of the history name the first four. A condensed contact problem has 1 to 4 of its own.
 
@@ -95,13 +95,13 @@ def solve_contact(
         The last fallback; None for none.
     """
     state, outcome = newton.iterate(state, linearised_at, give_up=True)
-    if outcome.converged and newton.modes.pushed_aside(newton.problem, state):
+    if outcome.converged and newton.modes.unconstrained_at(newton.problem, state):
         found = fall_back(newton, state, outcome, None, last)
         return found if found[1].converged else (state, outcome)
-    return completed(newton, state, outcome, last)
+    return with_fallbacks(newton, state, outcome, last)
 
 
-def completed(
+def with_fallbacks(
     newton: SemismoothNewton, state: State, outcome: Outcome, last: LastFallback | None = None
 ) -> tuple[State, Outcome]:
     """Return the end of an iteration, of a fallback, or the best iterate of all. Collective."""
@@ -160,10 +160,10 @@ def fall_back(
         found = _in_the_conductivity(newton, problem) or _separated(newton, problem, outcome)
         if found is not None:
             return found
-    if newton.left > 0:
+    if newton.steps_left > 0:
         logger.info("%s; going on with an interior point", outcome.ended)
         # Half of the steps are for the condensed body.
-        newton.reserved = 0 if last is None else (newton.left + 1) // 2
+        newton.reserved = 0 if last is None else (newton.steps_left + 1) // 2
         try:
             state, outcome = interior_point(newton, without_contact)
         except SingularError as error:
@@ -171,15 +171,15 @@ def fall_back(
             singular = error
         newton.reserved = 0
     by_friction = problem.interface.friction.acts and not newton.modes.constrained_by_supports
-    if by_friction and not outcome.converged and newton.left > 0:
+    if by_friction and not outcome.converged and newton.steps_left > 0:
         found = proximal_points(newton)
         if found is not None:
             return found
-    if last is not None and not (outcome.converged or outcome.overloaded) and newton.left > 0:
+    if last is not None and not (outcome.converged or outcome.overloaded) and newton.steps_left > 0:
         logger.info("%s; going on with the condensed body", outcome.ended)
         found = last(problem.start())
         # The reason of the interior point says more, unless no steps are left.
-        if found[1].converged or newton.left <= 0:
+        if found[1].converged or newton.steps_left <= 0:
             state, outcome = found
     # A nonlinear material may be singular at the strains of a step alone.
     if singular is not None and problem.equilibrium.linear and not outcome.converged:
@@ -332,7 +332,7 @@ def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
                 found = newton.iterate(newton.started(state), note=PROXIMAL_POINT)
                 if found[1].converged:
                     return found
-        elif number == 0 or newton.left <= 0:
+        elif number == 0 or newton.steps_left <= 0:
             return None
         else:
             stiffness = STIFFER * stiffness

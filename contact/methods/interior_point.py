@@ -93,16 +93,16 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
         method = InteriorPoint(newton, bound, begin)
         outcome, state = method.iterate(), method.state
         last = state
-        if not outcome.converged and newton.left > 0:
+        if not outcome.converged and newton.steps_left > 0:
             try:
                 last, outcome = newton.iterate(newton.started(state), note=INTERIOR_POINT)
             except SingularError:  # another bound may constrain the body
                 newton.step.renew()
-        if outcome.converged and modes.pushed_aside(problem, last):
+        if outcome.converged and modes.unconstrained_at(problem, last):
             aside = last, outcome
         elif outcome.converged or not interface.friction.acts:
             return last, outcome
-        if newton.left <= 0:
+        if newton.steps_left <= 0:
             break
         # Pressures of Newton's last steps if these have made progress, else of the interior point.
         if aside is None and outcome.residuals.significant < PROGRESS * best:
@@ -176,7 +176,7 @@ class InteriorPoint:
         newton = self._newton
         residuals, self._internal = evaluate_forces(self.problem, self.state)
         ended = "the interior point was given no step"
-        for steps in range(1, min(LIMIT, newton.left) + 1):
+        for steps in range(1, min(LIMIT, newton.steps_left) + 1):
             try:
                 taken = self.step()
             except InputError as error:

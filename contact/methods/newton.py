@@ -44,8 +44,8 @@ from contact.methods.fallbacks import (
     PROXIMAL_POINT,
     RIGID_MOTION,
     WORKING_SET,
-    completed,
     solve_contact,
+    with_fallbacks,
 )
 from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED
 from contact.methods.newton_step import NewtonStep
@@ -104,15 +104,16 @@ class Newton:
         self._condensable = options.condense and condensable(problem, options.linear)
         self._pays = options.condense and condensation_pays(problem, options.linear)
         self._chord = Chord(options.tolerance, MOST_STEPS if options.keep != "never" else 0.0)
-        self._condensation: Condensation | None = None
+        #: The condensed body; None before the first condensed step.
+        self.condensation: Condensation | None = None
         self.set_load_step(problem)
 
     def set_load_step(self, problem: ContactProblem) -> None:
         """Take another load step of the same problem; factorisations remain."""
         self.problem = self._modes.problem = problem
         self.recorder = Recorder(self.monitor)
-        if self._condensation is not None:
-            self._condensation.set_load_step(problem)
+        if self.condensation is not None:
+            self.condensation.set_load_step(problem)
         self._begin()
 
     def _newton_step(
@@ -124,11 +125,6 @@ class Newton:
     def _begin(self) -> None:
         whole = self.problem, self.options, self._step, self._modes, self.recorder
         self.whole = SemismoothNewton(*whole)
-
-    @property
-    def condensation(self) -> Condensation | None:
-        """The condensed body; None before the first condensed step."""
-        return self._condensation
 
     @property
     def history(self) -> list[Record]:
@@ -158,10 +154,10 @@ class Newton:
         if self._pays:
             begin = state
             state, outcome = self._condensed_steps(state, linearised_at)
-            if not (outcome.converged or outcome.overloaded or whole.left <= 0):
+            if not (outcome.converged or outcome.overloaded or whole.steps_left <= 0):
                 logger.info("%s; going on with the whole body", outcome.ended)
                 state, outcome = whole.iterate(state, linearised_at if state is begin else None)
-            state, outcome = completed(whole, state, outcome)
+            state, outcome = with_fallbacks(whole, state, outcome)
         else:
             last = self._condensed_steps if self._condensable else None
             state, outcome = solve_contact(whole, state, linearised_at, last)
@@ -172,20 +168,20 @@ class Newton:
         self, state: State, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate over the material; contact is solved on the Schur complement. Collective."""
-        if self._condensation is None:
-            self._condensation = Condensation(self.problem, self.counters)
+        if self.condensation is None:
+            self.condensation = Condensation(self.problem, self.counters)
         options, body = self.options, self.problem.equilibrium
         loop, chord = Iteration(self.whole, state), self._chord
         if loop.starts_converged:
             return state, loop.outcome()
         chord.begin()
         tangent = state.active_set is not None and linearised_at is None and not body.linear
-        for _ in range(min(options.max_iterations, self.whole.left)):
+        for _ in range(min(options.max_iterations, self.whole.steps_left)):
             before, residuals, last = loop.residuals, loop.residuals.significant, state
             state, keep = chord.choose(state, residuals, linearised_at)
             known = loop.internal if state is last and linearised_at is None else None
             kind = "tangent" if tangent else "secant"
-            condensed = self._condensation.linearise(kind, state, keep, linearised_at, known)
+            condensed = self.condensation.linearise(kind, state, keep, linearised_at, known)
             if condensed is None:
                 return last, loop.outcome(NOT_CONDENSED)
             # Inexact Newton: no more digits than the linearised material has.
@@ -200,7 +196,7 @@ class Newton:
             unsolved = outcome.residuals.significant > max(enough, UNSOLVED * residuals)
             if unsolved and not overloaded:
                 return last, loop.outcome(NOT_CONDENSED)
-            increment = self._condensation.expand(condensed, end.x)
+            increment = self.condensation.expand(condensed, end.x)
             state = replace(end, x=body.moved(state.x, increment), history=state.history)
             linearised_at = None
             if not body.linear:

@@ -67,7 +67,7 @@ class SemismoothNewton:
         self.best: Best[State] = Best()
 
     @property
-    def left(self) -> int:
+    def steps_left(self) -> int:
         """Number of steps left of the limit."""
         return self.options.max_outer - self.reserved - len(self.recorder.records)
 
@@ -128,7 +128,7 @@ class SemismoothNewton:
         step.begin()
         # At zero strain the secant is the tangent; an initial guess with an active set is near.
         tangent = state.active_set is not None and linearised_at is None and not linear
-        for _ in range(min(options.max_iterations, self.left)):
+        for _ in range(min(options.max_iterations, self.steps_left)):
             before, residuals = state, loop.residuals
             known = loop.internal if linearised_at is None else None
             taken = step(problem, state, tangent, residuals, linearised_at, known, exact)

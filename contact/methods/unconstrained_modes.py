@@ -226,7 +226,7 @@ class UnconstrainedModes:
             amounts = _least_distance(products, wanted, cone, -room)
         return RigidMotion(whole, moved, wanted, amounts, depth, limited)
 
-    def pushed_aside(self, problem: Problem, state: State) -> bool:
+    def unconstrained_at(self, problem: Problem, state: State) -> bool:
         """Tell whether a rigid-body mode has become unconstrained at a solution. Collective.
 
         With friction there may be another solution, at which it is constrained.

@@ -224,7 +224,7 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
     if unconstrained.shape[1] > 0:
         raise InputError(_unconstrained(problem, group, unconstrained), "unsupported")
     support = UnilateralSupport.of(group)
-    if support is not None and support.lost(problem.time) is not None:
+    if support is not None and support.release(problem.time) is not None:
         raise InputError(
             f"the loads pull the body off the foundation{support.besides}, and no support holds it "
             "there; accepted: loads that press it on, or more displacement components fixed",

@@ -77,15 +77,15 @@ class UnilateralSupport:
             group, free, np.concatenate([problem.nodes.gather(row[at]) for row in rows])
         )
 
-    def lost(self, time: float) -> Array | None:
+    def release(self, time: float) -> Array | None:
         """Return the mode, shape (m,), by which loads release the bodies; None if balanced.
 
         Collective.
         """
         work, scale = _work(self.group, self.free, time)
-        return on_root(self.group.problem.comm, lambda: self._lost(work, scale))
+        return on_root(self.group.problem.comm, lambda: self._release(work, scale))
 
-    def _lost(self, work: Array, scale: float) -> Array | None:
+    def _release(self, work: Array, scale: float) -> Array | None:
         """Return the mode of most power of the loads, on the rank that has the cone."""
         if np.abs(work).max() <= NEGLIGIBLE * scale:
             return None
@@ -123,11 +123,11 @@ def released(supports: Sequence[UnilateralSupport], begin: float, end: float) ->
         A time of equilibrium, and the time of the loads.
     """
     for support in supports:
-        if support.lost(end) is None:
+        if support.release(end) is None:
             continue
         for _ in range(ROUNDS):
             middle = (begin + end) / 2
-            begin, end = (middle, end) if support.lost(middle) is None else (begin, middle)
+            begin, end = (middle, end) if support.release(middle) is None else (begin, middle)
         return f"from t = {end:g} on the loads pull the body off the foundation{support.besides}"
     return ""
 

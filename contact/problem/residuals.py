@@ -168,7 +168,7 @@ def _as_pressures(interface: Interface, forces: Array) -> Array:
     return forces * np.sqrt(np.divide(count, area, out=np.zeros_like(area), where=area > 0))
 
 
-def left_as_pressures(problem: Problem, state: State, residual: Array) -> float:
+def residual_as_pressures(problem: Problem, state: State, residual: Array) -> float:
     """Return the residual forces as pressures, over the contact pressures. Collective."""
     body, interface = problem.equilibrium, problem.interface
     left = body.norms(body.unbalanced(residual))[0]

@@ -254,7 +254,7 @@ def not_held(solution: Solution) -> Iterator[Remark]:
         else:
             support = UnilateralSupport.of(group)
             motion, why = (
-                None if support is None else support.lost(time),
+                None if support is None else support.release(time),
                 "no contact force balances",
             )
         if motion is None:

@@ -10,7 +10,7 @@ from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOpt
 from contact.model.body import Fixed
 from contact.model.rigid import Motion, Rigid
 from contact.problem.problem import ContactProblem
-from contact.problem.residuals import evaluate, left_as_pressures, residual_forces
+from contact.problem.residuals import evaluate, residual_as_pressures, residual_forces
 from contact.problem.state import State
 from contact.results.remarks import rounding, untouched
 from contact.solving import solve, solve_steps
@@ -160,7 +160,7 @@ def test_what_presses_no_longer_is_not_unknown(method, remaining, gap):
         options = method(linear=linear)
         found = solve_steps(problem, [0.5, 1.0, 2.0, 3.0], options)
         assert found.converged, found.outcome.reason
-        left = left_as_pressures(problem, found.state, residual_forces(problem, found.state))
+        left = residual_as_pressures(problem, found.state, residual_forces(problem, found.state))
         assert max(found.outcome.residuals.pressure_rounding, left) < 1e-3
 
 
