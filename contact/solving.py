@@ -234,7 +234,7 @@ def evolve(
     check_variables(problem.equilibrium)
     settings = settings or NewtonOptions()
     method = METHODS[settings.method](problem, settings, monitor)
-    for state, outcome in LoadStepping(problem, method, start, before).run(ends, begin):
+    for state, outcome in LoadStepping(problem, method, start, before).steps(ends, begin):
         if not outcome.converged:
             raise NotConvergedError(
                 f"no step to {state.time:g}: {outcome.reason}; the states before remain"
@@ -361,8 +361,8 @@ def _take_steps(
     history, outcome, begin, end = list[Record](), None, times[0], times[-1]
     states = [record.state for record in records[-1:-3:-1]]
     tell(logger, 0.0, "steps to t = %g", end)
-    steps = LoadStepping(problem, method, *states)
-    for state, outcome in steps.run(times[1:], begin):
+    stepping = LoadStepping(problem, method, *states)
+    for state, outcome in stepping.steps(times[1:], begin):
         now, taken = state.time, outcome.records
         history += [replace(r, note=f"t = {now:g} {r.note}".strip()) for r in taken]
         if outcome.converged:

@@ -60,7 +60,7 @@ class LoadStepping:
         # Supports are the same in all steps.
         self._modes = UnconstrainedModes(problem)
 
-    def run(self, times: Sequence[float], begin: float = 0.0) -> Iterator[tuple[State, Outcome]]:
+    def steps(self, times: Sequence[float], begin: float = 0.0) -> Iterator[tuple[State, Outcome]]:
         """Yield state and outcome of each step; a step that fails is the last one. Collective.
 
         Parameters

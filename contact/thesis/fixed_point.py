@@ -77,11 +77,8 @@ class FixedPoint(OuterLoop):
             self._z = self._about(0.0, frictional and first > 0)
             self.bound = np.zeros(interface.jump.gap.size) if stuck is None else stuck
         else:
-            self.state, self._secant_at, first = (
-                start,
-                start.x if linearised_at is None else linearised_at,
-                1,
-            )
+            self.state, first = start, 1
+            self._secant_at = start.x if linearised_at is None else linearised_at
             nodal, pressure = interface.jump.apply(start.x), start.forces.pressure
             if interface.law.normal_law(nodal) is not None:
                 pressure = interface.pressure(nodal, start.forces)

@@ -37,7 +37,7 @@ def measured(case: Case, count: int) -> dict[str, Any]:
     problem = build_problem(case)
     method = Newton(problem, case.solver)
     solves, converged = 0, True
-    for _, outcome in LoadStepping(problem, method).run([*(np.arange(1, count + 1) / count)]):
+    for _, outcome in LoadStepping(problem, method).steps([*(np.arange(1, count + 1) / count)]):
         solves += outcome.counters.contact_solves
         converged &= outcome.converged
     return {

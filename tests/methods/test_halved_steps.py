@@ -33,14 +33,14 @@ def failing(problem, largest: float, options=TIGHT["newton"]):
 @pytest.mark.parametrize("parts", [1, 2, 16])
 def test_a_step_that_fails_is_halved(parts):
     problem = shaken()
-    steps = list(LoadStepping(problem, failing(problem, 1 / parts)).run([1.0, 2.0]))
+    steps = list(LoadStepping(problem, failing(problem, 1 / parts)).steps([1.0, 2.0]))
     assert all(outcome.converged for _, outcome in steps)
     assert [state.time for state, _ in steps] == [(k + 1) / parts for k in range(2 * parts)]
 
 
 def test_an_evolution_ends_with_what_it_has():
     problem = shaken()
-    steps = list(LoadStepping(problem, failing(problem, 1 / 17)).run([0.05, 1.05, 2.0]))
+    steps = list(LoadStepping(problem, failing(problem, 1 / 17)).steps([0.05, 1.05, 2.0]))
     assert [outcome.converged for _, outcome in steps] == [True, False]
     assert [state.time for state, _ in steps] == [0.05, 0.05 + 1 / 16]
 

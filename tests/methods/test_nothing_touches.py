@@ -40,7 +40,7 @@ def stepped(
 ) -> list[tuple[State, Outcome]]:
     """Return the load steps of a problem by Newton's method; all have converged."""
     method = METHODS["newton"](problem, NewtonOptions(**options), None)
-    steps = list(LoadStepping(problem, method).run(times))
+    steps = list(LoadStepping(problem, method).steps(times))
     assert all(outcome.converged for _, outcome in steps)
     return steps
 

@@ -56,7 +56,7 @@ def test_an_evolution_ends_where_loads_let_the_body_go(press, push, when, why):
     """Steps that end beyond are not tried; the last one before is as near as halves come."""
     problem = lying(MPI.COMM_SELF, press, push)
     method = Newton(problem, NewtonOptions())
-    *complete, (_, last) = LoadStepping(problem, method).run(TIMES)
+    *complete, (_, last) = LoadStepping(problem, method).steps(TIMES)
     assert [state.time for state, _ in complete[:3]] == [0.5, 1.0, 1.5]
     assert all(outcome.converged for _, outcome in complete)
     assert when - 0.5 / 16 <= complete[-1][0].time <= when * (1 + 1e-6)

@@ -179,7 +179,7 @@ def test_a_state_can_be_gone_on_from():
 
 
 def test_a_linear_body_is_factorised_once():
-    steps = LoadStepping(problem := shaken(), Newton(problem)).run(times(4))
+    steps = LoadStepping(problem := shaken(), Newton(problem)).steps(times(4))
     assert [outcome.counters.factorizations for _, outcome in steps] == [1] + 15 * [0]
 
 

@@ -30,7 +30,7 @@ def tabulated(times, values):
 def steps_of(problem, times, options=TIGHT["newton"], start=None) -> list[State]:
     """Return the states at the ends of all steps, which have to converge."""
     method = METHODS[options.method](problem, options, None)
-    steps = list(LoadStepping(problem, method, start).run(times))
+    steps = list(LoadStepping(problem, method, start).steps(times))
     assert all(outcome.converged for _, outcome in steps)
     return [state for state, _ in steps]
 
