@@ -204,38 +204,40 @@ def evaluate_forces(problem: Problem, state: State) -> tuple[Residuals, Array]:
     on_contact = np.zeros_like(internal)
     interface.add_forces(on_contact, state.x, state.forces)
     residual = internal - body.external(state.time) + on_contact
-    answers = body.norms(on_contact) + body.exchanged(state)
-    scale = loads + answers + body.norms(body.reactions(residual))
+    exerted = body.norms(on_contact) + body.exchanged(state)
+    scale = loads + exerted + body.norms(body.reactions(residual))
     unbalanced = body.norms(body.unbalanced(residual))
-    most, acted = body.rounding_limit * scale, loads > 0
-    asked = ~acted | (unbalanced <= most)
-    rounding, unknown = np.zeros_like(scale), np.zeros(interface.components)
-    if asked.any():
+    limit, loaded = body.rounding_limit * scale, loads > 0
+    small = ~loaded | (unbalanced <= limit)
+    rounding, contact_rounding = np.zeros_like(scale), np.zeros(interface.components)
+    if small.any():
         found = force_rounding(problem, state, internal, perturbed)
-        rounding = np.where(asked, found, 0.0)
-        unknown = np.minimum(rounding, most)[0]
-        acted |= answers > rounding
+        rounding = np.where(small, found, 0.0)
+        contact_rounding = np.minimum(rounding, limit)[0]
+        loaded |= exerted > rounding
         # Without loads on a component all of its forces are rounding, its own or that of others.
         largest = rounding.max(axis=1, keepdims=True)
-        rounding = np.where(acted, np.minimum(rounding, most), largest)
-        nothing = ~acted & (unbalanced <= rounding)
-        unbalanced, rounding = (np.where(nothing, 0.0, norms) for norms in (unbalanced, rounding))
-        if not acted.any():
+        rounding = np.where(loaded, np.minimum(rounding, limit), largest)
+        vanishes = ~loaded & (unbalanced <= rounding)
+        unbalanced, rounding = (np.where(vanishes, 0.0, norms) for norms in (unbalanced, rounding))
+        if not loaded.any():
             # Reference of free motions: the residual of the zero initial guess.
             first = body.norms(residual_forces(problem, problem.start()))
             scale = scale + first.max(axis=1, keepdims=True)
             body.internal_forces(state)  # laws with history keep their last response
     # Least reference of a component without loads, and of charges (in the unit of forces).
     scale = np.maximum(scale, EPS * scale.max())
-    size = np.where(scale > 0, scale, 1.0)
-    balance = worst((unbalanced / size).reshape(1, -1), (rounding / size).reshape(1, -1))
+    reference = np.where(scale > 0, scale, 1.0)
+    balance = worst((unbalanced / reference).reshape(1, -1), (rounding / reference).reshape(1, -1))
     nodal = interface.jump.apply(state.x)
-    bound, pressures = interface.bound(nodal, state.forces), _as_pressures(interface, unknown)
+    bound = interface.bound(nodal, state.forces)
+    pressures = _as_pressures(interface, contact_rounding)
     laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
-    granted = float(np.max(np.where(acted, np.minimum(rounding, unbalanced) / size, 0.0)))
+    accepted = np.where(loaded, np.minimum(rounding, unbalanced) / reference, 0.0)
+    equilibrium_rounding = float(accepted.max())
     residuals, floors = (
         (float(first), float(contact), float(friction))
         for (first,), (contact, friction) in zip(balance, laws, strict=True)
     )
-    known_to = _over_pressed(interface, state, pressures)
-    return Residuals(*residuals, floors, granted, known_to), internal
+    pressure_rounding = _over_pressed(interface, state, pressures)
+    return Residuals(*residuals, floors, equilibrium_rounding, pressure_rounding), internal

@@ -250,7 +250,7 @@ def uzawa_block_relaxation(
         image = multiplier + (1 - over) * (z - multiplier) + over * way
         done = residual <= options.inner or not np.isfinite(residual)
         # The residual is small before contact, the defect of the fixed point is not.
-        measured = jump.norm((total - project(total + way)) / beside[:, None])
+        defect = jump.norm((total - project(total + way)) / beside[:, None])
         if domain_norm is not None:
             phi: Array = (image + origin - project(image)) * (1 / r)
             before, done = last, False
@@ -259,8 +259,8 @@ def uzawa_block_relaxation(
                 change = domain_norm(increment - before[0]) ** 2 + jump.norm(phi - before[1]) ** 2
                 size = domain_norm(own + increment) ** 2 + jump.norm(phi) ** 2
                 done = change < options.eps**2 * size
-                measured = float(np.sqrt(change / size)) if size > 0 else 0.0
-        stalled = not done and stagnation(measured)
+                defect = float(np.sqrt(change / size)) if size > 0 else 0.0
+        stalled = not done and stagnation(defect)
         if done or stalled:
             return Relaxed(increment, forces, image - way, iteration, stalled)
         z = image
