@@ -217,7 +217,9 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     if solution.rounding > asked:
         known.append(f"rounding decides how well the forces balance, to {solution.rounding:.1e}")
     residual = residual_forces(problem, state)
-    unknown = max(outcome.residuals.pressure_rounding, residual_as_pressures(problem, state, residual))
+    unknown = max(
+        outcome.residuals.pressure_rounding, residual_as_pressures(problem, state, residual)
+    )
     moved = bool(problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR))
     loads = body.load_norms(state.time)
     if solution.converged and unknown > KNOWN and (moved or loads[0].max() > 0):
