@@ -20,7 +20,8 @@ and a problem that is put together in Python by
   `Material`, and crystals by `make_material`; `Rigid` with its `Motion`, `Electrode`, `Bolt`.
 - Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
   `Level`, `Heights`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`,
-  `Coulomb`; `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
+  `Coulomb`; `Electric`, or a `Conductor` with `ShiftedConductivity`, `RampConductivity`,
+  `PerfectConductivity`.
 - Solving: `Problem`, `solve`, `solve_steps`, `evolve`; `NewtonOptions`, `FixedPointOptions`,
   `PenaltyOptions`.
 - Derivatives: `sensitivity` by `Parameter` gives `Sensitivities`; `gap_gradient` and

@@ -15,8 +15,6 @@ from contact.derivatives.differences import Parameter as Parameter
 from contact.derivatives.identification import Identified as Identified
 from contact.derivatives.identification import identify as identify
 from contact.errors import InputError as InputError
-from contact.interface.law import Conductor as Conductor
-from contact.interface.layer import Layer as Layer
 from contact.mesh.domain import Domain as Domain
 from contact.mesh.reader import from_file as from_file
 from contact.mesh.reader import from_msh as from_msh
@@ -28,8 +26,12 @@ from contact.model.body import Elastic as Elastic
 from contact.model.body import Electrode as Electrode
 from contact.model.body import Fixed as Fixed
 from contact.model.body import Load as Load
+from contact.model.contact import Contact as Contact
 from contact.model.data import read_data as read_data
+from contact.model.electric import Conductor as Conductor
+from contact.model.electric import Electric as Electric
 from contact.model.friction import Friction as Friction
+from contact.model.layer import Layer as Layer
 from contact.model.obstacle import Cone as Cone
 from contact.model.obstacle import Cylinder as Cylinder
 from contact.model.obstacle import GapFunction as GapFunction
@@ -43,7 +45,6 @@ from contact.model.obstacle import Sphere as Sphere
 from contact.model.obstacle import Triangles as Triangles
 from contact.model.rigid import Motion as Motion
 from contact.model.rigid import Rigid as Rigid
-from contact.problem.contact import Contact as Contact
 from contact.problem.problem import ContactProblem as Problem  # noqa: F401
 from contact.results.solution import Solution as Solution
 from contact.solving import NotConvergedError as NotConvergedError

@@ -13,19 +13,20 @@ from contact.arguments import check_range
 from contact.body.description import Body, Material
 from contact.case.file import REPLACEABLE, Case
 from contact.errors import InputError
-from contact.interface.layer import Layer
 from contact.mesh.domain import Domain, revolved
 from contact.model.body import Bolt, Electrode, Fixed, Load
+from contact.model.contact import Contact
+from contact.model.electric import Electric
 from contact.model.friction import Friction
+from contact.model.layer import Layer
 from contact.model.obstacle import Obstacle
 from contact.model.rigid import Motion, Rigid
 from contact.problem.checks import check_problem, check_supports
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Law
 from forms.laws import FrictionCoefficient, FrictionLaw
 
-Given = TypeVar("Given", Fixed, Load, Electrode, Bolt, Motion)
+Given = TypeVar("Given", Fixed, Load, Electrode, Bolt, Motion, Electric)
 
 
 class Replacements(TypedDict, total=False):
@@ -89,7 +90,7 @@ def build_problem(
             [_acting(case, fixed) for fixed in case.fixed],
             [_acting(case, load) for load in case.load],
             elastic=case.elastic,
-            rigid=_rigid(case),
+            rigid=[Rigid(part.on, _acting(case, part)) for part in case.rigid],
             electrodes=[_acting(case, electrode) for electrode in case.electrode],
             bolts=[_acting(case, bolt) for bolt in case.bolt],
         )
@@ -148,18 +149,8 @@ def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
 
 
 def _acting(case: Case, given: Given) -> Given:
-    """Return a support, load, electrode, bolt or motion with the function of its amplitude."""
+    """Return a support, a load and the like with the function of its amplitude."""
     return given.model_copy(update={"amplitude": case.amplitude(given.amplitude)})
-
-
-def _rigid(case: Case) -> tuple[Rigid, ...]:
-    """Return the foundations and parts that move as rigid bodies."""
-    foundations = [
-        Rigid(contact.on, _acting(case, contact.rigid), foundation=True)
-        for _, contact in case.contacts
-        if contact.rigid is not None
-    ]
-    return (*foundations, *(Rigid(part.on, _acting(case, part)) for part in case.rigid))
 
 
 def _contacts(
@@ -180,20 +171,16 @@ def _contacts(
         )
     made = []
     for key, contact in case.contacts:
-        friction = case.friction_of(key, contact)[1]
+        friction, electric = case.friction_of(key, contact)[1], case.electric_of(key, contact)[1]
         if coefficient is not None or law is not None:
             friction = Friction(coefficient, radius=friction.radius, law=law)
-        electric = case.electric_of(key, contact)[1]
+        if electric is not None and electric.amplitude is not None:
+            electric = _acting(case, electric)
+        rigid = None if contact.rigid is None else _acting(case, contact.rigid)
+        given = {"friction": friction, "electric": electric, "rigid": rigid}
+        if foundation is not None:
+            given |= {"foundation": foundation, "gap": None, "direction": "foundation"}
         made.append(
-            Contact(
-                contact.on,
-                contact.obstacle() if foundation is None else foundation,
-                contact.compliant_layer() if layer is None else layer,
-                friction,
-                None if electric is None else electric.build(case, domain, contact.on),
-                contact.overlap == "press",
-                contact.against,
-                name=contact.name,
-            )
+            contact.model_copy(update=given if layer is None else {**given, "layer": layer})
         )
     return made

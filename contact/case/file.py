@@ -27,13 +27,14 @@ from pydantic_core import PydanticCustomError
 
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
-from contact.case.interface import Contact, Electric
 from contact.case.material import Material
 from contact.case.mesh import Mesh, cut_about_axis
 from contact.case.units import Labels, share
 from contact.errors import InputError, clipped
 from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
+from contact.model.contact import Contact
+from contact.model.electric import Electric
 from contact.model.fields import CONSTANT, Amplitude, Ramp, steady
 from contact.model.friction import Friction
 from contact.model.messages import describe, describe_fault, fault, keys_of, path_of, shown

@@ -22,8 +22,7 @@ from scipy import sparse
 from contact.arguments import naming, real
 from contact.errors import InputError
 from contact.interface.friction import NodalFriction, law_at
-from contact.interface.law import Conductor, InterfaceLaw
-from contact.interface.layer import Layer
+from contact.interface.law import InterfaceLaw
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Mixing
 from contact.interface.mortar.operator import CouplingOperator, coupling_operator
@@ -31,7 +30,9 @@ from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoothing
 from contact.linear.layout import Inclined, projectors
+from contact.model.electric import Conductor
 from contact.model.friction import Friction
+from contact.model.layer import Layer
 from contact.typing import Array
 from forms.laws import (
     Compliance,

@@ -12,82 +12,20 @@ is stiff enough cycles for ever between the slopes of an open and of a saturated
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.arguments import SAMPLES, check_slope, expect
 from contact.interface.active_set import touching
-from contact.interface.layer import Layer, NormalLaw
+from contact.interface.layer import NormalLaw
 from contact.interface.nodes import ContactNodes
+from contact.model.electric import Conductor
+from contact.model.layer import Layer
 from contact.typing import Array
-from forms.laws import Conductivity, PotentialLaw, Truncation
 
 #: A pressure above zero.
 TINY = np.finfo(float).tiny
-
-
-@dataclass(frozen=True)
-class Conductor:
-    """A conductive foundation at the potential phi_f: D.nu = psi(u_nu - rho) phi_L(phi - phi_f).
-
-    Parameters
-    ----------
-    psi
-        Conductivity law (capacitance/area), for instance `ShiftedConductivity`.
-    phi_f
-        Potential of the foundation; of several conductors in one, one value per node, shape (n,).
-    phi_l
-        Truncation phi_L of the potential difference; by default there is none.
-    lagged
-        Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
-        thesis does: it then converges for small k_e only (Theorem 5.2). Else phi is implicit,
-        as a Robin term in Algorithm 5, and only psi is lagged.
-    phi_f_at
-        phi_f as a function of time; None where it is always the same.
-    share
-        Part of the conductivity that is taken, from 0 to 1: for continuations.
-    """
-
-    psi: Conductivity
-    phi_f: float | Array
-    phi_l: PotentialLaw = field(default_factory=lambda: Truncation(np.inf))
-    lagged: bool = False
-    phi_f_at: Callable[[float], float | Array] | None = None
-    share: float = 1.0
-
-    def check(self) -> None:
-        """Refuse laws that lack something, or whose derivatives are not their own.
-
-        Raises
-        ------
-        InputError
-            The message names the law.
-        """
-        for name, law, methods in (
-            ("psi", self.psi, ("k_e", "delta", "follows_gap", "at", "gap_slope")),
-            ("phi_l", self.phi_l, ("__call__", "derivative")),
-        ):
-            missing = [method for method in methods if not hasattr(law, method)]
-            accepted = f"an object with {', '.join(methods)}"
-            place = f"Conductor: {name} without {', '.join(missing)}"
-            expect(place, law, accepted, not missing, "conductor-law")
-        both = np.concatenate([-SAMPLES[::-1], SAMPLES])
-        never, psi = np.zeros(both.size, dtype=bool), self.psi
-        if psi.follows_gap:
-            check_slope(
-                "Conductor: psi: gap_slope",
-                lambda s: psi.at(s, never, never),
-                lambda s: psi.gap_slope(s, never),
-                both,
-            )
-        check_slope("Conductor: phi_l: derivative", self.phi_l, self.phi_l.derivative, both)
-
-    def at(self, time: float) -> Conductor:
-        """Return the foundation at a time."""
-        return self if self.phi_f_at is None else replace(self, phi_f=self.phi_f_at(time))
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Discriminator, PlainValidator, Tag
-from pydantic.json_schema import SkipJsonSchema
+from pydantic import AfterValidator, Discriminator, Tag
 
 from contact.arguments import expect
 from contact.errors import InputError
 from contact.model.fields import Scalar
-from contact.model.section import Described, NonNegativeValue, Section
+from contact.model.section import Described, NonNegativeValue, Own, Section
 from contact.settings import Accepted, NonNegative, ReadWith
 from forms.laws import FrictionCoefficient, FrictionLaw, SlipCoefficient
 
@@ -59,9 +58,7 @@ def _kind(given: Any) -> str:
 Mu: TypeAlias = Annotated[
     Annotated[NonNegativeValue, Tag("formula")]
     | Annotated[SlipLaw, Tag("slip")]
-    | SkipJsonSchema[
-        Annotated[FrictionCoefficient | FrictionLaw, PlainValidator(_own), Tag("own")]
-    ],
+    | Annotated[FrictionCoefficient | FrictionLaw, Own(), AfterValidator(_own), Tag("own")],
     Discriminator(_kind),
     Accepted('a number >= 0 or a formula, or a table with law = "slip"'),
 ]

@@ -98,8 +98,13 @@ def sections_of(annotation: Any) -> dict[str, type]:
     found: dict[str, type] = {}
     if get_origin(annotation) is not Literal:
         for argument in get_args(annotation):
-            found |= sections_of(argument)
+            found |= {} if is_own(argument) else sections_of(argument)
     return found
+
+
+def is_own(annotation: Any) -> bool:
+    """Tell whether it stands for objects of Python, see `section.Own`."""
+    return any(getattr(mark, "tag", "") == "own" for mark in get_args(annotation))
 
 
 @cache
@@ -158,7 +163,8 @@ def accepted_by(annotation: Any, metadata: Iterable[Any] = ()) -> str:
     if get_origin(annotation) is Literal:
         return either(shown(value) for value in get_args(annotation))
     if get_origin(annotation) in (Union, types.UnionType):
-        some = [kind for kind in get_args(annotation) if kind is not type(None)]
+        known = (kind for kind in get_args(annotation) if not is_own(kind))
+        some = [kind for kind in known if kind is not type(None)]
         if len(some) == 1:  # a value that may be missing
             return accepted_by(some[0])
         others += [accepted_by(kind) for kind in some if not sections_of(kind)]

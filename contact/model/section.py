@@ -47,7 +47,7 @@ from pydantic import (
     Field as Bounds,
 )
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic_core import PydanticCustomError, PydanticOmit, core_schema
 from ufl.core.expr import Expr
 
 from contact import settings
@@ -167,6 +167,18 @@ def check_conditions(table: Table) -> Table:
             accepted = accepted_by(info.annotation, info.metadata)
             raise fault(key, Words("missing"), f"{accepted} with {needs.key} = {shown(other)}")
     return table
+
+
+class Own:
+    """Marks an object of Python's among kinds of values: no case file has it."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Take it as it is; who gives the kind its tag knows it."""
+        return core_schema.any_schema()
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        """Leave it out."""
+        raise PydanticOmit
 
 
 class FromTable:
@@ -407,12 +419,6 @@ Part: TypeAlias = Annotated[
     Accepted(mesh_parts.ACCEPTED),
     _NAMES,
 ]
-AmplitudeName: TypeAlias = Annotated[
-    str,
-    Bounds(min_length=1),
-    AMPLITUDE,
-    Accepted('a name below evolution.amplitudes, or "constant"'),
-]
 Vector: TypeAlias = Annotated[settings.Vector, as_tuple]
 Direction: TypeAlias = Annotated[settings.Direction, as_tuple]
 Triple: TypeAlias = Annotated[
@@ -441,9 +447,6 @@ FormulaOrFunction: TypeAlias = Annotated[
     Accepted("a number or a formula"),
     WithJsonSchema(_FORMULA),
 ]
-TimeFormula: TypeAlias = Annotated[
-    Formula, AfterValidator(of_time), Accepted("a number or a formula in t")
-]
 #: The same where Python may give functions, UFL and dolfinx Functions too.
 Value: TypeAlias = Annotated[
     Field | Moving,
@@ -455,9 +458,10 @@ Value: TypeAlias = Annotated[
 Values: TypeAlias = Annotated[
     Few[Value], SPATIAL, Accepted("a list of 2 numbers or formulas in 2-D, 3 in 3-D")
 ]
+#: One that is the same at all times.
+StaticValue: TypeAlias = Annotated[Value, AfterValidator(_static)]
 NonNegativeValue: TypeAlias = Annotated[
-    Value,
-    AfterValidator(_static),
+    StaticValue,
     AfterValidator(_not_negative),
     Accepted("a number >= 0 or a formula"),
     WithJsonSchema({**_FORMULA, "minimum": 0}),

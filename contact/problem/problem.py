@@ -28,7 +28,6 @@ from contact.interface.entries import (
     joined_nodes,
 )
 from contact.interface.interface import Interface
-from contact.interface.law import Conductor
 from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
@@ -38,8 +37,10 @@ from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
 from contact.mesh.geometry import area, volume
+from contact.model.contact import Contact, check_laws
+from contact.model.electric import Conductor, Electric
 from contact.model.friction import Friction
-from contact.problem.contact import Contact, check_laws
+from contact.model.rigid import Rigid
 from contact.problem.protocols import Scales
 from contact.problem.state import State
 from contact.ranks import on_all_ranks
@@ -140,24 +141,19 @@ class ContactProblem:
         body: Body,
         contact: Contact | Sequence[Contact],
         friction: Friction | None = None,
-        conductor: Conductor | None = None,
+        conductor: Electric | Conductor | None = None,
         degree: int = 1,
         element: str = STANDARD,
     ) -> None:
-        self.domain, self.body = domain, body
+        self.domain = domain
         expect("domain", domain, "Domain.from_mesh(...), from_msh(...)", isinstance(domain, Domain))
         expect("body", body, "Body(...)", isinstance(body, Body))
         given = several("contact", contact, Contact, "Contact(part), or several")
         expect("contact", contact, "Contact(part), or several", given)
         check_laws("Problem", friction, conductor)
-        self.contacts = tuple(
-            replace(
-                contact,
-                friction=contact.friction or friction or Friction(),
-                conductor=contact.conductor or conductor,
-            )
-            for contact in given
-        )
+        moving = [Rigid(c.on, c.rigid, foundation=True) for c in given if c.rigid is not None]
+        self.body = replace(body, rigid=(*moving, *body.rigid)) if moving else body
+        self.contacts = tuple(one.filled(domain, friction, conductor) for one in given)
         names = [contact.name for contact in self.contacts]
         for name in names:
             if names.count(name) > 1:
@@ -165,7 +161,7 @@ class ContactProblem:
                     f"contact.name: {name!r} is that of several contacts; accepted: one each",
                     "contact-name",
                 )
-        self.equilibrium = BodyEquilibrium(domain, body, degree, element)
+        self.equilibrium = BodyEquilibrium(domain, self.body, degree, element)
         self.interface = self._interface()
         self.scales = self._scales()
         self.time = 1.0

@@ -33,9 +33,9 @@ from contact.interface import pairing
 from contact.mesh.domain import Domain, from_mesh
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.nesting import prolong
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.results.recovery import nodal_means

@@ -26,7 +26,7 @@ from contact.mesh.geometry import geometry_nodes, volume_factors
 from contact.mesh.grid import SIDES, box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.problem.contact import Contact
+from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

@@ -21,7 +21,7 @@ from contact.body.elements import MEAN_DILATATION
 from contact.mesh.grid import box
 from contact.mesh.transfer import carry
 from contact.model.body import Fixed, Load
-from contact.problem.contact import Contact
+from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated
 from forms.hencky import Linear, Log

@@ -16,8 +16,8 @@ from contact.body.description import Body, Material
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.obstacle import GapFunction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

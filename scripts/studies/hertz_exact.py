@@ -16,7 +16,7 @@ from contact.body.description import Body
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.model.body import Fixed
-from contact.problem.contact import Contact
+from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.hencky import Linear

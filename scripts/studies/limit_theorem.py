@@ -15,9 +15,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from contact import Case, NotConvergedError, build_problem, load_case
-from contact.interface.layer import Layer
+from contact.model.contact import Contact
+from contact.model.layer import Layer
 from contact.model.obstacle import GapFunction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor

@@ -9,7 +9,7 @@ from contact.body.description import Body
 from contact.history import BodyState
 from contact.linear.operator import SparseOperator
 from contact.model.body import Fixed
-from contact.problem.contact import Contact
+from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import energy_density
 from forms.kinematics import strain

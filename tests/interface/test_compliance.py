@@ -10,13 +10,13 @@ from mpi4py import MPI
 
 from contact import solve as solve_case
 from contact.body.description import Body
-from contact.interface.layer import Layer
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.friction import Friction
-from contact.problem.contact import Contact
+from contact.model.layer import Layer
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear
@@ -205,7 +205,7 @@ def test_ranks_agree_on_a_layer_in_space(comm):
     def problem(comm):
         bare = leaning_block(comm, 3)
         layer = Layer(0.004, Compliance(0.003), PotentialFactor(4.0))
-        contact = replace(bare.contacts[0], foundation=flat(0.005), layer=layer)
+        contact = bare.contacts[0].model_copy(update={"foundation": flat(0.005), "layer": layer})
         return ContactProblem(bare.domain, bare.body, contact)
 
     found = []

@@ -9,9 +9,9 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.interface.penalised import PenalisedLaw, Regularisation
 from contact.mesh.grid import box, rectangle
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Plane, Sphere
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.thesis.uzawa import augmentation
 from forms import foundation as forms

@@ -10,9 +10,10 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.interface.law import Conductor, InterfaceLaw
-from contact.interface.layer import Layer
+from contact.interface.law import InterfaceLaw
 from contact.interface.nodes import ContactNodes
+from contact.model.electric import Conductor
+from contact.model.layer import Layer
 from forms.foundation import compliance, electric_contact
 from forms.laws import (
     Compliance,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from contact import InputError
 from contact import solve as solve_case
-from contact.interface.layer import Layer
 from contact.methods.options import OPTIONS, NewtonOptions
+from contact.model.layer import Layer
 from contact.problem.problem import ContactProblem
 from forms.laws import (
     Compliance,
@@ -53,7 +53,7 @@ NO_LAYERS = {
 @pytest.mark.parametrize("words", NO_LAYERS)
 def test_what_is_no_layer_is_refused(words):
     bare = leaning_block(MPI.COMM_SELF, 2)
-    contact = replace(bare.contacts[0], layer=NO_LAYERS[words])
+    contact = bare.contacts[0].model_copy(update={"layer": NO_LAYERS[words]})
     with pytest.raises(InputError, match=words):
         ContactProblem(bare.domain, bare.body, contact)
 

@@ -13,9 +13,9 @@ from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Level, Plane, Sphere
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.resultants import supports
 from forms.hencky import Linear

@@ -10,8 +10,8 @@ from contact.body.description import Body
 from contact.interface.smoothing import Smoothing
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.friction import Friction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

@@ -15,8 +15,8 @@ from contact.linear.multigrid import DEFAULTS, held_motions
 from contact.linear.operator import SparseOperator
 from contact.mesh.grid import box
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.obstacle import Plane
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems import mechanics

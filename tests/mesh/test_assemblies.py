@@ -15,8 +15,8 @@ from contact.mesh.reader import from_file
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.obstacle import GapFunction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.mesh.test_input_files import block

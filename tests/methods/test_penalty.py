@@ -14,10 +14,10 @@ from contact.interface.penalised import PenalisedLaw, Regularisation
 from contact.mesh import grid as domain
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.formula import Expression
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Plane
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint
 from contact.thesis.penalty import Penalty

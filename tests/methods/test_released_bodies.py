@@ -10,8 +10,8 @@ from contact.methods.load_stepping import LoadStepping
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import NotConvergedError, solve_steps

@@ -7,8 +7,8 @@ from contact.body.description import Body
 from contact.mesh.grid import rectangle
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant

@@ -1,7 +1,5 @@
 """Block relaxation and the fixed point around it: counts, options, and honest ends."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -9,8 +7,8 @@ from mpi4py import MPI
 from contact import build_problem, parse_case
 from contact.body.description import Body
 from contact.methods.options import FixedPointOptions
+from contact.model.contact import Contact
 from contact.model.friction import Friction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.thesis.fixed_point import FixedPoint
@@ -241,7 +239,7 @@ def test_nothing_to_do():
     for gap in (0.0, 1.0):
         example = bar(MPI.COMM_SELF, 4)
         body = Body(example.body.law, example.body.fixed)
-        contact = replace(example.contacts[0], foundation=flat(gap))
+        contact = example.contacts[0].model_copy(update={"foundation": flat(gap)})
         problem = ContactProblem(example.domain, body, contact)
         loop = solve(problem)
         assert np.abs(loop.state.x).max() < 1e-14

@@ -14,12 +14,12 @@ from contact.body.description import Body
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.obstacle import (
     Level,
     Triangles,
 )
 from contact.model.obstacle.triangles import read_stl
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant

@@ -1,7 +1,5 @@
 """The same solutions on any number of ranks, also where a rank has nothing to do."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from dolfinx import fem, graph, mesh
@@ -13,8 +11,8 @@ from contact.interface.smoothing import Smoothing
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
@@ -108,7 +106,7 @@ def test_a_rank_without_contact_nodes(comm):
 def tower_with_friction(comm):
     plain = tower(comm)
     friction = Friction(SlipCoefficient(0.3, 0.2, 10.0), radius=0.4)
-    contact = replace(plain.contacts[0], friction=friction)
+    contact = plain.contacts[0].model_copy(update={"friction": friction})
     return ContactProblem(plain.domain, plain.body, contact, degree=2)
 
 

@@ -120,7 +120,7 @@ WRONG = {
     "an edge": lambda: Punch((0, 0), (0, 1), 1.0, 2.0),
     "a distance": on(Level(lambda x: x[1])),
     "a number as distance": lambda: Level(1.0),  # type: ignore[arg-type]
-    "a layer": on(layer=3),
+    "a layer": on(layer="thick"),
     "half a layer": on(layer=lambda: Layer(0.1)),
     "friction": on(friction=0.3),
     "a law of friction": lambda: Friction(law=3),  # type: ignore[arg-type]

@@ -11,8 +11,8 @@ from contact.cli.check import expectations
 from contact.errors import InputError
 from contact.interface.pairing import find_pair
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.obstacle import GapFunction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.blocks import Blocks

@@ -10,9 +10,9 @@ from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.problem import residuals
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate, residual_forces
 from contact.problem.state import State
@@ -205,7 +205,7 @@ def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
     """A solution for another coefficient does not pass."""
     problem = solved.problem
     friction = Friction(SlipCoefficient(0.15, 0.1, 10.0))
-    contact = replace(problem.contacts[0], friction=friction)
+    contact = problem.contacts[0].model_copy(update={"friction": friction})
     other = ContactProblem(problem.domain, problem.body, contact)
     assert evaluate(other, solved.state).friction > 1e-4
     assert evaluate(problem, solved.state).largest <= SMALL

@@ -8,10 +8,10 @@ from contact.body.description import Body
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.rigid import Motion, Rigid
 from contact.problem.checks import check_rigid_modes
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.resultants import movements
 from contact.thesis.fixed_point import FixedPoint

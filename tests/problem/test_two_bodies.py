@@ -11,10 +11,10 @@ from contact.linear.operator import SparseOperator
 from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction
 from contact.problem.checks import check_rigid_modes
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.resultants import charge_balance
 from contact.results.surface import contact_table

@@ -11,8 +11,8 @@ from mpi4py import MPI
 from contact.body.description import Body
 from contact.mesh.domain import Domain, from_mesh
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

@@ -7,11 +7,11 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 from contact.body.description import Body
-from contact.interface.law import Conductor
-from contact.interface.layer import Layer
 from contact.mesh.grid import box, rectangle
 from contact.model.body import Fixed, Load
-from contact.problem.contact import Contact
+from contact.model.contact import Contact
+from contact.model.electric import Conductor
+from contact.model.layer import Layer
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import (

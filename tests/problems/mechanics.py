@@ -1,7 +1,7 @@
 """Small contact problems that several tests solve, and fields and rotations to state them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import ufl
@@ -15,9 +15,9 @@ from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Plane
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
@@ -81,7 +81,7 @@ def bar(
     built = build_problem(case, comm, law=law)
     if friction is None:
         return built
-    contact = replace(built.contacts[0], friction=friction)
+    contact = built.contacts[0].model_copy(update={"friction": friction})
     return ContactProblem(built.domain, built.body, contact, degree=degree)
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.interface.law import Conductor
 from contact.mesh.grid import box, rectangle
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
+from contact.model.electric import Conductor
 from contact.model.friction import Friction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

@@ -15,9 +15,9 @@ from contact.body.description import Body, Material
 from contact.mesh.domain import Domain, from_mesh, revolved
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import ConstantCoefficient

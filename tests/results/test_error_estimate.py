@@ -19,7 +19,7 @@ from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
-from contact.problem.contact import Contact
+from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated, oscillation, sampled

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contact.problem.contact import Contact
 from mpi4py import MPI
 
 from contact import parse_case, solve
@@ -16,7 +17,6 @@ from contact.model.body import Fixed, Load
 from contact.model.obstacle import GapFunction
 from contact.plot.figures import figures_of
 from contact.plot.run import read_grid, read_run
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.quantities import quantities
 from contact.results.quantity import AGAINST, OPPOSITE

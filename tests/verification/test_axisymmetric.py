@@ -22,8 +22,8 @@ from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.problem.checks import check_rigid_modes
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields
 from contact.results.resultants import charge_balance

@@ -8,9 +8,9 @@ import pytest
 from mpi4py import MPI
 
 from contact import InputError, Solution, build_problem, load_case, solve
-from contact.interface.layer import Layer
 from contact.model.formula import Expression
 from contact.model.friction import Friction
+from contact.model.layer import Layer
 from contact.problem.problem import ContactProblem
 from contact.results.surface import contact_table
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient
@@ -81,7 +81,7 @@ def test_layer_without_stiffness_is_signorini(name, method):
     bare = ContactProblem(
         soft.domain,
         soft.body,
-        replace(soft.contacts[0], layer=None),
+        soft.contacts[0].model_copy(update={"layer": None}),
     )
     a, b = (solve(problem, case.solver) for problem in (soft, bare))
     assert a.converged
@@ -188,7 +188,7 @@ def test_other_friction_laws_on_a_layer(law):
     problem = ContactProblem(
         problem.domain,
         problem.body,
-        replace(problem.contacts[0], friction=laws[law]),
+        problem.contacts[0].model_copy(update={"friction": laws[law]}),
     )
     solution = solve(problem, case.solver)
     assert solution.converged, solution.outcome

@@ -27,8 +27,8 @@ from contact.mesh.geometry import (
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
+from contact.model.contact import Contact
 from contact.model.obstacle import Sphere
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated
 from scripts.force_balance import force_balance

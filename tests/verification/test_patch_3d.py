@@ -7,7 +7,7 @@ from mpi4py import MPI
 from contact.body.description import Body
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed
-from contact.problem.contact import Contact
+from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

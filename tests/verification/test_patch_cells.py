@@ -11,9 +11,9 @@ from contact.mesh.domain import revolved
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import Plane
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields
 from forms.hencky import Linear, Log

@@ -17,9 +17,9 @@ from contact.mesh.reader import from_file
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields
 from contact.typing import Array

@@ -12,9 +12,9 @@ from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.obstacle import Plane
 from contact.model.rigid import Motion, Rigid
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.resultants import movements
 from contact.solving import solve

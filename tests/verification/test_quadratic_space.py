@@ -11,8 +11,8 @@ from contact.body.description import Body
 from contact.mesh.grid import box
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed
+from contact.model.contact import Contact
 from contact.model.obstacle import Sphere
-from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.surface import contact_table
 from forms.hencky import Linear

@@ -1,0 +1,300 @@
+"""A contact: a part that may touch a foundation or another body, and the laws between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+import numpy as np
+from pydantic import Discriminator, Field, Tag, WithJsonSchema, model_validator
+
+from contact.arguments import expect, one_of
+from contact.mesh.domain import Domain
+from contact.mesh.parts import meet
+from contact.model.body import ZERO
+from contact.model.electric import Conductor, Electric
+from contact.model.fields import Static
+from contact.model.formula import Expression
+from contact.model.friction import Friction
+from contact.model.layer import Layer
+from contact.model.messages import Words, fault
+from contact.model.obstacle import (
+    Cone,
+    Cylinder,
+    GapFunction,
+    Heights,
+    Level,
+    Obstacle,
+    Paraboloid,
+    Plane,
+    Punch,
+    Shape,
+    Sphere,
+    Triangles,
+)
+from contact.model.rigid import Motion
+from contact.model.section import Described, Direction, FromTable, Own, Part, StaticValue
+from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
+from contact.typing import Array
+from forms.laws import Compliance, PotentialFactor
+
+SHAPES = (Plane, Sphere, Cylinder, Cone, Paraboloid, Punch, Level, Heights, Triangles)
+
+
+def _kind(given: Any) -> Any:
+    """Return the name of a shape; "own" for a user's."""
+    if isinstance(given, Mapping):
+        return given.get("shape")
+    if isinstance(given, SHAPES):
+        return given.shape
+    return "own" if hasattr(given, "measure") else None
+
+
+#: A further shape is a dataclass in `contact.model.obstacle` with its name as `shape`.
+Foundation: TypeAlias = Annotated[
+    Annotated[Plane, FromTable, Tag("plane")]
+    | Annotated[Sphere, FromTable, Tag("sphere")]
+    | Annotated[Cylinder, FromTable, Tag("cylinder")]
+    | Annotated[Cone, FromTable, Tag("cone")]
+    | Annotated[Paraboloid, FromTable, Tag("paraboloid")]
+    | Annotated[Punch, FromTable, Tag("punch")]
+    | Annotated[Level, FromTable, Tag("distance")]
+    | Annotated[Heights, FromTable, Tag("heights")]
+    | Annotated[Triangles, FromTable, Tag("surface")]
+    | Annotated[Obstacle, Own(), Tag("own")],
+    Discriminator(_kind),
+]
+
+#: Of the layer; the thesis does not give its constants (section 8.1.2).
+COMPLIANT = ReadWith("law", "compliance")
+
+#: Of a number that may be infinite: JSON has no such number, and editors pass null for it.
+INFINITE = ["number", "null"]
+
+
+class Contact(Described):
+    """`[contact]`: a part of the body that may touch a foundation or another body.
+
+    Several contacts are a list of tables `[[contact]]`, each a foundation of its own. Their parts
+    share no nodes.
+
+    Examples
+    --------
+    >>> Contact(["left", "right"], gap=0.01).on
+    'left+right'
+    """
+
+    on: Part
+    """Part of the boundary, or a list of parts, that may touch the foundation."""
+    name: Annotated[str, Field(min_length=1), Accepted("a text")] | None = None
+    """Name of its results, `contacts` of the summary. Default: that of its part."""
+    law: Literal["signorini", "compliance"] = "signorini"
+    """`signorini`: rigid foundation; `compliance`: with a compliant layer in front."""
+    against: Part | None = None
+    """Part of another body of the mesh, or a list of parts, that it may touch, instead of a
+    foundation."""
+    gap: StaticValue | None = None
+    """Gap rho to the rigid foundation along the body's normal; with `against`, added to the
+    distance between the meshes. Below 0 it is an interference. Default: 0 without `foundation`."""
+    foundation: Foundation | None = None
+    """Rigid shape, instead of a gap: `[contact.foundation]`."""
+    direction: Literal["foundation", "body", "axis"] = "foundation"
+    """Contact direction on a rigid shape: normal of the foundation or of the body, or along
+    `axis`, as the closed forms of indentation take it; cones and edges need that. With a gap it
+    is the body's."""
+    axis: Direction | None = None
+    """With `direction = "axis"`: that direction, from the body towards the foundation, of any
+    length."""
+    overlap: Literal["refuse", "press"] = "refuse"
+    """Meshes of two bodies that overlap in the reference configuration, or a shape that cuts the
+    body: `refuse` that, or `press` it out as an interference."""
+    rigid: Motion | None = None
+    """Motion of the foundation: `[contact.rigid]`. Absent: it is fixed."""
+    layer: Annotated[
+        Annotated[float, Field(ge=0, allow_inf_nan=True), Tag("number")]
+        | Annotated[Layer | None, Own(), Tag("own")],
+        Discriminator(lambda given: "own" if isinstance(given, Layer | None) else "number"),
+        COMPLIANT,
+        Accepted("a number >= 0, or inf"),
+        WithJsonSchema({"type": INFINITE, "minimum": 0}),
+    ] = 0.0
+    """Thickness of the layer, which is touched at gap - layer. A layer thicker than the gap presses
+    on the undeformed body. `inf`: no rigid part, touched at gap."""
+    stiffness: Annotated[NonNegative, COMPLIANT] = 10.0
+    """c_nu, stiffness of the layer (force/volume)."""
+    limit: Annotated[
+        float,
+        Field(gt=0, allow_inf_nan=True),
+        COMPLIANT,
+        Accepted("a number > 0, or inf"),
+        WithJsonSchema({"type": INFINITE, "exclusiveMinimum": 0}),
+    ] = 0.1
+    """n_nu: depth at which the layer's pressure saturates; `inf`: never."""
+    potential_factor: Annotated[float, Field(ge=1), COMPLIANT, Accepted("a number >= 1")] = 2.0
+    """alpha_nu: growth of the layer's stiffness with the potential difference; 1: none."""
+    potential_range: Annotated[Positive, COMPLIANT] = 128.0
+    """Potential difference at which the growth ends."""
+    lagged: Annotated[Switch, COMPLIANT] = False
+    """`true`: the layer's force is taken from the previous outer iteration, as in Algorithms 6
+    and 8; not with method `newton`."""
+    friction: Annotated[
+        Friction | None, Accepted("a table; [friction] at the top level is for all contacts")
+    ] = None
+    """Friction on this part. Default: that of `[friction]`."""
+    electric: (
+        Annotated[
+            Annotated[Electric, Tag("table")] | Annotated[Conductor, Own(), Tag("own")],
+            Discriminator(lambda given: "own" if isinstance(given, Conductor) else "table"),
+            Accepted("a table"),
+        ]
+        | None
+    ) = None
+    """Electric contact of this part. Default: that of `[electric]`."""
+
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        foundation: Obstacle | Static | None = None,
+        layer: Layer | float | None = None,
+        friction: Friction | None = None,
+        conductor: Conductor | Electric | None = None,
+        press: bool = False,
+        against: str | Sequence[str] | None = None,
+        gap: Static | None = None,
+        name: str | None = None,
+        *,
+        electric: Electric | Conductor | None = None,
+        rigid: Motion | None = None,
+        direction: Literal["foundation", "body", "axis"] = "foundation",
+        axis: Sequence[float] | Array | None = None,
+        overlap: Literal["refuse", "press"] = "refuse",
+        stiffness: float = 10.0,
+        limit: float = 0.1,
+        potential_factor: float = 2.0,
+        potential_range: float = 128.0,
+        lagged: bool = False,
+    ) -> None:
+        expect("Contact: press", press, "True or False", isinstance(press, bool | np.bool_))
+        fits = isinstance(layer, Layer | float | int | None)
+        expect("Contact: layer", layer, "Layer(...), a thickness, or None", fits)
+        electric = one_of("Contact", conductor=conductor, electric=electric)
+        check_laws("Contact", friction, electric)
+        if not hasattr(foundation, "measure"):
+            gap, foundation = one_of("Contact", foundation=foundation, gap=gap), None
+        if isinstance(gap, float) and np.isinf(gap):  # which is no value of a field
+            gap, foundation = None, GapFunction.of(gap)
+        super().__init__(
+            on=on,
+            name=name,
+            law="signorini" if layer is None else "compliance",
+            against=against,
+            gap=gap,
+            foundation=foundation,
+            direction=direction,
+            axis=axis,
+            overlap="press" if press else overlap,
+            rigid=rigid,
+            layer=0.0 if layer is None else layer,
+            stiffness=stiffness,
+            limit=limit,
+            potential_factor=potential_factor,
+            potential_range=potential_range,
+            lagged=lagged,
+            friction=friction,
+            electric=electric,
+        )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, given: Any) -> Any:
+        """Fill in the gap of a contact without a shape."""
+        if isinstance(given, Mapping) and given.get("foundation") is given.get("gap") is None:
+            return {**given, "gap": ZERO}
+        return given
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        shape = None if self.foundation is None or not self.foundation.is_shape else self.foundation
+        given = {"against": self.against, "foundation": shape, "rigid": self.rigid, "gap": self.gap}
+        for one, other in (("against", "foundation"), ("against", "rigid"), ("gap", "foundation")):
+            if given[one] is not None and given[other] is not None:
+                key = other if other == "rigid" else one
+                raise fault(key, Words(f"both {one} and {other}"), "one of them", "exclusive-keys")
+        if self.name is not None and self.name.strip() != self.name:
+            raise fault("name", self.name, "a text without blanks at its ends")
+        if self.against is not None and meet(self.against, self.on):
+            raise fault("against", self.against, "another part than `on`")
+        if (self.axis is None) != (self.direction != "axis"):
+            accepted = 'a vector with direction = "axis", and with that alone'
+            raise fault("axis", Words("missing") if self.axis is None else self.axis, accepted)
+        if self.direction != "foundation" and not isinstance(shape, Shape | None):
+            raise fault("direction", self.direction, "that of a Shape; others have their own")
+        if self.foundation is None and self.axis is not None:
+            raise fault("direction", self.direction, "axis with a foundation that is a shape")
+        none = isinstance(self.gap, Expression) and self.gap.is_constant and self.gap.value >= 0
+        if self.overlap == "press" and none and self.against is None:
+            accepted = "press with against, a foundation that is a shape, or a gap below 0"
+            raise fault("overlap", self.overlap, accepted)
+        return self
+
+    @property
+    def press(self) -> bool:
+        """Whether an overlap with the undeformed body is an interference."""
+        return self.overlap == "press"
+
+    @property
+    def conductor(self) -> Conductor | None:
+        """The law of the electric contact, where it is given or filled in."""
+        return self.electric if isinstance(self.electric, Conductor) else None
+
+    def filled(
+        self, domain: Domain, friction: Friction | None, electric: Electric | Conductor | None
+    ) -> Contact:
+        """Return the contact with objects in all places, for a problem. Collective.
+
+        Parameters
+        ----------
+        domain
+            The mesh.
+        friction, electric
+            Those of contacts that have none of their own.
+        """
+        electric = self.electric or electric
+        if isinstance(electric, Electric):
+            electric = electric.conductor(domain, self.on)
+        filled = {
+            "name": self.name or self.on,
+            "foundation": self._obstacle(),
+            "layer": self._layer(),
+            "friction": self.friction or friction or Friction(),
+            "electric": electric,
+        }
+        # The motion of the foundation is one of the body's unknowns.
+        done = {"gap": None, "direction": "foundation", "axis": None, "rigid": None}
+        return self.model_copy(update=filled | done)
+
+    def _obstacle(self) -> Obstacle:
+        """Return the rigid foundation, or the gap, as contact nodes see it."""
+        if self.foundation is None:
+            assert self.gap is not None  # filled in
+            return GapFunction.of(self.gap)
+        if self.direction == "foundation":  # or the shape's own
+            return self.foundation
+        assert isinstance(self.foundation, Shape)  # checked
+        return replace(self.foundation, direction=self.direction, along=self.axis or ())
+
+    def _layer(self) -> Layer | None:
+        """Return the layer in front of the rigid foundation; None without one."""
+        if isinstance(self.layer, Layer | None) or self.law == "signorini":
+            return self.layer if isinstance(self.layer, Layer) else None
+        factor = PotentialFactor(self.stiffness, self.potential_factor, self.potential_range)
+        return Layer(self.layer, Compliance(self.limit), factor, self.lagged)
+
+
+def check_laws(name: str, friction: object, electric: object) -> None:
+    """Refuse objects that are no friction, or no electric contact."""
+    fits = isinstance(friction, Friction | None)
+    expect(f"{name}: friction", friction, "Friction(mu=...), or None", fits)
+    fits = isinstance(electric, Electric | Conductor | None)
+    expect(f"{name}: conductor", electric, "Electric(k_e=...), Conductor(...), or None", fits)

@@ -1,0 +1,161 @@
+"""A conductive foundation: its description, and its law at the nodes in front of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
+
+import numpy as np
+
+from contact.arguments import SAMPLES, check_slope, expect
+from contact.mesh.domain import Domain
+from contact.mesh.geometry import area, volume
+from contact.model.body import ZERO
+from contact.model.fields import GivenAmplitude, GivenTimed, amplitude_of, steady
+from contact.model.formula import as_number
+from contact.model.section import Described, FactorOfTime, Timed
+from contact.settings import NonNegative, Positive, ReadWith, Switch
+from contact.typing import Array
+from forms import laws
+from forms.laws import Conductivity, PotentialLaw, Truncation
+
+#: Width of the ramp of psi over the height of the body.
+RAMP = 0.1
+
+
+@dataclass(frozen=True)
+class Conductor:
+    """A conductive foundation at the potential phi_f: D.nu = psi(u_nu - rho) phi_L(phi - phi_f).
+
+    Parameters
+    ----------
+    psi
+        Conductivity law (capacitance/area), for instance `ShiftedConductivity`.
+    phi_f
+        Potential of the foundation; of several conductors in one, one value per node, shape (n,).
+    phi_l
+        Truncation phi_L of the potential difference; by default there is none.
+    lagged
+        Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
+        thesis does: it then converges for small k_e only (Theorem 5.2). Else phi is implicit,
+        as a Robin term in Algorithm 5, and only psi is lagged.
+    phi_f_at
+        phi_f as a function of time; None where it is always the same.
+    share
+        Part of the conductivity that is taken, from 0 to 1: for continuations.
+    """
+
+    psi: Conductivity
+    phi_f: float | Array
+    phi_l: PotentialLaw = field(default_factory=lambda: Truncation(np.inf))
+    lagged: bool = False
+    phi_f_at: Callable[[float], float | Array] | None = None
+    share: float = 1.0
+
+    def check(self) -> None:
+        """Refuse laws that lack something, or whose derivatives are not their own.
+
+        Raises
+        ------
+        InputError
+            The message names the law.
+        """
+        for name, law, methods in (
+            ("psi", self.psi, ("k_e", "delta", "follows_gap", "at", "gap_slope")),
+            ("phi_l", self.phi_l, ("__call__", "derivative")),
+        ):
+            missing = [method for method in methods if not hasattr(law, method)]
+            accepted = f"an object with {', '.join(methods)}"
+            place = f"Conductor: {name} without {', '.join(missing)}"
+            expect(place, law, accepted, not missing, "conductor-law")
+        both = np.concatenate([-SAMPLES[::-1], SAMPLES])
+        never, psi = np.zeros(both.size, dtype=bool), self.psi
+        if psi.follows_gap:
+            check_slope(
+                "Conductor: psi: gap_slope",
+                lambda s: psi.at(s, never, never),
+                lambda s: psi.gap_slope(s, never),
+                both,
+            )
+        check_slope("Conductor: phi_l: derivative", self.phi_l, self.phi_l.derivative, both)
+
+    def at(self, time: float) -> Conductor:
+        """Return the foundation at a time."""
+        return self if self.phi_f_at is None else replace(self, phi_f=self.phi_f_at(time))
+
+
+class Electric(Described):
+    """`[electric]`: a conductive foundation, D.nu = psi(u_nu - rho) phi_L(phi - phi_f)."""
+
+    law: Literal["shifted", "perfect", "ramp"] = "shifted"
+    """psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e in contact; `ramp`, as
+    the thesis has it, zero where u_nu <= rho, with which no contact conducts."""
+    k_e: NonNegative
+    """k_e of the foundation: a capacitance per area, for D.nu is a charge."""
+    phi_f: Timed = ZERO
+    """Potential phi_F of the foundation."""
+    amplitude: FactorOfTime | None = None
+    """Factor of phi_f as a function of time, see `[evolution]`. Without one phi_f is constant."""
+    delta: Annotated[Positive | None, ReadWith("law", ("shifted", "ramp"))] = None
+    """Slope of psi (1/length): psi rises within 1/delta of the gap. Default: 10 / H, H the volume
+    of the body over the area of its contact part, or its diameter where that is smaller. A
+    warning says where 1/delta is below two spacings of the contact nodes."""
+    limit: Positive | None = None
+    """Limit L of the truncation phi_L. Default: no truncation."""
+    lagged: Switch = False
+    """`true`: the charge is taken from the previous outer iteration, as in Algorithm 4; converges
+    for small k_e only; not with method `newton`."""
+
+    def __init__(
+        self,
+        k_e: float,
+        phi_f: GivenTimed = 0.0,
+        law: Literal["shifted", "perfect", "ramp"] = "shifted",
+        delta: float | None = None,
+        limit: float | None = None,
+        lagged: bool = False,
+        amplitude: GivenAmplitude | None = None,
+    ) -> None:
+        super().__init__(
+            law=law,
+            k_e=k_e,
+            phi_f=phi_f,
+            amplitude=amplitude,
+            delta=delta,
+            limit=limit,
+            lagged=lagged,
+        )
+
+    def conductor(self, domain: Domain, part: str) -> Conductor:
+        """Return the law in front of a part of a mesh. Collective."""
+        psi: laws.Conductivity
+        if self.law == "perfect":
+            psi = laws.PerfectConductivity(self.k_e)
+        else:
+            slope = self.delta or 1 / conduction_ramp(domain, part)
+            kind = {"shifted": laws.ShiftedConductivity, "ramp": laws.RampConductivity}[self.law]
+            psi = kind(self.k_e, slope)
+        truncation = laws.Truncation(np.inf if self.limit is None else self.limit)
+        phi_f = as_number(self.phi_f)
+        if isinstance(phi_f, float) and self.amplitude is None:
+            return Conductor(psi, phi_f, truncation, self.lagged)
+        # A foundation has its potential from the beginning.
+        factor, number = amplitude_of(self.amplitude or steady, True), self.phi_f.number
+
+        def phi_f_at(time: float) -> float:
+            """Return the potential of the foundation at a time."""
+            return float(factor(time) * number(time))
+
+        return Conductor(psi, phi_f_at(0.0), truncation, self.lagged, phi_f_at)
+
+
+def conduction_ramp(domain: Domain, part: str) -> float:
+    """Return how far in front of a foundation it conducts by default (length). Collective.
+
+    A tenth of the body's height over its contact part: of a length of the problem, so that
+    refined meshes resolve it and solutions have a limit. A fixed small number of the thesis's
+    delta means a wide ramp too.
+    """
+    height = volume(domain) / area(domain, part)
+    return RAMP * min(height, domain.size)
