@@ -12,7 +12,7 @@ potentials as those of the nodes: all of q is then of one kind.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
@@ -70,9 +70,9 @@ class Member:
         """How much an unknown of 1 is of a translation, a rotation or a potential."""
         if not isinstance(self.description, Rigid):
             return np.full(1, self.scale)
-        motion = self.description.motion
-        turns = np.full(len(motion.turns), 1 / self.scale)
-        return np.concatenate([np.ones(len(motion.displacement or ())), turns])
+        rigid = self.description
+        turns = np.full(len(rigid.turns), 1 / self.scale)
+        return np.concatenate([np.ones(len(rigid.displacement or ())), turns])
 
     @property
     def free(self) -> NDArray[np.bool_]:
@@ -97,7 +97,7 @@ class Member:
         if isinstance(self.description, Electrode):
             columns[:, -1, 0] = 1.0
         elif isinstance(self.description, Rigid):
-            offset = points - np.asarray(self.description.motion.centre)
+            offset = points - np.asarray(self.description.centre)
             columns[:, :d] = rigid_motions(offset) * self.units
         return columns
 
@@ -233,25 +233,25 @@ def make_global_unknowns(
 
 def _moving(rigid: Rigid, domain: Domain) -> Rigid:
     """Return a rigid part with all components of its motion, if that is one of the body."""
-    motion, place = rigid.motion, f"{rigid.name} on {rigid.on!r}: "
+    place = f"{rigid.name} on {rigid.on!r}: "
     for key in ("displacement", "force", "centre"):
-        given = getattr(motion, key)
+        given = getattr(rigid, key)
         if given is not None and len(given) != domain.dim:
             raise InputError(
                 f"{place}{key} has {len(given)} components, the body has {domain.dim}",
                 "components",
             )
     try:
-        motion.check_dimension(domain.dim)
+        rigid.check_dimension(domain.dim)
     except PydanticCustomError as error:
         raise describe_fault(error).within(place) from None
-    if domain.revolved and motion.off_axis is not None:
+    if domain.revolved and rigid.off_axis is not None:
         raise InputError(
             f"{rigid.name} on {rigid.on!r}: a rigid part moves along the axis alone where space is "
             "axisymmetric; accepted: 0 for the first component of the displacement, no rotation",
             "rigid-part",
         )
-    return replace(rigid, motion=motion.filled(domain.dim))
+    return rigid.filled(domain.dim)
 
 
 def _tie(

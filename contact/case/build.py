@@ -20,7 +20,7 @@ from contact.model.electric import Electric
 from contact.model.friction import Friction
 from contact.model.layer import Layer
 from contact.model.obstacle import Obstacle
-from contact.model.rigid import Motion, Rigid
+from contact.model.rigid import Motion
 from contact.problem.checks import check_problem, check_supports
 from contact.problem.problem import ContactProblem
 from forms.hencky import Law
@@ -90,7 +90,7 @@ def build_problem(
             [_acting(case, fixed) for fixed in case.fixed],
             [_acting(case, load) for load in case.load],
             elastic=case.elastic,
-            rigid=[Rigid(part.on, _acting(case, part)) for part in case.rigid],
+            rigid=[_acting(case, part) for part in case.rigid],
             electrodes=[_acting(case, electrode) for electrode in case.electrode],
             bolts=[_acting(case, bolt) for bolt in case.bolt],
         )

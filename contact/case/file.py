@@ -38,7 +38,7 @@ from contact.model.electric import Electric
 from contact.model.fields import CONSTANT, Amplitude, Ramp, steady
 from contact.model.friction import Friction
 from contact.model.messages import describe, describe_fault, fault, keys_of, path_of, shown
-from contact.model.rigid import Motion, RigidPart
+from contact.model.rigid import Motion, Rigid
 from contact.model.section import (
     FromTable,
     OneOrSome,
@@ -152,7 +152,7 @@ class Case(Section):
     """Elastic supports: any number of `[[elastic]]`."""
     load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = ()
     """Forces and charges: any number of `[[load]]`."""
-    rigid: Annotated[tuple[RigidPart, ...], as_tuple, Accepted("tables [[rigid]]")] = ()
+    rigid: Annotated[tuple[Rigid, ...], as_tuple, Accepted("tables [[rigid]]")] = ()
     """Parts that move as rigid bodies: any number of `[[rigid]]`."""
     electrode: Annotated[tuple[Electrode, ...], as_tuple, Accepted("tables [[electrode]]")] = ()
     """Electrodes of unknown potential: any number of `[[electrode]]`."""

@@ -139,7 +139,7 @@ def _member(member: Member, time: float) -> list[Row]:
     if isinstance(given, Rigid):
         where = f"foundation of {given.on!r}" if given.foundation else f"rigid part {given.on!r}"
         names = (("displacement", "rotation"), ("force", "moment"))
-    d = len(given.motion.displacement or ()) if isinstance(given, Rigid) else 1
+    d = len(given.displacement or ()) if isinstance(given, Rigid) else 1
     values = [member.given(time) * member.units, member.forces(time) / member.units]
     values[0][d:] = np.rad2deg(values[0][d:])
     rows = []

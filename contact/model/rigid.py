@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr, model_validator
 
-from contact.arguments import OfTime, expect, fill
-from contact.mesh.parts import part
+from contact.arguments import OfTime, expect
 from contact.model.body import ZERO
 from contact.model.fields import Amplitude, GivenAmplitude, GivenTimed, amplitude_of
 from contact.model.formula import Expression, as_number
@@ -146,7 +144,7 @@ class Motion(Described):
             return "displacement.0"
         return "rotation" if any(turn != ZERO for turn in self.turns) else None
 
-    def filled(self, dim: int) -> Motion:
+    def filled(self, dim: int) -> Self:
         """Return the motion with all components of a body in 2-D or 3-D."""
 
         def every(given: tuple[Any, ...], size: int) -> tuple[Any, ...]:
@@ -163,6 +161,11 @@ class Motion(Described):
         return self.model_copy(update=components)
 
     @property
+    def forces(self) -> tuple[Expression | OfTime, ...]:
+        """Force and moment."""
+        return (*(self.force or ()), *self.moments)
+
+    @property
     def values(self) -> tuple[float | OfTime | None, ...]:
         """Displacement and rotation in radians, None for free components."""
         units = [*[1.0] * len(self.displacement or ()), *[self._angle] * len(self.turns)]
@@ -173,11 +176,48 @@ class Motion(Described):
         )
 
 
-class RigidPart(Motion):
-    """`[[rigid]]`: a part that moves as a rigid body, such as a plate that loads the body."""
+class Rigid(Motion):
+    """`[[rigid]]`: a part that moves as a rigid body, such as a plate that loads the body.
+
+    Examples
+    --------
+    For ``Body(law, fixed, rigid=plate)``:
+
+    >>> plate = Rigid("top", displacement=[0.0, "free"], force=[0.0, -3.0])
+    >>> same = Rigid("top", Motion([0.0, "free"], force=[0.0, -3.0]))
+    """
+
+    name: ClassVar[str] = "rigid"
 
     on: Part
     """Part of the boundary, or a list of parts."""
+
+    _foundation: bool = PrivateAttr(False)
+
+    def __init__(
+        self,
+        on: str | Sequence[str],
+        motion: Motion | None = None,
+        foundation: bool = False,
+        *,
+        displacement: Sequence[GivenFree] | Array = (),
+        rotation: Given = (),
+        force: Sequence[GivenTimed] | Array = (),
+        moment: GivenTimed | Sequence[GivenTimed] | Array = (),
+        centre: Sequence[float] | Array = (),
+        amplitude: GivenAmplitude | None = None,
+    ) -> None:
+        if motion is None:
+            motion = Motion(displacement, rotation, force, moment, centre, amplitude)
+        expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
+        given = {key: getattr(motion, key) for key in Motion.model_fields}
+        Described.__init__(self, on=on, **given)
+        self._angle, self._foundation = motion._angle, foundation
+
+    @property
+    def foundation(self) -> bool:
+        """Whether it is the foundation in front of the part, as ``Contact(rigid=...)`` has it."""
+        return self._foundation
 
 
 def numbers_at(
@@ -190,58 +230,6 @@ def numbers_at(
         for value in values
     ]
     return amplitude_of(given, known)(time) * np.array(numbers)
-
-
-@dataclass(frozen=True)
-class Rigid:
-    """A part that moves as a rigid body, or a list of parts, or a foundation in front of it.
-
-    A plate on the top of a body, under a force:
-
-    >>> plate = Rigid("top", Motion([0.0, None], force=[0.0, -3.0]))
-
-    It is given to the body by ``Body(law, fixed, rigid=plate)``; ``Rigid("bottom", motion,
-    foundation=True)`` is the foundation in front of the contact part ``bottom``.
-
-    Parameters
-    ----------
-    on
-        Name of the part, or a list of names.
-    motion
-        How it moves.
-    foundation
-        Whether it is the foundation in front of the part, and not the part itself.
-
-    Raises
-    ------
-    InputError
-        If `on` is no name, or `motion` none.
-    """
-
-    on: str
-    motion: Motion
-    foundation: bool
-
-    def __init__(self, on: str | Sequence[str], motion: Motion, foundation: bool = False) -> None:
-        fill(self, on=part(on), motion=motion, foundation=foundation)
-        expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
-
-    name = "rigid"
-
-    @property
-    def values(self) -> tuple[float | OfTime | None, ...]:
-        """Displacement and rotation."""
-        return self.motion.values
-
-    @property
-    def forces(self) -> tuple[Expression | OfTime, ...]:
-        """Force and moment."""
-        return (*(self.motion.force or ()), *self.motion.moments)
-
-    @property
-    def amplitude(self) -> Amplitude | str | None:
-        """That of the motion."""
-        return self.motion.amplitude
 
 
 def rigid_motions(points: NDArray[np.floating], revolved: bool = False) -> Array:

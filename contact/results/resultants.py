@@ -367,7 +367,7 @@ def movements(problem: ContactProblem, state: State) -> Movements:
         if problem.domain.revolved:
             # Over the full turn forces across the axis, and moments about it, cancel.
             own = np.where(np.arange(own.size) == 1, own, 0.0)
-        own, d = own / member.units, len(member.description.motion.displacement or ())
+        own, d = own / member.units, len(member.description.displacement or ())
         (foundations if member.foundation else parts)[part] = {
             "displacement": [float(value) for value in values[:d]],
             "rotation": _one_or_more(np.rad2deg(values[d:])),

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contact.problem.contact import Contact
 from mpi4py import MPI
 
 from contact import parse_case, solve
 from contact.body.description import Body
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
 from contact.model.obstacle import GapFunction
 from contact.plot.figures import figures_of
 from contact.plot.run import read_grid, read_run
