@@ -1,12 +1,10 @@
 """The public names: for type checkers, and for `contact/__init__.py`, which imports them lazily."""
 
 from contact.body.description import Body as Body
-from contact.body.description import Material as Material
 from contact.case.build import build_problem as build_problem
 from contact.case.file import Case as Case
 from contact.case.file import load_case as load_case
 from contact.case.file import parse_case as parse_case
-from contact.case.material import make_material as make_material
 from contact.derivatives.by_fields import field_gradient as field_gradient
 from contact.derivatives.by_fields import gap_gradient as gap_gradient
 from contact.derivatives.by_parameters import Sensitivities as Sensitivities
@@ -32,6 +30,8 @@ from contact.model.electric import Conductor as Conductor
 from contact.model.electric import Electric as Electric
 from contact.model.friction import Friction as Friction
 from contact.model.layer import Layer as Layer
+from contact.model.material import Material as Material
+from contact.model.material import make_material as make_material
 from contact.model.obstacle import Cone as Cone
 from contact.model.obstacle import Cylinder as Cylinder
 from contact.model.obstacle import GapFunction as GapFunction

@@ -147,7 +147,7 @@ def test_a_law_without_a_differential_of_its_own(kinematic):
     data["material"]["kinematic"] = kinematic
     # A reaction depends on the history of the last step by itself.
     case, names = parse_case(data), ["contact_force_x", "max_pressure", "reaction_x_top"]
-    law = case.material.build(2).law
+    law = case.material.in_body(2).law
     plain = SimpleNamespace(
         **{name: getattr(law, name) for name in ("young", "poisson", "bulk", "shear", "symmetric")},
         variables=law.variables,

@@ -6,98 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from dolfinx.fem import Function
 
-from contact.arguments import CONSTANTS, expect, fill, is_law, several
+from contact.arguments import expect, fill, several
 from contact.errors import InputError
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
-from contact.model.fields import (
-    Field,
-    Static,
-    static,
-)
+from contact.model.material import Material
 from contact.model.rigid import Rigid
 from forms.elasticity import Anisotropic
 from forms.hencky import Law, is_linear
 from forms.history import HistoryLaw
 from forms.piezo import Piezo
-from forms.plane_stress import PlaneStressElastic, PlaneStressHistory, in_plane_stress
-
-
-@dataclass(frozen=True)
-class Material:
-    """A material and where it is.
-
-    Parameters
-    ----------
-    law
-        Law of the stress: `Linear`, `Log`, `UserLaw`, `J2`, or an object like these.
-    piezo
-        Piezoelectric tensors in the body's axes, or None.
-    on
-        Name of the region that consists of it, or several; none for the whole mesh.
-    factor
-        A function of position > 0 that its stresses are multiplied by, as `fields.field` takes it
-        (no unit): Young's modulus as a field, of which the law has a mean. A Function is copied.
-        None for 1.
-
-    Raises
-    ------
-    InputError
-        If an argument is nothing of these, or a factor is given with coupling, internal variables
-        or a time.
-    """
-
-    law: Law
-    piezo: Piezo | None
-    on: tuple[str, ...]
-    factor: Field | None
-
-    def __init__(
-        self,
-        law: Law,
-        piezo: Piezo | None = None,
-        on: str | Sequence[str] = (),
-        factor: Static | None = None,
-    ) -> None:
-        fill(self, law=law, piezo=piezo)
-        factor = factor.copy() if isinstance(factor, Function) else factor
-        names = several("on", on, str, "the name of a region, or a list of names")
-        fill(self, factor=None if factor is None else static(factor, "factor"), on=names)
-        accepted = (
-            "Linear(young, poisson) of numbers, Log, UserLaw, "
-            "forms.elasticity.Anisotropic(stiffness), of a crystal in 2-D with .in_plane(), or an "
-            "object with the numbers "
-            f"{', '.join(CONSTANTS)} and a stress as forms.hencky.Hencky or "
-            "forms.history.HistoryLaw have it"
-        )
-        expect("law", self.law, accepted, is_law(self.law))
-        fits = isinstance(self.piezo, Piezo | None)
-        expect("piezo", self.piezo, "Piezo(...), or None", fits)
-        fits = self.factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
-        accepted = "a material without coupling and internal variables"
-        expect("factor", self.factor, accepted, fits)
-
-    @property
-    def in_plane_stress(self) -> bool:
-        """Whether no stress acts across a plane body of it."""
-        return isinstance(self.law, PlaneStressElastic | PlaneStressHistory)
-
-    def plane_stress(self) -> Material:
-        """Return the material of a plane body without stress across it, of unit thickness.
-
-        Crystals are in the axes of the body.
-
-        Raises
-        ------
-        InputError
-            If a nonlinear law is piezoelectric: the strain across would have to follow the field.
-        """
-        fits = self.piezo is None or self.in_plane_stress or is_linear(self.law)
-        accepted = "None in plane stress, unless the law is linear"
-        expect("piezo", self.piezo, accepted, fits, "plane-stress")
-        law, piezo = in_plane_stress(self.law, self.piezo)
-        return replace(self, law=law, piezo=piezo)
 
 
 def _leading(materials: Sequence[Material]) -> tuple[Law, Piezo | None]:
@@ -179,7 +97,7 @@ class Body:
         if self.regions:  # as `dataclasses.replace` hands them on
             first, tensors = _leading(self.regions)
             accepted = "all materials as the law, Body([Material(...), Material(...)], ...)"
-            fits = self.law is first and self.piezo is tensors
+            fits = self.law is first and (self.piezo is None) == (tensors is None)
             expect("regions beside a law", self.regions, accepted, fits)
         history = any(isinstance(m.law, HistoryLaw) for m in self.materials)
         if self.bolts and history:
@@ -195,6 +113,13 @@ class Body:
     def materials(self) -> tuple[Material, ...]:
         """The materials, each with its regions."""
         return self.regions or (Material(self.law, self.piezo),)
+
+    def in_space(self, dim: int) -> Body:
+        """Return the body with the laws of its materials in its axes, in 2-D or 3-D."""
+        given = tuple(material.in_body(dim) for material in self.regions)
+        if all(one is own for one, own in zip(given, self.regions, strict=True)):
+            return self
+        return replace(self, law=given, piezo=None, regions=())
 
     @property
     def linear(self) -> bool:

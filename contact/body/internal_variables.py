@@ -19,7 +19,6 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike
 from ufl.core.expr import Expr
 
-from contact.body.description import Material
 from contact.body.pointwise import Pointwise
 from contact.body.stress_updates import check_law, respond
 from contact.errors import InputError

@@ -13,13 +13,13 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
 from contact.arguments import expect
-from contact.body.description import Material
 from contact.body.pointwise import CHUNK
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices, Measure
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import geometry_nodes
 from contact.model.fields import constant, values_at
+from contact.model.material import Material
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import Graded, Law

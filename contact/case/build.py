@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import TypedDict, TypeVar
 
 from mpi4py import MPI
 
 from contact.arguments import check_range
-from contact.body.description import Body, Material
+from contact.body.description import Body
 from contact.case.file import REPLACEABLE, Case
 from contact.errors import InputError
 from contact.mesh.domain import Domain, revolved
@@ -19,6 +18,7 @@ from contact.model.contact import Contact
 from contact.model.electric import Electric
 from contact.model.friction import Friction
 from contact.model.layer import Layer
+from contact.model.material import Material
 from contact.model.obstacle import Obstacle
 from contact.model.rigid import Motion
 from contact.problem.checks import check_problem, check_supports
@@ -141,8 +141,9 @@ def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
     for key, section in case.materials:
         if domain.revolved:
             section.check_revolved(key)
-        given = section.build(domain.dim)
-        own = given if law is None else replace(given, law=law)
+        own = section.in_body(domain.dim)
+        if law is not None:
+            own = Material(law, own.piezo, own.on or ())
         check_range(f"{key}.young", float(own.law.young))
         made.append(own.plane_stress() if case.space.kinematics == "plane_stress" else own)
     return made

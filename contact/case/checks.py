@@ -14,12 +14,8 @@ from contact.model.body import ZERO
 from contact.model.fields import CONSTANT
 from contact.model.formula import Expression
 from contact.model.messages import Words, fault, listed
-from contact.model.section import (
-    AMPLITUDE,
-    PART,
-    as_given,
-    walk,
-)
+from contact.model.section import as_given, walk
+from contact.model.values import AMPLITUDE, PART
 from contact.settings import SPATIAL
 from contact.tolerances import HUGE
 
@@ -66,9 +62,9 @@ def _check_plane_stress(case: Case) -> None:
         accepted = '"standard" in plane stress, where nothing locks'
         raise fault("space.element", case.space.element, accepted, "plane-stress")
     for key, material in case.materials:
-        if material.piezoelectric and material.law in ("log", "j2"):
+        if material.piezoelectric and material.kind in ("log", "j2"):
             accepted = '"linear" or "anisotropic" in plane stress with piezoelectric constants'
-            raise fault(f"{key}.law", material.law, accepted, "plane-stress")
+            raise fault(f"{key}.law", material.kind, accepted, "plane-stress")
 
 
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:

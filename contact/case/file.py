@@ -27,7 +27,6 @@ from pydantic_core import PydanticCustomError
 
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
-from contact.case.material import Material
 from contact.case.mesh import Mesh, cut_about_axis
 from contact.case.units import Labels, share
 from contact.errors import InputError, clipped
@@ -37,17 +36,11 @@ from contact.model.contact import Contact
 from contact.model.electric import Electric
 from contact.model.fields import CONSTANT, Amplitude, Ramp, steady
 from contact.model.friction import Friction
+from contact.model.material import Material
 from contact.model.messages import describe, describe_fault, fault, keys_of, path_of, shown
 from contact.model.rigid import Motion, Rigid
-from contact.model.section import (
-    FromTable,
-    OneOrSome,
-    Section,
-    Text,
-    as_tuple,
-    check_conditions,
-    without_effect,
-)
+from contact.model.section import FromTable, Section, check_conditions, without_effect
+from contact.model.values import OneOrSome, Text, as_tuple
 from contact.results.options import OutputOptions, Units
 from contact.settings import Accepted
 

@@ -9,12 +9,12 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaWarningKind
 
 import meshes
 from contact.case.file import DEFAULT, Case
-from contact.case.material import CONSTANTS, Material
 from contact.case.mesh import COMMON, Mesh
-from contact.case.units import BY_NAME
 from contact.mesh import grid
+from contact.model.material import CONSTANTS, Material
 from contact.model.messages import keys_of, kinds_of, sections_of
 from contact.model.section import conditions
+from contact.model.units import BY_NAME
 from contact.settings import ReadWith
 
 #: Version of the schema's own language.

@@ -24,8 +24,8 @@ from contact.model.fields import (
 )
 from contact.model.formula import Expression
 from contact.model.messages import Words, fault
-from contact.model.section import (
-    Described,
+from contact.model.section import Described, as_given
+from contact.model.values import (
     FactorOfTime,
     Few,
     Free,
@@ -35,7 +35,6 @@ from contact.model.section import (
     Timed,
     Value,
     Values,
-    as_given,
 )
 from contact.settings import SPATIAL, Accepted, Switch
 

@@ -34,7 +34,8 @@ from contact.model.obstacle import (
     Triangles,
 )
 from contact.model.rigid import Motion
-from contact.model.section import Described, Direction, FromTable, Own, Part, StaticValue
+from contact.model.section import Described, FromTable, Own
+from contact.model.values import Direction, Part, StaticValue
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor

@@ -14,7 +14,8 @@ from contact.mesh.geometry import area, volume
 from contact.model.body import ZERO
 from contact.model.fields import GivenAmplitude, GivenTimed, amplitude_of, steady
 from contact.model.formula import as_number
-from contact.model.section import Described, FactorOfTime, Timed
+from contact.model.section import Described
+from contact.model.values import FactorOfTime, Timed
 from contact.settings import NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
 from forms import laws

@@ -152,6 +152,7 @@ class ContactProblem:
         expect("contact", contact, "Contact(part), or several", given)
         check_laws("Problem", friction, conductor)
         moving = [Rigid(c.on, c.rigid, foundation=True) for c in given if c.rigid is not None]
+        body = body.in_space(domain.dim)
         self.body = replace(body, rigid=(*moving, *body.rigid)) if moving else body
         self.contacts = tuple(one.filled(domain, friction, conductor) for one in given)
         names = [contact.name for contact in self.contacts]

@@ -23,7 +23,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
-from contact.body.description import Material
 from contact.body.elements import MEAN_DILATATION
 from contact.body.loads import expression
 from contact.body.materials import factor_of
@@ -35,6 +34,7 @@ from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.mesh.parts import members, part
 from contact.model.body import Bolt
 from contact.model.fields import constant
+from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.fields import DerivedFields

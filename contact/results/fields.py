@@ -18,7 +18,6 @@ from ufl.core.expr import Expr
 
 from contact import _compat
 from contact.arguments import expect
-from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import form_law, piezo_with_constants
@@ -27,6 +26,7 @@ from contact.history import BodyState, Evaluated
 from contact.mesh.cells import shape_of
 from contact.mesh.geometry import volumes
 from contact.mesh.parts import disjoint_pieces
+from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.quantities import quantities, values_of

@@ -12,7 +12,6 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
-from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState
@@ -20,6 +19,7 @@ from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import Indices
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.model.fields import constant
+from contact.model.material import Material
 from contact.typing import Array
 from forms.elasticity import Anisotropic, mandel
 from forms.history import PAIRS, components, to_vector

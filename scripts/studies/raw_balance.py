@@ -15,7 +15,7 @@ from dolfinx import fem
 from scipy.spatial import KDTree
 
 from contact import Solution
-from contact.body.description import Material
+from contact.model.material import Material
 from contact.tolerances import EPS
 from contact.typing import Array
 

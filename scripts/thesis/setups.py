@@ -34,7 +34,7 @@ def constants(report: Report) -> None:
     """Print Table 8.1 beside the values of the case files."""
     case = load_case(CASES / "piezo-8-2.toml")
     (_, material), *_ = case.materials
-    piezo = material.piezo
+    piezo = material.coupling
     assert piezo is not None and material.young is not None and material.poisson is not None
     rows = (
         ("E", "GPa", 58.7102, material.young),

@@ -66,7 +66,7 @@ def test_the_rest_of_the_keys():
     assert (case.contact.stiffness, case.contact.limit) == (10.0, 0.1)
     assert (case.contact.potential_factor, case.contact.potential_range) == (2.0, 128.0)
     assert case.solver.r == 25.0
-    e, beta = case.material.piezo.voigt
+    e, beta = case.material.coupling.voigt
     assert e[2].tolist() == [-5.4, -5.4, 15.8, 0, 0, 0] and e[0, 4] == e[1, 3] == 12.3
     assert np.diag(beta).tolist() == [8.13866, 8.13866, 7.37455]
     again = parse_case(tomllib.loads(to_toml(case)))
@@ -140,7 +140,7 @@ def test_overrides(bar):
             "solver.nested = true",
         ],
     )
-    assert case.material.young == 2.0 and case.material.law == "linear"
+    assert case.material.young == 2.0 and case.material.kind == "linear"
     assert case.title == "two words"
     assert case.load[0].traction == (Expression("y"), Expression("-10*x"))
     assert case.friction.mu == Expression(0.3)

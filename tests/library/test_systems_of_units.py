@@ -92,7 +92,7 @@ def test_the_system_of_the_case_is_that_of_its_materials():
         "charge": "mC",
     }
     assert case.material.units == "N-mm-MPa"
-    assert case.material.build(2).law.young == pytest.approx(
+    assert case.material.in_body(2).law.young == pytest.approx(
         contact.library.materials.find("steel").isotropic[0] / 1e6
     )
     again = parse_case(tomllib.loads(to_toml(case)))

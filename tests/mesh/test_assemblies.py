@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body, Material
+from contact.body.description import Body
 from contact.cli.main import BAD_INPUT, main
 from contact.mesh.domain import Domain
 from contact.mesh.reader import from_file
@@ -16,6 +16,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
 from contact.model.contact import Contact
+from contact.model.material import Material
 from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -6,7 +6,6 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import Body, Fixed, Linear, Load
-from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle

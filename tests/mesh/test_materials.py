@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import parse_case, solve
-from contact.body.description import Body, Material
+from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.case.build import build_problem
 from contact.errors import InputError
@@ -13,6 +13,7 @@ from contact.history import BodyState
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed, Load
+from contact.model.material import Material
 from contact.results.fields import DerivedFields
 from forms.hencky import Linear
 from forms.piezo import hexagonal

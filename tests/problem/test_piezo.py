@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.case.material import Material
 from contact.errors import InputError
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.friction import Friction
+from contact.model.material import Material
 from contact.results.resultants import charge_balance
 from contact.thesis.fixed_point import FixedPoint
 from forms.laws import (
@@ -33,7 +33,7 @@ CRYSTAL = SCALED.crystal()
 def crystal_of(dim: int, **changes) -> Piezo:
     constants = {**COUPLING, **PERMITTIVITY, **changes}
     section = Material(young=1.0, poisson=0.3, piezo=constants)
-    made = section.build(dim).piezo
+    made = section.in_body(dim).piezo
     assert made is not None
     return made
 

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import parse_case, solve
-from contact.body.description import Body, Material
+from contact.body.description import Body
 from contact.errors import InputError, SingularError
 from contact.linear.operator import SparseOperator
 from contact.methods.method import METHODS
@@ -13,6 +13,7 @@ from contact.methods.options import OPTIONS
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
+from contact.model.material import Material
 from contact.model.obstacle import GapFunction
 from contact.problem.checks import check_rigid_modes
 from contact.problem.problem import ContactProblem

@@ -9,7 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
-from contact.body.description import Body, Material
+from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.cli.solve import _results
 from contact.mesh.cells import rule, shape_of
@@ -20,6 +20,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
 from contact.model.contact import Contact
+from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated, oscillation, sampled

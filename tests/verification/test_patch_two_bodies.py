@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial import cKDTree
 
-from contact.body.description import Body, Material
+from contact.body.description import Body
 from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, revolved
 from contact.mesh.reader import from_file
@@ -19,6 +19,7 @@ from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
+from contact.model.material import Material
 from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields

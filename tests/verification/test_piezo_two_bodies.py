@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body, Material
+from contact.body.description import Body
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Electrode, Fixed
 from contact.model.contact import Contact
 from contact.model.electric import Conductor
+from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.results.resultants import charge_balance, movements

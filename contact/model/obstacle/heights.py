@@ -14,7 +14,7 @@ from contact.arguments import expect, naming, one_of
 from contact.errors import InputError
 from contact.model.data import read_data
 from contact.model.obstacle.protocol import Shape
-from contact.model.section import File
+from contact.model.values import File
 from contact.settings import Accepted, Internal, Number, Positive, Required, Switch
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array

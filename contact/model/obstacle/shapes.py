@@ -19,7 +19,7 @@ from contact.arguments import expect, fill, real
 from contact.errors import InputError
 from contact.model.formula import Expression
 from contact.model.obstacle.protocol import Shape
-from contact.model.section import FormulaOrFunction
+from contact.model.values import FormulaOrFunction
 from contact.settings import Accepted, Direction, NonNegative, Positive, Switch, Vector
 from contact.tolerances import EPS
 from contact.typing import Array

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from contact.arguments import expect, one_of
 from contact.errors import InputError
 from contact.model.obstacle.protocol import Shape
-from contact.model.section import File
+from contact.model.values import File
 from contact.settings import Accepted, Internal, Required
 from contact.typing import Array
 

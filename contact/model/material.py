@@ -1,52 +1,52 @@
-"""Sections of the case file about the material, and the material itself."""
+"""A material and its regions: by constants, by the name of one of a library, or by a law object."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 import numpy as np
+from dolfinx.fem import Function
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag, ValidationError, model_validator
 
-from contact.arguments import expect
-from contact.body import description
-from contact.case.units import SystemOfUnits, UnitSystem
+from contact.arguments import CONSTANTS as NUMBERS
+from contact.arguments import expect, is_law, several
 from contact.errors import InputError
 from contact.library import units as systems
 from contact.library.materials import PACKAGED, Entry, find
-from contact.model.messages import Words, describe, fault, shown
-from contact.model.section import (
-    Axis,
-    Either,
-    File,
-    Names,
-    Section,
-    Text,
-    as_tuple,
+from contact.model import fields
+from contact.model.constants import (
+    POSITIVE,
+    SHORT,
+    Hardening,
+    Kinematic,
+    Piezo,
+    Poling,
+    Saturation,
+    either_way,
+    matrix,
 )
+from contact.model.messages import Words, describe, fault, shown
+from contact.model.section import Described, Own
+from contact.model.units import SystemOfUnits, UnitSystem
+from contact.model.values import File, Names, Text
 from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
 from contact.typing import Array, TableValue
 from forms import j2
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis
 from forms.elasticity import Anisotropic, hexagonal, moduli
-from forms.hencky import Law, Linear, Log
+from forms.hencky import Law, Linear, Log, is_linear
+from forms.history import HistoryLaw
 from forms.piezo import Piezo as PiezoTensors
-from forms.piezo import from_voigt, hexagonal_voigt
+from forms.piezo import from_voigt
+from forms.plane_stress import PlaneStressElastic, PlaneStressHistory, in_plane_stress
 
-#: The constants of a crystal of class 6mm: elastic; coupling and permittivity.
-SHORT = ("c11", "c12", "c13", "c33", "c44")
-PIEZO = ("e31", "e33", "e15", "beta11", "beta33")
 #: Keys that a material of the library does not take.
 PLASTIC = ("yield_stress", "hardening", "kinematic")
 CONSTANTS = ("law", "young", "poisson", "stiffness", *SHORT, "yield_strain", *PLASTIC, "piezo")
-
-Poling: TypeAlias = Annotated[
-    Either[Number, Axis], Accepted("an angle in 2-D, a list of 3 numbers in 3-D")
-]
-POSITIVE = "a symmetric, positive definite matrix"
 
 #: The laws of the stress; all but the last are isotropic.
 LawName: TypeAlias = Literal["linear", "log", "j2", "anisotropic"]
@@ -57,121 +57,15 @@ LOG = ReadWith("law", "log")
 J2 = ReadWith("law", "j2")
 
 
-def _matrix(rows: int, columns: int) -> Any:
-    row = Annotated[tuple[Number, ...], Field(min_length=columns, max_length=columns), as_tuple]
-    words = Accepted(f"a list of {rows} rows of {columns} numbers")
-    return Annotated[tuple[row, ...], Field(min_length=rows, max_length=rows), as_tuple, words]
+#: A law of a user's, in words.
+OWN_LAW = (
+    "Linear(young, poisson) of numbers, Log, UserLaw, forms.elasticity.Anisotropic(stiffness), of "
+    "a crystal in 2-D with .in_plane(), or an object with the numbers "
+    f"{', '.join(NUMBERS)} and a stress as forms.hencky.Hencky or forms.history.HistoryLaw have it"
+)
 
 
-def _either_way(section: Section, short: tuple[str, ...], full: tuple[str, ...]) -> None:
-    """Raise a fault unless all of some keys, or all of others, are given."""
-    given = [key for key in (*short, *full) if getattr(section, key) is not None]
-    if set(given) in ({*short}, {*full}):
-        return
-    missing = [k for k in (full if {*given} & {*full} else short) if k not in given]
-    raise fault(
-        missing[0] if missing else given[-1],
-        Words(f"only {', '.join(given) or 'nothing'}" if missing else "both ways"),
-        f"either all of {', '.join(short)}, or {' and '.join(full)}",
-        "exclusive-keys",
-    )
-
-
-class Piezo(Section):
-    """`[material.piezo]`: the law sigma = F eps + e^T grad(phi), D = e eps - beta grad(phi).
-
-    A crystal of class 6mm poled along X3, by five constants, or full Voigt matrices. In 2-D x and
-    y stand for X2 and X3.
-    """
-
-    e31: Number | None = None
-    """Coupling e31 = e32 of class 6mm (charge/area)."""
-    e33: Number | None = None
-    """Coupling e33 (charge/area)."""
-    e15: Number | None = None
-    """Coupling e15 = e24 (charge/area)."""
-    beta11: Positive | None = None
-    """Permittivity across the poling axis."""
-    beta33: Positive | None = None
-    """Permittivity along the poling axis."""
-    e: _matrix(3, 6) | None = None  # type: ignore[valid-type]
-    """Coupling matrix, columns 11, 22, 33, 23, 13, 12. With `beta`, instead of the five
-    constants."""
-    beta: _matrix(3, 3) | None = None  # type: ignore[valid-type]
-    """Permittivity matrix, symmetric and positive definite."""
-    poling: Poling | None = None
-    """Poling axis: angle (degrees) from x in 2-D, a vector in 3-D. Default: y in 2-D, z in
-    3-D."""
-
-    @property
-    def voigt(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Coupling, shape (3, 6), and permittivity, shape (3, 3), poled along X3."""
-        if self.e is not None:
-            return np.array(self.e), np.array(self.beta)
-        return hexagonal_voigt(*(getattr(self, key) for key in PIEZO))
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        _either_way(self, PIEZO, ("e", "beta"))
-        try:
-            from_voigt(*self.voigt)
-        except ValueError as error:
-            raise fault("beta", Words(error), POSITIVE, "material-constants") from None
-        return self
-
-
-class Saturation(Section):
-    """`[material.hardening]`: yield stress R(a) = Y + H a + Q (1 - exp(-q a)) (Voce) of `j2`.
-
-    a is the equivalent plastic strain.
-    """
-
-    saturation: Positive
-    """Q (force/area)."""
-    rate: Positive
-    """q."""
-    modulus: NonNegative = 0.0
-    """H (force/area)."""
-
-
-class BackStress(Section):
-    """`[[material.kinematic]]`: back stress db = (2/3) C de_p - gamma b da of `j2`.
-
-    Each term has one; the yield surface moves by their sum (Armstrong and Frederick, Chaboche).
-    """
-
-    modulus: Positive
-    """C, uniaxial stress over plastic strain (force/area)."""
-    recovery: NonNegative = 0.0
-    """gamma; 0: Prager's."""
-
-
-#: The hardening of `j2`.
-Hardening: TypeAlias = Annotated[
-    Annotated[NonNegative, Tag("number")]
-    | Annotated[Saturation, Tag("table")]
-    | Annotated[tuple[Annotated[tuple[Number, Number], as_tuple], ...], as_tuple, Tag("points")],
-    Discriminator(
-        lambda given: (
-            "points"
-            if isinstance(given, list | tuple)
-            else "table"
-            if isinstance(given, Mapping | Section)
-            else "number"
-        )
-    ),
-    Accepted(
-        "a modulus >= 0, a table { saturation, rate, modulus }, or a list of points "
-        "[plastic strain, stress]"
-    ),
-]
-Kinematic: TypeAlias = Annotated[
-    Either[NonNegative, Annotated[tuple[BackStress, ...], as_tuple]],
-    Accepted("a modulus >= 0, or a list of tables { modulus, recovery }"),
-]
-
-
-class Material(Section):
+class Material(Described):
     """`[material]`: isotropic material of Hencky or of flow theory (`j2`), or a crystal.
 
     Hencky's has sigma = k0 tr(eps) I + 2 g dev(eps).
@@ -194,7 +88,14 @@ class Material(Section):
     ] = None
     """With `name`: a library of one's own (TOML), relative to the case file. Default: that of the
     package."""
-    law: LawName | None = None
+    kind: Annotated[
+        Annotated[
+            Annotated[LawName, Tag("name")] | Annotated[Law, Own(), Tag("own")],
+            Discriminator(lambda given: "own" if is_law(given) else "name"),
+        ]
+        | None,
+        Field(alias="law"),
+    ] = None
     """`linear`: g = mu1; `log`: g = mu1 (s/t)(ln(t/s) + 1) for t = |dev eps| above the yield strain
     s; `j2`: flow theory (von Mises), with plastic strain that remains; `anisotropic`:
     sigma = C eps. Default: `linear`."""
@@ -208,7 +109,7 @@ class Material(Section):
         ISOTROPIC,
     ] = None
     """Poisson's ratio."""
-    stiffness: Annotated[_matrix(6, 6) | None, CRYSTAL] = None  # type: ignore[valid-type]
+    stiffness: Annotated[matrix(6, 6) | None, CRYSTAL] = None  # type: ignore[valid-type]
     """C of `anisotropic`, rows and columns 11, 22, 33, 23, 13, 12, symmetric and positive
     definite (force/area). Or the five constants c11 to c44 of class 6mm about X3."""
     c11: Annotated[Number | None, CRYSTAL] = None
@@ -238,8 +139,65 @@ class Material(Section):
     points, linear between them and constant behind."""
     kinematic: Annotated[Kinematic, J2] = 0.0
     """Kinematic hardening: Prager's modulus, uniaxial stress over plastic strain."""
-    piezo: Piezo | None = None
+    coupling: Annotated[
+        Annotated[
+            Annotated[Piezo, Tag("table")] | Annotated[PiezoTensors, Own(), Tag("own")],
+            Discriminator(lambda given: "own" if isinstance(given, PiezoTensors) else "table"),
+        ]
+        | None,
+        Field(alias="piezo"),
+    ] = None
     """Piezoelectric constants, `[material.piezo]`. Absent: mechanical only."""
+
+    _factor: fields.Field | None = PrivateAttr(None)
+
+    def __init__(
+        self,
+        law: Law | LawName | None = None,
+        piezo: PiezoTensors | Mapping[str, TableValue | Array] | None = None,
+        on: str | Sequence[str] = (),
+        factor: fields.Static | None = None,
+        **keys: TableValue | Array | None,
+    ) -> None:
+        given_law = law is None or isinstance(law, str) or is_law(law)
+        expect("law", law, OWN_LAW, given_law and (law is not None or keys))
+        fits = isinstance(piezo, PiezoTensors | Mapping | None)
+        expect("piezo", piezo, "Piezo(...), a table of constants, or None", fits)
+        names = several("on", on, str, "the name of a region, or a list of names")
+        super().__init__(law=law, piezo=piezo, on=names or None, **keys)
+        if factor is not None:
+            factor = factor.copy() if isinstance(factor, Function) else factor
+            self._factor = fields.static(factor, "factor")
+            fits = not (self.piezo or isinstance(self.law, HistoryLaw))
+            accepted = "a material without coupling and internal variables"
+            expect("factor", factor, accepted, fits)
+
+    @property
+    def law(self) -> Law:
+        """The law of the stress; of a crystal by its constants about its own axes."""
+        return self._about_x3 if isinstance(self.kind, str | None) else self.kind
+
+    @cached_property
+    def _about_x3(self) -> Law:
+        return self._law(np.eye(3))
+
+    @property
+    def piezo(self) -> PiezoTensors | None:
+        """The piezoelectric tensors; those by constants about the axes of the crystal."""
+        if self.coupling is not None:
+            given = self.coupling
+            return given if isinstance(given, PiezoTensors) else from_voigt(*given.voigt)
+        if self.entry is None or self.entry.piezo is None:
+            return None
+        tensors = self.entry.piezo
+        units = self.system({})
+        coupling, beta = np.asarray(tensors.e), np.asarray(tensors.beta)
+        return PiezoTensors(coupling / units.coupling, beta / units.permittivity)
+
+    @property
+    def factor(self) -> fields.Field | None:
+        """The function of position > 0 that its stresses are multiplied by; None for 1."""
+        return self._factor
 
     @cached_property
     def entry(self) -> Entry | None:
@@ -257,13 +215,15 @@ class Material(Section):
     @property
     def piezoelectric(self) -> bool:
         """Whether it couples stresses with an electric field."""
-        return self.piezo is not None or (self.entry is not None and self.entry.piezo is not None)
+        return self.coupling is not None or (
+            self.entry is not None and self.entry.piezo is not None
+        )
 
     @property
     def axis(self) -> tuple[str, float | tuple[float, ...] | None]:
         """The key that says where X3 points, and its value."""
-        if self.piezo is not None and self.piezo.poling is not None:
-            return "piezo.poling", self.piezo.poling
+        if isinstance(self.coupling, Piezo) and self.coupling.poling is not None:
+            return "piezo.poling", self.coupling.poling
         return "poling", self.poling
 
     @property
@@ -280,28 +240,29 @@ class Material(Section):
         if not isinstance(given, Mapping):
             return given
         if given.get("name") is None:
-            return {"law": "linear", **given}
+            return given if given.get("law") is not None else {**given, "law": "linear"}
         for key in CONSTANTS:
             if given.get(key) is not None:
                 words = Words(f'given with name = "{given["name"]}"')
                 raise fault(key, words, f"{key} without name", "exclusive-keys")
-        return {"units": "SI", **given}
+        return given if given.get("units") is not None else {**given, "units": "SI"}
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.name is not None:
             self._check_name()
             return self
-        if self.law == "anisotropic":
+        table = self.coupling if isinstance(self.coupling, Piezo) else None
+        if self.kind == "anisotropic":
             self._check_stiffness()
-        elif self.poling is not None and self.piezo is None:
+        elif self.poling is not None and table is None:
             raise fault("poling", self.poling, 'an axis with law = "anisotropic" or piezo')
-        elif self.law == "log":
+        elif self.kind == "log":
             self._check_log()
-        elif self.law == "j2":
+        elif self.kind == "j2":
             self._check_j2()
-        if self.poling is not None and self.piezo is not None and self.piezo.poling is not None:
-            raise fault("piezo.poling", self.piezo.poling, "one of poling and piezo.poling")
+        if self.poling is not None and table is not None and table.poling is not None:
+            raise fault("piezo.poling", table.poling, "one of poling and piezo.poling")
         return self
 
     def _check_name(self) -> None:
@@ -342,23 +303,47 @@ class Material(Section):
     def _check_stiffness(self) -> None:
         if self.yield_strain is not None:
             raise fault("yield_strain", self.yield_strain, "yield_strain with another law")
-        _either_way(self, SHORT, ("stiffness",))
+        either_way(self, SHORT, ("stiffness",))
         try:
             Anisotropic(self.voigt).check()
         except ValueError as error:
             key = "c11" if self.stiffness is None else "stiffness"
             raise fault(key, Words(error), POSITIVE, "material-constants") from None
 
-    def build(self, dim: int) -> description.Material:
-        """Return the material itself in the axes of a body in 2-D or 3-D."""
+    def in_body(self, dim: int) -> Material:
+        """Return the material with its law and tensors in the axes of a body in 2-D or 3-D."""
+        if not isinstance(self.kind, str | None) and not isinstance(self.coupling, Piezo):
+            return self
         axis = self.axis[1]
         if dim == 2:
             turn = in_plane(90.0 if axis is None else float(axis))  # type: ignore[arg-type]
         else:
             turn = np.eye(3) if axis is None else to_axis(axis)
-        tensors = self._piezo_tensors()
-        turned = None if tensors is None else tensors.rotated(turn)
-        return description.Material(self._law(turn), turned, self.on or ())
+        law = self._law(turn) if isinstance(self.kind, str | None) else self.kind
+        tensors = self.piezo
+        if tensors is not None and not isinstance(self.coupling, PiezoTensors):
+            tensors = tensors.rotated(turn)
+        return Material(law, tensors, self.on or (), self.factor)
+
+    @property
+    def in_plane_stress(self) -> bool:
+        """Whether no stress acts across a plane body of it."""
+        return isinstance(self.kind, PlaneStressElastic | PlaneStressHistory)
+
+    def plane_stress(self) -> Material:
+        """Return the material of a plane body without stress across it, of unit thickness.
+
+        Raises
+        ------
+        InputError
+            If a nonlinear law is piezoelectric: the strain across would have to follow the field.
+        """
+        own = self.in_body(2)
+        fits = own.piezo is None or own.in_plane_stress or is_linear(own.law)
+        accepted = "None in plane stress, unless the law is linear"
+        expect("piezo", own.piezo, accepted, fits, "plane-stress")
+        law, piezo = in_plane_stress(own.law, own.piezo)
+        return Material(law, piezo, own.on or (), own.factor)
 
     def _law(self, turn: Array) -> Law:
         """Return the law of the stress, the crystal turned into the body."""
@@ -368,12 +353,12 @@ class Material(Section):
                 young, poisson = self.entry.isotropic
                 return Linear(young / unit, poisson)
             return Anisotropic(self.entry.stiffness / unit).rotated(turn)
-        if self.law == "anisotropic":
+        if self.kind == "anisotropic":
             return Anisotropic(self.voigt).rotated(turn)
         assert self.young is not None and self.poisson is not None  # required
-        if self.law == "linear":
+        if self.kind == "linear":
             return Linear(self.young, self.poisson)
-        if self.law == "j2":
+        if self.kind == "j2":
             return self._plastic()
         assert self.yield_strain is not None
         return Log(
@@ -407,20 +392,9 @@ class Material(Section):
             else kinematic,
         )
 
-    def _piezo_tensors(self) -> PiezoTensors | None:
-        """Return the piezoelectric tensors in the axes of the crystal, if there are any."""
-        if self.piezo is not None:
-            return from_voigt(*self.piezo.voigt)
-        if self.entry is None or self.entry.piezo is None:
-            return None
-        tensors = self.entry.piezo
-        units = self.system({})
-        coupling, beta = np.asarray(tensors.e), np.asarray(tensors.beta)
-        return PiezoTensors(coupling / units.coupling, beta / units.permittivity)
-
     def check_revolved(self, key: str) -> None:
         """Refuse a crystal that is not transversely isotropic, for a body of revolution."""
-        law, tensors = self._law(np.eye(3)), self._piezo_tensors()
+        law, tensors = self.law, self.piezo
         parts = [] if tensors is None else [tensors.e, tensors.beta]
         if isinstance(law, Anisotropic):
             parts.append(stiffness_tensor(law.stiffness))
@@ -433,7 +407,7 @@ class Material(Section):
             )
 
 
-def make_material(dim: int, **keys: TableValue | NDArray[np.float64]) -> description.Material:
+def make_material(dim: int, **keys: TableValue | Array) -> Material:
     """Return the material that `[material]` of a case file with some keys describes.
 
     Parameters
@@ -461,12 +435,11 @@ def make_material(dim: int, **keys: TableValue | NDArray[np.float64]) -> descrip
     Linear(young=210000.0, poisson=0.3)
     """
     expect("make_material: dim", dim, "2 or 3", dim in (2, 3))
-    plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in keys.items()}
     try:
-        section = Material.model_validate(plain)
+        section = Material.model_validate(keys)
     except ValidationError as error:
         raise describe(error, Material, "make_material") from None
     key, axis = section.axis
     accepted = "an angle from x in degrees" if dim == 2 else f"a vector of {dim} numbers"
     expect(f"make_material: {key}", axis, accepted, axis is None or np.ndim(axis) == dim - 2)
-    return section.build(dim)
+    return section.in_body(dim)
