@@ -26,6 +26,7 @@ from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.geometry import geometry_nodes, integration_weights
+from contact.model.material import Material
 from contact.ranks import collective, on_all_ranks
 from contact.typing import Array
 from forms.hencky import FormLaw, Graded, Law

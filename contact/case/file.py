@@ -26,7 +26,6 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from contact.case.checks import check_mesh, check_sections
-from contact.case.evolution import Evolution
 from contact.case.mesh import Mesh, cut_about_axis
 from contact.case.units import Labels, share
 from contact.errors import InputError, clipped
@@ -34,6 +33,7 @@ from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, O
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.electric import Electric
+from contact.model.evolution import Evolution
 from contact.model.fields import CONSTANT, Amplitude, Ramp, steady
 from contact.model.friction import Friction
 from contact.model.material import Material

@@ -122,7 +122,7 @@ Hardening: TypeAlias = Annotated[
     Discriminator(
         lambda given: (
             "points"
-            if isinstance(given, list | tuple)
+            if isinstance(given, list | tuple | np.ndarray)
             else "table"
             if isinstance(given, Mapping | Section)
             else "number"

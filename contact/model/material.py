@@ -154,13 +154,38 @@ class Material(Described):
     def __init__(
         self,
         law: Law | LawName | None = None,
-        piezo: PiezoTensors | Mapping[str, TableValue | Array] | None = None,
+        piezo: PiezoTensors | Mapping[str, float | Array | Sequence[Sequence[float]]] | None = None,
         on: str | Sequence[str] = (),
         factor: fields.Static | None = None,
-        **keys: TableValue | Array | None,
+        *,
+        name: str | None = None,
+        units: str | Mapping[str, str] | None = None,
+        library: str | None = None,
+        young: float | None = None,
+        poisson: float | None = None,
+        stiffness: Array | Sequence[Sequence[float]] | None = None,
+        c11: float | None = None,
+        c12: float | None = None,
+        c13: float | None = None,
+        c33: float | None = None,
+        c44: float | None = None,
+        poling: float | Array | Sequence[float] | None = None,
+        yield_strain: float | None = None,
+        argument: Literal["norm", "square"] = "norm",
+        g_min: float = 0.0,
+        yield_stress: float | None = None,
+        hardening: float | Mapping[str, float] | Sequence[Sequence[float]] | None = None,
+        kinematic: float | Sequence[Mapping[str, float]] | None = None,
     ) -> None:
-        given_law = law is None or isinstance(law, str) or is_law(law)
-        expect("law", law, OWN_LAW, given_law and (law is not None or keys))
+        every = {"name": name, "units": units, "library": library, "young": young}
+        every |= {"poisson": poisson, "stiffness": stiffness, "poling": poling}
+        every |= {"c11": c11, "c12": c12, "c13": c13, "c33": c33, "c44": c44}
+        every |= {"yield_strain": yield_strain, "argument": argument, "g_min": g_min}
+        every |= {"yield_stress": yield_stress, "hardening": hardening, "kinematic": kinematic}
+        keys = {key: value for key, value in every.items() if value is not None}
+        fits = isinstance(law, str) or is_law(law)
+        by_keys = law is None and {*keys} & {"name", "young", "poisson", "stiffness", "c11"}
+        expect("law", law, OWN_LAW, fits or by_keys)
         fits = isinstance(piezo, PiezoTensors | Mapping | None)
         expect("piezo", piezo, "Piezo(...), a table of constants, or None", fits)
         names = several("on", on, str, "the name of a region, or a list of names")

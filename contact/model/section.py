@@ -98,7 +98,7 @@ class Described(Section):
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
         """Enter the keys under "Parameters" in the docstring, in the order of the arguments."""
         said = {key: field.description or "" for key, field in keys_of(cls).items()}
-        own = [key for key in inspect.signature(cls.__init__).parameters if key in said]
+        own = [key for key in inspect.signature(cls.__init__).parameters if key in said] or [*said]
         lines = [line for key in own for line in (key, textwrap.indent(said[key], "    "))]
         text, _, examples = inspect.cleandoc(cls.__doc__ or "").partition("\n\nExamples\n")
         parts = [text, "\n".join(["Parameters", "----------", *lines])]

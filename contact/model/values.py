@@ -141,7 +141,9 @@ def _part(given: Any) -> str:
 
 
 #: Tell a list, "many", from a single value, "one".
-one_or_many = Discriminator(lambda given: "many" if isinstance(given, list | tuple) else "one")
+one_or_many = Discriminator(
+    lambda given: "many" if isinstance(given, list | tuple | np.ndarray) else "one"
+)
 
 
 def _components(given: Any) -> Any:

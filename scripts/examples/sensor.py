@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from contact import Case, build_problem, load_case
-from contact.case.evolution import Evolution
+from contact.model.evolution import Evolution
 from contact.results.resultants import Reading, sensor
 from scripts.cases import CASES
 from scripts.reporting import Report, parser, solved, subplots

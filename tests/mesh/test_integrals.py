@@ -10,6 +10,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle
 from contact.mesh.integrals import compiled
+from contact.model.material import Material
 from tests.problems.sizes import integral
 
 COMM = MPI.COMM_WORLD

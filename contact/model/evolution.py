@@ -1,4 +1,4 @@
-"""Sections of the case file about load steps: stages, and amplitudes."""
+"""Load steps: stages, and amplitudes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from contact.errors import InputError
 from contact.model.messages import Words, fault
-from contact.model.section import Section
+from contact.model.section import Described
 from contact.model.values import File, Text, as_tuple
 from contact.settings import Accepted, Count, Number
 
@@ -32,7 +32,7 @@ def _check_increasing(key: str, times: tuple[float, ...]) -> None:
         raise fault(key, times, "numbers that increase")
 
 
-class Amplitude(Section):
+class Amplitude(Described):
     """`[evolution.amplitudes.NAME]`: a factor as a function of time, linear between the values."""
 
     time: Increasing | None = None
@@ -123,7 +123,7 @@ def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return times, values
 
 
-class Evolution(Section):
+class Evolution(Described):
     """`[evolution]`: quasi-static load steps with incremental friction. Absent: one static step.
 
     Friction acts on the slip of each step. A step that fails is halved, up to four times.
