@@ -1,0 +1,134 @@
+"""Descriptions are what a case file of the same keys gives, and problems of both are the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contact import (
+    Body,
+    Conductor,
+    Contact,
+    Electric,
+    Fixed,
+    Friction,
+    InputError,
+    Layer,
+    Linear,
+    Material,
+    Motion,
+    Plane,
+    Problem,
+    Rigid,
+    ShiftedConductivity,
+    parse_case,
+    solve,
+)
+from contact.model.evolution import Amplitude, Evolution
+from forms.laws import Compliance, PotentialFactor, Truncation
+from tests.problems.put_together import block
+
+TABLES = {
+    "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4]},
+    "material": {"name": "PZT-4", "units": "GPa", "poling": 30.0},
+    "fixed": [{"on": "top", "displacement": [0.0, -0.005], "potential": 0.0}],
+    "rigid": [{"on": "left", "displacement": ["free", 0.0], "force": [0.1, 0.0]}],
+    "contact": {
+        "on": "bottom",
+        "law": "compliance",
+        "gap": "0.001*x",
+        "layer": 0.002,
+        "stiffness": 50.0,
+        "limit": np.inf,
+        "electric": {"k_e": 2.0, "phi_f": 0.1},
+    },
+    "evolution": {
+        "times": [0.0, 1.0],
+        "steps": [2],
+        "amplitudes": {"press": {"time": [0.0, 1.0], "value": [0.0, 2.0]}},
+    },
+}
+
+
+def test_tables_are_the_same_objects() -> None:
+    case = parse_case(TABLES)
+    assert case.material == Material(name="PZT-4", units="GPa", poling=30.0)
+    for part in (
+        Rigid("left", Motion(["free", 0.0], force=[0.1, 0.0])),
+        Rigid("left", displacement=["free", 0.0], force=[0.1, 0.0]),
+    ):
+        assert case.rigid[0].model_dump() == part.model_dump()
+    electric = Electric(2.0, 0.1)
+    assert case.contact == Contact(
+        "bottom", gap="0.001*x", layer=0.002, stiffness=50.0, limit=np.inf, electric=electric
+    )
+    amplitude = Amplitude(time=[0.0, 1.0], value=[0.0, 2.0])
+    assert case.evolution == Evolution(times=[0.0, 1.0], steps=[2], amplitudes={"press": amplitude})
+
+
+def test_objects_stand_for_keys() -> None:
+    """A body on a layer that conducts: by keys, and by the laws that they mean."""
+    body = Body(Material(name="PZT-4", units="GPa"), Fixed("top", [0.0, -0.005], potential=0.0))
+    keys = Contact("bottom", layer=0.002, stiffness=50.0, electric=Electric(2.0, 0.1, delta=20.0))
+    laws = Contact(
+        "bottom",
+        layer=Layer(0.002, Compliance(0.1), PotentialFactor(50.0, 2.0, 128.0)),
+        conductor=Conductor(ShiftedConductivity(2.0, 20.0), 0.1, Truncation(np.inf)),
+    )
+    one, other = (solve(Problem(block(), body, contact)) for contact in (keys, laws))
+    assert one.charges is not None and other.charges is not None
+    assert one.contact_force == pytest.approx(other.contact_force, rel=1e-10)
+    assert one.charges.foundation == pytest.approx(other.charges.foundation, rel=1e-10)
+    assert abs(one.charges.foundation) > 0
+
+
+def test_a_material_of_keys_is_turned_into_the_body() -> None:
+    """A crystal aslant, among others, as in a case."""
+    keys = {"name": "PZT-4", "units": "GPa", "poling": 30.0}
+    case = parse_case(
+        {
+            **{key: TABLES[key] for key in ("mesh", "fixed")},
+            "material": keys,
+            "contact": {"on": "bottom"},
+        }
+    )
+    body = Body(Material(**keys), Fixed("top", [0.0, -0.005], potential=0.0))
+    one, other = solve(case), solve(Problem(block(), body, Contact("bottom")))
+    assert one.contact_force == pytest.approx(other.contact_force, rel=1e-10)
+    assert Material(Linear(1.0, 0.3)).law == Linear(1.0, 0.3)
+
+
+def test_foundations_move_by_the_contact() -> None:
+    """As by `Rigid(foundation=True)`; a problem is made of the contacts of another one."""
+    body, motion = Body(Linear(10.0, 0.3), Fixed("top", [0.0, 0.0])), Motion([0.0, 0.004])
+    plane = Plane((0.0, 0.0), (0.0, 1.0))
+    first = Problem(block(), body, Contact("bottom", plane, rigid=motion), Friction(mu=0.1))
+    moved = Body(body.law, body.fixed, rigid=Rigid("bottom", motion, foundation=True))
+    again = Problem(first.domain, first.body, first.contacts)
+    second = Problem(first.domain, moved, Contact("bottom", plane), Friction(mu=0.1))
+    forces = [solve(problem).contact_force for problem in (first, again, second)]
+    assert forces[0][1] < -0.01
+    for force in forces[1:]:
+        assert force == pytest.approx(forces[0], rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("make", "key"),
+    [
+        (lambda: Contact("bottom", overlap="push"), "overlap"),
+        (lambda: Contact("bottom", layer=-0.1), "layer"),
+        (lambda: Contact("bottom", layer=0.1, stiffness=-1.0), "stiffness"),
+        (lambda: Contact("bottom", stiffness=1.0), "stiffness"),  # without a layer
+        (lambda: Contact("bottom", gap="0.1*w"), "gap"),
+        (lambda: Contact("bottom", name=" a"), "name"),
+        (lambda: Electric(-1.0), "k_e"),
+        (lambda: Electric(1.0, "x"), "phi_f"),
+        (lambda: Material(young=-1.0, poisson=0.3), "young"),
+        (lambda: Material(Linear(1.0, 0.3), young=1.0), "young"),
+        (lambda: Material("j2", young=1.0, poisson=0.3), "yield_stress"),
+        (lambda: Amplitude(time=[1.0, 0.0], value=[0.0, 1.0]), "time"),
+    ],
+)
+def test_wrong_values_are_named(make, key) -> None:
+    with pytest.raises(InputError, match=rf"\b{key}: .*; accepted: "):
+        make()
