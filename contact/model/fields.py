@@ -220,46 +220,6 @@ def static(value: Static, name: str) -> Field:
     return cast(Field, made)
 
 
-def vector(
-    value: FreeVector | None, free: bool = False, name: str = ""
-) -> tuple[Field | Moving | None, ...] | None:
-    """Return the components of a vector; None as it is.
-
-    Parameters
-    ----------
-    value
-        A list of arguments of `field`, or a UFL expression or Function of vectors.
-    free
-        Whether None or "free" leaves a component free.
-    name
-        Its name in messages.
-
-    Raises
-    ------
-    InputError
-        If it is no vector, or a component is nothing of the kind.
-    """
-    if value is None:
-        return None
-    if isinstance(value, Expr) and len(value.ufl_shape) == 1:
-        return tuple(field(value[i]) for i in range(value.ufl_shape[0]))
-    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
-        raise InputError(
-            f"given {value!r} for a vector; accepted: a list with an entry a component, such as "
-            "[0.0, 0.0] in the plane, or UFL or a Function of vectors",
-            "field",
-        )
-    found = tuple(
-        None if isinstance(v, str) and v == "free" else field(v, f"{name}.{k}" if name else "")
-        for k, v in enumerate(value)
-    )
-    if not free and any(component is None for component in found):
-        raise InputError(
-            f"given {value!r} for a vector; accepted: 0 where nothing acts", "load-values"
-        )
-    return found
-
-
 @dataclass(frozen=True)
 class Callback:
     """A function of x, an array of shape (3, n), that returns n values.

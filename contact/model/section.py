@@ -56,7 +56,6 @@ class Section(BaseModel):
         strict=True,
         allow_inf_nan=False,
         arbitrary_types_allowed=True,  # objects of Python
-        populate_by_name=True,
         validate_default=False,
         use_attribute_docstrings=True,
         defer_build=True,  # the case's own is all that reads; each would take milliseconds
@@ -78,8 +77,12 @@ class Section(BaseModel):
 
     @model_serializer(mode="wrap")
     def _write(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        unread = without_effect(self)
-        return {key: value for key, value in handler(self).items() if key not in unread}
+        unread, keys = (
+            without_effect(self),
+            {n: f.alias or n for n, f in fields_of(type(self)).items()},
+        )
+        written = {keys.get(name, name): value for name, value in handler(self).items()}
+        return {key: value for key, value in written.items() if key not in unread}
 
 
 #: The context of a description that is made in Python, where values may be objects.

@@ -27,7 +27,7 @@ from contact import (
     Sphere,
     solve,
 )
-from contact.model.fields import field, vector
+from contact.model.fields import field
 
 pytestmark = pytest.mark.parallel(2)
 
@@ -77,7 +77,7 @@ def test_numbers_by_other_names() -> None:
     inside = np.zeros((3, 2))
     for given in (np.array(0.3), ufl.as_ufl(0.3), 0.3 + 0 * x[0], np.float32(0.25) + 0.05):
         np.testing.assert_allclose(field(given).numpy(inside), 0.3, rtol=1e-7)
-    moved = vector(ufl.as_vector([0.1 * x[0], -0.3]))
+    moved = Fixed("top", ufl.as_vector([0.1 * x[0], -0.3])).displacement
     assert moved is not None
     assert np.all(moved[1].numpy(inside) == -0.3)
 
@@ -149,13 +149,13 @@ def test_vectors() -> None:
     u.interpolate(lambda x: np.array([x[0], 2 * x[1]]))
     points = mesh.geometry.x[:, :2]
     for given in (u, ufl.as_vector([ufl.SpatialCoordinate(mesh)[0], 2 * u[1] / 2])):
-        x, y = vector(given)
+        x, y = Load("top", traction=given).traction
         np.testing.assert_allclose(x.numpy(points), points[:, 0], atol=1e-12)
         np.testing.assert_allclose(y.numpy(points), 2 * points[:, 1], atol=1e-12)
-    assert vector(["free", None], free=True) == (None, None)
+    assert Fixed("top", ["free", None], 0.0).displacement == ("free", "free")
     for given in (["free", 1.0], [None, 1.0]):
-        with pytest.raises(InputError, match="accepted: 0 where nothing acts"):
-            vector(given)
+        with pytest.raises(InputError, match=r"Load on 'top': traction\.0: "):
+            Load("top", traction=given)
 
 
 TOP = Fixed("top", [0.0, -0.01])
