@@ -20,7 +20,7 @@ TREES = [ast.parse(path.read_text()) for path in SOURCES]
 DIFFERS = "…"
 
 #: What takes an identifier, and where.
-TAKES = {"InputError": 1, "SingularError": 1, "fault": 3, "expect": 4, "_line": 4}
+TAKES = {"InputError": 1, "SingularError": 1, "fault": 3, "expect": 4, "_line": 4, "refuse": 2}
 
 
 def text_of(node: ast.expr) -> str:
