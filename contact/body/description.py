@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +117,7 @@ class Body:
 
     def in_space(self, dim: int) -> Body:
         """Return the body with the laws of its materials in its axes, in 2-D or 3-D."""
-        given = tuple(material.in_body(dim) for material in self.regions)
+        given: Any = tuple(material.in_body(dim) for material in self.regions)
         if all(one is own for one, own in zip(given, self.regions, strict=True)):
             return self
         return replace(self, law=given, piezo=None, regions=())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TypedDict, TypeVar
+from typing import Any, TypedDict, TypeVar
 
 from mpi4py import MPI
 
@@ -20,13 +20,13 @@ from contact.model.friction import Friction
 from contact.model.layer import Layer
 from contact.model.material import Material
 from contact.model.obstacle import Obstacle
-from contact.model.rigid import Motion
+from contact.model.rigid import Motion, Rigid
 from contact.problem.checks import check_problem, check_supports
 from contact.problem.problem import ContactProblem
 from forms.hencky import Law
 from forms.laws import FrictionCoefficient, FrictionLaw
 
-Given = TypeVar("Given", Fixed, Load, Electrode, Bolt, Motion, Electric)
+Given = TypeVar("Given", Fixed, Load, Electrode, Bolt, Motion, Rigid, Electric)
 
 
 class Replacements(TypedDict, total=False):
@@ -178,10 +178,10 @@ def _contacts(
         if electric is not None and electric.amplitude is not None:
             electric = _acting(case, electric)
         rigid = None if contact.rigid is None else _acting(case, contact.rigid)
-        given = {"friction": friction, "electric": electric, "rigid": rigid}
+        given: dict[str, Any] = {"friction": friction, "electric": electric, "rigid": rigid}
         if foundation is not None:
             given |= {"foundation": foundation, "gap": None, "direction": "foundation"}
-        made.append(
-            contact.model_copy(update=given if layer is None else {**given, "layer": layer})
-        )
+        if layer is not None:
+            given["layer"] = layer
+        made.append(contact.model_copy(update=given))
     return made

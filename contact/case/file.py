@@ -204,7 +204,7 @@ class Case(Section):
 
     def electric_of(self, key: str, contact: Contact) -> tuple[str, Electric | None]:
         """Return the electric contact of a contact, likewise."""
-        if contact.electric is not None:
+        if isinstance(contact.electric, Electric):
             return f"{key}.electric", contact.electric
         return "electric", self.electric
 

@@ -3,7 +3,7 @@
 `material` has materials with their `constants`, `body` supports, loads, electrodes and bolts,
 `rigid` rigid parts, `contact` contacts with their `obstacle`, `friction`, `layer` and `electric`,
 `evolution` load steps; `fields` and `formula` have given functions of position and time, `section`
-and `values` what all are made of, `messages` their errors.
+and `values` tables and kinds of values, `messages` their errors.
 
 Imports: `contact.mesh` and the packages below these.
 """

@@ -179,7 +179,8 @@ class Contact(Described):
         expect("Contact: press", press, "True or False", isinstance(press, bool | np.bool_))
         fits = isinstance(layer, Layer | float | int | None)
         expect("Contact: layer", layer, "Layer(...), a thickness, or None", fits)
-        electric = one_of("Contact", conductor=conductor, electric=electric)
+        expect("Contact: conductor", conductor, "this, or electric", None in (conductor, electric))
+        electric = conductor if electric is None else electric
         check_laws("Contact", friction, electric)
         if not hasattr(foundation, "measure"):
             gap, foundation = one_of("Contact", foundation=foundation, gap=gap), None
@@ -266,8 +267,8 @@ class Contact(Described):
             electric = electric.conductor(domain, self.on)
         filled = {
             "name": self.name or self.on,
-            "foundation": self._obstacle(),
-            "layer": self._layer(),
+            "foundation": self.obstacle,
+            "layer": self.compliant_layer,
             "friction": self.friction or friction or Friction(),
             "electric": electric,
         }
@@ -275,7 +276,8 @@ class Contact(Described):
         done = {"gap": None, "direction": "foundation", "axis": None, "rigid": None}
         return self.model_copy(update=filled | done)
 
-    def _obstacle(self) -> Obstacle:
+    @property
+    def obstacle(self) -> Obstacle:
         """Return the rigid foundation, or the gap, as contact nodes see it."""
         if self.foundation is None:
             assert self.gap is not None  # filled in
@@ -285,7 +287,8 @@ class Contact(Described):
         assert isinstance(self.foundation, Shape)  # checked
         return replace(self.foundation, direction=self.direction, along=self.axis or ())
 
-    def _layer(self) -> Layer | None:
+    @property
+    def compliant_layer(self) -> Layer | None:
         """Return the layer in front of the rigid foundation; None without one."""
         if isinstance(self.layer, Layer | None) or self.law == "signorini":
             return self.layer if isinstance(self.layer, Layer) else None

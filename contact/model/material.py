@@ -177,7 +177,7 @@ class Material(Described):
         hardening: float | Mapping[str, float] | Sequence[Sequence[float]] | None = None,
         kinematic: float | Sequence[Mapping[str, float]] | None = None,
     ) -> None:
-        every = {"name": name, "units": units, "library": library, "young": young}
+        every: dict[str, Any] = {"name": name, "units": units, "library": library, "young": young}
         every |= {"poisson": poisson, "stiffness": stiffness, "poling": poling}
         every |= {"c11": c11, "c12": c12, "c13": c13, "c33": c33, "c44": c44}
         every |= {"yield_strain": yield_strain, "argument": argument, "g_min": g_min}

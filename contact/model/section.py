@@ -142,7 +142,8 @@ def without_effect(table: Any) -> set[str]:
 
 def value_of(table: Any, key: str) -> Any:
     """Return the value of a key, whose attribute may have another name."""
-    return getattr(table, next(n for n, f in fields_of(type(table)).items() if key in (n, f.alias)))
+    of: Any = type(table)
+    return getattr(table, next(n for n, f in fields_of(of).items() if key in (n, f.alias)))
 
 
 def check_conditions(table: Table) -> Table:

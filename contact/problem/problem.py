@@ -277,14 +277,15 @@ class ContactProblem:
         body.cuts.check(np.arange(len(along), dtype=np.int32), along, "contact meets")
 
     def _entry(self, key: str, contact: Contact) -> Entry:
-        if contact.layer is not None:
-            contact.layer.check(self.domain.size)
+        layer = contact.compliant_layer
+        if layer is not None:
+            layer.check(self.domain.size)
         if contact.conductor is not None:
             with on_all_ranks(self.comm):
                 contact.conductor.check()
         assert contact.friction is not None  # filled in above
-        body, given = self.equilibrium, (contact.foundation, key, contact.press)
-        laws = contact.friction, contact.layer, contact.conductor
+        body, given = self.equilibrium, (contact.obstacle, key, contact.press)
+        laws = contact.friction, layer, contact.conductor
         if contact.against is not None:
             rough = contact.friction.acts
             nodes, coupling = find_pair(body, contact.on, contact.against, *given, friction=rough)
@@ -299,7 +300,7 @@ class ContactProblem:
         if contact.conductor is None or not self.piezoelectric:
             return None
         global_unknowns = self.equilibrium.global_unknowns
-        held = held_nodes(found, contact.foundation, self.equilibrium.free, nodes)
+        held = held_nodes(found, contact.obstacle, self.equilibrium.free, nodes)
         taken = bool(global_unknowns.tied[found.nodes, -1].any())
         if self.comm.allreduce(taken, op=MPI.LOR):
             raise InputError(

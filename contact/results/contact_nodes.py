@@ -314,7 +314,7 @@ def contact_shares(
         total = resultant(problem, nodes.points[own], forces[own])
         stick, slides = (nodes.sum(own & (status == name)) for name in ("stick", "slip"))
         area = stick + slides
-        found[contact.name] = ContactShare(
+        found[contact.name or contact.on] = ContactShare(
             problem,
             state,
             own,

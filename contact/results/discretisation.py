@@ -124,7 +124,7 @@ def own_shape(problem: ContactProblem) -> Iterator[Remark]:
         total = comm.allreduce(sums, op=MPI.SUM)
         flat = np.linalg.norm(total[:-1]) > 0.995 * total[-1]
         gap = comm.allreduce(float(np.abs(nodes.gap).max(initial=0.0)), op=MPI.MAX)
-        if contact.against is None and not contact.foundation.is_shape:
+        if contact.against is None and not contact.obstacle.is_shape:
             found += [contact.on] * (not flat and gap <= 1e-9 * size)
     if found:
         yield (

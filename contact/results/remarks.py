@@ -186,7 +186,8 @@ def layers(solution: Solution) -> Iterator[Remark]:
             f"the layer is thicker than the gap, by up to {-least:.4g}, and presses on the "
             "undeformed body"
         )
-    if any(contact.layer is not None and contact.layer.falls(size) for contact in problem.contacts):
+    layers = (contact.compliant_layer for contact in problem.contacts)
+    if any(layer is not None and layer.falls(size) for layer in layers):
         yield "several solutions may exist, for p_nu falls with the penetration of the layer"
 
 
