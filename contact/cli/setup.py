@@ -13,7 +13,9 @@ import matplotlib
 import numpy as np
 from dolfinx import mesh as dmesh
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from scipy.spatial import KDTree
 
 from contact import _compat
 from contact.case.file import Case
@@ -23,8 +25,9 @@ from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
 from contact.mesh.geometry import facet_normals
 from contact.model.fields import Field, Moving, at_time
-from contact.plot.space import Camera, rendered
-from contact.plot.style import STYLE, heading
+from contact.plot.camera import Camera, rendered
+from contact.plot.foundation import add_foundation, facing
+from contact.plot.style import BLUE, SKY, STYLE, heading
 from contact.problem.problem import ContactProblem
 from contact.results.options import Units
 from contact.typing import Array
@@ -110,12 +113,22 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
 
 
 def _foundation(problem: ContactProblem) -> Array:
-    """Return where the contact nodes would meet rigid foundations, shape (m, d). Collective."""
-    found: list[Array] = [np.zeros((0, problem.dim))]
+    """Return contact nodes, and where they would meet rigid foundations, (m, 2, d). Collective."""
+    found: list[Array] = [np.zeros((0, 2, problem.dim))]
     for nodes in (entry.nodes for entry in problem.entries if entry.coupling is None):
         near = np.isfinite(nodes.gap)
-        found.append(nodes.gather((nodes.points + nodes.gap[:, None] * nodes.normal)[near]))
+        places = nodes.points + np.where(near, nodes.gap, 0.0)[:, None] * nodes.normal
+        found.append(nodes.gather(np.stack([nodes.points, places], axis=1)[near]))
     return np.concatenate(found)
+
+
+def _shape(facets: Array, surface: Array, diameter: float) -> Any:
+    """Return the rigid shapes in front of the facets of contact nodes, shape (n, c, 3)."""
+    if not surface.size:
+        return facing(facets[:0], facets[:0, :, 0], diameter)
+    apart, nodes = KDTree(surface[:, 0]).query(facets)
+    places = np.where((apart > 1e-9 * diameter)[..., None], np.nan, surface[nodes, 1])
+    return facing(places, np.linalg.norm(places - facets, axis=2), diameter)
 
 
 def _conditions(case: Case, problem: ContactProblem) -> Iterator[tuple[str, Array, Array | None]]:
@@ -211,7 +224,7 @@ def _draw_plane(
             ax.quiver(*start.T, *step.T, color=role.colour, **arrows)
             ax.update_datalim(np.concatenate([start, start + step]))
     if surface.size:
-        ax.plot(*surface.T, ".", ms=4, color=FOUNDATION, label="foundation")
+        ax.plot(*surface[:, 1].T, ".", ms=4, color=FOUNDATION, label="foundation")
     ax.set_title(_sizes(extent, units), fontsize=8)
     ax.set_aspect("equal")
     ax.margins(0.03)
@@ -228,6 +241,7 @@ def _draw_space(
     points = boundary.reshape(-1, 3)
     extent = np.ptp(points, axis=0)
     arrows = [role.arrows(points.mean(axis=0), 0.2 * float(extent.max())) for role in roles]
+    shape = _shape(boundary, surface, float(extent.max()))
 
     def add(plotter: Any) -> None:
         import pyvista
@@ -243,10 +257,10 @@ def _draw_space(
             plotter.add_mesh(facets(role.facets), color=role.colour, lighting=False, **look)
             if start.size:
                 plotter.add_arrows(start, step, color=role.colour)
-        if surface.size:
-            plotter.add_points(surface, color=FOUNDATION, point_size=5.0)
+        if shape.n_cells:
+            add_foundation(plotter, shape)
 
-    seen = np.concatenate([points, surface.reshape(-1, 3), *(start for start, _ in arrows)])
+    seen = np.concatenate([points, shape.points, *(start for start, _ in arrows)])
     figure = Figure(figsize=(6.9, 6.0))
     ax = figure.subplots()
     ax.axis("off")
@@ -255,8 +269,8 @@ def _draw_space(
     ax.set_title(_sizes(extent, units), y=-0.02, fontsize=8)
     for role in roles:
         ax.plot([], [], "s", color=role.colour, label=role.words)
-    if surface.size:
-        ax.plot([], [], "o", ms=3, color=FOUNDATION, label="foundation")
+    if shape.n_cells:
+        ax.plot([], [], "s", color=BLUE, markerfacecolor=to_rgba(SKY, 0.3), label="foundation")
     return figure
 
 

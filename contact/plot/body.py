@@ -20,9 +20,9 @@ from matplotlib.tri import Triangulation
 
 from contact.errors import InputError
 from contact.mesh.cells import LINEAR
-from contact.plot.foundation import HATCHED, magnification, profiles
+from contact.plot.foundation import HATCHED, foundation, magnification, profiles
 from contact.plot.run import Run
-from contact.plot.space import Scene, Zone, foundation, show_body
+from contact.plot.space import Scene, Zone, show_body
 from contact.plot.style import (
     NARROW,
     PAGE,

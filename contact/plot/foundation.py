@@ -1,19 +1,20 @@
 """Rigid foundations in pictures of deformed bodies, and how far displacements are magnified.
 
-A foundation is known by the gaps and directions of the contact nodes, which the files of a run have.
+A foundation is known by the gaps and directions of the contact nodes, in the files of a run.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from contact.plot.contact import ends
-from contact.plot.run import Run
-from contact.plot.style import BLUE
+from contact.plot.run import Run, linear, polygons
+from contact.plot.style import BLUE, SKY
 from contact.results.grid import Table
 from contact.typing import Array
 
@@ -193,3 +194,47 @@ def profiles(run: Run, scale: float, places: Array, side: int, box: Array | None
         mirror = np.array([side, 1])
         found.append(Profile((points + drawn[:, None] * normal) * mirror, normal * mirror, gap))
     return found
+
+
+def foundation(run: Run, scale: float) -> Any:
+    """Return the parts of rigid shapes that face the body beside displacements times a scale.
+
+    They are the contact facets moved by their gaps, as far as these are not large.
+    """
+    distance, gap = np.full((2, len(run.table["gap"])), np.nan)
+    for table in run.contacts:
+        if np.all(table["rigid"]):
+            own, way = run.table["entry"] == table["entry"][0], scalings(run, table, None)[0]
+            distance[own] = way.distance + (scale - 1) * way.more
+            gap[own] = distance[own] - scale * way.approach
+    skin = linear(run.surface)
+    row = np.asarray(skin["row"])
+    places = skin.points + np.where(row < 0, np.nan, distance[row])[:, None] * skin["normal"]
+    return facing(places[skin.regular_faces], gap[row][skin.regular_faces], run.diameter)
+
+
+def facing(corners: Array, gap: Array, diameter: float) -> Any:
+    """Return facets by their corners, shape (n, k, 3), as far as their gaps are not large.
+
+    Parameters
+    ----------
+    corners, gap
+        The corners, NaN for none, and their gaps, shape (n, k).
+    diameter
+        Of the body.
+    """
+    known = np.isfinite(corners).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1)
+    shape = polygons(corners[known])
+    if not shape.n_cells:
+        return shape
+    shape["gap"] = gap[known].ravel()
+    room = BEYOND * diameter + max(float(shape["gap"].min()), 0.0)
+    return shape.clean().clip_scalar("gap", value=room)
+
+
+def add_foundation(plotter: Any, shape: Any) -> None:
+    """Add a rigid shape, through which the body is seen, with its rim."""
+    lit = {"ambient": 0.5, "diffuse": 0.5, "smooth_shading": True}
+    plotter.add_mesh(shape, color=SKY, opacity=0.3, show_scalar_bar=False, **lit)
+    rim = shape.extract_feature_edges(feature_edges=False, manifold_edges=False)
+    plotter.add_mesh(rim, color=BLUE, line_width=2.0)

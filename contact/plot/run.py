@@ -251,6 +251,17 @@ def read_grid(path: Path) -> Any:
     return grid
 
 
+def linear(grid: Any) -> Any:
+    """Return the surface of a grid in triangles: of cells of degree 2 four of each."""
+    return grid.extract_surface(nonlinear_subdivision=1).triangulate()
+
+
+def polygons(corners: Array) -> Any:
+    """Return polygons by their corners, shape (n, k, 3)."""
+    numbers = np.arange(corners[..., 0].size).reshape(corners.shape[:2])
+    return pyvista.PolyData.from_regular_faces(corners.reshape(-1, 3), numbers)
+
+
 def _columns(path: Path) -> dict[str, NDArray[Any]]:
     """Read a table: the columns by name."""
     with path.open(newline="", encoding="utf-8-sig") as file:

@@ -10,16 +10,16 @@ import numpy as np
 import pyvista
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import ListedColormap, Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from contact.plot.camera import SNAPPED, Camera, rendered, scale_bar, triad
-from contact.plot.foundation import BEYOND, magnification, scalings
-from contact.plot.run import Run
-from contact.plot.style import BLUE, NARROW, ORANGE, ZONES, Look, page_width, sheet
+from contact.plot.foundation import add_foundation, foundation, magnification
+from contact.plot.run import Run, linear, polygons
+from contact.plot.style import BLUE, NARROW, ORANGE, SKY, ZONES, Look, page_width, sheet
 from contact.results.quantity import STATUS
 from contact.typing import Array
 
@@ -41,11 +41,6 @@ ROOM = 0.35
 SMALL = 0.1
 #: Facets up to which the mesh is drawn.
 FACETS = 8000
-
-
-def linear(grid: Any) -> Any:
-    """Return the surface of a grid in triangles: of cells of degree 2 four of each."""
-    return grid.extract_surface(nonlinear_subdivision=1).triangulate()
 
 
 def areas(run: Run, skin: Any) -> Array:
@@ -117,15 +112,19 @@ def chosen_view(run: Run, skin: Any, zone: Zone) -> tuple[Array, bool] | None:
     """
     e1 = np.linalg.svd(zone.normal[None])[2][1]
     e2, turns = np.cross(zone.normal, e1), np.arange(0.0, 2 * np.pi, np.pi / 4)
-    ring = np.cos(turns)[:, None] * e1 + np.sin(turns)[:, None] * e2
-    tilts = np.radians(TILTS)
-    views = np.concatenate([np.cos(t) * zone.normal + np.sin(t) * ring for t in tilts])
+
+    def turned(angle: float) -> Array:
+        return np.cos(turns + angle)[:, None] * e1 + np.sin(turns + angle)[:, None] * e2
+
+    # Oblique: along an axis of a box two of its edges would be one line.
+    ring, oblique, tilts = turned(0.0), turned(np.pi / 8), np.radians(TILTS)
+    views = np.concatenate([np.cos(t) * zone.normal + np.sin(t) * oblique for t in tilts])
     size = np.linalg.norm(zone.area, axis=1)[:, None, None]
     lifted = zone.corners + 1e-3 * np.sqrt(size.sum()) * zone.area[:, None] / size
 
     def add(plotter: Any) -> None:
         plotter.add_mesh(skin, color="black", lighting=False)
-        plotter.add_mesh(_polygons(lifted), color="white", lighting=False)
+        plotter.add_mesh(polygons(lifted), color="white", lighting=False)
 
     cameras = [Camera.of(view, zone.points) for view in views]
     images = rendered(add, cameras, 100, "black")
@@ -140,31 +139,6 @@ def chosen_view(run: Run, skin: Any, zone: Zone) -> tuple[Array, bool] | None:
     centre, points = zone.points.mean(axis=0), np.asarray(skin.points)
     removed = ((points - centre) @ ring.T > 0).mean(axis=0)
     return ring[np.argmin(removed - 0.1 * ring @ USUAL)], True
-
-
-def _polygons(corners: Array) -> Any:
-    """Return polygons by their corners, shape (n, k, 3)."""
-    numbers = np.arange(corners[..., 0].size).reshape(corners.shape[:2])
-    return pyvista.PolyData.from_regular_faces(corners.reshape(-1, 3), numbers)
-
-
-def foundation(run: Run, scale: float) -> Any:
-    """Return the parts of rigid shapes that face the body beside displacements times a scale.
-
-    They are the contact facets moved by their gaps, as far as these are not large.
-    """
-    distance = np.full(len(run.table["gap"]), np.nan)
-    for table in run.contacts:
-        if np.all(table["rigid"]):
-            way = scalings(run, table, None)[0]
-            drawn = way.distance + (scale - 1) * way.more
-            far = drawn - scale * way.approach > BEYOND * run.diameter
-            distance[run.table["entry"] == table["entry"][0]] = np.where(far, np.nan, drawn)
-    skin = linear(run.surface)
-    row = np.asarray(skin["row"])
-    places = skin.points + np.where(row < 0, np.nan, distance[row])[:, None] * skin["normal"]
-    faces = skin.regular_faces[np.isfinite(places[skin.regular_faces]).all(axis=(1, 2))]
-    return pyvista.PolyData.from_regular_faces(np.nan_to_num(places), faces).clean()
 
 
 @dataclass(frozen=True)
@@ -220,21 +194,19 @@ class Scene:
         skin = grid.extract_surface(nonlinear_subdivision=1)
         faint = {"show_edges": skin.n_cells < FACETS, "line_width": 0.5, "edge_opacity": 0.2}
         lit = {"ambient": 0.6, "diffuse": 0.45, "smooth_shading": True, "split_sharp_edges": True}
-        plotter.add_mesh(skin, show_scalar_bar=False, **lit, **faint, **self.colours)
         lines = {"manifold_edges": False, "non_manifold_edges": False}
         edges = skin.extract_feature_edges(40.0, **lines)
         if edges.n_cells:
             plotter.add_mesh(edges, color="black", line_width=2.5)
+        if self.foundation is not None and self.foundation.n_cells:
+            add_foundation(plotter, self.foundation)
+        # The bar of colours is that of the mesh that is added last.
+        plotter.add_mesh(skin, show_scalar_bar=False, **lit, **faint, **self.colours)
         if self.painted is not None:
             size = float(np.linalg.norm(np.ptp(skin.points, axis=0)))
             away = self.zone.normal if view is None else view
             lifted = self.painted.translate(2e-3 * size * away)
             plotter.add_mesh(lifted, show_scalar_bar=False, **self.shades)
-        if self.foundation is not None and self.foundation.n_cells:
-            clear = {"color": BLUE, "opacity": 0.18, "lighting": False}
-            plotter.add_mesh(self.foundation, **clear)
-            rim = self.foundation.extract_feature_edges(feature_edges=False, manifold_edges=False)
-            plotter.add_mesh(rim, color=BLUE, line_width=2.0)
 
     def window(self, label: str) -> Any:
         """Return a plotter that shows the scene in a window to turn it in, or in a notebook."""
@@ -319,7 +291,8 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
         label += f", peak {norm.vmax:.4g}"
         bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
         figure.colorbar(ScalarMappable(norm, "viridis"), ax=[whole, *axes], **bar)
-    figure.legend(handles=_legend(run, frictional), ncols=3, loc="outside lower center")
+    columns = 2 if narrow else 4
+    figure.legend(handles=_legend(run, frictional), ncols=columns, loc="outside lower center")
     return figure
 
 
@@ -332,6 +305,8 @@ def _legend(run: Run, frictional: bool) -> list[Patch]:
     for zone, label in words.items():
         count = np.count_nonzero(run.table["status"] == zone)
         found.append(Patch(color=ZONES[zone][0], label=f"{label}: {count} nodes"))
+    if np.any(run.table["rigid"]):
+        found.append(Patch(facecolor=to_rgba(SKY, 0.3), edgecolor=BLUE, label="foundation"))
     return found
 
 
@@ -423,7 +398,7 @@ def _show_status(ax: Axes, front: Front, camera: Camera) -> None:
     middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
     after, before = (np.roll(corners, k, axis=1) for k in (-1, 1))
     quads = np.stack([corners, (corners + after) / 2, middle, (corners + before) / 2], axis=2)
-    mesh = _polygons(quads.reshape(-1, 4, 3))
+    mesh = polygons(quads.reshape(-1, 4, 3))
     order = np.argsort([STATUS[zone] for zone in ZONES])
     status = front.skin["status"][front.faces].ravel().astype(int)
     known = status >= STATUS["open"]  # nodes that are held are no contact nodes

@@ -16,8 +16,16 @@ from contact.errors import InputError
 from contact.plot import figures
 from contact.plot.body import picture
 from contact.plot.figures import figures_of, window
-from contact.plot.run import Run
-from contact.plot.space import Front, Scene, Zone, chosen_view, close_camera, contact_figure, linear
+from contact.plot.foundation import foundation
+from contact.plot.run import Run, linear
+from contact.plot.space import (
+    Front,
+    Scene,
+    Zone,
+    chosen_view,
+    close_camera,
+    contact_figure,
+)
 from contact.plot.style import Look
 from contact.results.quantity import STATUS
 from contact.solving import solve
@@ -79,6 +87,24 @@ def test_facets_behind_are_not_painted_over_those_in_front() -> None:
             count = np.count_nonzero(each.table["status"] == name)
             assert np.count_nonzero(seen == STATUS[name]) == count
             assert f"{word}: {count} nodes" in words
+
+
+def test_rigid_shapes_are_drawn_where_they_are() -> None:
+    """In front of the contact part, as far as they are near: a ball that is pushed into it."""
+    ball = {"shape": "sphere", "centre": [1.0, 0.5, 1.45], "radius": 0.45}
+    run = pressed("top", fixed=[{"on": "bottom", "displacement": [0.0, 0.0, 0.01]}],
+                  mesh={"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [12, 6, 2]},
+                  contact={"on": "top", "foundation": ball})  # fmt: skip
+    shape = foundation(run, 1.0)
+    distance = np.linalg.norm(shape.points - ball["centre"], axis=1)
+    # The rim is cut between nodes, on chords.
+    assert distance.max() < 0.45 + 1e-6 and distance.min() > 0.42
+    assert np.count_nonzero(abs(distance - 0.45) < 1e-6) > 10
+    assert shape.points[:, 2].min() == pytest.approx(1.0, abs=1e-3)
+    assert 1.15 < shape.points[:, 2].max() < 1.32  # the body is 2 long: gaps up to 0.3
+    assert Scene.of(run).foundation.n_cells == shape.n_cells
+    two = replace(run, table={**run.table, "rigid": np.zeros(len(run.points), dtype=bool)})
+    assert foundation(two, 1.0).n_cells == 0
 
 
 def test_the_peak_is_that_of_all_nodes() -> None:
@@ -143,7 +169,8 @@ def test_panels_name_what_they_show(mu: float) -> None:
         titles = [ax.title.get_window_extent(canvas.get_renderer()) for ax in figure.axes[:3]]
     assert not titles[0].overlaps(titles[1]) and not titles[1].overlaps(titles[2])
     words = [text.get_text().split(":")[0] for text in figure.legends[0].get_texts()]
-    assert words == (["sticking", "sliding", "open"] if mu else ["in contact", "open"])
+    zones = ["sticking", "sliding", "open"] if mu else ["in contact", "open"]
+    assert words == [*zones, "foundation"]
     arrows = [each for each in figure.axes[2].collections if isinstance(each, Quiver)]
     assert len(arrows) == (mu > 0)
     assert ("longest arrow" in figure.axes[2].get_title()) == (mu > 0)
