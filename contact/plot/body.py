@@ -275,7 +275,7 @@ def _bar(figure: Figure, picture: Picture) -> None:
     bar = {"location": "bottom", "label": picture.label, "aspect": 40, "shrink": 0.8}
     made = figure.colorbar(colours, ax=axes, **bar)
     made.formatter.set_powerlimits((-2, 4))  # long numbers would meet
-    made.locator = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10])
+    made.locator = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10])
     text = made.ax.xaxis.get_offset_text()
     text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the bar
 

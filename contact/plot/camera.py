@@ -120,7 +120,7 @@ def rendered(
 
 def triad(ax: Axes, camera: Camera) -> None:
     """Draw the directions of the coordinates into a corner."""
-    inset = ax.inset_axes((0.0, 0.0, 0.16, 0.16))
+    inset = ax.inset_axes((-0.04, -0.1, 0.16, 0.16))
     inset.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
     inset.axis("off")
     for name, step in zip("xyz", camera.flat(np.eye(3)), strict=True):

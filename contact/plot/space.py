@@ -228,7 +228,9 @@ def show_body(ax: Axes, run: Run, scene: Scene, view: Any, box: Array) -> Camera
     towards, cut = found
     eye = towards + 0.35 * scene.zone.normal if cut else towards
     corners = np.array([box[list(which), range(3)] for which in np.ndindex(2, 2, 2)])
-    camera = Camera.of(eye, corners)
+    shape = scene.foundation
+    seen = corners if shape is None else np.concatenate([corners, shape.points])
+    camera = Camera.of(eye, seen)
     images = rendered(lambda plotter: scene.add(plotter, towards, cut), [camera])
     if not images:
         return None
