@@ -57,11 +57,6 @@ def scalar(run: Run, field: str) -> tuple[Array, bool]:
     Derived fields are taken as they are in cells of degree 1, and averaged at the nodes of
     others. ``displacement``, ``stress``... are the lengths of these vectors and tensors, and
     ``displacement_y``, ``stress_xy``... their components.
-
-    Raises
-    ------
-    InputError
-        If the body has no such field.
     """
     at_points, in_cells = run.body.point_data, run.body.cell_data
     if field in in_cells:
@@ -143,22 +138,7 @@ class Picture:
 def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE) -> Picture:
     """Return a picture of the body, with colours for the part of it that is shown.
 
-    Parameters
-    ----------
-    run
-        The run.
-    field
-        To colour by, as `scalar` takes it.
-    scale
-        As `Picture` has it; by default that of the body, or of a small contact zone's vicinity,
-        which is then the part that is shown.
-    look
-        The choices; in 2-D that of the part that is shown.
-
-    Raises
-    ------
-    InputError
-        If there is no such field, or nothing to be seen.
+    By default scale and part are those of the body, or of a small contact zone's vicinity.
     """
     values, in_cells = scalar(run, field)
     near = None
@@ -190,17 +170,7 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
 
 
 def _inside(skin: Any, box: Array, sides: Sequence[int], values: Array) -> Array:
-    """Return the values of a surface, or of its mirror image, in a box; where it has none others.
-
-    Parameters
-    ----------
-    skin, box
-        As `Picture` has them.
-    sides
-        As `Look.sides` returns them.
-    values
-        Those for a box beside the surface.
-    """
+    """Return the values of a surface, or of its mirror image, in a box; else those given."""
     found = []
     for side in sides:
         part, ends = skin, box.copy()

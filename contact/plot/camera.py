@@ -86,18 +86,9 @@ class Camera:
 def rendered(
     add: Callable[[Any], None], cameras: Sequence[Camera], pixels: int = 1200, ground: str = "white"
 ) -> list[Array]:
-    """Return images of a scene by pyvista, without a window; none without a display.
+    """Return images of a scene, with so many pixels on the longer side; none without a display.
 
-    Parameters
-    ----------
-    add
-        Adds the meshes of the scene to a ``pyvista.Plotter``.
-    cameras
-        For an image each.
-    pixels
-        On the longer side.
-    ground
-        Colour of the background.
+    The scene is added to a ``pyvista.Plotter``, and seen by each camera.
     """
     if not os.environ.get("DISPLAY") and pyvista.vtk_version_info < (9, 4):
         try:

@@ -78,19 +78,7 @@ def shown(
     """Return the ends of the axes along Gamma_3 of some contacts; None for one beside `look`.
 
     They are the coordinates that are asked for, of an arc length that of the nodes within; else
-    they show all, or the vicinity of a small contact zone.
-
-    Parameters
-    ----------
-    tables, run, look
-        The contacts, their run and the choices.
-    touching
-        Which nodes of each are in contact.
-
-    Raises
-    ------
-    InputError
-        If there are coordinates beside all of them.
+    they show all, or the vicinity of a small contact zone, by which nodes are `touching`.
     """
     given = {"xlim": look.xlim, "ylim": look.ylim}
     asked = {k: ends for k, ends in enumerate(given.values()) if ends is not None}
@@ -158,18 +146,9 @@ def shares(where: Array, outer: tuple[float, float]) -> Array:
 
 
 def zones(ax: Axes, where: Array, outer: tuple[float, float], status: Any, rows: Array) -> None:
-    """Colour the share of each node by its status.
+    """Colour the share of each node by its status, shape (m, n), in rows with m + 1 ends.
 
-    Parameters
-    ----------
-    ax
-        The axes.
-    where, outer
-        Positions of the nodes, shape (n,), and where Gamma_3 ends.
-    status
-        Of the nodes in each row, shape (m, n).
-    rows
-        Where the rows begin and end, shape (m + 1,); those of one row in shares of the axis.
+    Those of one row are shares of the axis.
     """
     order = np.argsort(where)
     ax.pcolormesh(
@@ -194,14 +173,7 @@ def patches(frictional: bool) -> list[Patch]:
 def window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[Array, Array]:
     """Return the corners of the part that is shown: all, or a small contact zone's vicinity.
 
-    Parameters
-    ----------
-    places
-        Nodes of Gamma_3, shape (n, k).
-    touching
-        Which of them are in contact, shape (n,).
-    margin
-        About all, in shares of the extent.
+    About all there is a margin, in shares of the extent.
     """
     extent = float(np.ptp(places, axis=0).max())
     zone = float(np.ptp(places[touching], axis=0).max()) if touching.any() else extent

@@ -64,15 +64,8 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
 
     In 2-D the contact figure shows the stresses along Gamma_3 with the friction bound and the zones
     of stick and slip, as Figure 7.4 of the thesis does. In 3-D it shows the body from where its
-    contact is seen, and pressure, status and friction along the mean normal of the contact.
-
-    Parameters
-    ----------
-    run, look
-        The run, and choices for all figures.
-    fields
-        Fields to colour the body by, and these figures alone; by default all figures, the body by
-        von Mises stress and potential.
+    contact is seen, and pressure, status and friction along the mean normal of the contact. With
+    `fields` the body is drawn alone, coloured by each of them.
     """
     found = Gallery()
     with matplotlib.rc_context(look.style):
@@ -115,16 +108,7 @@ def plot(
     look: Look = PAGE,
     step: int | None = None,
 ) -> list[Path]:
-    """Draw the figures of a run into its folder, as `draw` does; return the files. On one rank.
-
-    Those of a step, numbered from 1, end with its number.
-
-    Raises
-    ------
-    InputError
-        If the folder has not all that is needed, or no such field, cannot be written to, or another
-        run works in it.
-    """
+    """Draw the figures of a run, or of its step, into its folder; return the files. On one rank."""
 
     def read() -> Run:
         return read_run(folder) if step is None else read_step(folder, step)
@@ -133,40 +117,17 @@ def plot(
 
 
 def window(run: Run, field: str | None = None) -> Any:
-    """Return the plotter of pyvista that shows a body in 3-D, to be turned.
-
-    Parameters
-    ----------
-    run
-        The run.
-    field
-        To colour the body by; by default the contact pressure is drawn on it.
-
-    Raises
-    ------
-    InputError
-        If the body is plane, or has no such field.
-    """
+    """Return the plotter of pyvista that shows a body in 3-D, by default with contact pressure."""
     if run.plane:
         raise InputError(
             "a plane body is not turned; accepted: a run in 3-D, or contact plot", "figure-option"
         )
-    if field is None:
-        return Scene.of(run).window("contact pressure")
-    made = picture(run, field)
-    return made.scene.window(field)
+    scene = Scene.of(run) if field is None else picture(run, field).scene
+    return scene.window(field or "contact pressure")
 
 
 def export(folder: Path, fields: Sequence[str] = ()) -> list[Path]:
-    """Write ``figure-view.html``, or ``figure-view-FIELD.html``, to be turned in a browser.
-
-    On one rank.
-
-    Raises
-    ------
-    InputError
-        As `plot` and `window`, and if the packages are not there by which pyvista writes it.
-    """
+    """Write ``figure-view.html``, or ``figure-view-FIELD.html``, to be turned in a browser."""
     missing = [name for name in ("trame", "trame_vtk", "trame_vuetify") if find_spec(name) is None]
     if missing:
         raise InputError(
@@ -189,11 +150,6 @@ def animate(folder: Path, fields: Sequence[str] = (), look: Look = PAGE) -> list
     """Draw ``animation-FIELD.gif`` from the files of an evolution; return the files. On one rank.
 
     Scale, colours and axes are the same in all frames.
-
-    Raises
-    ------
-    InputError
-        As `plot`, and if the folder has no steps.
     """
 
     def draw(new: Path) -> list[Path]:
@@ -228,12 +184,8 @@ def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, loo
         "norm": Normalize(ends[:, 0].min(), ends[:, 1].max()),
         "label": named(field, runs[0].units)[1],
     }
-    box = np.array(
-        [
-            np.min([made.box[0] for made in pictures], 0),
-            np.max([made.box[1] for made in pictures], 0),
-        ]
-    )
+    boxes = np.array([made.box for made in pictures])
+    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     with matplotlib.rc_context(look.style):
         found = [body_figure(replace(made, box=box, **alike)) for made in pictures]
         figures = [figure for figure in found if figure is not None]

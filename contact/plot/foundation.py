@@ -66,12 +66,7 @@ class Scaling:
 def scalings(run: Run, table: Table, box: Array | None) -> list[Scaling]:
     """Return how the foundation of a contact may be drawn, the best first; also the other body.
 
-    Parameters
-    ----------
-    run, table
-        The run, and the nodes of one of its contacts.
-    box
-        Corners of the part that is shown, shape (2, d); all for None.
+    The box has the corners of the part that is shown, shape (2, d); None for all.
     """
     points = np.column_stack([table[axis] for axis in "xyz"[: len(run.axes)]])
     seen, diameter = np.ones(len(points), dtype=bool), run.diameter
@@ -95,14 +90,7 @@ def magnification(*runs: Run, box: Array | None = None) -> float:
     """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of a diameter.
 
     Displacements that are visible anyway are drawn as they are. Bodies do not overlap each other or
-    their foundation, whose gap a displacement would close many times over.
-
-    Parameters
-    ----------
-    runs
-        All that have this scale.
-    box
-        Corners of the part that is shown, shape (2, d); all by default.
+    their foundation, whose gap a displacement would close many times over. Box as in `scalings`.
     """
     diameter = runs[0].diameter if box is None else float(np.ptp(box, axis=0).max())
     largest = max(float(np.linalg.norm(run.displacement, axis=1).max()) for run in runs)
@@ -161,18 +149,8 @@ class Profile:
 def profiles(run: Run, scale: float, places: Array, side: int, box: Array | None) -> list[Profile]:
     """Return the foundations of a run in 2-D, as far as they face the body.
 
-    Not one that is farther from the deformed body than that is thick: that would be a dot then.
-
-    Parameters
-    ----------
-    run, scale
-        The run, and the factor of its displacements.
-    places
-        Points of the deformed body, shape (n, 2).
-    side
-        -1 for mirror images, else 1.
-    box
-        As `magnification` has had it.
+    Not one that is farther from the deformed body, given by its points, than that is thick: that
+    would be a dot then. The side is -1 for mirror images, else 1.
     """
     found = []
     for table in run.contacts:
@@ -214,15 +192,7 @@ def foundation(run: Run, scale: float) -> Any:
 
 
 def facing(corners: Array, gap: Array, diameter: float) -> Any:
-    """Return facets by their corners, shape (n, k, 3), as far as their gaps are not large.
-
-    Parameters
-    ----------
-    corners, gap
-        The corners, NaN for none, and their gaps, shape (n, k).
-    diameter
-        Of the body.
-    """
+    """Return facets by their corners, shape (n, k, 3), NaN for none, but those of large gaps."""
     known = np.isfinite(corners).all(axis=(1, 2)) & np.isfinite(gap).all(axis=1)
     shape = polygons(corners[known])
     if not shape.n_cells:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -23,8 +24,6 @@ from contact.results.grid import Table
 from contact.results.options import Units
 from contact.results.quantity import OPPOSITE
 from contact.typing import Array
-
-T = TypeVar("T")
 
 #: Most frames of an animation.
 MOST = 100
@@ -102,27 +101,40 @@ class Run:
         return float(np.ptp(self.body.points, axis=0).max())
 
 
-def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
-    """Read the files of a run. On one rank.
+@contextmanager
+def _as_written(folder: Path) -> Iterator[None]:
+    """Refuse results that are missing or damaged."""
+    try:
+        yield
+    except FileNotFoundError as error:
+        hint = ', written with output.fields = "vtu"' if "fields" in str(error.filename) else ""
+        raise InputError(
+            f"{error.filename}: no such file; accepted: a run's results{hint}", "no-results"
+        ) from None
+    except OSError as error:
+        raise refused(error) from None
+    except (KeyError, ValueError, IndexError, TypeError) as error:
+        raise InputError(
+            f"{folder}: not as a run has left it ({error}); accepted: the files of a run",
+            "no-results",
+        ) from None
 
-    Parameters
-    ----------
-    folder
-        The results of the run.
-    summary
-        The contents of ``summary.json``, where that is not written yet.
+
+def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
+    """Read the files of a run; of its summary the contents if that is not written yet.
+
+    On one rank.
 
     Raises
     ------
     InputError
         If the folder has not all that is needed.
     """
-    about = summary or read(folder, "summary.json", _table_of)
-    surface, body = (read(folder, name, read_grid) for name in ("contact.vtu", "fields.vtu"))
-    columns = read(folder, "contact.csv", _nodes)
-    files = about.get("files", [path.name for path in folder.iterdir()])
-
-    def run(_: Path) -> Run:
+    with _as_written(folder):
+        about = summary or json.loads((folder / "summary.json").read_bytes())
+        surface, body = (read_grid(folder / name) for name in ("contact.vtu", "fields.vtu"))
+        columns = _columns(folder / "contact.csv")
+        files = about.get("files", [path.name for path in folder.iterdir()])
         flat = "rz" if about["kinematics"] == "axisymmetric" else "xy"
         row = surface["row"]
         nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
@@ -135,13 +147,11 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             _moved({**columns, **along, "entry": surface["entry"][nodes], "rigid": rigid}, body),
             body,
             surface,
-            opposite=read(folder, OPPOSITE, read_grid) if OPPOSITE in files else None,
+            opposite=read_grid(folder / OPPOSITE) if OPPOSITE in files else None,
             regions=about.get("regions", ()),
-            steps=read(folder, "steps.csv", _steps) if "steps.csv" in files else None,
-            tables=read(folder, "contact-steps.csv", _tables) if "steps.csv" in files else (),
+            steps=_columns(folder / "steps.csv") if "steps.csv" in files else None,
+            tables=_tables(folder / "contact-steps.csv") if "steps.csv" in files else (),
         )
-
-    return read(folder, "summary.json", run)
 
 
 def read_steps(folder: Path) -> list[tuple[float, Run]]:
@@ -152,13 +162,7 @@ def read_steps(folder: Path) -> list[tuple[float, Run]]:
 
 
 def read_step(folder: Path, number: int) -> Run:
-    """Read the results at the end of a step, numbered from 1.
-
-    Raises
-    ------
-    InputError
-        If the folder has no such step with its fields.
-    """
+    """Read the results at the end of a step, numbered from 1; refuse one without fields."""
     run, frames = _frames(folder)
     known = {frame[1] + 1: frame for frame in frames}
     if number not in known:
@@ -180,8 +184,7 @@ def _frames(folder: Path) -> tuple[Run, list[tuple[float, int, str, str]]]:
     run = read_run(folder)
     assert run.steps is not None  # where there are fields in time, there are steps
     fields, contact = (
-        _SET.findall(read(folder, f"{kind}.pvd", lambda path: path.read_text("utf-8")))
-        for kind in ("fields", "contact")
+        _SET.findall((folder / f"{kind}.pvd").read_text("utf-8")) for kind in ("fields", "contact")
     )
     times = [float(time) for time, _ in fields]
     rows = [int(np.argmin(abs(run.steps["t"] - time))) for time in times]
@@ -191,63 +194,23 @@ def _frames(folder: Path) -> tuple[Run, list[tuple[float, int, str, str]]]:
 
 def _at(run: Run, folder: Path, time: float, row: int, fields: str, contact: str) -> Run:
     """Return an evolution's results at a time, the end of the step of a row."""
-    body, surface = (read(folder, name, read_grid) for name in (fields, contact))
+    with _as_written(folder):
+        body, surface = (read_grid(folder / name) for name in (fields, contact))
     title = f"{run.title}, t = {time:.3g}".lstrip(", ")
     table = _moved({**run.table, **run.tables[row]}, body)
     own = {"table": table, "body": body, "surface": surface, "opposite": None}
     return replace(run, title=title, step=row + 1, steps=None, tables=(), **own)
 
 
-def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
-    """Read a file of the results.
-
-    Raises
-    ------
-    InputError
-        If it is missing or damaged.
-    """
-    path = folder / name
-    try:
-        return reader(path)
-    except InputError:  # of a further file
-        raise
-    except FileNotFoundError:
-        hint = ', written with output.fields = "vtu"' if name == "fields.vtu" else ""
-        raise InputError(
-            f"{path}: no such file; accepted: a run's results{hint}", "no-results"
-        ) from None
-    except OSError as error:
-        raise refused(error) from None
-    except (KeyError, ValueError, IndexError, TypeError, AttributeError) as error:
-        why = f"no {error}" if isinstance(error, KeyError) else error
-        raise InputError(
-            f"{path}: not as a run has left it ({why}); accepted: the file that solving writes",
-            "no-results",
-        ) from None
-
-
-def _table_of(path: Path) -> dict[str, Any]:
-    found = json.loads(path.read_bytes())
-    if not isinstance(found, dict):
-        raise ValueError("no table of results")
-    return found
-
-
 def read_grid(path: Path) -> Any:
-    """Read a grid of pyvista with its fields.
-
-    Raises
-    ------
-    ValueError
-        If the file is not one of ours.
-    """
+    """Read a grid of pyvista with its fields; a file of another kind is a ValueError."""
     path.open("rb").close()
     errors = pyvista.VtkErrorCatcher(send_to_logging=False)
     with errors, catch_warnings():  # VTK and pyvista would print them
         simplefilter("ignore")
         grid = pyvista.read(path)
     if errors.events or not grid.n_cells:
-        raise ValueError("it has no grid")
+        raise ValueError(f"no grid in {path.name}")
     return grid
 
 
@@ -266,41 +229,13 @@ def _columns(path: Path) -> dict[str, NDArray[Any]]:
     """Read a table: the columns by name."""
     with path.open(newline="", encoding="utf-8-sig") as file:
         header, *rows = csv.reader(file)
-    for row in rows:
-        if len(row) != len(header):
-            raise ValueError(f"a row of {len(row)} values under {len(header)} columns")
     columns = {name: np.array(texts) for name, *texts in zip(header, *rows, strict=True)}
     return {k: v if k in ("status", "on") else v.astype(float) for k, v in columns.items()}
 
 
-def _with(columns: dict[str, NDArray[Any]], *names: str) -> dict[str, NDArray[Any]]:
-    """Return columns, or raise a KeyError with the first that is missing of some."""
-    for name in names:
-        if name not in columns:
-            raise KeyError(name)
-    return columns
-
-
-def _nodes(path: Path) -> dict[str, NDArray[Any]]:
-    """Read ``contact.csv``, or the table of all steps, with the columns that figures ask for."""
-    columns, tangential = _columns(path), ["u_t", "tau"]
-    if "z" in columns:
-        tangential = [f"{name}{axis}" for name in ("u_t", "tau_") for axis in "xyz"]
-    names = "x", "y", "weight", "gap", "u_n", "pressure", "bound", "status"
-    return _with(columns, *names, *tangential)
-
-
-def _steps(path: Path) -> dict[str, NDArray[Any]]:
-    """Read ``steps.csv`` with the columns that figures ask for."""
-    columns = _columns(path)
-    found = [re.fullmatch(r"(driven|rigid)_(force_)?([xyz](?:_.*)?)", name) for name in columns]
-    names = [f"{m[1]}_{'' if m[2] else 'force_'}{m[3]}" for m in found if m is not None]
-    return _with(columns, "t", "work", "energy", "dissipation", *names)
-
-
 def _tables(path: Path) -> list[Table]:
     """Read ``contact-steps.csv``: a table a step."""
-    columns = _nodes(path)
+    columns = _columns(path)
     starts = np.flatnonzero(np.diff(columns["t"])) + 1
     parts = {name: np.split(values, starts) for name, values in columns.items()}
     return [{name: values[k] for name, values in parts.items()} for k in range(len(starts) + 1)]

@@ -100,15 +100,7 @@ class Look:
     def ends(self, axis: int, low: float, high: float, shown: str) -> tuple[float, float] | None:
         """Return the ends that are asked for of the x or y axis (0 or 1); None for any.
 
-        Parameters
-        ----------
-        low, high, shown
-            Where that which is drawn begins and ends, and its name.
-
-        Raises
-        ------
-        InputError
-            If it would not be seen.
+        They are refused beside that which is drawn, which has a name and is between low and high.
         """
         given = (self.xlim, self.ylim)[axis]
         if given is not None and not (given[0] < high and low < given[1]):
@@ -165,14 +157,8 @@ POWERS["force · length"] = POWERS["work"]
 def unit_of(quantity: str, units: Units, plane: bool) -> str:
     """Return the unit of a quantity in brackets, after a blank; nothing where it has no name.
 
-    Parameters
-    ----------
-    quantity
-        "length", "stress", ..., one of `POWERS`, or a quotient of two.
-    units
-        The names of units.
-    plane
-        Whether the body is plane, of which all is that of a unit of thickness.
+    The quantity is "length", "stress", ..., one of `POWERS`, or a quotient of two. Of a plane body
+    all is that of a unit of thickness.
     """
     if "/" in quantity:
         names = [unit_of(part, units, plane)[2:-1] for part in quantity.split("/")]

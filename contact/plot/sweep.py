@@ -62,23 +62,8 @@ def plot_sweep(
 ) -> list[Path]:
     """Draw ``figure-sweep``, or ``figure-sweep-COLUMN``, from the tables of a sweep; return files.
 
-    On one rank.
-
-    Parameters
-    ----------
-    folder
-        Of the sweep.
-    columns
-        To draw, a figure each with a panel for each component, or entry of a table; by default
-        those of `DRAWN`, and those that were asked for with ``--columns``, as far as they vary, in
-        one figure.
-    formats, look
-        Endings of the files, and choices for the figure.
-
-    Raises
-    ------
-    InputError
-        If the table is damaged, or has no such column.
+    Each column has a figure, with a panel for each component, or entry of a table; by default one
+    has those of `DRAWN`, and those asked for with ``--columns``, as far as they vary. On one rank.
     """
     swept = _read(folder)
     figures = {f"-{name.replace('/', '-')}": swept.chosen(name) for name in columns}
@@ -152,13 +137,7 @@ class Swept:
         return [name for name in names if self.varies(name)]
 
     def chosen(self, key: str) -> list[str]:
-        """Return the columns of a key: those that vary, if any does.
-
-        Raises
-        ------
-        InputError
-            If there is none.
-        """
+        """Return the columns of a key: those that vary, if any does."""
         known = [name for name in self.columns if name != "input"]
         found = [name for name in known if is_of(name, key)]
         if not found:
