@@ -117,26 +117,19 @@ def solve(
     """
     clock = time.perf_counter()
     start = start.state if isinstance(start, Solution) else start
-    _check_arguments(case, settings, monitor, start, replacements)
+    case, options = _checked(case, settings, monitor, start, replacements)
     if isinstance(case, ContactProblem):
-        _check_together(case, settings, start, replacements)
-        check_problem(case)
-        return reviewed(solve_problem(case, settings or NewtonOptions(), monitor, start))
-    case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
-    options = settings or case.solver
-    _check_together(case, options, start, replacements)
-    times = step_times(case)
-    if case.mesh.adapt is not None:
-        solver = partial(solve_problem, settings=options, monitor=monitor, guess=COARSE)
-        with named(case.source):
-            solution = adapted(case, comm, partial(solver, times=times))
-            return reviewed(solution, case, clock)
-    problem, guess = build_problem(case, comm, **replacements), GIVEN
+        return reviewed(solve_problem(case, options, monitor, start))
+    solver = partial(solve_problem, settings=options, monitor=monitor, times=step_times(case))
     with named(case.source):
-        if start is None:
-            chosen = case.model_copy(update={"solver": options})
-            start, guess = default_start(chosen, problem, **replacements), COARSE
-        solution = solve_problem(problem, options, monitor, start, guess, times)
+        if case.mesh.adapt is not None:
+            solution = adapted(case, comm, partial(solver, guess=COARSE))
+        else:
+            problem, guess = build_problem(case, comm, **replacements), GIVEN
+            if start is None:
+                chosen = case.model_copy(update={"solver": options})
+                start, guess = default_start(chosen, problem, **replacements), COARSE
+            solution = solver(problem, start=start, guess=guess)
         return reviewed(solution, case, clock, described=not replacements)
 
 
@@ -174,7 +167,8 @@ def solve_steps(
     InputError, SolveInterrupted
         As `evolve` and `solve` raise them.
     """
-    _check_arguments(problem, settings, monitor)
+    expect("solve_steps", problem, "a Problem", isinstance(problem, ContactProblem))
+    _check_types(settings, monitor)
     ends = _checked_times(problem, times, 0.0)
     options = settings or NewtonOptions()
     solution = solve_problem(problem, options, monitor, times=(0.0, *ends), kept=kept, keep=keep)
@@ -226,7 +220,8 @@ def evolve(
         If a step fails; the states before have been given.
     """
     start = start.state if isinstance(start, Solution) else start
-    _check_arguments(problem, settings, monitor, start)
+    expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
+    _check_types(settings, monitor, start)
     earlier = before is None or (isinstance(before, State) and start is not None)
     expect("before", before, "the state before start", earlier)
     begin = 0.0 if start is None else start.time
@@ -399,54 +394,52 @@ def _prescribed(problem: ContactProblem, start: State) -> State:
     return State(x, start.forces, problem.time, problem.history)
 
 
-def _check_arguments(
-    case: object,
-    settings: Options | None,
-    monitor: Monitor | None,
-    start: State | None = None,
-    replacements: Mapping[str, object] | None = None,
-) -> None:
-    """Refuse arguments of other types; without `replacements` a case is one of them."""
+def _check_types(settings: object, monitor: object, start: object = None) -> None:
+    """Refuse arguments of other types."""
     accepted = "NewtonOptions(), FixedPointOptions(), PenaltyOptions()"
     expect("settings", settings, accepted, isinstance(settings, Options | None))
     accepted = "a function of a record, called after each outer iteration"
     expect("monitor", monitor, accepted, monitor is None or callable(monitor))
     accepted = "an earlier solution of the same problem, or its state"
     expect("start", start, accepted, isinstance(start, State | None))
-    if replacements is None:
-        expect("problem", case, "a Problem", isinstance(case, ContactProblem))
-        return
+
+
+def _checked(
+    case: Case | ContactProblem | str | Path,
+    settings: Options | None,
+    monitor: Monitor | None,
+    start: State | None,
+    replacements: Mapping[str, object],
+) -> tuple[Case | ContactProblem, Options]:
+    """Return the case, read from its file, or the problem, and the options of its method.
+
+    Arguments of other types, and those that would be ignored, are refused. Collective.
+    """
     fits = isinstance(case, Case | ContactProblem | str | Path)
     expect("solve", case, "a case, the name of a case file, or a Problem", fits)
+    _check_types(settings, monitor, start)
     for name in replacements.keys() - set(REPLACEMENTS):
         accepted = f"{', '.join(REPLACEMENTS)}; a method as settings, times by solve_steps"
         raise InputError(f"{name}: unknown; accepted: {accepted}", "no-such-name")
-
-
-def _check_together(
-    case: Case | ContactProblem,
-    settings: Options | None,
-    start: State | None,
-    replacements: Mapping[str, object],
-) -> None:
-    """Refuse arguments that would be ignored."""
-    nested = getattr(settings, "nested", None) or None  # of Newton's method alone
-    given: dict[str, object] = {"start": start, "nested": nested}
+    if not isinstance(case, Case | ContactProblem):
+        case = load_case(case, without=replaced_by(replacements))
+    options = settings or (case.solver if isinstance(case, Case) else NewtonOptions())
+    nested = getattr(options, "nested", None) or None  # of Newton's method alone
+    ignored: dict[str, object] = {"start": start, "nested": nested}
     if isinstance(case, ContactProblem):
-        given, beside = {"nested": nested, **replacements}, "a problem that is built already"
+        ignored, beside = {"nested": nested, **replacements}, "a problem that is built already"
+        check_problem(case)
     elif case.mesh.adapt is not None:
-        given, beside = {**given, **replacements}, "[mesh.adapt]"
+        ignored, beside = {**ignored, **replacements}, "[mesh.adapt]"
     elif case.evolution is not None:
         beside = "[evolution]; evolve(problem, times, start=state) goes on"
     else:
-        given = {} if nested is None else {"start": start}
+        ignored = {} if nested is None else {"start": start}
         beside = "nested = true, which makes an initial guess of its own"
-    for name, value in given.items():
-        if value is not None:
-            raise InputError(
-                f"{name}: given together with {beside}; accepted: one without it",
-                "ignored-argument",
-            )
+    for name in (name for name, value in ignored.items() if value is not None):
+        words = f"{name}: given together with {beside}; accepted: one without it"
+        raise InputError(words, "ignored-argument")
+    return case, options
 
 
 def _checked_times(
