@@ -120,18 +120,9 @@ def grown(
     A last mesh with few more cells than the one before would cost as much again.
 
     Those of cut cells fall with the mesh size as they do where solutions are smooth (Melenk and
-    Wohlmuth, Adv. Comput. Math. 15, 2001); singular corners are seen by the next estimate.
-
-    Parameters
-    ----------
-    domain, squares
-        The mesh, and eta_K^2 of its owned cells.
-    fraction
-        Of `marked`.
-    goal, room
-        Shares of the sum of eta_K^2 that is asked for, and of the cells that there may be.
-    degree
-        Of the elements.
+    Wohlmuth, Adv. Comput. Math. 15, 2001); singular corners are seen by the next estimate. Squares
+    are eta_K^2 of the owned cells, goal and room the shares of their sum that is asked for, and of
+    the cells that there may be.
     """
     comm, d = domain.comm, domain.dim
     first, asked = (comm.allreduce(value, op=MPI.SUM) for value in (squares.size, squares.sum()))
@@ -171,17 +162,7 @@ def indicators(solution: Solution) -> tuple[Array, float]:
 
 
 def marked(comm: MPI.Intracomm, squares: Array, fraction: float) -> Indices:
-    """Return the fewest owned cells that have a share of the sum (Doerfler, 1996). Collective.
-
-    Parameters
-    ----------
-    comm
-        Communicator of the mesh.
-    squares
-        eta_K^2 of the owned cells.
-    fraction
-        The share of the sum over all ranks.
-    """
+    """Return the fewest owned cells that have a share of the sum (Doerfler, 1996). Collective."""
     share = (1 - ROUNDING) * fraction * comm.allreduce(float(squares.sum()), op=MPI.SUM)
     most = comm.allreduce(float(squares.max(initial=0.0)), op=MPI.MAX)
     # Bisection for the least of them: numbers >= 0 are in the order of their bits.

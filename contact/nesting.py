@@ -141,12 +141,7 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
 
     A generated mesh has its cells halved as often as they are enough, and its parts end at
     positions of the grid; a mesh that is refined has one refinement less. ``levels`` is the number
-    of meshes, with the finest; None for all that pay.
-
-    Raises
-    ------
-    InputError
-        If there are not as many as asked for, or none.
+    of meshes, with the finest, which are refused where there are fewer; None for all that pay.
     """
     found: list[Case] = []
     mesh = _coarser(case.mesh)

@@ -75,13 +75,7 @@ class Axis:
 
     @staticmethod
     def of(text: str) -> Axis:
-        """Read ``key=v1,v2,...``: TOML values, bare words, or ``a:b:n``, n numbers from a to b.
-
-        Raises
-        ------
-        InputError
-            If it is not that.
-        """
+        """Read ``key=v1,v2,...``: TOML values, bare words, or ``a:b:n``, n numbers from a to b."""
         key, _, given = text.partition("=")
         if ":" in given and not {*given} & {*"[]{}\"'"}:
             given = ",".join(_spread(part, text) for part in given.split(","))
@@ -127,15 +121,7 @@ def _spread(text: str, whole: str) -> str:
 def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float]:
     """Return keys of the summary as columns, an entry of a list each. Collective.
 
-    Parameters
-    ----------
-    names
-        Of the keys; ``error.energy`` is one of a table in it. A table stands for all in it.
-
-    Raises
-    ------
-    InputError
-        If there is no such key, no number in it, or a list of any length.
+    ``error.energy`` is a key of a table; a table alone stands for all its numbers and vectors.
     """
     found: dict[str, float] = {}
     for name in names:
@@ -288,14 +274,8 @@ def _kept_rows(
 ) -> dict[tuple[str, ...], dict[str, Any]]:
     """Return the rows that are there already, by the values of the keys. On one rank.
 
-    ``first`` has the values of the first row, and ``load`` returns the case of a row, read from
-    the case file or from another.
-
-    Raises
-    ------
-    InputError
-        If the files there are no sweep's, or those of a sweep of other input or without the
-        further ``columns``.
+    Those of another sweep are refused: of other keys, files or columns, or another case, that of
+    the `first` values; `load` returns the case of values, from the case file or from another.
     """
     table, before, where = folder / TABLE, folder / CASE, f"--out {folder}"
     rows = _read(table) if table.exists() else []

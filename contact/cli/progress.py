@@ -62,21 +62,8 @@ def progress(
 ) -> Iterator[Monitor | None]:
     """Show the logs of ``contact`` on rank 0 and yield the monitor that shows the iterations.
 
-    Parameters
-    ----------
-    comm
-        Communicator of the solve.
-    quiet
-        Show warnings alone.
-    log
-        A file, to whose end all records are written with the time, inner iterations too.
-    verbose
-        Show all records, with the time.
-
-    Raises
-    ------
-    InputError
-        If the log cannot be written.
+    If `quiet` warnings alone are shown, if `verbose` all records with the time, which are written
+    to the end of a `log` too.
     """
     handlers: list[logging.Handler] = [logging.NullHandler()] if comm.rank > 0 else []
     on_root(comm, lambda: handlers.append(_log(log)) if log is not None else None)
@@ -115,16 +102,8 @@ class Console(logging.Handler):
     """Shows the table of iterations and the lines of the leading logger, or a bar instead of these.
 
     The leading one is the highest of those in `RANKS` that has spoken so far; the others are heard
-    in long silence.
-
-    Parameters
-    ----------
-    quiet
-        Whether warnings alone are shown.
-    bar
-        tqdm's, on a terminal: over outer iterations, or over the finished share of many solves.
-    verbose
-        Whether all lines are shown, with the time, and no table.
+    in long silence. tqdm's bar, on a terminal, is over outer iterations, or over the finished share
+    of many solves.
     """
 
     def __init__(self, quiet: bool = False, bar: Any = None, verbose: bool = False) -> None:

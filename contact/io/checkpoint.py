@@ -51,25 +51,10 @@ _NEAR = 1e-9
 
 
 class Checkpoints:
-    """The checkpoints that a run writes after its steps. Collective.
+    """The checkpoints that a run writes after its steps into the folder of its results. Collective.
 
-    Parameters
-    ----------
-    folder
-        The folder of the results.
-    problem
-        The problem of the evolution.
-    case
-        The case, which a restart is held against.
-    kept
-        Records of earlier steps, which are written first unless they stand there.
-    here
-        Whether they do.
-
-    Raises
-    ------
-    InputError
-        If there are files of these names that no run has left.
+    A restart is held against the case. Records of earlier steps, `kept`, are written first, unless
+    they stand `here`. Files of these names that no run has left are refused.
     """
 
     def __init__(
@@ -117,13 +102,7 @@ class Checkpoints:
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Return the checkpoints in a folder, one after the other. On one rank.
-
-    Raises
-    ------
-    InputError
-        If there are none.
-    """
+    """Return the checkpoints in a folder, one after the other; refuse none. On one rank."""
     found: list[Path] = []
     while (run := _run_of(path := folder / FOLDER / f"{len(found) + 1:05d}.npz")) is not None:
         if found and run != _run_of(found[0]):
@@ -167,13 +146,7 @@ def discard(folder: Path) -> None:
 
 
 def read_steps(folder: str | Path, problem: ContactProblem) -> list[StepRecord]:
-    """Return the records of the steps that a run has left in a folder. Collective.
-
-    Raises
-    ------
-    InputError
-        If there are none, or they are damaged, or of another problem.
-    """
+    """Return the records of the steps that a run of a problem has left in a folder. Collective."""
     files: list[Path] = on_root(problem.comm, lambda: files_of(Path(folder)))
     reader, found = _Reader(problem), list[StepRecord]()
     for path in files:
@@ -183,13 +156,7 @@ def read_steps(folder: str | Path, problem: ContactProblem) -> list[StepRecord]:
 
 
 def write_checkpoint(solution: Solution, path: str | Path) -> None:
-    """Write the state of a solution into a file. Collective.
-
-    Raises
-    ------
-    InputError
-        If that is refused.
-    """
+    """Write the state of a solution into a file. Collective."""
     arrays = _gathered(solution.problem, solution.state)
     on_root(solution.problem.comm, lambda: _write(Path(path), arrays))
 

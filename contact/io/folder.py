@@ -54,13 +54,9 @@ class ResultFolder:
     comm: MPI.Intracomm
 
     def replace(self, write: Callable[[Path], Mapping[str, object]]) -> None:
-        """Replace the results of an earlier run. Collective.
+        """Replace the results of an earlier run; where `write` fails, these stay. Collective.
 
-        Parameters
-        ----------
-        write
-            Writes all files but the summary into the folder that it is given, and returns the
-            contents of the summary. Collective; where it fails, the earlier results stay.
+        It writes all files but the summary into a folder, and returns the contents of that.
         """
         new = self.path / STAGE
         try:
@@ -84,20 +80,8 @@ def result_folder(
     """Make a folder if need be, and keep other runs out of it. Collective.
 
     Files of an interrupted run are put in order first. Folders that were made here and stay empty
-    are removed in the end.
-
-    Parameters
-    ----------
-    path, comm
-        The folder, and the ranks of the run.
-    overwrite
-        Whether files may be replaced that no run has left, but have the names of results.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written to, if another run works in it, or if something that is no
-        result stands under the name of one.
+    are removed in the end. Files with names of results that no run has left are refused, unless
+    they may be overwritten.
     """
     path = Path(path)
     held, together = ExitStack(), False
@@ -172,14 +156,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def check_names(folder: Path, names: Iterator[str] | Sequence[str], overwrite: bool) -> None:
-    """Check that files of some names may be replaced.
-
-    Raises
-    ------
-    InputError
-        If there is something that the summary does not name, and without `overwrite`; or a folder
-        in place of a file, or a file of a folder.
-    """
+    """Refuse to replace files that the summary does not name, or a folder by a file."""
     own = listed(folder / SUMMARY)
     for name in names:
         path, expected = folder / name, "a folder" if name.endswith(".bp") else "a file"

@@ -210,7 +210,7 @@ def read_grid(path: Path) -> Any:
         simplefilter("ignore")
         grid = pyvista.read(path)
     if errors.events or not grid.n_cells:
-        raise ValueError(f"no grid in {path.name}")
+        raise ValueError(f"{path.name}: it has no grid")
     return grid
 
 
