@@ -23,7 +23,7 @@ from contact.mesh.geometry import volume_fractions, volumes
 from contact.mesh.grid import rotate
 from contact.mesh.reader import from_file, from_generator
 from contact.mesh.transfer import check_adaptable, refined
-from contact.methods.signals import deaf
+from contact.methods.signals import killed_on_signal
 from contact.model.formula import Expression
 from contact.model.messages import UNKNOWN, Words, fault
 from contact.model.section import Section
@@ -294,7 +294,7 @@ class Mesh(Section):
             domain = grid.box(comm, *self._grid, cell=shape.name)
         else:
             assert self.generator is not None
-            with deaf():
+            with killed_on_signal():
                 domain = from_generator(
                     comm, self.generator, self.cell, self.order, **self.parameters
                 )

@@ -19,14 +19,14 @@ from contact.ranks import largest
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.methods.report import Monitor, Record
 
-#: The signals that ask a run to end.
+#: Signals that end a run.
 ENDING = signal.SIGINT, signal.SIGTERM
 
-#: Seconds in which a second signal is taken for an echo of the first: a launcher and its process
-#: group may both deliver the same one.
+#: Seconds in which a second signal is an echo of the first: a launcher and its process group may
+#: both deliver one.
 REPEAT = 2.0
 
-#: Added to the number of the signal that ended a run: its exit status.
+#: Exit status of a run ended by a signal, less the number of the signal.
 SIGNALLED = 128
 
 #: A handler of signals, as `signal.signal` takes it.
@@ -34,13 +34,7 @@ Handler: TypeAlias = Callable[[int, FrameType | None], object] | int
 
 
 class Interrupted(Exception):
-    """A signal asked for the end of the solve.
-
-    Parameters
-    ----------
-    number
-        Of the signal.
-    """
+    """End of a solve by the signal of a number."""
 
     def __init__(self, number: int) -> None:
         super().__init__(f"interrupted ({signal.Signals(number).name})")
@@ -60,29 +54,29 @@ class Stop:
     comm
         Communicator of the problem.
     monitor
-        Told of every outer iteration first.
+        Called after each outer iteration first.
     caught
-        The signals on this rank.
-    told
+        Signals on this rank.
+    raised
         Whether `Interrupted` has been raised for them.
     """
 
     comm: MPI.Intracomm
     monitor: Monitor | None
     caught: list[int] = field(default_factory=list)
-    told: bool = False
+    raised: bool = False
 
     def __call__(self, record: Record) -> None:
-        """Pass an outer iteration on, and look for signals. Collective."""
+        """Call the monitor, and look for signals. Collective."""
         if self.monitor is not None:
             self.monitor(record)
         self.poll()
 
     def poll(self) -> None:
-        """Look for signals, once an inner iteration. Collective."""
+        """Raise `Interrupted` after a signal on any rank. Collective."""
         number = self.first()
         if number:
-            self.told = True
+            self.raised = True
             raise Interrupted(number)
 
     def first(self) -> int:
@@ -91,33 +85,30 @@ class Stop:
 
 
 @dataclass
-class Ending:
+class RunEnding:
     """Handler of signals outside of a solve: ends the run by an exception.
 
     Attributes
     ----------
     caught
-        The signals so far. Where a library swallows the exception, the next solve stops for them.
-    deaf_until
-        Until when a signal is an echo of the one that has stopped a solve (monotonic seconds).
+        Signals so far, for the next solve where a library swallows the exception.
+    echo_until
+        End of the time in which signals are echoes (monotonic seconds).
     """
 
     caught: list[int] = field(default_factory=list)
-    deaf_until: float = -math.inf
+    echo_until: float = -math.inf
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Note a signal, and raise KeyboardInterrupt or `Terminated`."""
-        if time.monotonic() >= self.deaf_until:
+        if time.monotonic() >= self.echo_until:
             self.caught.append(number)
             raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
 
 
 @contextmanager
 def _handled(handler: Handler, replaces: Callable[[object], bool]) -> Iterator[None]:
-    """Install a handler in place of some, which come back in the end.
-
-    Signals can be caught in the main thread alone; in others nothing is changed.
-    """
+    """Replace some handlers within a block, in the main thread alone."""
     before = {number: signal.getsignal(number) for number in ENDING}
     if threading.current_thread() is not threading.main_thread():
         before.clear()
@@ -133,13 +124,9 @@ def _handled(handler: Handler, replaces: Callable[[object], bool]) -> Iterator[N
 
 @contextmanager
 def signals_held() -> Iterator[list[int]]:
-    """Let signals wait until the end of the block, which must not be left half done.
+    """Delay signals to the end of the block; yield their list, which may be cleared.
 
-    One that comes more than `REPEAT` seconds after the first ends the process.
-
-    Yields
-    ------
-    The signals so far. They have their effect in the end, unless the list is cleared.
+    A signal more than `REPEAT` seconds after the first one ends the process.
     """
     caught: list[int] = []
     last = math.inf
@@ -165,18 +152,10 @@ def signals_held() -> Iterator[list[int]]:
 def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Stop]:
     """Yield a monitor that raises `Interrupted` on all ranks after a signal on any.
 
-    A signal for which nothing was raised, after the last iteration, has its usual effect in the
-    end, on all ranks.
-
-    Parameters
-    ----------
-    comm
-        Communicator of the problem.
-    monitor
-        Told of every iteration first.
+    A signal after the last iteration has its usual effect after the block, on all ranks.
     """
     stop = Stop(comm, monitor)
-    outside = [old for old in map(signal.getsignal, ENDING) if isinstance(old, Ending)][:1]
+    outside = [old for old in map(signal.getsignal, ENDING) if isinstance(old, RunEnding)][:1]
     try:
         with signals_held() as stop.caught:
             stop.caught += [number for ending in outside for number in ending.caught[:1]]
@@ -186,27 +165,23 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Sto
                 if number and not stop.caught:
                     stop.caught.append(number)
             finally:
-                if stop.told:
+                if stop.raised:
                     stop.caught.clear()
     finally:
-        for ending in outside if stop.told else ():
-            ending.deaf_until = time.monotonic() + REPEAT
+        for ending in outside if stop.raised else ():
+            ending.echo_until = time.monotonic() + REPEAT
 
 
 @contextmanager
 def ending_on_signal() -> Iterator[None]:
-    """Let signals end a run in words, where Python's own handlers stand."""
+    """End a run by an exception at a signal, in place of Python's own handlers."""
     own = signal.SIG_DFL, signal.default_int_handler
-    with _handled(Ending(), lambda old: old in own):
+    with _handled(RunEnding(), lambda old: old in own):
         yield
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
-    """Let signals end the process at once, where `ending_on_signal` would end the run.
-
-    For work of a library that takes minutes without returning to Python, before anything has
-    been computed.
-    """
-    with _handled(signal.SIG_DFL, lambda old: isinstance(old, Ending)):
+def killed_on_signal() -> Iterator[None]:
+    """End the process at a signal within `ending_on_signal`, in long calls of libraries."""
+    with _handled(signal.SIG_DFL, lambda old: isinstance(old, RunEnding)):
         yield
