@@ -110,7 +110,7 @@ def _along_axis(layout: Layout) -> PETSc.NullSpace:
     return PETSc.NullSpace().create(vectors=[motion], comm=layout.comm)
 
 
-def held_motions(layout: Layout) -> PETSc.NullSpace:
+def masked_motions(layout: Layout) -> PETSc.NullSpace:
     """Return the rigid motions, 0 at fixed unknowns, orthonormalised. Collective."""
     vectors: list[PETSc.Vec] = []
     for motion in rigid_motions(layout).getVecs():

@@ -31,7 +31,7 @@ from contact.linear.layout import (
     nodal_blocks,
     times,
 )
-from contact.linear.multigrid import TOUCH, Hierarchy, held_motions
+from contact.linear.multigrid import TOUCH, Hierarchy, masked_motions
 from contact.linear.refinement import Subsystems, refine
 from contact.ranks import summed
 from contact.typing import Array
@@ -142,7 +142,7 @@ class SparseOperator:
         if self.iterative and self.layout.coupled:
             self._split = BlockPreconditioner(self.ksp, self.layout, symmetric)
         elif self.iterative:
-            self._modes = held_motions(self.layout)
+            self._modes = masked_motions(self.layout)
             multigrid.configure(self.ksp, symmetric)
         else:
             self.ksp.setType("preonly")

@@ -39,10 +39,6 @@ def _check(code: int) -> None:
         raise PETSc.Error(code)
 
 
-def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
-    _check(_petsc.MatFactorSetSchurIS(ctypes.c_void_p(factor.handle), ctypes.c_void_p(kept.handle)))
-
-
 def _complement(factor: PETSc.Mat, size: int) -> Array:
     """Copy the Schur complement, stored by columns, out of a factorisation.
 
@@ -157,7 +153,8 @@ class SchurComplement:
         pc.setFactorSetUpSolverType()
         pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
         if self.size > 0:
-            _set_kept(pc.getFactorMatrix(), self._numbers)
+            handles = (pc.getFactorMatrix().handle, self._numbers.handle)
+            _check(_petsc.MatFactorSetSchurIS(*map(ctypes.c_void_p, handles)))
 
     def exceeds(self, rhs: Array, rounding: Array) -> bool:
         """Tell whether a right-hand side exceeds rounding at eliminated unknowns."""

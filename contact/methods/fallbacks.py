@@ -322,12 +322,12 @@ def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
         term = Proximal(stiffness, nodes.tangential_component(nodes.apply(state.x)))
         method = newton.on(problem.with_interface(replace(interface, proximal=term)))
         try:
-            held, outcome = method.iterate(state, note=PROXIMAL_POINT)
+            balanced, outcome = method.iterate(state, note=PROXIMAL_POINT)
         except SingularError:  # no contact: a normal motion is unconstrained
             newton.step.renew()
             return None
         if outcome.converged:
-            state, stiffness = held, SOFTER * stiffness
+            state, stiffness = balanced, SOFTER * stiffness
             if evaluate(problem, state).significant <= NEARLY_BALANCED:
                 found = newton.iterate(newton.started(state), note=PROXIMAL_POINT)
                 if found[1].converged:

@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from contact import build_problem
 from contact.linear.layout import balance
-from contact.linear.multigrid import DEFAULTS, held_motions, rigid_motions
+from contact.linear.multigrid import DEFAULTS, masked_motions, rigid_motions
 from contact.problem.problem import ContactProblem
 from scripts.benchmarks.bench_one import LINEAR, block
 from scripts.reporting import Report, append, parser
@@ -91,7 +91,7 @@ def measured(problem: ContactProblem, options: Mapping[str, str]) -> dict[str, A
     balance(matrix, layout)
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     ours = options is SOLVERS["this code"]
-    matrix.setNearNullSpace(held_motions(layout) if ours else rigid_motions(layout))
+    matrix.setNearNullSpace(masked_motions(layout) if ours else rigid_motions(layout))
     prefix, database = "beside_", PETSc.Options("beside_")
     given = {
         "ksp_type": "cg",

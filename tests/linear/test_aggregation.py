@@ -11,7 +11,7 @@ from contact.body.description import Body
 from contact.linear import aggregation
 from contact.linear.aggregation import Aggregation, tentative
 from contact.linear.layout import hidden, options
-from contact.linear.multigrid import DEFAULTS, held_motions
+from contact.linear.multigrid import DEFAULTS, masked_motions
 from contact.linear.operator import SparseOperator
 from contact.mesh.grid import box
 from contact.model.body import Fixed, Load
@@ -30,7 +30,7 @@ def level_of(problem: ContactProblem, steps: int = 1) -> tuple[PETSc.Mat, Aggreg
     matrix = body.create_matrix()
     body.assemble(matrix, "secant", problem.start())
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    matrix.setNearNullSpace(held_motions(body.layout))
+    matrix.setNearNullSpace(masked_motions(body.layout))
     return matrix, Aggregation(matrix, aggregates(matrix), steps)
 
 
@@ -144,7 +144,7 @@ def test_entries_may_be_zero_where_others_are_later() -> None:
     rows = np.repeat(np.arange(*matrix.getOwnershipRange()), np.diff(starts))
     matrix.setValuesCSR(starts, columns, np.where(rows % 3 == columns % 3, values, 0.0))
     matrix.assemble()
-    matrix.setNearNullSpace(held_motions(body.layout))
+    matrix.setNearNullSpace(masked_motions(body.layout))
     level = Aggregation(matrix, aggregates(matrix, "0"))
     level.update()
     coupled.copy(matrix, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
@@ -172,7 +172,7 @@ def test_rounding_on_one_side_of_a_symmetric_matrix() -> None:
     matrix.setValuesCSR(starts, columns, values)
     matrix.assemble()
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    matrix.setNearNullSpace(held_motions(body.layout))
+    matrix.setNearNullSpace(masked_motions(body.layout))
     found = aggregates(matrix, "0")
     assert matrix.isSymmetricKnown() == (True, True)
     ones = found.createVecRight()
