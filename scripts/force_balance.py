@@ -61,7 +61,7 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     forces = -problem.nodes.weight[:, None] * stress
     problem.nodes.transpose(forces, pushes)
     contact = body.nodal(pushes)[:, :d].sum(axis=0)
-    ends = np.cumsum([entry.nodes.nodes.size for entry in problem.entries])[:-1]
+    ends = np.cumsum([own.nodes.nodes.size for own in problem.geometries])[:-1]
     passed = [part.sum(axis=0) for part in np.split(forces, ends)]
     local = np.stack([given, supports, contact, *passed])
     total = problem.domain.resultant(problem.comm.allreduce(local, op=MPI.SUM))

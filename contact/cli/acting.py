@@ -53,7 +53,7 @@ def acting(problem: ContactProblem, times: Sequence[float]) -> list[str]:
     Each thing is told at the time at which it is largest, and not at all if it is 0 at all times.
     """
     comm, size = problem.comm, problem.domain.size
-    gap = problem.nodes.gap
+    gap = problem.interface.gap
     gap = np.where(np.abs(gap) < NEGLIGIBLE * size, 0.0, gap)  # rounding is no gap
     least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
     largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)

@@ -115,7 +115,10 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
 def _foundation(problem: ContactProblem) -> Array:
     """Return contact nodes, and where they would meet rigid foundations, (m, 2, d). Collective."""
     found: list[Array] = [np.zeros((0, 2, problem.dim))]
-    for nodes in (entry.nodes for entry in problem.entries if entry.coupling is None):
+    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
+        nodes = geometry.nodes
+        if contact.against is not None:
+            continue
         near = np.isfinite(nodes.gap)
         places = nodes.points + np.where(near, nodes.gap, 0.0)[:, None] * nodes.normal
         found.append(nodes.gather(np.stack([nodes.points, places], axis=1)[near]))

@@ -7,9 +7,9 @@ Where to find
 complementarity functions, their residuals and generalised derivative
     `complementarity`, with the parameters c and gamma (`ComplementarityParameters`).
 active set (open, stick, slip)
-    `active_set`: `ActiveSet` and `touching` are its only definition.
+    `active_set`: `ActiveSet` and `touching`, its only definition.
 all laws together
-    `interface.Interface`: opening, slip, pressure, friction bound, forces on the body.
+    `interface.Interface`: normal gap, slip, pressure, friction bound, forces on the body.
 friction
     `friction`, with the coefficients of `forms.laws`; `smoothing` has the non-local operator R.
 layer and current
@@ -17,17 +17,16 @@ layer and current
 penalised laws
     `penalised`.
 jump, lumped surface mass
-    `nodes.ContactNodes`, of both kinds of contact.
+    `nodes.ContactNodes`, of both kinds of contact; `nodes.Geometry` of one contact.
 contact forces, slip history
     `multipliers`.
-contact nodes
+contact nodes and their geometry at a place
     in front of a rigid foundation `placing`, of another body `pairing`; of several contacts
-    `entries`.
+    `joined`.
 mortar coupling
-    `mortar`: `search` finds the facets opposite, on whatever rank, `coupling` integrates the dual
-    operator over their `segments`, `operator` applies it, `lumping` has the areas of nodes;
-    `contact.mesh.deviation` has the distance of a curved surface from its chords. Each rank has the
-    rows of its own nodes.
+    `mortar`: `search` of the facets opposite on all ranks, `coupling` (D and M, by integrals over
+    `segments`), `operator` (their application), `lumping` (areas of nodes); the deviation of curved
+    surfaces from their chords is in `contact.mesh.deviation`. Each rank has the rows of its nodes.
 rigid shapes
     `obstacle`: `protocol` is the base class of shapes, which `shapes` and `triangles` are.
 """

@@ -16,21 +16,19 @@ from contact.tolerances import EPS
 from contact.typing import Array
 
 
-def touching(pressure: Array, opening: Array, c: float, rounding: float = 0.0) -> NDArray[np.bool_]:
-    """Tell where the rigid part presses: p - c (gap - u_nu) > 0, shape (n,).
+def touching(
+    pressure: Array, normal_gap: Array, c: float, rounding: float = 0.0
+) -> NDArray[np.bool_]:
+    """Return where the rigid part presses: p - c g_N > 0, shape (n,).
 
     Parameters
     ----------
-    pressure
-        Multiplier of the unilateral constraint, shape (n,).
-    opening
-        gap - u_nu, shape (n,).
-    c
-        Weighs displacements against stresses (stress/length).
-    rounding
-        A stress that counts as none.
+    pressure, normal_gap
+        Multiplier of the unilateral constraint, and g_N = gap - u_nu, shape (n,).
+    c, rounding
+        Complementarity parameter (stress/length), and tolerance (stress).
     """
-    return np.greater(pressure - c * opening, rounding)
+    return np.greater(pressure - c * normal_gap, rounding)
 
 
 @dataclass(frozen=True)
@@ -42,8 +40,8 @@ class ActiveSet:
     closed
         Where the rigid part presses, shape (n,).
     sticks, slips
-        Where friction holds the node, and where it is at its bound, shape (n,). A smoothed
-        pressure and Tresca's law bound the friction of open nodes too, which then do either.
+        Where friction is below its bound, and at it, shape (n,). With a smoothed pressure or
+        Tresca's law open nodes have a bound, and do either.
     """
 
     closed: NDArray[np.bool_]
@@ -72,7 +70,7 @@ class ActiveSet:
         c, rounding
             As in `touching`.
         """
-        # A node that was at its bound and does not slip yet sticks, whatever the last digit says.
+        # At the bound and without slip yet a node sticks, to rounding.
         allowed = bound * (1 + 100 * EPS) + rounding
         within = np.linalg.norm(friction + c * slip, axis=1) <= allowed
         acts = (bound > 0) | closed
@@ -84,14 +82,12 @@ class ActiveSet:
         return ActiveSet(closed, closed & friction, np.zeros_like(closed))
 
     def stopped(self, before: ActiveSet, friction: Array, slip: Array) -> ActiveSet:
-        """Return this set where nodes stick that friction pushes along.
-
-        Such a node has to stop before it can slip back.
+        """Return this set with stick where slip reverses: lambda_f . u_tau < 0 after slip.
 
         Parameters
         ----------
         before
-            The active set of the step before.
+            Active set of the last step.
         friction, slip
             As in `of`.
         """
@@ -99,7 +95,7 @@ class ActiveSet:
         return replace(self, sticks=self.sticks | stops, slips=self.slips & ~stops)
 
     def same(self, other: ActiveSet) -> bool:
-        """Tell whether all nodes of this rank are in the same state in another set."""
+        """Return whether another set is the same on this rank."""
         return (
             np.array_equal(self.closed, other.closed)
             and np.array_equal(self.sticks, other.sticks)

@@ -4,7 +4,7 @@ With projections onto the admissible forces, a half line and a disc, the laws ar
 
     p - max(0, p - c (gap - u_nu)) = 0,     lambda_f - proj_s(lambda_f + c u_tau) = 0,
 
-with the initial gap (rho in the pages) and the opening gap - u_nu (the normal gap g_N).
+with the initial gap (rho in the pages) and the normal gap g_N = gap - u_nu.
 Their pieces are those of the active set (`contact.interface.active_set`). `interface_residuals`
 evaluates them; `linearise` takes a step of the semismooth Newton method on them, node by node.
 There a node in contact pushes with p - gamma (gap - u_nu), a sticking one with
@@ -84,41 +84,40 @@ def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
 def interface_residuals(
     interface: Interface,
     nodal: Array,
-    forces: Multipliers,
+    multipliers: Multipliers,
     bound: Array,
     rounding: Array | float = 0.0,
 ) -> tuple[Array, Array]:
-    """Return the relative contact and friction residuals at nodal unknowns. Collective.
+    """Return the relative contact and friction residuals and their floors, (2,). Collective.
 
-    Those of each connected component are relative to its pressures; the `worst` are returned,
-    with their rounding floors, both of shape (2,).
+    The `worst` of the connected components, each relative to its pressures.
 
     Parameters
     ----------
-    interface, nodal, forces, bound
-        The laws, unknowns and contact forces at the nodes, and the friction bound, shape (n,).
+    interface, nodal, multipliers, bound
+        The laws, unknowns and multipliers at the nodes, and the friction bound, shape (n,).
     rounding
-        Norm of pressures in L2(Gamma_3) that nothing can tell from zero, of each component.
+        Rounding of the pressures of each component, in L2(Gamma_3).
     """
-    # Closing a gap at one node takes a stress of E/h: where the body is that long only because its
-    # cells are stretched, E/diameter hides errors of the pressure far above the tolerance.
+    # Closing a gap at one node takes a stress of E/h: with stretched cells E/diameter would hide
+    # errors of the pressure far above the tolerance.
     c = interface.elongation * interface.stiffness
-    opening = interface.opening(nodal)
-    contact = forces.pressure - project_half_line(forces.pressure - c * opening)
+    normal_gap = interface.normal_gap(nodal)
+    contact = multipliers.pressure - project_half_line(multipliers.pressure - c * normal_gap)
     # Friction along the normal violates the law wherever a node sticks or slips.
-    trial = interface.jump.tangential_component(forces.friction) + c * interface.slip(nodal)
-    friction = forces.friction - project_disc(trial, bound)
+    trial = interface.nodes.tangential_component(multipliers.friction) + c * interface.slip(nodal)
+    friction = multipliers.friction - project_disc(trial, bound)
     friction[np.isnan(bound)] = np.nan  # no comparison with NaN is true
-    # Where next to nothing presses, rounding is compared with the stress that closing would take,
-    # but not of gaps far wider than nodes move: these say nothing of the loads.
+    # Beside small pressures the reference is the stress that closes the gaps, up to the motion of
+    # the nodes: wider gaps say nothing of the loads.
     before = np.linalg.norm(interface.friction.history.jump, axis=1)
     now = np.linalg.norm(nodal[:, : interface.dim], axis=1)
     way = np.maximum(now, before)
     closing = interface.stiffness * interface.norms(
-        np.minimum(np.minimum(np.abs(opening), way), interface.diameter)
+        np.minimum(np.minimum(np.abs(normal_gap), way), interface.diameter)
     )
-    pressed = interface.norms(interface.pressure(nodal, forces))
-    # Where nothing presses, nodes may have moved until they just touch: gaps are rounding too.
+    pressed = interface.norms(interface.pressure(nodal, multipliers))
+    # Without pressure nodes may just touch: their gaps are rounding too.
     moved = interface.norms(np.full_like(way, interface.rounding(nodal)))
     covered = interface.stiffness * interface.norms(np.minimum(now, interface.diameter))
     closing = np.where(pressed <= moved, np.maximum(closing, covered), closing)
@@ -130,11 +129,7 @@ def interface_residuals(
 
 
 def worst(residuals: Array, floors: Array) -> tuple[Array, Array]:
-    """Return the largest residual of each row, and its rounding floor.
-
-    It is the largest of those above their floors, which alone decide whether a state is accepted,
-    and the largest of all where none is.
-    """
+    """Return the largest residual of each row, above its floor if any is, and its floor."""
     above = np.where(residuals <= floors, -1.0, residuals)
     some = (above >= 0) | np.isnan(above)
     chosen = np.where(some.any(axis=1, keepdims=True), above, residuals)
@@ -152,11 +147,11 @@ class ComplementarityParameters:
     Attributes
     ----------
     c
-        Weighs displacements against stresses in the functions, and thereby in the active set.
+        Complementarity parameter of the functions and of the active set.
     nodal_stiffness
-        Of the body against a displacement of one contact node, about E'/h.
+        Stiffness of the body at one contact node, about E'/h.
     gamma
-        Augmentation parameter: of the eliminated constraints, far above the others.
+        Augmentation parameter of the eliminated constraints, far above the others.
     """
 
     c: float
@@ -166,21 +161,21 @@ class ComplementarityParameters:
 
 @dataclass(frozen=True)
 class LinearisedContact:
-    """Contact forces at an iterate and their derivative.
+    """Multipliers at an iterate and their derivative.
 
     Attributes
     ----------
-    forces
-        Multipliers, to be put into the residual.
+    multipliers
+        Multipliers of the residual.
     blocks
         Derivative by the nodal unknowns, shape (n, block size, block size), without weights.
     active_set
-        The state of each node in this step.
+        Active set of this step.
     unchanged
-        Whether that is the one of the step before, on all ranks.
+        Whether it is that of the last step, on all ranks.
     """
 
-    forces: Multipliers
+    multipliers: Multipliers
     blocks: Array
     active_set: ActiveSet
     unchanged: bool
@@ -190,7 +185,7 @@ class LinearisedContact:
 def linearise(
     interface: Interface,
     nodal: Array,
-    forces: Multipliers,
+    multipliers: Multipliers,
     parameters: ComplementarityParameters,
     before: ActiveSet | None,
     softening: float = np.inf,
@@ -199,24 +194,23 @@ def linearise(
 
     Parameters
     ----------
-    interface, nodal, forces
+    interface, nodal, multipliers
         The contact nodes with their laws, the unknowns there, and the contact forces.
     parameters
         Of the complementarity functions.
     before
-        The active set of the step before; None in the first one, where closed nodes stick.
+        Active set of the last step; None in the first one, where closed nodes stick.
     softening
-        Part of a node's own stiffness that a falling friction coefficient may take away: with its
-        neighbours, which slide along, a node is less stiff than alone.
+        Largest share of a node's stiffness that a falling friction coefficient takes away.
     """
-    jump, frictional, c = interface.jump, interface.friction.acts, parameters.c
-    p, lam, n, d = forces.pressure, forces.friction, jump.normal, jump.dim
-    opening, slip = interface.opening(nodal), interface.slip(nodal)
+    nodes, frictional, c = interface.nodes, interface.friction.acts, parameters.c
+    p, lam, n, d = multipliers.pressure, multipliers.friction, nodes.normal, nodes.dim
+    normal_gap, slip = interface.normal_gap(nodal), interface.slip(nodal)
     length = np.linalg.norm(slip, axis=1)
-    total = interface.pressure(nodal, forces)
+    total = interface.pressure(nodal, multipliers)
     bound = interface.friction.bound(total, length)
     if before is None:
-        active = ActiveSet.without_slip(opening <= 1e-12 * interface.diameter, frictional)
+        active = ActiveSet.without_slip(normal_gap <= 1e-12 * interface.diameter, frictional)
     else:
         lam = at_bound(before, lam, slip, bound)
         known = Multipliers(p, lam)
@@ -227,17 +221,17 @@ def linearise(
     changed = before is None or not active.same(before)
     unchanged = float(summed(interface.comm, changed)) == 0
 
-    pressure = np.where(closed, p - parameters.gamma * opening, 0.0)
-    blocks = np.zeros((p.size, jump.block_size, jump.block_size))
+    pressure = np.where(closed, p - parameters.gamma * normal_gap, 0.0)
+    blocks = np.zeros((p.size, nodes.block_size, nodes.block_size))
     slope = np.where(closed, parameters.gamma, 0.0)[:, None] * n
     blocks[:, :d, :d] = n[:, :, None] * slope[:, None, :]
     friction = np.zeros_like(lam)
     if frictional:
         friction[sticks] = (lam + parameters.gamma * slip)[sticks]
-        blocks[sticks, :d, :d] += parameters.gamma * jump.tangent[sticks]
+        blocks[sticks, :d, :d] += parameters.gamma * nodes.tangent[sticks]
 
         along = trial / np.maximum(norm, 1e-300)[:, None]
-        across = jump.tangent - along[:, :, None] * along[:, None, :]
+        across = nodes.tangent - along[:, :, None] * along[:, None, :]
         # Across z = lambda + c u_tau the new multiplier is s/|u_tau| times the new slip:
         # lambda = s z/|z|, linearised in u and lambda and solved for the latter.
         least = np.maximum(bound * c / parameters.gamma, 1e-300)  # turning is at most gamma
@@ -248,9 +242,9 @@ def linearise(
         rate = _bound_gradient(interface, total, slip, length, limit)
         # The bound follows the pressure of this very step.
         by_pressure = interface.friction.by_pressure(total, length)
-        ahead = -by_pressure * parameters.gamma * np.where(closed, opening, 0.0)
+        ahead = -by_pressure * parameters.gamma * np.where(closed, normal_gap, 0.0)
         rate[:, :d] += by_pressure[:, None] * slope
-        rate += by_pressure[:, None] * interface.law.layer_gradient(nodal)
+        rate += by_pressure[:, None] * interface.layer.pressure_gradient(nodal)
         friction[slips] += (ahead[:, None] * along)[slips]
         blocks[slips, :d, :] += along[slips, :, None] * rate[slips, None, :]
         blocks[slips, :d, :d] += sliding[slips]
@@ -258,10 +252,10 @@ def linearise(
 
 
 def at_bound(before: ActiveSet, friction: Array, slip: Array, bound: Array) -> Array:
-    """Return friction, at its bound where nodes go on slipping against it, shape (n, d).
+    """Return friction, raised to its bound at nodes that go on slipping, shape (n, d).
 
     The linearised bound of a coefficient that falls with the slip may be far below that of the new
-    slip. A node would stick by it, be released for the same reason as before, and so on.
+    slip: active sets would cycle between stick and slip.
     """
     norm = np.linalg.norm(friction, axis=1)
     slides = (
@@ -274,12 +268,9 @@ def at_bound(before: ActiveSet, friction: Array, slip: Array, bound: Array) -> A
 def _bound_gradient(
     interface: Interface, total: Array, slip: Array, length: Array, limit: float | None
 ) -> Array:
-    """Return the derivative of the friction bound by the slip, shape (n, block size).
-
-    Taken only when the slip zone is that of the step before, and limited: where friction falls
-    faster than the node's own stiffness, the linearised node would snap.
-    """
-    gradient = np.zeros((length.size, interface.jump.block_size))
+    """Return the derivative of the friction bound by the slip, shape (n, block size)."""
+    # Where friction falls faster than the node's own stiffness, the linearised node would snap.
+    gradient = np.zeros((length.size, interface.nodes.block_size))
     if limit is None:
         return gradient
     fall = np.maximum(interface.friction.by_slip(total, length), -limit)

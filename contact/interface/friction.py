@@ -33,14 +33,13 @@ from forms.laws import ConstantCoefficient, Coulomb, FrictionLaw, Tresca
 
 
 def law_at(friction: Friction, nodes: ContactNodes) -> FrictionLaw | None:
-    """Return the law at contact nodes; None where no bound is ever above 0. Collective.
+    """Return the law at contact nodes; None without friction. Collective.
 
     Raises
     ------
     InputError
-        If a bound or coefficient is negative or no number at a node, or a coefficient of the
-        slip where nothing slips, or a derivative, the maximum or the Lipschitz constant is not
-        that of its law.
+        If a bound or coefficient is negative or no number at a node, or without slip; or a wrong
+        derivative, maximum or Lipschitz constant.
     """
     given: Any = friction.mu.coefficient if isinstance(friction.mu, SlipLaw) else friction.mu
     if friction.law == "none":
@@ -74,7 +73,7 @@ def law_at(friction: Friction, nodes: ContactNodes) -> FrictionLaw | None:
 
 
 def _check_law(law: FrictionLaw) -> None:
-    """Refuse a law whose derivatives, or constants, are not its own."""
+    """Refuse a law with wrong derivatives or constants."""
     slip, pressure = np.tile(SAMPLES, PRESSURES.size), np.repeat(PRESSURES, SAMPLES.size)
     for name, bound, slope, at in (
         ("by_slip", lambda s: law(s, pressure), lambda s: law.by_slip(s, pressure), slip),
@@ -85,10 +84,7 @@ def _check_law(law: FrictionLaw) -> None:
 
 
 def _check_constants(name: str, symbol: str, law: FrictionLaw) -> None:
-    """Refuse an upper bound, or a Lipschitz constant, that values of s/p contradict.
-
-    Nothing is refused where `sampled` has no values.
-    """
+    """Refuse an upper bound or a Lipschitz constant that values of s/p contradict."""
     for key in ("maximum", "lipschitz"):
         given = getattr(law, key)
         fits = isinstance(given, int | float | np.number) and given >= 0
@@ -141,7 +137,7 @@ def _check(name: str, values: Array, nodes: ContactNodes) -> None:
 class NodalFriction:
     """Friction at the owned contact nodes, in a step of an evolution.
 
-    The slips that its methods take are those of the step; the law is given all that has slipped.
+    Its methods take slips of the step; the law depends on the accumulated slip.
 
     Attributes
     ----------
@@ -186,8 +182,7 @@ class NodalFriction:
     def by_pressure(self, pressure: Array, slip: Array) -> Array:
         """Return the derivative of the bound by the pressure at the node, shape (n,).
 
-        0 for a smoothed pressure, which couples all nodes within the radius and would fill the
-        matrix: it is lagged.
+        0 for a smoothed pressure: it would couple all nodes within the radius, and is lagged.
         """
         if self.law is None or not self.local:
             return np.zeros_like(slip)

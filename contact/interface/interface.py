@@ -22,14 +22,14 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class Proximal:
-    """An elastic bed along the tangents, about an earlier iterate.
+    """An elastic bed along the tangents: k (u_tau - u_tau of an iterate).
 
     Attributes
     ----------
     stiffness
-        Of the bed (stress/length).
+        k (stress/length).
     about
-        Tangential displacement of the iterate, shape (n, d).
+        u_tau of the iterate, shape (n, d).
     """
 
     stiffness: float
@@ -40,37 +40,40 @@ class Proximal:
 class Interface:
     """Unilateral contact, friction, layer and current at the owned contact nodes.
 
-    Nodal unknowns are arrays of shape (n, block size): displacement, then scaled potential.
+    Nodal unknowns have shape (n, block size): displacement, then scaled potential.
 
     Attributes
     ----------
-    jump
-        The contact nodes; their gap is that of the unilateral constraint.
-    law
+    nodes
+        The contact nodes.
+    gap
+        Of the unilateral constraint, shape (n,): that of the nodes, or infinite where none acts, as
+        behind a layer without a rigid part, and at nodes outside of a working set.
+    layer
         Layer and current.
     friction
         Friction.
-    held
-        The current through nodes that cannot move, but whose potential is free; None without.
+    constrained
+        Current through nodes without a free displacement, but with a free potential, or None.
     stiffness
-        c = E/diameter, which weighs displacements against stresses (stress/length); E of the
-        regions that touch.
+        Complementarity parameter c = E/diameter (stress/length), E behind Gamma_3.
     diameter
         Largest extent of the body (length).
     elongation
-        How many times longer than usual the cells behind Gamma_3 are, across it
-        (`contact.mesh.entities.elongation`); residuals take c so many times as large.
+        Aspect ratio of the cells behind Gamma_3 (`contact.mesh.entities.elongation`), by which c
+        of the residuals is larger.
     component, components
-        The connected component of the mesh that each contact node belongs to, shape (n,), and how
-        many there are (`contact.body.component_norms`).
+        Connected component of each contact node, shape (n,), and their number
+        (`contact.body.component_norms`).
     proximal
-        The term of a proximal-point method; None for the problem itself.
+        The term of a proximal-point method, or None.
     """
 
-    jump: ContactNodes
-    law: InterfaceLaw
+    nodes: ContactNodes
+    gap: Array
+    layer: InterfaceLaw
     friction: NodalFriction
-    held: InterfaceLaw | None
+    constrained: InterfaceLaw | None
     stiffness: float
     diameter: float
     elongation: float
@@ -81,163 +84,153 @@ class Interface:
     @property
     def comm(self) -> MPI.Intracomm:
         """Communicator."""
-        return self.jump.comm
+        return self.nodes.comm
 
     @property
     def dim(self) -> int:
         """Number of displacement components."""
-        return self.jump.dim
+        return self.nodes.dim
 
     def at(self, time: float, history: SlipHistory) -> Interface:
-        """Return the interface of a step that ends at a time with the slip history before it."""
+        """Return the interface at the end of a step, with the slip history before it."""
         return replace(
             self,
-            law=self.law.at(time),
+            layer=self.layer.at(time),
             friction=replace(self.friction, history=history),
-            held=None if self.held is None else self.held.at(time),
+            constrained=None if self.constrained is None else self.constrained.at(time),
         )
 
     def norms(self, values: Array) -> Array:
         """Return the norms in L2(Gamma_3) of values on each component, shape (k,). Collective."""
         if self.components == 1:
-            return np.array([self.jump.norm(values)])
+            return np.array([self.nodes.norm(values)])
         squares = values**2 if values.ndim == 1 else np.einsum("ni,ni->n", values, values)
         return np.sqrt(
-            component_sums(self.comm, self.component, self.jump.weight * squares, self.components)
+            component_sums(self.comm, self.component, self.nodes.weight * squares, self.components)
         )
 
     def component_norms(self, values: Array) -> Array:
         """Return the norms on the components of the nodes, 1 for a single one. Collective."""
         norms = self.norms(values)
         if self.components == 1 or not norms.max() > 0:
-            return np.ones_like(self.jump.weight)
+            return np.ones_like(self.nodes.weight)
         return np.maximum(norms, EPS * norms.max())[self.component]
 
     @property
     def extents(self) -> tuple[Array, Array]:
         """The number of contact nodes of each component, and their area, shape (k,). Collective."""
-        of, weight = (self.comm, self.component), self.jump.weight
+        of, weight = (self.comm, self.component), self.nodes.weight
         count = component_sums(*of, np.ones_like(weight), self.components)
         return count, component_sums(*of, weight, self.components)
 
-    def opening(self, nodal: Array) -> Array:
-        """Return gap - u_nu, shape (n,): the distance that is left."""
-        return self.jump.gap - self.jump.normal_component(nodal)
+    def normal_gap(self, nodal: Array) -> Array:
+        """Return g_N = gap - u_nu, shape (n,)."""
+        return self.gap - self.nodes.normal_component(nodal)
 
     def slip(self, nodal: Array) -> Array:
-        """Return the slip of the step, u_tau less that at its beginning, shape (n, d).
-
-        Friction depends on this alone. For a static problem, one step from zero, it is u_tau.
-        """
-        return self.jump.tangential_component(nodal[:, : self.dim] - self.friction.history.jump)
+        """Return the slip of the step, u_tau less that at its beginning, shape (n, d)."""
+        return self.nodes.tangential_component(nodal[:, : self.dim] - self.friction.history.jump)
 
     def commit(self, nodal: Array) -> SlipHistory:
         """Return the slip history of the next step, where this one ends at nodal unknowns."""
         accumulated = self.friction.history.accumulated + self.slip_length(nodal)
-        return SlipHistory(self.jump.tangential_component(nodal), accumulated)
+        return SlipHistory(self.nodes.tangential_component(nodal), accumulated)
 
     def slip_length(self, nodal: Array) -> Array:
         """Return the lengths of `slip`, shape (n,)."""
         return np.linalg.norm(self.slip(nodal), axis=1)
 
-    def pressure(self, nodal: Array, forces: Multipliers) -> Array:
+    def pressure(self, nodal: Array, multipliers: Multipliers) -> Array:
         """Return -sigma_nu, the multiplier and the layer's pressure, shape (n,)."""
-        return forces.pressure + self.law.layer_pressure(nodal)
+        return multipliers.pressure + self.layer.pressure(nodal)
 
-    def bound(self, nodal: Array, forces: Multipliers) -> Array:
+    def bound(self, nodal: Array, multipliers: Multipliers) -> Array:
         """Return the friction bound s, shape (n,). Collective."""
-        return self.friction.bound(self.pressure(nodal, forces), self.slip_length(nodal))
+        return self.friction.bound(self.pressure(nodal, multipliers), self.slip_length(nodal))
 
-    def stress(self, nodal: Array, forces: Multipliers) -> Array:
+    def stress(self, nodal: Array, multipliers: Multipliers) -> Array:
         """Return -sigma nu, layer included, shape (n, d)."""
-        return Multipliers(self.pressure(nodal, forces), forces.friction).vectors(self.jump)
+        pressure = self.pressure(nodal, multipliers)
+        return Multipliers(pressure, multipliers.friction).vectors(self.nodes)
 
     def active_set(
         self,
         nodal: Array,
-        forces: Multipliers,
+        multipliers: Multipliers,
         bound: Array,
         c: float | None = None,
         rounding: float = 0.0,
     ) -> ActiveSet:
-        """Return which nodes are open, stick or slip.
+        """Return the active set: open, stick, slip.
 
         Parameters
         ----------
-        nodal, forces, bound
-            Unknowns, contact forces and friction bound.
+        nodal, multipliers, bound
+            Unknowns, multipliers and friction bound.
         c, rounding
-            Weight of displacements against stresses, `stiffness` by default, and a stress that
-            counts as none.
+            As in `touching`; `stiffness` by default.
         """
         c = self.stiffness if c is None else c
-        closed = touching(forces.pressure, self.opening(nodal), c, rounding)
+        closed = touching(multipliers.pressure, self.normal_gap(nodal), c, rounding)
         if not self.friction.acts:
             return ActiveSet.without_slip(closed, False)
-        return ActiveSet.of(closed, forces.friction, self.slip(nodal), bound, c, rounding)
+        return ActiveSet.of(closed, multipliers.friction, self.slip(nodal), bound, c, rounding)
 
     def node_counts(self, nodal: Array, active: ActiveSet) -> tuple[int, int, int]:
-        """Return the numbers of nodes that are open, stick and slip. Collective.
-
-        Parameters
-        ----------
-        nodal
-            Unknowns: a node that presses the layer alone is not open.
-        active
-            The active set.
-        """
-        closed = active.closed | (self.law.layer_pressure(nodal) > 0)
+        """Return the numbers of open, stick and slip nodes; layer contact is closed. Collective."""
+        closed = active.closed | (self.layer.pressure(nodal) > 0)
         sticks = closed & active.sticks
         local = [np.count_nonzero(nodes) for nodes in (~closed, sticks, closed & ~sticks)]
         opened, stick, slip = (int(count) for count in summed(self.comm, local))
         return opened, stick, slip
 
     def rounding(self, nodal: Array) -> float:
-        """Return a pressure that rounding of the displacements makes (stress). Collective."""
-        displacement = np.abs(nodal[:, : self.jump.dim]).max(axis=1, initial=0.0)
-        return 2 * ROUNDING * self.stiffness * self.jump.maximum(displacement)
+        """Return the pressure of a rounding of the displacements (stress). Collective."""
+        displacement = np.abs(nodal[:, : self.nodes.dim]).max(axis=1, initial=0.0)
+        return 2 * ROUNDING * self.stiffness * self.nodes.maximum(displacement)
 
     def negligible(self, nodal: Array, pressure: Array) -> float:
-        """Return a pressure that counts as none beside all others. Collective.
+        """Return the rounding of pressures, by displacements or the largest one. Collective."""
+        return max(NEGLIGIBLE * self.nodes.maximum(pressure), self.rounding(nodal))
 
-        That is rounding of the displacements, or of the largest pressure.
-        """
-        return max(NEGLIGIBLE * self.jump.maximum(pressure), self.rounding(nodal))
+    def acting(
+        self, x: Array, multipliers: Multipliers
+    ) -> Iterator[tuple[InterfaceLaw, Array, Array]]:
+        """Yield law, unknowns and pressures of contact, then constrained nodes. Collective."""
+        nodal = self.nodes.apply(x)
+        yield self.layer, nodal, self.pressure(nodal, multipliers)
+        if self.constrained is not None:
+            nodal = self.constrained.nodes.apply(x)
+            yield self.constrained, nodal, self.constrained.resting(nodal)
 
-    def acting(self, x: Array, forces: Multipliers) -> Iterator[tuple[InterfaceLaw, Array, Array]]:
-        """Yield the law, unknowns and pressures of contact nodes, then of held ones. Collective."""
-        nodal = self.jump.apply(x)
-        yield self.law, nodal, self.pressure(nodal, forces)
-        if self.held is not None:
-            nodal = self.held.jump.apply(x)
-            yield self.held, nodal, self.held.resting(nodal)
-
-    def add_forces(self, residual: Array, x: Array, forces: Multipliers) -> None:
+    def add_forces(self, residual: Array, x: Array, multipliers: Multipliers) -> None:
         """Add the contact forces and the current at local unknowns to owned values."""
-        jump = self.jump
-        jump.transpose(jump.weight[:, None] * forces.vectors(jump), residual)
-        for law, nodal, pressure in self.acting(x, forces):
-            law.jump.transpose(law.jump.weight[:, None] * law.force(nodal, pressure), residual)
+        nodes = self.nodes
+        nodes.transpose(nodes.weight[:, None] * multipliers.vectors(nodes), residual)
+        for law, nodal, pressure in self.acting(x, multipliers):
+            law.nodes.transpose(law.nodes.weight[:, None] * law.force(nodal, pressure), residual)
         if self.proximal is not None:
-            away = jump.tangential_component(jump.apply(x)) - self.proximal.about
-            jump.transpose(self.proximal.stiffness * jump.weight[:, None] * away, residual)
+            away = nodes.tangential_component(nodes.apply(x)) - self.proximal.about
+            nodes.transpose(self.proximal.stiffness * nodes.weight[:, None] * away, residual)
 
-    def add_current(self, residual: Array, x: Array, change: Array, forces: Multipliers) -> None:
+    def add_current(
+        self, residual: Array, x: Array, change: Array, multipliers: Multipliers
+    ) -> None:
         """Add the change of the current with local unknowns, psi frozen, to owned values."""
-        for law, nodal, pressure in self.acting(x, forces):
+        for law, nodal, pressure in self.acting(x, multipliers):
             block = law.current_block(nodal, pressure)
-            density = np.einsum("nij,nj->ni", block, law.jump.apply(change))
-            law.jump.transpose(law.jump.weight[:, None] * density, residual)
+            density = np.einsum("nij,nj->ni", block, law.nodes.apply(change))
+            law.nodes.transpose(law.nodes.weight[:, None] * density, residual)
 
     @property
     def coupled(self) -> NDArray[np.int32]:
-        """Nodes at which the operator has blocks: contact nodes, then held ones."""
-        if self.held is None:
-            return self.jump.nodes
-        return np.concatenate([self.jump.nodes, self.held.jump.nodes])
+        """Nodes at which the operator has blocks: contact nodes, then constrained ones."""
+        if self.constrained is None:
+            return self.nodes.nodes
+        return np.concatenate([self.nodes.nodes, self.constrained.nodes.nodes])
 
     def weighted(self, blocks: Array, x: Array) -> Array:
-        """Return the operator's blocks at `coupled`: those of the contact nodes, times weight.
+        """Return the blocks of the operator at `coupled`: those of the contact nodes, times weight.
 
         Parameters
         ----------
@@ -248,11 +241,11 @@ class Interface:
         """
         if self.proximal is not None:
             blocks = blocks.copy()
-            blocks[:, : self.dim, : self.dim] += self.proximal.stiffness * self.jump.tangent
-        weighted = self.jump.weight[:, None, None] * blocks
-        if self.held is None:
+            blocks[:, : self.dim, : self.dim] += self.proximal.stiffness * self.nodes.tangent
+        weighted = self.nodes.weight[:, None, None] * blocks
+        if self.constrained is None:
             return weighted
-        held = self.held.jump
-        nodal = held.apply(x)
-        block = self.held.current_block(nodal, self.held.resting(nodal))
-        return np.concatenate([weighted, held.weight[:, None, None] * block])
+        there = self.constrained.nodes
+        nodal = there.apply(x)
+        block = self.constrained.current_block(nodal, self.constrained.resting(nodal))
+        return np.concatenate([weighted, there.weight[:, None, None] * block])

@@ -35,8 +35,8 @@ class InterfaceLaw:
     `contact_scale` (stress/length) weighs penetrations against pressures.
     """
 
-    jump: ContactNodes
-    layer: Layer | None
+    nodes: ContactNodes
+    compliance: Layer | None
     conductor: Conductor | None
     phi_scale: float
     contact_scale: float
@@ -44,7 +44,7 @@ class InterfaceLaw:
     @property
     def active(self) -> bool:
         """Whether there is a layer or a conductor."""
-        return self.layer is not None or self.conductor is not None
+        return self.compliance is not None or self.conductor is not None
 
     @property
     def follows_gap(self) -> bool:
@@ -55,19 +55,17 @@ class InterfaceLaw:
         return conductor.psi.follows_gap
 
     @property
-    def constrained(self) -> ContactNodes:
-        """The contact nodes with the gap of the unilateral constraint: infinite without one."""
-        rigid = self.layer is None or np.isfinite(self.layer.thickness)
-        if np.all(rigid):
-            return self.jump
-        return replace(self.jump, gap=np.where(rigid, self.jump.gap, np.inf))
+    def constrained_gap(self) -> Array:
+        """Gap of the unilateral constraint, (n,): infinite where there is no rigid part."""
+        rigid = self.compliance is None or np.isfinite(self.compliance.thickness)
+        return np.where(rigid, self.nodes.gap, np.inf)
 
     @property
     def touch(self) -> Array:
         """The gap rho_0 of the layer's first touch, shape (n,)."""
-        assert self.layer is not None
-        depth = self.layer.thickness
-        return self.jump.gap - np.where(np.isfinite(depth), depth, 0.0)
+        assert self.compliance is not None
+        depth = self.compliance.thickness
+        return self.nodes.gap - np.where(np.isfinite(depth), depth, 0.0)
 
     def at(self, time: float) -> InterfaceLaw:
         """Return the foundation at a time."""
@@ -85,39 +83,37 @@ class InterfaceLaw:
 
         None where there is no layer, or where it is lagged and thus a given force.
         """
-        if self.layer is None or self.layer.lagged:
+        if self.compliance is None or self.compliance.lagged:
             return None
-        stiffness = np.broadcast_to(self.layer.h_nu(self._difference(x)), x.shape[:1])
-        gap = self.constrained.gap
-        return NormalLaw(self.layer.p_nu, stiffness, self.touch, gap)
+        stiffness = np.broadcast_to(self.compliance.h_nu(self._difference(x)), x.shape[:1])
+        gap = self.constrained_gap
+        return NormalLaw(self.compliance.p_nu, stiffness, self.touch, gap)
 
     def _difference(self, x: Array) -> Array:
         """Return phi - phi_F at the nodes; 0 for a body without potential."""
-        if self.jump.block_size == self.jump.dim:
+        if self.nodes.block_size == self.nodes.dim:
             return np.zeros(x.shape[0])
         phi_f = self.conductor.phi_f if self.conductor is not None else 0.0
         return self.phi_scale * x[:, -1] - phi_f
 
     def _penetration(self, x: Array) -> Array:
         """Return u_nu - rho at the nodes."""
-        return self.jump.normal_component(x) - self.jump.gap
+        return self.nodes.normal_component(x) - self.nodes.gap
 
-    def layer_pressure(self, x: Array) -> Array:
+    def pressure(self, x: Array) -> Array:
         """Return the pressure of the layer at nodal unknowns of shape (n, block size)."""
-        if self.layer is None:
+        if self.compliance is None:
             return np.zeros(x.shape[0])
-        stiffness = self.layer.h_nu(self._difference(x))
-        return np.asarray(stiffness * self.layer.p_nu(self._depth(x)), dtype=float)
+        stiffness = self.compliance.h_nu(self._difference(x))
+        return np.asarray(stiffness * self.compliance.p_nu(self._depth(x)), dtype=float)
 
     def _depth(self, x: Array) -> Array:
-        """Return how deep the layer is pressed in: not deeper than to the rigid part.
-
-        An iterate may go beyond; the excess pressure belongs to the multiplier alone.
-        """
-        return np.minimum(self.jump.normal_component(x), self.constrained.gap) - self.touch
+        """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""
+        # An iterate may go beyond the rigid part; the excess pressure belongs to the multiplier.
+        return np.minimum(self.nodes.normal_component(x), self.constrained_gap) - self.touch
 
     def charge(self, x: Array, pressure: Array) -> Array:
-        """Return D.nu = psi phi_L(phi - phi_F) at the nodes; `pressure` tells the contact."""
+        """Return D.nu = psi phi_L(phi - phi_F) at the nodes; nodes with `pressure` are closed."""
         if self.conductor is None:
             return np.zeros(x.shape[0])
         return self._conductivity(x, pressure) * self.conductor.phi_l(self._difference(x))
@@ -127,59 +123,54 @@ class InterfaceLaw:
         assert self.conductor is not None
         pressed = self._pressed(x, pressure)
         # A multiplier of the size of rounding on an open node is no pressure.
-        loaded = pressed | (self.layer_pressure(x) > 0)
+        loaded = pressed | (self.pressure(x) > 0)
         psi = self.conductor.psi.at(self._penetration(x), pressed, loaded)
         return np.asarray(self.conductor.share * psi)
 
     def resting(self, x: Array) -> Array:
-        """Return pressures by which nodes conduct whose displacements are prescribed, shape (n,).
-
-        They are closed up to the rounding of these; there is no tolerance of a solver.
-        """
-        reach = np.abs(self.jump.gap) + np.linalg.norm(x[:, : self.jump.dim], axis=1)
+        """Return rounding pressures, by which constrained nodes that touch conduct, shape (n,)."""
+        reach = np.abs(self.nodes.gap) + np.linalg.norm(x[:, : self.nodes.dim], axis=1)
         return np.maximum(1e-12 * self.contact_scale * reach, TINY)
 
     def _pressed(self, x: Array, pressure: Array) -> NDArray[np.bool_]:
-        """Tell where the rigid part presses, and u_nu = rho.
-
-        An iterate misses that by the tolerance of the inner loop, which the steep ramp would
-        make a thousand times larger; an open node may carry a multiplier of that size.
-        """
-        opening = self.constrained.gap - self.jump.normal_component(x)
-        return touching(pressure - self.layer_pressure(x), opening, self.contact_scale)
+        """Return where the rigid part presses, shape (n,)."""
+        # u_nu = rho holds to the tolerance of the inner loop, which a steep ramp makes a thousand
+        # times larger; so large a multiplier at an open node is no pressure.
+        normal_gap = self.constrained_gap - self.nodes.normal_component(x)
+        return touching(pressure - self.pressure(x), normal_gap, self.contact_scale)
 
     def force(self, x: Array, pressure: Array) -> Array:
         """Return the nodal residual density, shape (n, block size), in scaled unknowns."""
-        total = np.zeros((x.shape[0], self.jump.block_size))
-        total[:, : self.jump.dim] = self.layer_pressure(x)[:, None] * self.jump.normal
+        total = np.zeros((x.shape[0], self.nodes.block_size))
+        total[:, : self.nodes.dim] = self.pressure(x)[:, None] * self.nodes.normal
         if self.conductor is not None:
             total[:, -1] -= self.phi_scale * self.charge(x, pressure)
         return total
 
-    def layer_gradient(self, x: Array) -> Array:
-        """Return the derivative of `layer_pressure` by the nodal unknowns, (n, block size)."""
-        total = np.zeros((x.shape[0], self.jump.block_size))
-        if self.layer is None:
+    def pressure_gradient(self, x: Array) -> Array:
+        """Return the derivative of `pressure` by the nodal unknowns, (n, block size)."""
+        total = np.zeros((x.shape[0], self.nodes.block_size))
+        if self.compliance is None:
             return total
         depth, difference = self._depth(x), self._difference(x)
-        inside = self.jump.normal_component(x) < self.constrained.gap
-        slope = self.layer.h_nu(difference) * self.layer.p_nu.derivative(depth) * inside
-        total[:, : self.jump.dim] = slope[:, None] * self.jump.normal
-        if self.jump.block_size > self.jump.dim:
-            growth = self.layer.h_nu.derivative(difference) * self.layer.p_nu(depth)
+        inside = self.nodes.normal_component(x) < self.constrained_gap
+        slope = self.compliance.h_nu(difference) * self.compliance.p_nu.derivative(depth) * inside
+        total[:, : self.nodes.dim] = slope[:, None] * self.nodes.normal
+        if self.nodes.block_size > self.nodes.dim:
+            growth = self.compliance.h_nu.derivative(difference) * self.compliance.p_nu(depth)
             total[:, -1] = self.phi_scale * growth
         return total
 
-    def layer_block(self, x: Array, full: bool) -> Array:
+    def pressure_block(self, x: Array, full: bool) -> Array:
         """Return the derivative of the layer's force, shape (n, block size, block size).
 
         Without that of h_nu, which is not symmetric, unless `full`.
         """
-        gradient = self.layer_gradient(x)
+        gradient = self.pressure_gradient(x)
         if not full:
-            gradient[:, self.jump.dim :] = 0.0
-        total = np.zeros((*gradient.shape, self.jump.block_size))
-        total[:, : self.jump.dim] = self.jump.normal[:, :, None] * gradient[:, None, :]
+            gradient[:, self.nodes.dim :] = 0.0
+        total = np.zeros((*gradient.shape, self.nodes.block_size))
+        total[:, : self.nodes.dim] = self.nodes.normal[:, :, None] * gradient[:, None, :]
         return total
 
     def current_block(self, x: Array, pressure: Array, full: bool = False) -> Array:
@@ -188,12 +179,12 @@ class InterfaceLaw:
         Parameters
         ----------
         x, pressure
-            Nodal unknowns, and pressures that tell the contact.
+            Nodal unknowns and pressures.
         full
             With the derivative of psi by the gap, not symmetric. Else psi is frozen, and a lagged
-            current has no derivative, as the fixed point takes it.
+            current has no derivative, as in the fixed point.
         """
-        d, bs = self.jump.dim, self.jump.block_size
+        d, bs = self.nodes.dim, self.nodes.block_size
         total = np.zeros((x.shape[0], bs, bs))
         if self.conductor is None or (self.conductor.lagged and not full):
             return total
@@ -204,7 +195,7 @@ class InterfaceLaw:
             # The contact flag of the perfect conductor is kept; at kinks a one-sided derivative.
             closing = conductor.psi.gap_slope(self._penetration(x), self._pressed(x, pressure))
             closing = self.phi_scale * conductor.share * closing * conductor.phi_l(difference)
-            total[:, -1, :d] = -np.asarray(closing)[:, None] * self.jump.normal
+            total[:, -1, :d] = -np.asarray(closing)[:, None] * self.nodes.normal
         return total
 
     def block(self, x: Array, pressure: Array, full: bool = False) -> Array:
@@ -214,6 +205,6 @@ class InterfaceLaw:
         lagged layer and current too.
         """
         total = self.current_block(x, pressure, full)
-        if self.layer is not None and (full or not self.layer.lagged):
-            total += self.layer_block(x, full)
+        if self.compliance is not None and (full or not self.compliance.lagged):
+            total += self.pressure_block(x, full)
         return total

@@ -22,7 +22,7 @@ class NormalLaw:
     stiffness
         h_nu, frozen, shape (n,).
     touch, gap
-        rho_0 and rho: where the layer and the rigid part are touched, shape (n,).
+        rho_0 and rho, gaps of the layer and of the rigid part, shape (n,).
     """
 
     p_nu: PenetrationLaw
@@ -39,10 +39,9 @@ class NormalLaw:
         return self.stiffness * self.p_nu.derivative(u_n - self.touch)
 
     def pressure(self, z: Array, r: float) -> Array:
-        """Return the total pressure P for which (phi, P) is on the graph and P + r phi = z.
+        """Return P with (phi, P) on the graph and P + r phi = z: (3.43) with a layer.
 
-        This is (3.43) with a layer. The graph rises, so that P is unique for any
-        r > 0; where p_nu falls, r must exceed its slope.
+        It is unique for any r > 0 above the slope of a falling p_nu.
         """
         low, high = self.touch, np.minimum(self.gap, z / r)
         phi, layer, steep = high, self.layer(high), self.layer_slope(high)
@@ -66,7 +65,7 @@ class NormalLaw:
         return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
 
     def displacement(self, z: Array, r: float) -> Array:
-        """Return the u_nu that goes with `pressure`."""
+        """Return u_nu = (z - `pressure`)/r."""
         return np.asarray((z - self.pressure(z, r)) / r, dtype=float)
 
     def pressure_slope(self, z: Array, r: float) -> Array:

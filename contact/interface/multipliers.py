@@ -1,9 +1,8 @@
-"""Values at the contact nodes that go with the jump: contact forces and slip history.
+"""Multipliers and slip history at the contact nodes.
 
-All laws of Gamma_3 are written in the jump T x (`ContactNodes`). `Multipliers` are dual to it, and
-`SlipHistory` is its history between the steps of an evolution: friction acts against the slip since
-the end of the last step, and a coefficient mu(slip) looks at all slip so far. A static problem is
-one step from zero.
+`Multipliers` are dual to the jump T x (`ContactNodes`). `SlipHistory` is T x at the end of the last
+step of an evolution: friction acts against the slip since then, and a coefficient mu(slip) depends
+on the accumulated slip. A static problem is one step from zero.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Contact forces at the owned contact nodes.
+    """Multipliers of contact and friction at the owned contact nodes.
 
     Attributes
     ----------
     pressure
-        lambda_c = -sigma_nu without the layer's part, shape (n,).
+        lambda_c = -sigma_nu less the pressure of the layer, shape (n,).
     friction
         lambda_f = -sigma_tau, tangential vectors, shape (n, d).
     """
@@ -34,34 +33,31 @@ class Multipliers:
     friction: Array
 
     @staticmethod
-    def zero(jump: ContactNodes) -> Multipliers:
-        """Return vanishing contact forces."""
-        return Multipliers(np.zeros(jump.gap.size), np.zeros(jump.normal.shape))
+    def zero(nodes: ContactNodes) -> Multipliers:
+        """Return zero."""
+        return Multipliers(np.zeros(nodes.weight.size), np.zeros(nodes.normal.shape))
 
     @staticmethod
-    def of(jump: ContactNodes, pressure: Array, friction: Array) -> Multipliers:
-        """Return contact forces with the tangential part of vectors of shape (n, d).
+    def of(nodes: ContactNodes, pressure: Array, friction: Array) -> Multipliers:
+        """Return multipliers, with the tangential part of vectors of shape (n, d) as friction."""
+        return Multipliers(pressure, nodes.tangential_component(friction))
 
-        All methods hand over theirs by this: rounding along the normal is no friction.
-        """
-        return Multipliers(pressure, jump.tangential_component(friction))
-
-    def vectors(self, jump: ContactNodes) -> Array:
+    def vectors(self, nodes: ContactNodes) -> Array:
         """Return lambda_c nu + lambda_f, shape (n, d); of lambda_f the tangential part acts."""
-        return self.pressure[:, None] * jump.normal + jump.tangential_component(self.friction)
+        return self.pressure[:, None] * nodes.normal + nodes.tangential_component(self.friction)
 
 
 @dataclass(frozen=True)
 class SlipHistory:
-    """The tangential jump at the end of the last step, and the way that it has gone.
+    """The tangential jump at the end of the last step, and the accumulated slip.
 
-    Its arrays are not to be written to (they are marked so). Open nodes have them too: one that
-    touches again slips from where it was at the end of the last step.
+    Read-only arrays. Open nodes have them too: one that touches again slips from its jump at the
+    end of the last step.
 
     Attributes
     ----------
     jump
-        j_tau at the end of the last step, tangential vectors, shape (n, d) (length).
+        j_tau at the end of the last step, shape (n, d) (length).
     accumulated
         Sum of |Delta j_tau| over all steps, shape (n,) (length).
     """
@@ -70,17 +66,17 @@ class SlipHistory:
     accumulated: Array
 
     def __post_init__(self) -> None:
-        """Keep whoever holds it from changing it."""
+        """Make the arrays read-only."""
         self.jump.flags.writeable = self.accumulated.flags.writeable = False
 
     @staticmethod
-    def rest(jump: ContactNodes) -> SlipHistory:
-        """Return that of a body that has never slipped."""
-        return SlipHistory(np.zeros(jump.normal.shape), np.zeros(jump.gap.size))
+    def rest(nodes: ContactNodes) -> SlipHistory:
+        """Return zero."""
+        return SlipHistory(np.zeros(nodes.normal.shape), np.zeros(nodes.weight.size))
 
     @property
     def place(self) -> str:
-        """Its arrays live at the contact nodes."""
+        """The contact nodes."""
         return CONTACT_NODES
 
     @property

@@ -1,7 +1,7 @@
-"""The contact nodes: where the foundation acts on the body.
+"""The contact nodes and their geometry.
 
-Multipliers and auxiliary variables live at these nodes, and the products of L2(Gamma_3) are
-lumped there. Each rank holds the contact nodes that it owns; sums and norms are global.
+Multipliers and auxiliary variables live at these nodes; products of L2(Gamma_3) are lumped there.
+Each rank has the contact nodes that it owns; sums and norms are global.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.interface.mortar.lumping import Mixing
 from contact.interface.mortar.operator import CouplingOperator
 from contact.ranks import largest, summed
 from contact.typing import Array
@@ -28,21 +29,21 @@ def unit_vectors(vectors: Array) -> Array:
 def contact_directions(
     normal: Array, movable: Array, given: NDArray[np.bool_] | bool = True
 ) -> tuple[Array, Array]:
-    """Return the lifts of unit normals, and the projectors onto the directions of friction.
+    """Return the admissible normals, and the projectors onto the directions of friction.
 
     Parameters
     ----------
     normal
-        Contact directions, of which some part is free, shape (n, d).
+        Contact directions, with an unconstrained part each, shape (n, d).
     movable
-        The projectors onto the directions that no support holds, shape (n, d, d).
+        Projectors onto the unconstrained directions, shape (n, d, d).
     given
-        Whether the jumps along the directions that supports hold are given by supports alone,
-        shape (n,): in front of a foundation they are.
+        Whether supports alone prescribe the jumps along constrained directions, shape (n,): in
+        front of a foundation they do.
 
     Returns
     -------
-    See `ContactNodes.lift` and `ContactNodes.tangent`, shapes (n, d) and (n, d, d).
+    `ContactNodes.admissible_normal` and `ContactNodes.tangent`, shapes (n, d) and (n, d, d).
     """
     admissible = np.einsum("nij,nj->ni", movable, normal)
     length = np.linalg.norm(admissible, axis=1)[:, None]
@@ -54,16 +55,19 @@ def contact_directions(
 
 @dataclass(frozen=True)
 class ContactNodes:
-    """The contact nodes that this rank owns: the jump in front of a rigid foundation.
+    """The contact nodes that this rank owns, and their geometry: the jump T x, gaps and areas.
+
+    Which nodes these are is decided once, in the reference configuration. Arrays marked with (R)
+    belong to it, all others to the current place of the bodies (`Geometry`).
 
     Attributes
     ----------
     comm
         Communicator of the mesh.
     nodes
-        Local node (block) numbers, shape (n,).
+        Local node (block) numbers (R), shape (n,).
     points
-        Coordinates, shape (n, d) (length).
+        Coordinates (R), shape (n, d) (length): coefficients such as mu(x), and output, use them.
     weight
         Lumped surface mass, the tributary area of each node: integrals of the nodal basis
         functions over Gamma_3, shape (n,). They reproduce the nodal forces of a constant pressure
@@ -71,35 +75,35 @@ class ContactNodes:
         `contact.interface.mortar.lumping`).
     normal
         Contact direction, a unit vector out of the body, shape (n, d).
-    lift
-        The least displacement along directions that no support holds whose normal component is 1,
-        shape (n, d): the normal, but where a support holds nodes aslant to it.
+    admissible_normal
+        The least unconstrained displacement of normal component 1, shape (n, d): the normal, but
+        where supports constrain a node aslant to it.
     tangent
-        Projector onto the directions in which nodes slip and friction acts, shape (n, d, d): all
-        tangential ones, as a node that supports move slips too; but they bear the friction along
-        directions they hold where these are aslant to the contact direction, or where the other
-        side moves along them: no unknown is the jump there, as of nodes on a plane of symmetry.
+        Projector onto the directions of slip and friction, shape (n, d, d): the tangential ones,
+        prescribed displacements included; but for those that supports constrain aslant to the
+        contact direction, or while the other side moves along them: no unknown is the jump there,
+        as on a plane of symmetry, and the supports bear the friction.
     gap
-        Distance to the foundation along the contact direction, shape (n,).
+        Distance to the foundation along the contact direction, shape (n,); infinite at nodes that
+        face nothing.
     deviation
-        Of a curved surface from its facets, as far as the gaps do not have it, shape (n,) (length).
+        Of a curved surface from its facets, without the part in the gaps, shape (n,) (length).
     block_size
         Unknowns a node: d, or d + 1 with the potential.
     motion
-        How the foundation moves here with the m global unknowns behind those of the nodes
-        (`contact.body.global_unknowns`), shape (n, block_size, m); None where nothing moves.
+        Motion R of the foundation by the m global unknowns (`contact.body.global_unknowns`) (R),
+        shape (n, block_size, m); None without these.
     cut
-        Largest depth in the foundation, undeformed, of a node on a straight facet of a curved
-        part; the gap of these nodes is 0 (length).
+        Largest depth in the foundation of a node on a straight facet of a curved part; the gap of
+        these nodes is 0 (length).
     revolved
-        Whether the nodes stand for the rings through them, about the axis x = 0.
+        Whether nodes are rings about the axis x = 0.
     carried
-        How the nodes move with these unknowns where no jump changes, likewise: as the foundation
-        does, and against nodes beside them that follow a rigid part. Along directions that supports
-        hold they do not; the `lift` then closes the gap as much.
+        Motion of the nodes with the global unknowns at a constant jump, as `motion`; along
+        constrained directions the `admissible_normal` takes it up.
     coupling
-        The operator of jumps that are no nodal values, between bodies and on quadratic triangles;
-        None for none.
+        Operator of jumps that are sums over nodes, between bodies and on quadratic triangles, or
+        None.
     """
 
     comm: MPI.Comm
@@ -107,7 +111,7 @@ class ContactNodes:
     points: Array
     weight: Array
     normal: Array
-    lift: Array
+    admissible_normal: Array
     tangent: Array
     gap: Array
     deviation: Array
@@ -124,10 +128,9 @@ class ContactNodes:
         return self.normal.shape[1]
 
     def apply(self, x: Array) -> Array:
-        """Return the jumps, shape (n, block_size), of a local dof array. Collective.
+        """Return the jumps T x, shape (n, block_size), of a local dof array. Collective.
 
-        In front of a foundation that stays these are the nodal unknowns; they are relative to one
-        that moves.
+        These are the nodal unknowns, in front of a moving foundation relative to it.
         """
         values = self._nodal(x)
         nodal = values[self.nodes]
@@ -138,15 +141,12 @@ class ContactNodes:
         return nodal - self.motion @ x[x.size - self.motion.shape[2] :]
 
     def _nodal(self, values: Array) -> Array:
-        """Return a view of the nodal values; the global unknowns are behind them."""
+        """Return a view of the nodal values, without the global unknowns behind them."""
         count = values.size // self.block_size
         return values[: count * self.block_size].reshape(count, self.block_size)
 
     def transpose(self, nodal: Array, into: Array) -> None:
-        """Add nodal vectors of shape (n, d) or (n, block_size) to a local dof array.
-
-        The opposite ones act on the foundation where that moves, or on the other body. Collective.
-        """
+        """Add T^T times vectors, (n, d) or (n, block_size), to a local dof array. Collective."""
         size = nodal.shape[1]
         values = self._nodal(into)[:, :size]
         own = np.ones(self.nodes.size, dtype=bool)
@@ -163,11 +163,8 @@ class ContactNodes:
         return np.einsum("ni,ni->n", u[:, : self.dim], self.normal)
 
     def tangential_component(self, u: Array) -> Array:
-        """Return u_tau in the free tangential directions, shape (n, d).
-
-        Its part along the normal is rounding of u_tau: the projector is applied twice, since
-        once leaves that of u, beside which u_tau may be small.
-        """
+        """Return u_tau in the free tangential directions, shape (n, d)."""
+        # Twice: once would leave rounding of u along the normal, beside which u_tau may be small.
         once = np.einsum("nij,nj->ni", self.tangent, u[:, : self.dim])
         return np.einsum("nij,nj->ni", self.tangent, once)
 
@@ -192,3 +189,25 @@ class ContactNodes:
     def gather(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the values of all ranks, in rank order, on every rank."""
         return np.concatenate(self.comm.allgather(values))
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The geometry of one contact at a place of the bodies: a function of positions alone.
+
+    Attributes
+    ----------
+    nodes
+        The contact nodes, without the operator of all contacts: normals, gaps, areas.
+    jumps
+        D and M of their jumps; None where jumps are nodal values.
+    covered
+        Share of each node's area that faces the other body, shape (n,); None before a foundation.
+    constrained
+        Nodes that cannot move, but through which current flows; None without.
+    """
+
+    nodes: ContactNodes
+    jumps: Mixing | None
+    covered: Array | None = None
+    constrained: ContactNodes | None = None

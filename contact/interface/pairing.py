@@ -1,6 +1,12 @@
-"""Contact nodes in front of another body: where they are, and which parts face each other."""
+"""Contact of two bodies: which nodes, their geometry at any place, and which parts face each other.
+
+`find_pair` decides once, in the reference configuration, and checks the input; the
+`PairPlacement` that it returns gives normals, gaps, areas, D and M as functions of positions.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
@@ -15,7 +21,7 @@ from contact.errors import InputError
 from contact.interface.mortar.coupling import Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
-from contact.interface.nodes import ContactNodes, contact_directions
+from contact.interface.nodes import ContactNodes, Geometry, contact_directions
 from contact.interface.placing import check_gap
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at, connected_components, owned_among
@@ -29,6 +35,84 @@ from contact.typing import Array
 REACH = 0.25
 
 
+@dataclass(frozen=True)
+class PairPlacement:
+    """The contact of two bodies, its nodes chosen in the reference configuration.
+
+    Attributes
+    ----------
+    body
+        Both bodies.
+    slave, master
+        The two sides in the reference configuration.
+    reach
+        Largest distance at which facets face each other (length).
+    without, nodes
+        Global numbers of the slave nodes that carry no multiplier, and of those of this rank that
+        carry one (`couple`).
+    added
+        Gap that is added to that between the meshes, at these nodes, shape (n,) (length).
+    press
+        Whether overlaps in the reference configuration are interferences.
+    """
+
+    body: BodyEquilibrium
+    slave: Surface
+    master: Surface
+    reach: float
+    without: NDArray[np.int64]
+    nodes: NDArray[np.int64]
+    added: Array
+    press: bool
+
+    def at(self, displacement: Array) -> Geometry:
+        """Return the geometry at a displacement of the owned nodes, shape (nodes, d). Collective.
+
+        Nodes that face nothing there are open: their gap is infinite.
+        """
+        slave, master = (side.moved(displacement) for side in (self.slave, self.master))
+        found = couple(slave, master, self.reach, self.without, self.nodes)
+        return self.geometry(slave, master, found)
+
+    def geometry(self, slave: Surface, master: Surface, found: Coupling) -> Geometry:
+        """Return the geometry, given both sides at their place and their operator. Collective."""
+        body, normal = self.body, found.normal
+        _, local = owned_among(body.layout.index_map, self.nodes)
+        points = body.space.tabulate_dof_coordinates()[local, : body.dim]
+        gap, cut = found.gap, 0.0
+        if not self.press and found.depth <= TOUCHING * body.domain.size:
+            gap, cut = _without_sagittas(body, found)
+        unknown = body.comm.allreduce(
+            max(side.unknown_deviation for side in (slave, master)), op=MPI.MAX
+        )
+        movable = body.movable(local)
+        given = _given(body, found, slave.owners, movable)
+        nodes = ContactNodes(
+            body.comm,
+            local,
+            points,
+            found.weight,
+            normal,
+            *contact_directions(normal, movable, given),
+            gap + self.added,
+            np.full(local.size, unknown),
+            body.block_size,
+            cut,
+            body.domain.revolved,
+            body.global_unknowns.of_foundation(points, body.block_size),
+        )
+        return Geometry(nodes, found, found.covered)
+
+
+def _without_sagittas(body: BodyEquilibrium, found: Coupling) -> tuple[Array, float]:
+    """Return the gaps of sides that touch, and the largest depth that is left out. Collective."""
+    # Chords of two curved sides in contact cut each other by their sagittas. A negative mean of a
+    # gap that touches 0 within a facet stays.
+    least = np.minimum(found.apart, 0.0)
+    cut = body.comm.allreduce(float(np.max(least - found.gap, initial=0.0)), op=MPI.MAX)
+    return np.maximum(found.gap, least), cut if cut > TOUCHING * body.domain.size else 0.0
+
+
 def find_pair(
     body: BodyEquilibrium,
     part: str,
@@ -37,13 +121,13 @@ def find_pair(
     key: str = "contact",
     press: bool = False,
     friction: bool = False,
-) -> tuple[ContactNodes, Coupling]:
-    """Return the nodes of a part that may touch another one, and the operator. Collective.
+) -> tuple[PairPlacement, Geometry]:
+    """Choose the nodes of a part that may touch another one, in the reference place. Collective.
 
     A node whose normal is fixed by a Dirichlet condition is left out, and its multiplier is
     handed over to its neighbours. With friction that is so too where a tangential component is
     fixed, but not on the other side, on which it would act; where both are, or there is no
-    friction, it is removed from the tangent projector.
+    friction, it is removed from the tangent projector. Nodes that face nothing are left out.
 
     Parameters
     ----------
@@ -58,6 +142,10 @@ def find_pair(
     friction
         Whether there is friction between them.
 
+    Returns
+    -------
+    The placement, and its geometry in the reference configuration.
+
     Raises
     ------
     InputError
@@ -67,56 +155,45 @@ def find_pair(
     label = f"{key}.against: {part!r} and {against!r}"
     slave = surface_of(body.domain, body.space, part)
     master = surface_of(body.domain, body.space, against)
-    coupling = _coupled(body, slave, master, label, part if friction else None)
-    _, local = owned_among(body.layout.index_map, coupling.nodes)
-    d = body.dim
-    points, normal = body.space.tabulate_dof_coordinates()[local, :d], coupling.normal
-    gap, cut = coupling.gap, 0.0
+    _refuse_shared(slave, master, label)
+    reach = REACH * body.domain.size
+    found = couple(slave, master, reach)
+    without = _without_multiplier(body, slave, found, label, part if friction else None)
+    if body.comm.allreduce(without.size, op=MPI.SUM) > 0:
+        found = couple(slave, master, reach, without)
+    if body.comm.allreduce(found.nodes.size, op=MPI.SUM) == 0:
+        raise InputError(
+            f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
+            "held there; accepted: sides of two bodies that look at each other",
+            "pair",
+        )
+    _check_apart(body, found, slave.owners, label)
     if not press:
-        gap, cut = _apart(slave, body, coupling, label)
+        _refuse_overlap(body, found, slave.owners, label)
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
-    _, added = measured(distance, points, normal, body.comm, key)
+    _, local = owned_among(body.layout.index_map, found.nodes)
+    points = body.space.tabulate_dof_coordinates()[local, : body.dim]
+    _, added = measured(distance, points, found.normal, body.comm, key)
     check_gap(body.domain, added, key)
-    sides = (side.unknown_deviation for side in (slave, master))
-    unknown = body.comm.allreduce(max(sides, default=0.0), op=MPI.MAX)
-    movable = body.movable(local)
-    nodes = ContactNodes(
-        body.comm,
-        local,
-        points,
-        coupling.weight,
-        normal,
-        *contact_directions(normal, movable, _given(body, coupling, slave.owners, movable)),
-        gap + added,
-        np.full(local.size, unknown),
-        body.block_size,
-        cut,
-        body.domain.revolved,
-        body.global_unknowns.of_foundation(points, body.block_size),
-    )
-    return nodes, coupling
+    placement = PairPlacement(body, slave, master, reach, without, found.nodes, added, press)
+    return placement, placement.geometry(slave, master, found)
 
 
-def _coupled(
-    body: BodyEquilibrium, slave: Surface, master: Surface, label: str, rough: str | None
-) -> Coupling:
-    """Return the operator without slave nodes that carry no multiplier. Collective.
-
-    Parameters
-    ----------
-    body, slave, master, label
-        The sides, and their name in messages.
-    rough
-        The part that the slave side is, if there is friction.
-    """
+def _refuse_shared(slave: Surface, master: Surface, label: str) -> None:
+    """Refuse sides that share nodes. Collective."""
     owners = slave.owners
     one, other = (owners.requested(side.nodes.ravel()) for side in (slave, master))
-    if body.comm.allreduce(np.intersect1d(one, other).size, op=MPI.SUM) > 0:
+    if owners.comm.allreduce(np.intersect1d(one, other).size, op=MPI.SUM) > 0:
         raise InputError(
             f"{label} share nodes; accepted: parts of two bodies whose meshes are apart", "pair"
         )
-    reach = REACH * body.domain.size
-    coupling = couple(slave, master, reach)
+
+
+def _without_multiplier(
+    body: BodyEquilibrium, slave: Surface, coupling: Coupling, label: str, rough: str | None
+) -> NDArray[np.int64]:
+    """Return the slave nodes of this rank and its facets that carry no multiplier. Collective."""
+    owners = slave.owners
     on_axis = owners.requested(pairs_at_axis(slave, slave.nodes)[:, 0])
     stuck = np.union1d(_stuck(body, coupling), on_axis)
     if rough is not None:
@@ -124,17 +201,7 @@ def _coupled(
         one_sided[np.isin(coupling.nodes, stuck)] = False
         _check_rim(body, slave, rough, [coupling.nodes[lost] for lost in one_sided.T], label)
         stuck = np.union1d(stuck, coupling.nodes[one_sided.any(axis=1)])
-    if body.comm.allreduce(stuck.size, op=MPI.SUM) > 0:
-        without = owners.among(stuck, slave.nodes.ravel())
-        coupling = couple(slave, master, reach, without)
-    if body.comm.allreduce(coupling.nodes.size, op=MPI.SUM) == 0:
-        raise InputError(
-            f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
-            "held there; accepted: sides of two bodies that look at each other",
-            "pair",
-        )
-    _check_apart(body, coupling, owners, label)
-    return coupling
+    return owners.among(stuck, slave.nodes.ravel())
 
 
 def _check_apart(body: BodyEquilibrium, coupling: Coupling, owners: Owners, label: str) -> None:
@@ -164,23 +231,20 @@ def _one_sided(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> NDA
         return ~body.free[numbers - owners.begin, : body.dim]
 
     opposite = owners.values(coupling.masters, fixed)
-    return fixed(coupling.nodes) & (np.abs(coupling.other) @ opposite <= 0)
+    return fixed(coupling.nodes) & (np.abs(coupling.M) @ opposite <= 0)
 
 
 def _given(
     body: BodyEquilibrium, coupling: Coupling, owners: Owners, movable: Array
 ) -> NDArray[np.bool_]:
-    """Tell where supports hold the masters along all directions in which they hold the slave.
-
-    Shape (n,), of projectors `movable` of the slave nodes. Collective.
-    """
+    """Return where supports constrain the masters along all directions of the slave, (n,)."""
 
     def free(numbers: NDArray[np.int64]) -> Array:
         """Return the directions in which nodes of this rank move, shape (k, d^2)."""
         local = np.asarray(numbers - owners.begin, dtype=np.int32)
         return np.abs(body.movable(local)).reshape(local.size, body.dim**2)
 
-    moves = np.abs(coupling.other) @ owners.values(coupling.masters, free)
+    moves = np.abs(coupling.M) @ owners.values(coupling.masters, free)
     held = np.eye(body.dim) - movable
     along = held @ moves.reshape(-1, body.dim, body.dim)
     return np.asarray(np.abs(along).max(axis=(1, 2), initial=0.0) <= ROUNDING)
@@ -189,16 +253,7 @@ def _given(
 def _check_rim(
     body: BodyEquilibrium, slave: Surface, part: str, lost: list[NDArray[np.int64]], label: str
 ) -> None:
-    """Refuse supports that hold facets, not only a rim, where the other side is free. Collective.
-
-    Parameters
-    ----------
-    body, slave, part, label
-        The slave side, and the name of the contact in messages.
-    lost
-        Its nodes on this rank where a component is fixed, but free on the other side, for each of
-        them.
-    """
+    """Refuse supports on facets, not only on a rim, where the other side is free. Collective."""
     lost = [slave.owners.among(nodes, slave.nodes.ravel()) for nodes in lost]
     facets, filled = body.domain.facets(part), False
     for support in body.body.fixed:
@@ -214,21 +269,11 @@ def _check_rim(
         )
 
 
-def _apart(
-    slave: Surface, body: BodyEquilibrium, coupling: Coupling, label: str
-) -> tuple[Array, float]:
-    """Refuse bodies that overlap; return gaps without depths, and the largest depth. Collective.
-
-    Facets are chords of a curved surface: those of two sides that lie on each other cut each other
-    by their sagittas. That is taken off; a negative gap between sides that are apart remains, as in
-    front of foundations, for the mean of a gap that touches 0 within a facet is.
-    """
-    gap, rounding = coupling.gap, TOUCHING * body.domain.size
-    if coupling.depth <= rounding:
-        least = np.minimum(coupling.apart, 0.0)
-        cut = body.comm.allreduce(float(np.max(least - gap, initial=0.0)), op=MPI.MAX)
-        return np.maximum(gap, least), cut if cut > rounding else 0.0
-    if _connected(body, coupling, slave.owners):
+def _refuse_overlap(body: BodyEquilibrium, coupling: Coupling, owners: Owners, label: str) -> None:
+    """Refuse bodies that overlap in the reference configuration. Collective."""
+    if coupling.depth <= TOUCHING * body.domain.size:
+        return
+    if _connected(body, coupling, owners):
         raise InputError(
             f"{label} are sides of one body that look away from each other; accepted: parts of two "
             "bodies whose meshes are apart",

@@ -46,9 +46,9 @@ class PenalisedLaw:
     interface, eps
         The contact nodes with their laws, and the parameters of these.
     iterate
-        Nodal unknowns at which the friction modulus s/(|u_tau| + eps) is kept, (4.32)-(4.33), shape
-        (n, block size). None: it is that of the present ones, (4.3); with a smoothing radius the
-        derivative then leaves out the terms of the smoothed pressure, which would couple the nodes.
+        Nodal unknowns of the lagged friction modulus s/(|u_tau| + eps), (4.32)-(4.33), shape
+        (n, block size). None: the modulus is implicit, (4.3), but for a smoothed pressure in its
+        derivative.
     """
 
     def __init__(
@@ -58,20 +58,20 @@ class PenalisedLaw:
         self._modulus = None if iterate is None else self._modulus_at(iterate)
 
     def acts(self) -> bool:
-        """Tell whether a kept modulus is above 0 anywhere. Collective."""
-        return self._modulus is None or self._interface.jump.maximum(self._modulus) > 0
+        """Return whether friction acts: a lagged modulus above 0 anywhere. Collective."""
+        return self._modulus is None or self._interface.nodes.maximum(self._modulus) > 0
 
     def stick(self) -> None:
-        """Hold all nodes as stiffly along the foundation as across it."""
-        self._modulus = np.full(self._interface.jump.gap.shape, 1 / self._eps.contact)
+        """Set the friction modulus to 1/eps_contact at all nodes."""
+        self._modulus = np.full(self._interface.gap.shape, 1 / self._eps.contact)
 
     def _pressed(self, nodal: Array) -> tuple[Multipliers, Array]:
         """Return the pressures, and their derivative in u_nu: 1/eps also at first touch."""
-        jump = self._interface.jump
-        normal = jump.normal_component(nodal)
-        pressure = np.asarray(penalty_pressure(normal, jump.gap, self._eps.contact))
-        forces = Multipliers(pressure, np.zeros(jump.normal.shape))
-        return forces, (normal >= jump.gap) / self._eps.contact
+        interface, nodes = self._interface, self._interface.nodes
+        normal = nodes.normal_component(nodal)
+        pressure = np.asarray(penalty_pressure(normal, interface.gap, self._eps.contact))
+        multipliers = Multipliers(pressure, np.zeros(nodes.normal.shape))
+        return multipliers, (normal >= interface.gap) / self._eps.contact
 
     def _modulus_at(self, nodal: Array) -> Array:
         """Return the friction modulus, shape (n,). Collective."""
@@ -89,16 +89,16 @@ class PenalisedLaw:
 
     def block(self, nodal: Array) -> Array:
         """Return their derivative, shape (n, d, d). Collective."""
-        interface, jump = self._interface, self._interface.jump
-        forces, slope = self._pressed(nodal)
+        interface, nodes = self._interface, self._interface.nodes
+        multipliers, slope = self._pressed(nodal)
         modulus = self._modulus_at(nodal) if self._modulus is None else self._modulus
-        block = slope[:, None, None] * outer(jump.normal, jump.normal)
-        block = block + modulus[:, None, None] * jump.tangent
+        block = slope[:, None, None] * outer(nodes.normal, nodes.normal)
+        block = block + modulus[:, None, None] * nodes.tangent
         if self._modulus is not None:
             return block
         slip, unit = interface.slip_length(nodal), unit_vectors(interface.slip(nodal))
-        total, share = interface.pressure(nodal, forces), slip / (slip + self._eps.slip)
+        total, share = interface.pressure(nodal, multipliers), slip / (slip + self._eps.slip)
         along = (interface.friction.by_slip(total, slip) - modulus) * share
         across = interface.friction.by_pressure(total, slip) * slope * share
         block = block + along[:, None, None] * outer(unit, unit)
-        return block + across[:, None, None] * outer(unit, jump.normal)
+        return block + across[:, None, None] * outer(unit, nodes.normal)

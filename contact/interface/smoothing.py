@@ -42,7 +42,7 @@ class Smoothing:
     Parameters
     ----------
     nodes
-        The contact nodes; those of other ranks within the radius are taken into account.
+        The contact nodes, those of other ranks within the radius included.
     radius
         The radius r >= 0 (length); 0 gives the identity.
     """
@@ -96,11 +96,8 @@ def _omega(square: Array, radius: float) -> Array:
 
 
 def _ring_mean(points: Array, others: Array, radius: float) -> Array:
-    """Return the means of omega over the rings through other points (r, z), shape (n,).
-
-    In the angle theta between the half planes, |x - x_j|^2 is |x - x_j|^2 at theta = 0, plus
-    2 r r_j (1 - cos theta). Gauss's rule takes the angles at which omega is not 0.
-    """
+    """Return the means of omega over the rings through other points (r, z), shape (n,)."""
+    # At the angle theta |x - x_j|^2 grows by 2 r r_j (1 - cos theta); Gauss's rule where omega > 0.
     square = np.sum((points - others) ** 2, axis=1)
     product = 2 * points[:, 0] * others[:, 0]
     reach = (radius**2 - square) / np.where(product > 0, product, np.inf)

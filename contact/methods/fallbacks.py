@@ -227,14 +227,14 @@ def working_set(newton: SemismoothNewton, state: State) -> State | None:
         State after a linear solve without contact.
     """
     problem, interface = newton.problem, newton.problem.interface
-    nodes = interface.jump
-    inside = np.zeros(nodes.gap.shape, dtype=bool)
+    nodes = interface.nodes
+    inside = np.zeros(nodes.weight.shape, dtype=bool)
     deepest, count = _penetrating(interface, state, inside)
     while count > 0:
-        opening = interface.opening(nodes.apply(state.x))
-        inside |= opening <= -deepest
-        gap = np.where(inside, nodes.gap, np.inf)
-        less = problem.with_interface(replace(interface, jump=replace(nodes, gap=gap)))
+        normal_gap = interface.normal_gap(nodes.apply(state.x))
+        inside |= normal_gap <= -deepest
+        gap = np.where(inside, interface.gap, np.inf)
+        less = problem.with_laws(replace(interface, gap=gap))
         # At one stiff node of a soft body a forcing term leaves pressures of any sign.
         state, outcome = newton.on(less).iterate(state, note=WORKING_SET, exact=True)
         before = count
@@ -248,9 +248,9 @@ def _penetrating(
     interface: Interface, state: State, inside: NDArray[np.bool_]
 ) -> tuple[float, int]:
     """Return the largest penetration of nodes outside a set, and their number. Collective."""
-    nodal = interface.jump.apply(state.x)
-    depth = np.where(inside, 0.0, -interface.opening(nodal))
-    deepest = interface.jump.maximum(depth)
+    nodal = interface.nodes.apply(state.x)
+    depth = np.where(inside, 0.0, -interface.normal_gap(nodal))
+    deepest = interface.nodes.maximum(depth)
     rounding = interface.rounding(nodal) / interface.stiffness
     count = int(summed(interface.comm, np.count_nonzero(depth > rounding)))
     return deepest, count
@@ -295,12 +295,12 @@ def _in_the_conductivity(
     where the node leaves: the active set cycles. With little of it contact is nearly uncoupled.
     """
     interface = problem.interface
-    if interface.law.conductor is None:
+    if interface.layer.conductor is None:
         return None
 
     def solve(part: float, state: State) -> tuple[State, Outcome]:
-        less = replace(interface, law=interface.law.conducting(part))
-        method = newton if part == 1.0 else newton.on(problem.with_interface(less))
+        less = replace(interface, layer=interface.layer.conducting(part))
+        method = newton if part == 1.0 else newton.on(problem.with_laws(less))
         return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
 
     return continuation(solve, problem.start())
@@ -316,11 +316,11 @@ def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
     bears little, Newton's method takes the last steps without it.
     """
     problem, interface = newton.problem, newton.problem.interface
-    nodes, state = interface.jump, problem.start()
+    nodes, state = interface.nodes, problem.start()
     stiffness = PROXIMAL_STIFFNESS * newton.step.parameters.c
     for number in range(PROXIMAL_PROBLEMS):
         term = Proximal(stiffness, nodes.tangential_component(nodes.apply(state.x)))
-        method = newton.on(problem.with_interface(replace(interface, proximal=term)))
+        method = newton.on(problem.with_laws(replace(interface, proximal=term)))
         try:
             balanced, outcome = method.iterate(state, note=PROXIMAL_POINT)
         except SingularError:  # no contact: a normal motion is unconstrained

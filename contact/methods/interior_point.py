@@ -86,7 +86,7 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
     """
     problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
     stuck = modes.stuck_bound()
-    bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
+    bound = np.zeros(interface.nodes.weight.size) if stuck is None else stuck
     aside: tuple[State, Outcome] | None = None
     best, raised = 1.0, False
     for _ in range(UPDATES):
@@ -108,10 +108,10 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
         if aside is None and outcome.residuals.significant < PROGRESS * best:
             state = last
         best = min(best, outcome.residuals.significant)
-        nodal = interface.jump.apply(state.x)
+        nodal = interface.nodes.apply(state.x)
         bound = interface.bound(nodal, state.forces)
         # With all nodes open the next bound is zero, and the solution the same.
-        if aside is not None and interface.jump.maximum(bound) <= interface.rounding(nodal):
+        if aside is not None and interface.nodes.maximum(bound) <= interface.rounding(nodal):
             break
         multiple = modes.overload(bound)
         if multiple == np.inf or (raised and multiple > 1):
@@ -140,34 +140,34 @@ class InteriorPoint:
         problem = newton.problem
         self.problem, self._newton, self._step = problem, newton, newton.step
         interface = problem.interface
-        jump, self._state = interface.jump, problem.start()
-        self._near = np.isfinite(jump.gap)
-        total, limit = all_loads(problem), jump.weight * bound
-        count = max(jump.size, 1)
-        self._frictional = self._near & (limit > EPS * max(jump.maximum(limit), total / count))
-        nodal = jump.apply(self._state.x)
-        moved = np.zeros_like(nodal) if begin is None else jump.apply(begin.x) - nodal
-        opening = interface.opening(nodal + moved)[self._near]
-        gap = jump.gap[self._near]
+        nodes, self._state = interface.nodes, problem.start()
+        self._near = np.isfinite(interface.gap)
+        total, limit = all_loads(problem), nodes.weight * bound
+        count = max(nodes.size, 1)
+        self._frictional = self._near & (limit > EPS * max(nodes.maximum(limit), total / count))
+        nodal = nodes.apply(self._state.x)
+        moved = np.zeros_like(nodal) if begin is None else nodes.apply(begin.x) - nodal
+        normal_gap = interface.normal_gap(nodal + moved)[self._near]
+        gap = interface.gap[self._near]
         scales = problem.scales
         block = scales.plane_modulus * scales.area / scales.height
         if begin is not None:
-            way = jump.maximum(np.abs(moved[:, : jump.dim]).max(axis=1, initial=0.0))
+            way = nodes.maximum(np.abs(moved[:, : nodes.dim]).max(axis=1, initial=0.0))
             # Without loads the stiffness is that of a block; without penetration any work will do.
-            far = jump.maximum(-opening) or SHARE * (way or interface.diameter)
+            far = nodes.maximum(-normal_gap) or SHARE * (way or interface.diameter)
             least = np.sqrt(SHARE) * far
             work = (total / way if total > 0 and way > 0 else block) * least**2
         else:
-            total = total or block * jump.maximum(np.abs(opening))
-            least = float(summed(jump.comm, np.maximum(gap, 0.0).sum())) / count + total / block
+            total = total or block * nodes.maximum(np.abs(normal_gap))
+            least = float(summed(nodes.comm, np.maximum(gap, 0.0).sum())) / count + total / block
             work = SHARE_UNSUPPORTED * total * least / count
-        # Where the body lifts off without contact, the first slack is that opening.
-        slack = np.maximum(np.maximum(gap, opening), least)
+        # Where the body lifts off without contact, the first slack is the normal gap.
+        slack = np.maximum(np.maximum(gap, normal_gap), least)
         frictional = self._frictional
         slips, limit = interface.slip_length(nodal + moved)[frictional], limit[frictional]
-        zeros = np.zeros((limit.size, jump.dim))
+        zeros = np.zeros((limit.size, nodes.dim))
         length = np.maximum(work / limit, slips)
-        self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
+        self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, nodes.comm)
         #: Least reference of the duality gap, where no work is done: all nodes stick.
         self._least_work = CLOSED * self.cones.duality_gap() if begin is None else 0.0
 
@@ -192,8 +192,8 @@ class InteriorPoint:
             if not taken or not np.isfinite(residuals.significant):
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
-            nodal = self.problem.interface.jump.apply(self._state.x)
-            pressure = self.problem.interface.jump.maximum(self.state.forces.pressure)
+            nodal = self.problem.interface.nodes.apply(self._state.x)
+            pressure = self.problem.interface.nodes.maximum(self.state.forces.pressure)
             if pressure <= self.problem.interface.rounding(nodal):
                 ended = f"nothing presses after {steps} steps"
                 break
@@ -207,22 +207,22 @@ class InteriorPoint:
     @property
     def state(self) -> State:
         """The iterate."""
-        cones, jump = self.cones, self.problem.interface.jump
-        pressure, friction = np.zeros(jump.weight.size), np.zeros(jump.normal.shape)
-        pressure[self._near] = cones.force / jump.weight[self._near]
-        friction[self._frictional] = -cones.friction / jump.weight[self._frictional, None]
-        return replace(self._state, forces=Multipliers.of(jump, pressure, friction))
+        cones, nodes = self.cones, self.problem.interface.nodes
+        pressure, friction = np.zeros(nodes.weight.size), np.zeros(nodes.normal.shape)
+        pressure[self._near] = cones.force / nodes.weight[self._near]
+        friction[self._frictional] = -cones.friction / nodes.weight[self._frictional, None]
+        return replace(self._state, forces=Multipliers.of(nodes, pressure, friction))
 
     def relative_gap(self) -> float:
         """Return the duality gap over the work of loads and contact. Collective."""
         body, interface, x = self.problem.equilibrium, self.problem.interface, self._state.x
-        jump, cones, nodal = interface.jump, self.cones, interface.jump.apply(x)
-        ways = np.abs(jump.gap) + np.abs(jump.normal_component(nodal))
+        nodes, cones, nodal = interface.nodes, self.cones, interface.nodes.apply(x)
+        ways = np.abs(interface.gap) + np.abs(nodes.normal_component(nodal))
         slips = interface.slip_length(nodal)[self._frictional]
-        contact = float(summed(jump.comm, cones.force @ ways[self._near] + cones.bound @ slips))
+        contact = float(summed(nodes.comm, cones.force @ ways[self._near] + cones.bound @ slips))
         own = body.owned_part(x)[: body.owned]
         forces = self._internal, body.external(self._state.time)
-        works = [abs(float(summed(jump.comm, own @ force[: body.owned]))) for force in forces]
+        works = [abs(float(summed(nodes.comm, own @ force[: body.owned]))) for force in forces]
         return cones.duality_gap() / (max(contact + sum(works), self._least_work) or 1.0)
 
     @np.errstate(over="ignore", invalid="ignore")  # such a step is not taken
@@ -231,32 +231,32 @@ class InteriorPoint:
         cones, interface, state = self.cones, self.problem.interface, self.state
         if not cones.interior():
             return False
-        jump, near, frictional = interface.jump, self._near, self._frictional
-        body, d = self.problem.equilibrium, jump.dim
-        nodal = jump.apply(state.x)
+        nodes, near, frictional = interface.nodes, self._near, self._frictional
+        body, d = self.problem.equilibrium, nodes.dim
+        nodal = nodes.apply(state.x)
         residual = -residual_forces(self.problem, state, internal=self._internal)
-        slack = interface.opening(nodal)[near] - cones.slack
+        slack = interface.normal_gap(nodal)[near] - cones.slack
         slip = interface.slip(nodal)[frictional] - cones.slip
         cones.scale()
         stiff, across = cones.stiffness()
-        blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
-        normal, tangent = jump.normal[near], jump.tangent[frictional]
+        blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))
+        normal, tangent = nodes.normal[near], nodes.tangent[frictional]
         blocks[near, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
         blocks[frictional, :d, :d] += tangent @ across @ tangent
-        self._step.assemble(self.problem, state, blocks / jump.weight[:, None, None])
+        self._step.assemble(self.problem, state, blocks / nodes.weight[:, None, None])
 
         def solve(constants: tuple[Array, Array]) -> tuple[Array, ConeStep]:
             force, friction = cones.reduced(constants)
-            at_nodes = np.zeros((jump.nodes.size, d))
+            at_nodes = np.zeros((nodes.nodes.size, d))
             at_nodes[near] = -(force - stiff * slack)[:, None] * normal
             at_nodes[frictional] += friction - np.einsum("kij,kj->ki", across, slip)
             rhs = residual.copy()
-            jump.transpose(at_nodes, rhs)
+            nodes.transpose(at_nodes, rhs)
             dx = self._step.operator.solve(rhs, FORCING)
-            moved = jump.apply(dx)
-            closed = slack - jump.normal_component(moved)[near]
+            moved = nodes.apply(dx)
+            closed = slack - nodes.normal_component(moved)[near]
             return dx, cones.complete(
-                constants, closed, jump.tangential_component(moved)[frictional] + slip
+                constants, closed, nodes.tangential_component(moved)[frictional] + slip
             )
 
         now, affine = cones.duality_gap(), solve(cones.affine_target())[1]

@@ -107,7 +107,7 @@ class NewtonStep:
         """The operator of the linear systems."""
         if self._operator is None:
             interface, body = self._problem.interface, self._problem.equilibrium
-            asymmetric = interface.friction.acts or interface.law.active or not body.symmetric
+            asymmetric = interface.friction.acts or interface.layer.active or not body.symmetric
             self._operator = self._problem.operator(
                 symmetric=not asymmetric, counters=self._counters, kind=self.options.linear
             )
@@ -116,15 +116,15 @@ class NewtonStep:
     def assemble(self, problem: Problem, state: State, blocks: Array) -> None:
         """Assemble the operator with nodal blocks and those of layer and current. Collective."""
         interface, body = problem.interface, problem.equilibrium
-        if interface.law.active:
-            nodal = interface.jump.apply(state.x)
-            blocks = blocks + interface.law.block(nodal, interface.pressure(nodal, state.forces))
+        if interface.layer.active:
+            nodal = interface.nodes.apply(state.x)
+            blocks = blocks + interface.layer.block(nodal, interface.pressure(nodal, state.forces))
         weighted = interface.weighted(blocks, state.x)
         self.operator.update("secant", state, weighted, constant=body.linear)
 
     def without_contact(self, problem: Problem, state: State) -> State:
         """Return the state after one linear solve with all nodes open. Collective."""
-        nodes, body = problem.interface.jump, problem.equilibrium
+        nodes, body = problem.interface.nodes, problem.equilibrium
         free = State(state.x, Multipliers.zero(nodes), state.time, state.history)
         size = nodes.block_size
         self.assemble(problem, free, np.zeros((nodes.nodes.size, size, size)))
@@ -159,8 +159,8 @@ class NewtonStep:
             Whether iterative solvers go to their own tolerance, without the forcing term.
         """
         interface = problem.interface
-        body, jump = problem.equilibrium, interface.jump
-        nodal = jump.apply(state.x)
+        body, nodes = problem.equilibrium, interface.nodes
+        nodal = nodes.apply(state.x)
         contact = linearise(
             interface,
             nodal,
@@ -178,15 +178,15 @@ class NewtonStep:
             stiffness = (
                 REGULARISATION * min(reached.significant, 1.0) * self.parameters.nodal_stiffness
             )
-            along = jump.normal[:, :, None] * jump.normal[:, None, :]
-            blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
+            along = nodes.normal[:, :, None] * nodes.normal[:, None, :]
+            blocks[:, : body.dim, : body.dim] += stiffness * (along + nodes.tangent)
         blocks = interface.weighted(blocks, state.x)
         at = state if linearised_at is None else replace(state, x=linearised_at)
         self.operator.update(kind, at, blocks, constant=body.linear or remains)
         self._kind = kind
-        here = replace(state, forces=contact.forces)
+        here = replace(state, forces=contact.multipliers)
         residual = residual_forces(problem, here, linearised_at, internal)
-        jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
+        nodes.transpose((nodes.weight * shift)[:, None] * nodes.normal, residual)
         forcing = None if exact else self._forcing_term(reached.significant)
         try:
             increment = self.operator.solve(-residual, forcing)
@@ -195,12 +195,12 @@ class NewtonStep:
                 raise
             self.renew()
             return None
-        moved = jump.apply(increment)
+        moved = nodes.apply(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)
-        vectors = contact.forces.vectors(jump) + change[:, : interface.dim]
-        forces = Multipliers.of(jump, jump.normal_component(vectors), vectors)
-        pressed = jump.normal_component(np.einsum("nij,nj->ni", layer, moved))
-        known = interface.law.layer_pressure(nodal) + shift + pressed
+        vectors = contact.multipliers.vectors(nodes) + change[:, : interface.dim]
+        forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
+        pressed = nodes.normal_component(np.einsum("nij,nj->ni", layer, moved))
+        known = interface.layer.pressure(nodal) + shift + pressed
         # Far motions leave nodes of a rigid part off it by rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
         return replace(
@@ -211,13 +211,13 @@ class NewtonStep:
         self, interface: Interface, nodal: Array, contact: LinearisedContact, reached: float
     ) -> Array | float:
         """Return the derivative of the current, with that of psi(u_nu - rho) or psi frozen."""
-        law = interface.law
+        law = interface.layer
         if not law.active:
             return 0.0
         follow = contact.unchanged
         if law.follows_gap:
             follow = self.conductivity_derivative(reached, follow)
-        return law.current_block(nodal, interface.pressure(nodal, contact.forces), follow)
+        return law.current_block(nodal, interface.pressure(nodal, contact.multipliers), follow)
 
 
 def linearised_layer(
@@ -232,15 +232,15 @@ def linearised_layer(
     As for the active set, the point of linearisation is that of the law with the sum p + c u_nu:
     about the displacement alone, a layer stiffer than the body cycles between its regimes.
     """
-    law, jump, c = interface.law, interface.jump, parameters.c
+    law, nodes, c = interface.layer, interface.nodes, parameters.c
     graph = law.normal_law(nodal)
     if graph is None:
-        return law.layer_block(nodal, full), np.zeros(nodal.shape[0])
-    u_n, layer = jump.normal_component(nodal), law.layer_pressure(nodal)
+        return law.pressure_block(nodal, full), np.zeros(nodal.shape[0])
+    u_n, layer = nodes.normal_component(nodal), law.pressure(nodal)
     known = layer if state.layer_pressure is None else state.layer_pressure
     place = graph.displacement(state.forces.pressure + known + c * u_n, c)
     linearised_at = nodal.copy()
-    linearised_at[:, : interface.dim] += (place - u_n)[:, None] * jump.normal
-    block = law.layer_block(linearised_at, full)
-    back = jump.normal_component(np.einsum("nij,nj->ni", block, nodal - linearised_at))
-    return block, law.layer_pressure(linearised_at) + back - layer
+    linearised_at[:, : interface.dim] += (place - u_n)[:, None] * nodes.normal
+    block = law.pressure_block(linearised_at, full)
+    back = nodes.normal_component(np.einsum("nij,nj->ni", block, nodal - linearised_at))
+    return block, law.pressure(linearised_at) + back - layer

@@ -85,11 +85,11 @@ class SemismoothNewton:
     def started(self, start: State) -> State:
         """Return an initial guess with its active set."""
         interface, c = self.problem.interface, self.step.parameters.c
-        nodal = interface.jump.apply(start.x)
+        nodal = interface.nodes.apply(start.x)
         # Rounding of the pressure at an open node would be a friction bound, and make it stick.
-        closed = touching(start.forces.pressure, interface.opening(nodal), c)
+        closed = touching(start.forces.pressure, interface.normal_gap(nodal), c)
         pressure = np.where(closed, start.forces.pressure, 0.0)
-        forces = Multipliers.of(interface.jump, pressure, start.forces.friction)
+        forces = Multipliers.of(interface.nodes, pressure, start.forces.friction)
         bound = interface.bound(nodal, forces)
         active_set = interface.active_set(nodal, forces, bound, c)
         return replace(start, forces=forces, active_set=active_set, layer_pressure=None)
@@ -218,7 +218,7 @@ class Iteration:
         return Outcome(self.residuals, self._options.allowed, ended)
 
     def _largest_pressure(self, state: State) -> float:
-        return self._problem.interface.jump.maximum(state.forces.pressure)
+        return self._problem.interface.nodes.maximum(state.forces.pressure)
 
     def _loss_of_contact(self, state: State) -> tuple[State, Outcome] | None:
         """Return zero displacement if contact is lost and no load acts; else None. Collective."""
@@ -246,15 +246,15 @@ def _node_counts(state: State, problem: Problem) -> tuple[int, int, int] | None:
     if state.active_set is None:
         return None
     interface = problem.interface
-    return interface.node_counts(interface.jump.apply(state.x), state.active_set)
+    return interface.node_counts(interface.nodes.apply(state.x), state.active_set)
 
 
 def _overestimates_stiffness(problem: Problem, c: float, state: State) -> bool:
     """Tell whether c times the penetration of a first state is far above all loads. Collective."""
     interface = problem.interface
-    penetration = np.maximum(-interface.opening(interface.jump.apply(state.x)), 0.0)
+    penetration = np.maximum(-interface.normal_gap(interface.nodes.apply(state.x)), 0.0)
     forces = np.abs(residual_forces(problem, problem.start()))
     on_nodes, on_global = np.split(forces, [problem.equilibrium.owned])
     loads = float(summed(interface.comm, on_nodes.sum())) + on_global.sum()
     # A given motion of the foundation alone is no load to compare with.
-    return bool(c * interface.jump.sum(penetration) > OVERESTIMATE * loads > 0)
+    return bool(c * interface.nodes.sum(penetration) > OVERESTIMATE * loads > 0)

@@ -102,7 +102,7 @@ class UnconstrainedModes:
     def _constrained_undeformed(self, friction: bool) -> bool:
         """Tell whether supports and contact of the reference configuration constrain all modes."""
         interface, rest = self.problem.interface, self.problem.start()
-        touching = interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.diameter
+        touching = interface.normal_gap(interface.nodes.apply(rest.x)) <= 1e-12 * interface.diameter
         grams = [group.constraints(friction, touching) for group in groups(self.problem)]
         return all(null_space(gram).size == 0 for gram in grams)
 
@@ -112,7 +112,7 @@ class UnconstrainedModes:
         That is where supports and frictionless contact balance all loads. Collective.
         """
         problem = self.problem
-        weight = problem.interface.jump.weight
+        weight = problem.interface.nodes.weight
         if not problem.frictional:
             return None
         if not self.friction_alone and self.overload(np.zeros_like(weight)) == 1:
@@ -136,12 +136,12 @@ class UnconstrainedModes:
         """Return which nodes of each unsupported body touch first, shape (n,). Collective."""
         # At others, whose tangents are inclined, friction could bear a body without pressure.
         interface, rest = self.problem.interface, self.problem.start()
-        opening = interface.opening(interface.jump.apply(rest.x))
-        found = np.zeros(opening.size, dtype=bool)
+        normal_gap = interface.normal_gap(interface.nodes.apply(rest.x))
+        found = np.zeros(normal_gap.size, dtype=bool)
         for group in self._unsupported:
             moved = np.abs(group.normal).sum(axis=1) + np.abs(group.tangential).sum(axis=(1, 2))
-            own = np.where(moved > 0, opening, np.inf)
-            found |= own <= NEGLIGIBLE * interface.diameter - interface.jump.maximum(-own)
+            own = np.where(moved > 0, normal_gap, np.inf)
+            found |= own <= NEGLIGIBLE * interface.diameter - interface.nodes.maximum(-own)
         return found
 
     @cached_property
@@ -165,9 +165,9 @@ class UnconstrainedModes:
             Stiffness of a node (stress/length). A proximal term of sqrt(EPS) times it makes the
             system regular; a second step removes its forces.
         """
-        jump, start = problem.interface.jump, problem.start()
-        blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
-        blocks[:] = np.sqrt(EPS) * stiffness * np.eye(jump.block_size)
+        nodes, start = problem.interface.nodes, problem.start()
+        blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))
+        blocks[:] = np.sqrt(EPS) * stiffness * np.eye(nodes.block_size)
         operator.update("secant", start, problem.interface.weighted(blocks, start.x))
         state = start
         for _ in range(2):  # each leaves an error of sqrt(EPS)
@@ -177,11 +177,11 @@ class UnconstrainedModes:
         if found is None:
             return None
         further = found.columns @ (found.amounts - found.wanted)
-        way = jump.maximum(np.linalg.norm(further, axis=1))
+        way = nodes.maximum(np.linalg.norm(further, axis=1))
         if not way**2 <= 2 * found.depth**2:  # more than 45 degrees off the normal
             return None
-        moved = np.zeros((state.x.size // jump.block_size, jump.block_size))
-        moved[jump.nodes, : jump.dim] = found.columns @ found.amounts
+        moved = np.zeros((state.x.size // nodes.block_size, nodes.block_size))
+        moved[nodes.nodes, : nodes.dim] = found.columns @ found.amounts
         return replace(state, x=state.x - moved.ravel())
 
     def free_motion(self, problem: Problem, state: State) -> RigidMotion | None:
@@ -190,14 +190,14 @@ class UnconstrainedModes:
         None without any. Collective.
         """
         interface = problem.interface
-        jump, nodal = interface.jump, interface.jump.apply(state.x)
+        nodes, nodal = interface.nodes, interface.nodes.apply(state.x)
         # Pressures that are rounding do not constrain.
         pressed = interface.pressure(nodal, state.forces) > interface.rounding(nodal)
         motions, columns = [], []
         for group in self._unsupported:
             free = null_space(group.constraints(self.problem.frictional, pressed))
             if free.shape[1] > 0:
-                along = group.normal[:, None, :] * jump.lift[:, :, None]
+                along = group.normal[:, None, :] * nodes.admissible_normal[:, :, None]
                 columns.append((along + group.tangential) @ free)
                 motions.append(group.moved @ free)
         if not motions:
@@ -208,20 +208,20 @@ class UnconstrainedModes:
             vectors = [*(body.local(column) for column in whole.T), state.x]
             rows, weights = _by_volume(problem, vectors)
         else:  # of a condensed body the jumps alone are known
-            values = np.concatenate([moved, nodal[:, : jump.dim, None]], axis=2)
-            rows, weights = values.reshape(-1, values.shape[2]), np.repeat(jump.weight, jump.dim)
-        gram = jump.comm.allreduce(rows.T @ (weights[:, None] * rows), op=MPI.SUM)
+            values = np.concatenate([moved, nodal[:, : nodes.dim, None]], axis=2)
+            rows, weights = values.reshape(-1, values.shape[2]), np.repeat(nodes.weight, nodes.dim)
+        gram = nodes.comm.allreduce(rows.T @ (weights[:, None] * rows), op=MPI.SUM)
         products, sides = gram[:-1, :-1], gram[:-1, -1]
         wanted = amounts = np.linalg.lstsq(products, sides, rcond=EPS)[0]
-        near, opening = np.isfinite(jump.gap), interface.opening(nodal)
-        rising = np.einsum("ni,nik->nk", jump.normal, moved)
-        depth = jump.maximum(-(opening + rising @ wanted)[near])
+        near, normal_gap = np.isfinite(interface.gap), interface.normal_gap(nodal)
+        rising = np.einsum("ni,nik->nk", nodes.normal, moved)
+        depth = nodes.maximum(-(normal_gap + rising @ wanted)[near])
         limited = depth > NEGLIGIBLE * interface.diameter
         if limited:
             # Penetration of a solution is rounding.
-            deep = opening < -NEGLIGIBLE * interface.diameter
-            room = np.where(deep, opening, np.maximum(opening, 0.0))
-            parts = jump.comm.allgather((rising[near], room[near]))
+            deep = normal_gap < -NEGLIGIBLE * interface.diameter
+            room = np.where(deep, normal_gap, np.maximum(normal_gap, 0.0))
+            parts = nodes.comm.allgather((rising[near], room[near]))
             cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))
             amounts = _least_distance(products, wanted, cone, -room)
         return RigidMotion(whole, moved, wanted, amounts, depth, limited)
@@ -269,7 +269,7 @@ def with_least_displacements(
         return state, outcome
     if not outcome.converged:
         # A method may stall on contact forces that are rounding.
-        free = replace(state, forces=Multipliers.zero(problem.interface.jump))
+        free = replace(state, forces=Multipliers.zero(problem.interface.nodes))
         residuals = evaluate(problem, free)
         if residuals.excess(outcome.allowed):
             return state, outcome
@@ -279,12 +279,12 @@ def with_least_displacements(
         return state, outcome
     x = body.moved(state.x, -found.motion)
     # Contact forces that are rounding are out of balance after the motion.
-    for forces in (Multipliers.zero(problem.interface.jump), state.forces):
+    for forces in (Multipliers.zero(problem.interface.nodes), state.forces):
         least = replace(state, x=x, forces=forces)
         residuals = evaluate(problem, least)
         if not residuals.excess(outcome.allowed):
             outcome = replace(outcome, residuals=residuals)
-            pressed = problem.interface.jump.maximum(state.forces.pressure) > 0
+            pressed = problem.interface.nodes.maximum(state.forces.pressure) > 0
             if pressed and forces is not state.forces:
                 # Pressures that were rounding have constrained other modes.
                 return with_least_displacements(modes, least, outcome)

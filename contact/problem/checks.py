@@ -285,9 +285,9 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     locally = [body.local(column) for column in columns.T]
     flows, among_held = _flows(problem, state)
     rows.append(np.column_stack([problem.nodes.apply(x)[flows, -1] for x in locally]))
-    if interface.held is not None:
-        jump = interface.held.jump
-        rows.append(np.column_stack([jump.apply(x)[among_held, -1] for x in locally]))
+    if interface.constrained is not None:
+        nodes = interface.constrained.nodes
+        rows.append(np.column_stack([nodes.apply(x)[among_held, -1] for x in locally]))
     gram = sum(problem.comm.allreduce(part.T @ part, op=MPI.SUM) for part in rows)
     floating = null_space(gram / max(np.trace(gram), 1.0))
     if floating.shape[1] == 0:
@@ -311,7 +311,7 @@ def _flows(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return through which contact nodes current flows or could; and the nodes with supports."""
     interface = problem.interface
-    law, held = interface.law, interface.held
+    law, held = interface.layer, interface.constrained
     if state is None:
         return _conducts(law, interface.diameter), _conducts(held, interface.diameter)
     found = [
@@ -323,7 +323,7 @@ def _flows(
 
 def _conducts(law: InterfaceLaw | None, deep: float) -> NDArray[np.bool_]:
     """Return which nodes conduct deep inside the foundation."""
-    closed = np.ones(0 if law is None else law.jump.nodes.size, dtype=bool)
+    closed = np.ones(0 if law is None else law.nodes.nodes.size, dtype=bool)
     if law is None or law.conductor is None:
         return ~closed
     psi = law.conductor.psi.at(np.full(closed.size, deep), ~closed, closed)

@@ -162,9 +162,9 @@ class CondensedProblem:
     def start(self, time: float | None = None) -> State:
         """Return the zero initial guess."""
         x = self.equilibrium.prescribe(self.equilibrium.rest())
-        return State(x, Multipliers.zero(self.interface.jump), self.time)
+        return State(x, Multipliers.zero(self.interface.nodes), self.time)
 
-    def with_interface(self, interface: Interface) -> CondensedProblem:
+    def with_laws(self, interface: Interface) -> CondensedProblem:
         """Return the problem with another interface on the same contact nodes."""
         return replace(self, interface=interface)
 
@@ -176,20 +176,18 @@ class CondensedProblem:
 
 def at_kept_nodes(interface: Interface) -> Interface:
     """Return an interface numbered by kept nodes."""
-    count = interface.jump.nodes.size
+    count = interface.nodes.nodes.size
     first, others = np.split(np.arange(interface.coupled.size, dtype=np.int32), [count])
 
     def kept(nodes: ContactNodes, positions: NDArray[np.int32]) -> ContactNodes:
         """Return nodes of other numbers, whose unknowns are the jumps."""
         return replace(nodes, nodes=positions, motion=None, carried=None, coupling=None)
 
-    law, held = interface.law, interface.held
-    return replace(
-        interface,
-        jump=kept(interface.jump, first),
-        law=replace(law, jump=kept(law.jump, first)),
-        held=None if held is None else replace(held, jump=kept(held.jump, others)),
-    )
+    nodes, constrained = kept(interface.nodes, first), interface.constrained
+    if constrained is not None:
+        constrained = replace(constrained, nodes=kept(constrained.nodes, others))
+    law = replace(interface.layer, nodes=nodes)
+    return replace(interface, nodes=nodes, layer=law, constrained=constrained)
 
 
 class Condensation:
@@ -288,8 +286,8 @@ class Condensation:
         if not (self._regular and np.isfinite(forces).all()):
             return None
         free, inclined = body.layout.at(self.nodes)
-        jump = self.full.interface.jump
-        others = body.nodal(state.x)[self.nodes[jump.nodes.size :]]
+        nodes = self.full.interface.nodes
+        others = body.nodal(state.x)[self.nodes[nodes.nodes.size :]]
         condensed = CondensedBody(
             body.comm,
             body.dim,
@@ -297,7 +295,7 @@ class Condensation:
             self._rows,
             self._stiffness,
             forces,
-            np.concatenate([jump.apply(state.x), others]).ravel(),
+            np.concatenate([nodes.apply(state.x), others]).ravel(),
             self._own,
             acting,
             body.component_norms.at(self.nodes),

@@ -71,8 +71,8 @@ def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]
     foundation = np.zeros_like(residual)
     interface.add_forces(foundation, state.x, state.forces)
     internal = residual + external - foundation
-    vectors = interface.jump.weight[:, None] * state.forces.vectors(interface.jump)
-    interface.jump.transpose(-vectors, foundation)
+    vectors = interface.nodes.weight[:, None] * state.forces.vectors(interface.nodes)
+    interface.nodes.transpose(-vectors, foundation)
     return external - foundation + body.reactions(residual), internal
 
 
@@ -86,7 +86,7 @@ def dissipated(
     interface = problem.interface
     slip = interface.slip(problem.nodal(state))
     work = np.einsum("ni,ni->n", state.forces.friction, slip)
-    return interface.jump.sum(work if nodes is None else np.where(nodes, work, 0.0))
+    return interface.nodes.sum(work if nodes is None else np.where(nodes, work, 0.0))
 
 
 def stored(problem: ContactProblem, state: State) -> float:

@@ -156,7 +156,7 @@ class Overload:
         problem, free = group.problem, null_space(group.supports)
         if free.shape[1] == 0:
             return None
-        nodes, near = problem.nodes, np.isfinite(problem.nodes.gap)
+        nodes, near = problem.nodes, np.isfinite(problem.interface.gap)
         normal, tangential, bound = (
             nodes.gather(of[near])
             for of in (group.normal @ free, group.tangential @ free, friction)

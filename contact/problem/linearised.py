@@ -73,18 +73,18 @@ def active_set(problem: ContactProblem, state: State) -> ActiveSet:
 
 def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equations:
     """Return the residuals of the equations of an active set. Collective."""
-    interface, jump, nodal = problem.interface, problem.nodes, problem.nodal(state)
-    vectors = state.forces.vectors(jump)
+    interface, nodes, nodal = problem.interface, problem.nodes, problem.nodal(state)
+    vectors = state.forces.vectors(nodes)
     slip, pressure = interface.slip(nodal), interface.pressure(nodal, state.forces)
     length = np.linalg.norm(slip, axis=1)
     bound = interface.friction.bound(pressure, length)
     along = unit_vectors(slip)
-    friction = jump.tangential_component(vectors)
+    friction = nodes.tangential_component(vectors)
     slides = friction - np.where(active.slips, bound, 0.0)[:, None] * along
     tangential = np.where(active.sticks[:, None], interface.stiffness * slip, slides)
-    closing = -interface.stiffness * interface.opening(nodal)
-    normal = np.where(active.closed, closing, jump.normal_component(vectors))
-    conditions = normal[:, None] * jump.normal + tangential
+    closing = -interface.stiffness * interface.normal_gap(nodal)
+    normal = np.where(active.closed, closing, nodes.normal_component(vectors))
+    conditions = normal[:, None] * nodes.normal + tangential
     # Forces on nodes of a rigid part as forces on it: a parameter may be its moment arm.
     forces = problem.equilibrium.unbalanced(residual_forces(problem, state))
     return Equations(forces, conditions)
@@ -92,11 +92,11 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
 
 def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float]:
     """Return reference norms of forces and, in L2(Gamma_3), of conditions. Collective."""
-    body, jump, scales = problem.equilibrium, problem.nodes, problem.scales
+    body, nodes, scales = problem.equilibrium, problem.nodes, problem.scales
     least = WEAK * scales.young * scales.area
     forces = body.norm(body.internal_forces(state)) + body.norm(body.external(state.time))
     moved = problem.interface.stiffness * problem.nodal(state)[:, : problem.dim]
-    stresses = jump.norm(moved) + jump.norm(state.forces.vectors(jump))
+    stresses = nodes.norm(moved) + nodes.norm(state.forces.vectors(nodes))
     return forces + least, stresses + least / scales.area**0.5
 
 
@@ -110,8 +110,8 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     active, c = active_set(problem, state), interface.stiffness
     moved = c * np.linalg.norm(nodal[:, : problem.dim], axis=1)
     small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(nodal, forces), moved))
-    opening, length = np.abs(interface.opening(nodal)), interface.slip_length(nodal)
-    weak = np.where(active.closed, np.abs(forces.pressure) <= small, c * opening <= small)
+    normal_gap, length = np.abs(interface.normal_gap(nodal)), interface.slip_length(nodal)
+    weak = np.where(active.closed, np.abs(forces.pressure) <= small, c * normal_gap <= small)
     if interface.friction.acts:
         bound = interface.bound(nodal, forces)
         left = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
@@ -147,18 +147,18 @@ class Linearised:
     ) -> None:
         self.problem, self.state = problem, state
         self.active = active_set(problem, state)
-        interface, jump, nodal = problem.interface, problem.nodes, problem.nodal(state)
+        interface, nodes, nodal = problem.interface, problem.nodes, problem.nodal(state)
         self._pressure = interface.pressure(nodal, state.forces)
-        law = interface.law.block(nodal, self._pressure, full=True)
+        law = interface.layer.block(nodal, self._pressure, full=True)
         self._conditions(nodal)
         regular = self._by_force.copy()
-        normal = jump.normal[:, :, None] * jump.normal[:, None, :]
+        normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
         small = interface.stiffness / parameters.gamma
         regular -= np.where(self.active.closed, small, 0.0)[:, None, None] * normal
         sticks = np.where(self.active.sticks, small, 0.0)
-        regular -= sticks[:, None, None] * jump.tangent
+        regular -= sticks[:, None, None] * nodes.tangent
         self._regular = np.linalg.inv(regular)
-        d = jump.dim
+        d = nodes.dim
         law[:, :d] -= self._regular @ self._by_jump
         kind = "auto" if multigrid.is_large(problem.equilibrium.layout) else "lu"
         self._operator = problem.operator(symmetric=False, counters=counters, kind=kind)
@@ -166,15 +166,15 @@ class Linearised:
 
     def _conditions(self, nodal: Array) -> None:
         """Compute C_u, shape (n, d, block size), and C_f, shape (n, d, d)."""
-        interface, jump, active = self.problem.interface, self.problem.nodes, self.active
-        d, slip = jump.dim, interface.slip(nodal)
+        interface, nodes, active = self.problem.interface, self.problem.nodes, self.active
+        d, slip = nodes.dim, interface.slip(nodal)
         length = np.linalg.norm(slip, axis=1)
         size = np.where(active.slips, np.maximum(length, np.finfo(float).tiny), 1.0)
         along = slip / size[:, None]
-        normal = jump.normal[:, :, None] * jump.normal[:, None, :]
+        normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
         friction, closed = interface.friction, active.closed[:, None, None]
         bound = friction.bound(self._pressure, length)
-        across = jump.tangent - along[:, :, None] * along[:, None, :]
+        across = nodes.tangent - along[:, :, None] * along[:, None, :]
         by_slip = friction.by_slip(self._pressure, length)
         turning = (bound / size)[:, None, None] * across
         falls = turning + by_slip[:, None, None] * (along[:, :, None] * along[:, None, :])
@@ -186,33 +186,33 @@ class Linearised:
             total, smooth = friction.history.accumulated + length, friction.smooth(self._pressure)
             rate = np.asarray(friction.law.by_pressure(total, smooth), dtype=float)
             self._rate = np.broadcast_to(rate, length.shape) * (smooth > 0)
-        self._layer = interface.law.layer_gradient(nodal)
+        self._layer = interface.layer.pressure_gradient(nodal)
         local = self._rate * friction.local
-        self._by_jump = np.zeros((length.size, d, jump.block_size))
+        self._by_jump = np.zeros((length.size, d, nodes.block_size))
         self._by_jump[:, :, :d] = np.where(closed, interface.stiffness * normal, 0.0)
         #: Derivative of the conditions by the slip alone, and by its length.
-        self.by_slip = np.where(sticks, interface.stiffness * jump.tangent, 0.0)
+        self.by_slip = np.where(sticks, interface.stiffness * nodes.tangent, 0.0)
         self.by_slip -= np.where(slips, falls, 0.0)
         self.by_length = -by_slip[:, None] * self._along
         self._by_jump[:, :, :d] += self.by_slip
         self._by_jump -= (local[:, None] * self._along)[:, :, None] * self._layer[:, None, :]
-        pressed = (local[:, None] * self._along)[:, :, None] * jump.normal[:, None, :]
-        self._by_force = np.where(closed, 0.0, normal) + np.where(sticks, 0.0, jump.tangent)
+        pressed = (local[:, None] * self._along)[:, :, None] * nodes.normal[:, None, :]
+        self._by_force = np.where(closed, 0.0, normal) + np.where(sticks, 0.0, nodes.tangent)
         # No contact force along fixed components.
-        self._by_force += np.eye(d) - normal - jump.tangent
+        self._by_force += np.eye(d) - normal - nodes.tangent
         self._by_force -= pressed
 
     def solve(self, change: Equations) -> tuple[Array, Array]:
         """Return dx on the owned unknowns and df with J (dx, df) = -change. Collective."""
-        jump = self.problem.nodes
+        nodes = self.problem.nodes
         rhs, left = -change.forces, -change.conditions
         x, f = np.zeros_like(rhs), np.zeros_like(left)
         size, steps = 0.0, list[float]()
         while True:
             known = np.einsum("nij,nj->ni", self._regular, left)
-            jump.transpose(-jump.weight[:, None] * known, rhs)
+            nodes.transpose(-nodes.weight[:, None] * known, rhs)
             dx = self._operator.solve(rhs, EPS)
-            moved = jump.apply(self.problem.equilibrium.local(dx))
+            moved = nodes.apply(self.problem.equilibrium.local(dx))
             df = known - np.einsum(
                 "nij,nj->ni", self._regular, np.einsum("nij,nj->ni", self._by_jump, moved)
             )
@@ -225,32 +225,33 @@ class Linearised:
 
     def solve_transposed(self, by_x: Array, by_force: Array) -> tuple[Array, Array]:
         """Return w with J^T w = (by_x, by_force), shapes (owned,) and (n, d). Collective."""
-        jump, weight = self.problem.nodes, self.problem.nodes.weight[:, None]
+        nodes, weight = self.problem.nodes, self.problem.nodes.weight[:, None]
         rhs, left = by_x.copy(), by_force
         x, c = np.zeros_like(rhs), np.zeros_like(left)
         size, steps = 0.0, list[float]()
         while True:
             known = np.einsum("nji,nj->ni", self._regular, left)
-            jump.transpose(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
+            nodes.transpose(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
             dx = self._operator.solve_transposed(rhs)
-            moved = weight * jump.apply(self.problem.equilibrium.local(dx))[:, : jump.dim]
+            moved = weight * nodes.apply(self.problem.equilibrium.local(dx))[:, : nodes.dim]
             dc = known - np.einsum("nji,nj->ni", self._regular, moved)
             x, c = x + dx, c + dc
             by_jump, by_own = self._smoothed_transposed(dc)
             left = left - moved - np.einsum("nji,nj->ni", self._by_force, dc) - by_own
             rhs -= self._operator.multiply(dx, transposed=True)
-            jump.transpose(-by_jump, rhs)
+            nodes.transpose(-by_jump, rhs)
             size, steps = max(size, self._norm(x, c)), [*steps, self._norm(dx, dc)]
             if self._enough(steps, size):
                 return x, c
 
     def by_gap(self, x: Array, conditions: Array) -> Array:
         """Return the derivatives by the gap at each node, (n,), from the adjoint. Collective."""
-        jump, d = self.problem.nodes, self.problem.dim
-        by_normal = np.einsum("nij,nj->ni", self._by_jump[:, :, :d], jump.normal)
+        nodes, d = self.problem.nodes, self.problem.dim
+        by_normal = np.einsum("nij,nj->ni", self._by_jump[:, :, :d], nodes.normal)
         found = np.einsum("ni,ni->n", conditions, by_normal)
-        pressed = jump.weight * jump.normal_component(jump.apply(self.problem.equilibrium.local(x)))
-        return found + pressed * np.einsum("ni,ni->n", self._layer[:, :d], jump.normal)
+        moved = nodes.apply(self.problem.equilibrium.local(x))
+        pressed = nodes.weight * nodes.normal_component(moved)
+        return found + pressed * np.einsum("ni,ni->n", self._layer[:, :d], nodes.normal)
 
     def _conditions_of(self, moved: Array, f: Array) -> Array:
         """Return C_u du + C_f df, with the smoothed pressure. Collective."""
@@ -293,9 +294,9 @@ class Linearised:
 
 def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> State:
     """Return a state moved by changes of owned unknowns and contact forces. Collective."""
-    jump = problem.nodes
-    vectors = state.forces.vectors(jump) + f
-    forces = Multipliers.of(jump, jump.normal_component(vectors), vectors)
+    nodes = problem.nodes
+    vectors = state.forces.vectors(nodes) + f
+    forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
     return replace(state, x=problem.equilibrium.moved(state.x, x), forces=forces)
 
 
@@ -331,11 +332,11 @@ def commit_transposed(problem: ContactProblem, state: State, after: History) -> 
     if variables is not None:
         problem.equilibrium.laws.commit_transposed(state, variables)
         by_x += problem.equilibrium.forces_of_laws()
-    jump, nodal = problem.nodes, problem.nodal(state)
+    nodes, nodal = problem.nodes, problem.nodal(state)
     by_jump = np.zeros_like(nodal)
-    by_jump[:, : jump.dim] = jump.tangential_component(slip.jump)
-    by_jump[:, : jump.dim] += slip.accumulated[:, None] * _direction(problem, nodal)
-    jump.transpose(by_jump, by_x)
+    by_jump[:, : nodes.dim] = nodes.tangential_component(slip.jump)
+    by_jump[:, : nodes.dim] += slip.accumulated[:, None] * _direction(problem, nodal)
+    nodes.transpose(by_jump, by_x)
     return by_x
 
 

@@ -20,18 +20,19 @@ from contact.body.internal_variables import VARIABLES
 from contact.body.materials import young_behind
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
-from contact.interface.entries import (
-    Entry,
+from contact.interface.interface import Interface
+from contact.interface.joined import (
+    joined_conductors,
+    joined_constrained,
     joined_friction,
-    joined_held,
-    joined_law,
+    joined_layers,
     joined_nodes,
 )
-from contact.interface.interface import Interface
+from contact.interface.law import InterfaceLaw
 from contact.interface.multipliers import Multipliers, SlipHistory
-from contact.interface.nodes import ContactNodes
-from contact.interface.pairing import find_pair
-from contact.interface.placing import Candidates, find_nodes, held_nodes
+from contact.interface.nodes import ContactNodes, Geometry
+from contact.interface.pairing import PairPlacement, find_pair
+from contact.interface.placing import FoundationPlacement, find_nodes
 from contact.linear.constraint import ConstrainedOperator, Constraint
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
@@ -48,7 +49,7 @@ from contact.typing import Array
 
 
 def approached(
-    nodes: ContactNodes, x: Array, global_unknowns: GlobalUnknowns, time: float
+    interface: Interface, x: Array, global_unknowns: GlobalUnknowns, time: float
 ) -> Array:
     """Return unknowns with each free foundation moved by its force to where it first touches.
 
@@ -57,8 +58,8 @@ def approached(
 
     Parameters
     ----------
-    nodes
-        The contact nodes.
+    interface
+        The contact nodes with their gaps.
     x
         Local unknowns, the global ones behind them.
     global_unknowns
@@ -66,24 +67,27 @@ def approached(
     time
         When: forces are those of this time.
     """
-    forces = global_unknowns.forces(time)
+    nodes, forces = interface.nodes, global_unknowns.forces(time)
     for member in global_unknowns.members:
         push = np.zeros(global_unknowns.size)
         push[member.columns] = forces[member.columns]
         if nodes.motion is None or not member.foundation or not push.any():
             continue
-        opening = nodes.gap - nodes.normal_component(nodes.apply(x))
+        normal_gap = interface.normal_gap(nodes.apply(x))
         closing = -nodes.normal_component(nodes.motion @ push)
         mine = np.abs(nodes.motion[:, :, member.columns]).max(axis=(1, 2), initial=0.0) > 0
-        way = np.full(opening.size, np.inf)
+        way = np.full(normal_gap.size, np.inf)
         there = mine & (closing > 0)
-        way[there] = opening[there] / closing[there]
+        way[there] = normal_gap[there] / closing[there]
         least = nodes.comm.allreduce(float(way.min(initial=np.inf)), op=MPI.MIN)
         if 0 < least < np.inf:
             x = x.copy()
             x[x.size - global_unknowns.size :] += least * push
     return x
 
+
+#: The contact of a part: where its nodes are, and their geometry at any place, by `at`.
+Placement = FoundationPlacement | PairPlacement
 
 #: Part of the history of each problem.
 SLIP = "slip"
@@ -115,8 +119,9 @@ class ContactProblem:
         The contacts, each with its friction and conductor.
     equilibrium
         The body: its space, forms, forces and operators.
-    entries
-        The contacts with their nodes, in the order of the interface.
+    placements, geometries
+        Of each contact: which nodes, and their geometry where the bodies are: in the reference
+        configuration, but of `with_geometry`.
     interface
         Gamma_3 with its laws.
     scales
@@ -163,7 +168,15 @@ class ContactProblem:
                     "contact-name",
                 )
         self.equilibrium = BodyEquilibrium(domain, self.body, degree, element)
+        one = len(self.contacts) == 1
+        placed = [
+            self._placed("contact" if one else f"contact.{i}", contact)
+            for i, contact in enumerate(self.contacts)
+        ]
+        self.placements = tuple(placement for placement, _ in placed)
+        self.geometries = tuple(geometry for _, geometry in placed)
         self.interface = self._interface()
+        self._check_cuts()
         self.scales = self._scales()
         self.time = 1.0
         self.since: float | None = None
@@ -193,18 +206,31 @@ class ContactProblem:
         step = copy(self)
         step.time, step.since = time, since
         step.history = (history or self.initial) if history is not None else self.history
-        slip = step.history[SLIP]
-        assert isinstance(slip, SlipHistory)
-        step.interface = self.interface.at(time, slip)
+        step.interface = self.interface.at(time, step.slip_history)
         return step
 
-    def with_interface(self, interface: Interface) -> ContactProblem:
-        """Return the problem with other laws, or gaps, at the same contact nodes."""
+    @property
+    def slip_history(self) -> SlipHistory:
+        """The part of the history that friction has."""
+        slip = self.history[SLIP]
+        assert isinstance(slip, SlipHistory)
+        return slip
+
+    def with_geometry(self, geometries: Sequence[Geometry]) -> ContactProblem:
+        """Return the problem with its contacts at another place, each as of `Placement.at`.
+
+        The contact nodes, the history and the time are the same. Collective.
+        """
+        other = copy(self)
+        other.__dict__.pop("constraint", None)  # of the other geometry, where it is asked for
+        other.geometries = tuple(geometries)
+        other.interface = other._interface().at(self.time, self.slip_history)
+        return other
+
+    def with_laws(self, interface: Interface) -> ContactProblem:
+        """Return the problem with other laws at the same contact nodes."""
         other = copy(self)
         other.interface = interface
-        other.__dict__.pop(
-            "constraint", None
-        )  # that of the other nodes is made when it is asked for
         return other
 
     def commit(self, state: State) -> History:
@@ -228,55 +254,8 @@ class ContactProblem:
         """Return the points of the places of a history that this rank owns, shape (n, d)."""
         return self.nodes.points if place == CONTACT_NODES else self.equilibrium.laws.places
 
-    def _interface(self) -> Interface:
-        size, one = self.domain.size, len(self.contacts) == 1
-        self.entries = tuple(
-            self._entry("contact" if one else f"contact.{i}", contact)
-            for i, contact in enumerate(self.contacts)
-        )
-        body = self.equilibrium
-        found = joined_nodes(
-            self.entries,
-            body.layout.index_map,
-            body.free,
-            body.global_unknowns.ties,
-            body.layout.inclined,
-        )
-        self._check_cuts(found)
-        # The softer side where bodies touch: parts far from there may be softer by far.
-        where = self.domain, self.body.materials, body.cells
-        sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
-        young = max(min(young_behind(*where, side) for side in both) for both in sides)
-        stiffness = young / size
-        law = joined_law(self.entries, found, body.phi_scale, stiffness)
-        friction = joined_friction(self.entries, found)
-        held = joined_held(self.entries, law, body.layout.index_map.local_range[0])
-        mesh = self.domain.mesh
-        longer = max(elongation(mesh, self.domain.facets(contact.on)) for contact in self.contacts)
-        component, components = (
-            body.component_norms.component[found.nodes],
-            body.component_norms.count,
-        )
-        return Interface(
-            law.constrained, law, friction, held, stiffness, size, longer, component, components
-        )
-
-    def _check_cuts(self, nodes: ContactNodes) -> None:
-        """Refuse contact at nodes of a bolt's cut that moves across it. Collective."""
-        body = self.equilibrium
-        if body.cuts is None:
-            return
-        acting = [nodes.normal]
-        if any(entry.friction.acts for entry in self.entries):
-            acting += list(np.moveaxis(nodes.tangent, 2, 0))
-        along = np.zeros((len(body.free), self.dim, len(acting)))
-        for k, vectors in enumerate(acting):
-            into = np.zeros_like(body.owned_part(body.rest()))
-            nodes.transpose(vectors, into)
-            along[:, :, k] = body.nodal(into)[:, : self.dim]
-        body.cuts.check(np.arange(len(along), dtype=np.int32), along, "contact meets")
-
-    def _entry(self, key: str, contact: Contact) -> Entry:
+    def _placed(self, key: str, contact: Contact) -> tuple[Placement, Geometry]:
+        """Return the placement of a contact, and its geometry in the reference configuration."""
         layer = contact.compliant_layer
         if layer is not None:
             layer.check(self.domain.size)
@@ -285,37 +264,57 @@ class ContactProblem:
                 contact.conductor.check()
         assert contact.friction is not None  # filled in above
         body, given = self.equilibrium, (contact.obstacle, key, contact.press)
-        laws = contact.friction, layer, contact.conductor
         if contact.against is not None:
-            rough = contact.friction.acts
-            nodes, coupling = find_pair(body, contact.on, contact.against, *given, friction=rough)
-            return Entry(contact.on, nodes, *laws, coupling=coupling)
-        nodes, found = find_nodes(body, contact.on, *given)
-        held = self._held(key, contact, nodes, found)
-        return Entry(contact.on, nodes, *laws, held, mixing=found.mixing)
+            return find_pair(body, contact.on, contact.against, *given, contact.friction.acts)
+        conducts = contact.conductor is not None and self.piezoelectric
+        return find_nodes(body, contact.on, *given, conducts)
 
-    def _held(
-        self, key: str, contact: Contact, nodes: ContactNodes, found: Candidates
-    ) -> ContactNodes | None:
-        if contact.conductor is None or not self.piezoelectric:
-            return None
-        global_unknowns = self.equilibrium.global_unknowns
-        held = held_nodes(found, contact.obstacle, self.equilibrium.free, nodes)
-        taken = bool(global_unknowns.tied[found.nodes, -1].any())
-        if self.comm.allreduce(taken, op=MPI.LOR):
-            raise InputError(
-                f"{key}.on: part {contact.on!r}, which carries charge, shares nodes with an "
-                "electrode of unknown potential; accepted: parts apart, or an insulated foundation",
-                "rigid-part",
-            )
-        moves = global_unknowns.member(contact.on) is not None
-        if held.size > 0 and moves:
-            raise InputError(
-                f"{key}.rigid: supports hold nodes of part {contact.on!r}, which carry charge as "
-                "the foundation comes near; accepted: a part that can move everywhere",
-                "held-charge",
-            )
-        return held
+    def _interface(self) -> Interface:
+        """Return the laws of all contacts at their geometries. Collective."""
+        body, geometries = self.equilibrium, self.geometries
+        nodes = joined_nodes(geometries, [contact.on for contact in self.contacts], body)
+        # The softer side where bodies touch: parts far from there may be softer by far.
+        where = self.domain, self.body.materials, body.cells
+        sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
+        young = max(min(young_behind(*where, side) for side in both) for both in sides)
+        stiffness = young / self.domain.size
+        conductors = [contact.conductor for contact in self.contacts]
+        law = InterfaceLaw(
+            nodes,
+            joined_layers([contact.compliant_layer for contact in self.contacts], geometries),
+            joined_conductors(conductors, [geometry.nodes for geometry in geometries]),
+            body.phi_scale,
+            stiffness,
+        )
+        frictions = [contact.friction or Friction() for contact in self.contacts]
+        facets = [self.domain.facets(contact.on) for contact in self.contacts]
+        return Interface(
+            nodes,
+            law.constrained_gap,
+            law,
+            joined_friction(frictions, geometries, nodes),
+            joined_constrained(conductors, geometries, law, body.layout.index_map.local_range[0]),
+            stiffness,
+            self.domain.size,
+            max(elongation(self.domain.mesh, own) for own in facets),
+            body.component_norms.component[nodes.nodes],
+            body.component_norms.count,
+        )
+
+    def _check_cuts(self) -> None:
+        """Refuse contact at nodes of a bolt's cut that moves across it. Collective."""
+        body, nodes = self.equilibrium, self.nodes
+        if body.cuts is None:
+            return
+        acting = [nodes.normal]
+        if any(contact.friction and contact.friction.acts for contact in self.contacts):
+            acting += list(np.moveaxis(nodes.tangent, 2, 0))
+        along = np.zeros((len(body.free), self.dim, len(acting)))
+        for k, vectors in enumerate(acting):
+            into = np.zeros_like(body.owned_part(body.rest()))
+            nodes.transpose(vectors, into)
+            along[:, :, k] = body.nodal(into)[:, : self.dim]
+        body.cuts.check(np.arange(len(along), dtype=np.int32), along, "contact meets")
 
     def _area(self, domain: Domain) -> float:
         """Return the area of Gamma_3. Collective."""
@@ -340,7 +339,7 @@ class ContactProblem:
     @property
     def entry_numbers(self) -> NDArray[np.intp]:
         """Number of the contact of each owned contact node, shape (n,)."""
-        sizes = [entry.nodes.nodes.size for entry in self.entries]
+        sizes = [geometry.nodes.nodes.size for geometry in self.geometries]
         return np.repeat(np.arange(len(sizes)), sizes)
 
     @cached_property
@@ -398,7 +397,7 @@ class ContactProblem:
     @property
     def nodes(self) -> ContactNodes:
         """The contact nodes."""
-        return self.interface.jump
+        return self.interface.nodes
 
     def nodal(self, state: State) -> Array:
         """Return the unknowns at the owned contact nodes, shape (n, block size)."""
@@ -416,5 +415,5 @@ class ContactProblem:
         if self.piezoelectric and conductors:
             if all(fixed.potential is None for fixed in self.body.fixed):
                 body.nodal(x)[:, -1] = conductors[0].at(self.time).phi_f / body.phi_scale
-        x = approached(self.nodes, body.prescribe(x, time), body.global_unknowns, time)
+        x = approached(self.interface, body.prescribe(x, time), body.global_unknowns, time)
         return State(x, Multipliers.zero(self.nodes), time, self.history)

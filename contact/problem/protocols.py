@@ -166,7 +166,7 @@ class Problem(Protocol):
         Or of another time.
         """
 
-    def with_interface(self, interface: Interface) -> Problem:
+    def with_laws(self, interface: Interface) -> Problem:
         """Return the problem with another interface on the same contact nodes."""
 
     def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> Operator:

@@ -180,9 +180,9 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
     Multipliers at open nodes, and pressures that are rounding, do not count as contact.
     """
-    nodal, own = interface.jump.apply(state.x), state.forces.pressure
+    nodal, own = interface.nodes.apply(state.x), state.forces.pressure
     rounding = interface.rounding(nodal)
-    on = touching(own, interface.opening(nodal), interface.stiffness, rounding)
+    on = touching(own, interface.normal_gap(nodal), interface.stiffness, rounding)
     pressed = interface.norms(interface.pressure(nodal, state.forces) - own * ~on)
     much = (pressed > 0) & (pressed > EPS * pressed.max())
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())
@@ -229,7 +229,7 @@ def evaluate_forces(problem: Problem, state: State) -> tuple[Residuals, Array]:
     scale = np.maximum(scale, EPS * scale.max())
     reference = np.where(scale > 0, scale, 1.0)
     balance = worst((unbalanced / reference).reshape(1, -1), (rounding / reference).reshape(1, -1))
-    nodal = interface.jump.apply(state.x)
+    nodal = interface.nodes.apply(state.x)
     bound = interface.bound(nodal, state.forces)
     pressures = _as_pressures(interface, contact_rounding)
     laws = interface_residuals(interface, nodal, state.forces, bound, pressures)

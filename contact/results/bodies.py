@@ -57,8 +57,8 @@ def sides(solution: Solution) -> Iterator[Remark]:
     penetrates the finer side, or carries pressures that the softer side cannot follow.
     """
     problem = solution.problem
-    for contact, entry in zip(problem.contacts, problem.entries, strict=True):
-        if contact.against is None or entry.coupling is None:
+    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
+        if contact.against is None or geometry.jumps is None or geometry.covered is None:
             continue
         sides = f"contact on {contact.on!r} against {contact.against!r}"
         (size, young), (other_size, other_young) = (
@@ -70,7 +70,7 @@ def sides(solution: Solution) -> Iterator[Remark]:
         elif young > SOFTER * other_young and size >= other_size:
             yield f"{sides}: the other side is {young / other_young:.3g} times softer, {better}"
         # Beyond the rim of the other side pressures end, far from where they act.
-        nodes, covered = entry.coupling.nodes, entry.coupling.covered
+        nodes, covered = geometry.jumps.nodes, geometry.covered
         partly = _pressed(problem, solution.state, nodes[covered < HALF])
         count = problem.comm.allreduce(int(partly.sum()), op=MPI.SUM)
         if count:
@@ -129,9 +129,9 @@ def apart(problem: ContactProblem) -> Iterator[Remark]:
         return
     met = np.zeros(count, dtype=np.intc)
     owners = Owners.of(problem.equilibrium.layout.index_map, problem.comm)
-    for entry in problem.entries:
-        if entry.coupling is not None:
-            both = np.concatenate([entry.coupling.slaves, entry.coupling.masters])
+    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
+        if contact.against is not None and geometry.jumps is not None:
+            both = np.concatenate([geometry.jumps.slaves, geometry.jumps.masters])
             met[piece[owners.requested(both) - owners.begin]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.MAX)
     alone = count - int(np.count_nonzero(met))
@@ -149,7 +149,7 @@ def held_along(solution: Solution) -> Iterator[Remark]:
     """
     problem, nodes, d = solution.problem, solution.problem.nodes, solution.problem.dim
     rubs = solution.friction_bound > 0
-    aslant = np.where(rubs, np.linalg.norm(nodes.lift - nodes.normal, axis=1), 0.0)
+    aslant = np.where(rubs, np.linalg.norm(nodes.admissible_normal - nodes.normal, axis=1), 0.0)
     jump = problem.nodal(solution.state)[:, :d]
     along = jump - nodes.normal_component(jump)[:, None] * nodes.normal
     held = np.linalg.norm(along - nodes.tangential_component(jump), axis=1)

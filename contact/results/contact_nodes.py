@@ -88,7 +88,7 @@ class Solved:
         interface, nodal = self.problem.interface, self.nodal
         rounding = interface.negligible(nodal, self.pressure)
         active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
-        layer = interface.law.layer_pressure(nodal) > rounding
+        layer = interface.layer.pressure(nodal) > rounding
         touches = active.closed | layer
         sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")
@@ -161,7 +161,7 @@ class ContactResult:
     @property
     def part(self) -> NDArray[Any] | None:
         """Part of each node; None for a single contact."""
-        names = np.array([entry.on for entry in self._problem.entries])
+        names = np.array([contact.on for contact in self._problem.contacts])
         return names[self.entry] if names.size > 1 else None
 
     def tangential(self, vectors: Array) -> Array:
@@ -201,7 +201,7 @@ class ContactResult:
 def contact_result(solved: Solved) -> ContactResult:
     """Return the contact nodes of a solved problem, those of all ranks. Collective."""
     problem, nodes, forces = solved.problem, solved.problem.nodes, solved.forces
-    gap, normal_displacement = problem.interface.law.jump.gap, solved.normal_displacement
+    gap, normal_displacement = nodes.gap, solved.normal_displacement
     own: dict[str, NDArray[Any]] = {
         # Mesh generators leave coordinates such as -3e-19.
         "points": np.where(np.abs(nodes.points) < 1e-15 * problem.domain.size, 0.0, nodes.points),
@@ -221,7 +221,7 @@ def contact_result(solved: Solved) -> ContactResult:
     }
     if problem.piezoelectric:
         own["potential"] = problem.equilibrium.phi_scale * solved.nodal[:, -1]
-        own["charge"] = problem.interface.law.charge(solved.nodal, solved.pressure)
+        own["charge"] = problem.interface.layer.charge(solved.nodal, solved.pressure)
     own = {name: nodes.gather(values) for name, values in own.items()}
     order = _by_position(problem, nodes.gather(nodes.points))
     if problem.dim == 2:

@@ -118,8 +118,8 @@ def own_shape(problem: ContactProblem) -> Iterator[Remark]:
     """Warn of a curved part without a gap anywhere: its foundation has then its very shape."""
     comm, size = problem.comm, problem.domain.size
     found = []
-    for contact, entry in zip(problem.contacts, problem.entries, strict=True):
-        nodes = entry.nodes
+    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
+        nodes = geometry.nodes
         sums = np.append(nodes.weight @ nodes.normal, nodes.weight.sum())
         total = comm.allreduce(sums, op=MPI.SUM)
         flat = np.linalg.norm(total[:-1]) > 0.995 * total[-1]
@@ -201,8 +201,8 @@ def without_heights(
         Nodes that are in contact in some step, shape (n,); before a solve all may be.
     """
     begin = 0
-    for contact, entry in zip(problem.contacts, problem.entries, strict=True):
-        nodes, shape = entry.nodes, contact.foundation
+    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
+        nodes, shape = geometry.nodes, contact.foundation
         here = slice(begin, begin + len(nodes.weight))
         begin = here.stop
         if not isinstance(shape, Heights):
@@ -234,7 +234,7 @@ def _touched(solution: Solution) -> NDArray[np.bool_]:
     """Return which contact nodes touch at the end of any step. Collective."""
     interface, found = solution.problem.interface, solution.status != "open"
     for record in solution.steps:
-        nodal = interface.jump.apply(record.state.x)
+        nodal = interface.nodes.apply(record.state.x)
         found = found | (interface.pressure(nodal, record.state.forces) > interface.rounding(nodal))
     return found
 
@@ -249,7 +249,7 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
         )
     closed, unknown = solution.status != "open", nodes.maximum(nodes.deviation)
     if nodes.maximum(closed.astype(float)) == 0:
-        least = -nodes.maximum(-nodes.gap, -np.inf)
+        least = -nodes.maximum(-problem.interface.gap, -np.inf)
         if unknown > max(DEVIATION * least, NEGLIGIBLE * problem.domain.size):
             yield (
                 f"nothing touches, but straight facets deviate by up to {unknown:.3g} from a "
@@ -258,7 +258,7 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     elif problem.equilibrium.degree == 2 and problem.domain.levels == 0:
         yield from _straight_edges(solution, closed, unknown)
     else:
-        size = nodes.maximum(np.where(closed, np.abs(nodes.gap), 0.0))
+        size = nodes.maximum(np.where(closed, np.abs(problem.interface.gap), 0.0))
         if size > 1e-9 * problem.domain.size and unknown > DEVIATION * size:
             yield (
                 f"straight facets deviate by up to {unknown:.3g} from a curved contact surface, "

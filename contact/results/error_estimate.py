@@ -316,11 +316,11 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     index_map = body.space.dofmap.index_map
     vector = la.vector(index_map, 3 + 2 * d)
     values = vector.array.reshape(-1, 3 + 2 * d)
-    opening = interface.opening(nodal)
-    values[interface.jump.nodes] = np.column_stack(
+    normal_gap = interface.normal_gap(nodal)
+    values[interface.nodes.nodes] = np.column_stack(
         [
             state.forces.pressure,
-            np.where(np.isfinite(opening), opening, 0.0),  # no rigid part: no pressure on it
+            np.where(np.isfinite(normal_gap), normal_gap, 0.0),  # no rigid part: no pressure on it
             interface.bound(nodal, state.forces),
             interface.slip(nodal),
             state.forces.friction,
@@ -329,10 +329,10 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     vector.scatter_forward()
     at, weights = rule(shape.facet, 4)
     found = shape.facet.lagrange(body.degree, at) @ values[nodes]
-    pressure, opening, bound = (found[..., i] for i in range(3))
+    pressure, normal_gap, bound = (found[..., i] for i in range(3))
     slip, friction = found[..., 3 : 3 + d], found[..., 3 + d :]
     # Next to a single node the quadratic function of its pressure is negative.
-    density = np.maximum(pressure, 0.0) * np.abs(opening) + np.abs(
+    density = np.maximum(pressure, 0.0) * np.abs(normal_gap) + np.abs(
         bound * np.linalg.norm(slip, axis=-1) - np.sum(slip * friction, axis=-1)
     )
     behind = geometry_nodes(domain, cells)

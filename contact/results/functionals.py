@@ -117,13 +117,13 @@ class ContactForce:
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        jump = problem.nodes
+        nodes = problem.nodes
         turn = np.where(_of_contact(problem, self.contact), self._turn(problem), 0.0)
-        by_force = np.zeros_like(jump.normal)
-        by_force[:, self.axis] = turn * jump.weight
-        layer = problem.interface.law.layer_gradient(problem.nodal(state))
+        by_force = np.zeros_like(nodes.normal)
+        by_force[:, self.axis] = turn * nodes.weight
+        layer = problem.interface.layer.pressure_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
-        jump.transpose((turn * jump.weight * jump.normal[:, self.axis])[:, None] * layer, by_x)
+        nodes.transpose((turn * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x)
         return by_x, by_force
 
 
@@ -166,12 +166,12 @@ class MaxPressure(Largest):
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        jump = problem.nodes
+        nodes = problem.nodes
         at = _largest(problem, self.values(problem, state))
-        layer = problem.interface.law.layer_gradient(problem.nodal(state))
+        layer = problem.interface.layer.pressure_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
-        jump.transpose(at[:, None] * layer, by_x)
-        return by_x, at[:, None] * jump.normal
+        nodes.transpose(at[:, None] * layer, by_x)
+        return by_x, at[:, None] * nodes.normal
 
 
 @dataclass(frozen=True)
@@ -242,16 +242,16 @@ class Reaction:
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        body, interface, jump = problem.equilibrium, problem.interface, problem.nodes
+        body, interface, nodes = problem.equilibrium, problem.interface, problem.nodes
         weights = self.weights(problem)
         by_x = body.tangent_transposed(state, weights)
-        seen = jump.apply(body.local(weights))
-        by_force = jump.weight[:, None] * seen[:, : jump.dim]
+        seen = nodes.apply(body.local(weights))
+        by_force = nodes.weight[:, None] * seen[:, : nodes.dim]
         for law, nodal, pressure in interface.acting(state.x, state.forces):
-            block = law.block(nodal, pressure, full=law is interface.law)
-            there = law.jump.apply(body.local(weights))
-            law.jump.transpose(
-                law.jump.weight[:, None] * np.einsum("nji,nj->ni", block, there), by_x
+            block = law.block(nodal, pressure, full=law is interface.layer)
+            there = law.nodes.apply(body.local(weights))
+            law.nodes.transpose(
+                law.nodes.weight[:, None] * np.einsum("nji,nj->ni", block, there), by_x
             )
         return by_x, by_force
 
@@ -264,16 +264,16 @@ class FoundationCharge:
         """Return it. Collective."""
         found = 0.0
         for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
-            found += law.jump.sum(law.charge(nodal, pressure))
+            found += law.nodes.sum(law.charge(nodal, pressure))
         return found
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
         for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
-            full = law is problem.interface.law
+            full = law is problem.interface.layer
             slope = -law.current_block(nodal, pressure, full)[:, -1] / law.phi_scale
-            law.jump.transpose(law.jump.weight[:, None] * slope, by_x)
+            law.nodes.transpose(law.nodes.weight[:, None] * slope, by_x)
         return by_x, np.zeros_like(problem.nodes.normal)
 
 

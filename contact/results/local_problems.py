@@ -330,8 +330,8 @@ def _contact_traction(problem: ContactProblem, state: State) -> Array:
     found = la.vector(body.space.dofmap.index_map, body.dim)
     found.array[:] = np.nan
     at_nodes = found.array.reshape(-1, body.dim)
-    at_nodes[interface.jump.nodes] = (
-        -pressure[:, None] * interface.jump.normal - state.forces.friction
+    at_nodes[interface.nodes.nodes] = (
+        -pressure[:, None] * interface.nodes.normal - state.forces.friction
     )
     found.scatter_forward()
     return at_nodes

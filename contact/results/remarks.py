@@ -177,8 +177,8 @@ def small_strain(solution: Solution) -> Iterator[Remark]:
 def layers(solution: Solution) -> Iterator[Remark]:
     """Warn of layers that press on the undeformed body, or whose p_nu falls: (h6) asks for less."""
     problem = solution.problem
-    law, size = problem.interface.law, problem.domain.size
-    if law.layer is None:
+    law, size = problem.interface.layer, problem.domain.size
+    if law.compliance is None:
         return
     least = -problem.nodes.maximum(-law.touch, -np.inf)
     if least < -1e-9 * size:
@@ -298,7 +298,7 @@ def strong_friction(solution: Solution) -> Iterator[Remark]:
 
 def _conductor(solution: Solution) -> Conductor | None:
     """Return the foundation's electric contact; None where nothing is conducted."""
-    conductor = solution.problem.interface.law.conductor
+    conductor = solution.problem.interface.layer.conductor
     if conductor is None or not solution.problem.piezoelectric or conductor.psi.k_e == 0:
         return None
     return conductor
@@ -358,8 +358,8 @@ def giving_way(solution: Solution) -> Iterator[Remark]:
         return
     size = np.linalg.norm(solution.friction, axis=1)
     slip = np.linalg.norm(solution.slip[size < STICKS * solution.friction_bound], axis=1)
-    depth = (solution.normal_displacement - problem.nodes.gap)[solution.pressure > 0]
-    if problem.interface.law.layer is not None:
+    depth = (solution.normal_displacement - problem.interface.gap)[solution.pressure > 0]
+    if problem.interface.layer.compliance is not None:
         depth = depth[:0]  # it gives way by itself
     deep, far = (
         problem.comm.allreduce(float(values.max(initial=0.0)), op=MPI.MAX)

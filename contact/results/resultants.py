@@ -292,8 +292,8 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     leaving = np.zeros_like(body.external(state.time))
     for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
         density = np.zeros((nodal.shape[0], body.block_size))
-        density[:, -1] = law.jump.weight * law.charge(nodal, pressure)
-        law.jump.transpose(density, leaving)
+        density[:, -1] = law.nodes.weight * law.charge(nodal, pressure)
+        law.nodes.transpose(density, leaving)
     return np.asarray(body.nodal(leaving)[:, -1])
 
 

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.interface.entries import Entry
-from contact.interface.mortar.coupling import Coupling
-from contact.interface.mortar.lumping import Lumping
+from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.cells import shape_of
 from contact.mesh.owners import Owners
@@ -38,7 +36,7 @@ def contact_surface(solution: Solution) -> Grid:
     problem, d = solution.problem, solution.problem.dim
     body = problem.equilibrium
     owners = Owners.of(body.layout.index_map, problem.comm)
-    parts = [surface_of(problem.domain, body.space, entry.on) for entry in problem.entries]
+    parts = [surface_of(problem.domain, body.space, contact.on) for contact in problem.contacts]
     # A node of two contacts is one of each.
     nodes, cells = _numbered(owners, [part.nodes for part in parts])
     owner = np.repeat(np.arange(len(nodes)), [own.size for own in nodes]).astype(np.int32)
@@ -106,15 +104,15 @@ def opposite_surface(solution: Solution) -> Grid | None:
     body = problem.equilibrium
     owners = Owners.of(body.layout.index_map, problem.comm)
     stresses = np.column_stack([solution.pressure, solution.forces.vectors(problem.nodes)])
-    ends = np.cumsum([entry.nodes.nodes.size for entry in problem.entries])[:-1]
+    ends = np.cumsum([own.nodes.nodes.size for own in problem.geometries])[:-1]
     sides, facets = [], []
     for i, own in enumerate(np.split(stresses, ends)):
-        against, entry = problem.contacts[i].against, problem.entries[i]
-        if against is None or entry.coupling is None:
+        against, geometry = problem.contacts[i].against, problem.geometries[i]
+        if against is None or geometry.jumps is None:
             continue
         surface = surface_of(problem.domain, body.space, against)
         lumped = Lumping.of(surface)
-        acting = _acting(owners, entry, entry.coupling, lumped, own)
+        acting = _acting(owners, geometry.jumps, lumped, geometry.nodes.weight[:, None] * own)
         points, x = _at_nodes(solution, lumped.nodes - owners.begin)
         sides.append(
             {
@@ -135,12 +133,11 @@ def opposite_surface(solution: Solution) -> Grid | None:
     return Grid(fields.pop("points"), cells, shape_of(problem.domain.mesh).facet, fields)
 
 
-def _acting(owners: Owners, entry: Entry, coupling: Coupling, lumped: Lumping, own: Array) -> Array:
-    """Return the stresses of all contact nodes on this rank's nodes of the other side, (m, k)."""
-    # Those given are of this rank's nodes. Collective.
-    on_nodes: Array = np.zeros((lumped.nodes.size, own.shape[1]))
-    forces = coupling.other.T @ (entry.nodes.weight[:, None] * own)
-    nodes, sums = owners.sums(coupling.masters, forces)
+def _acting(owners: Owners, jumps: Mixing, lumped: Lumping, forces: Array) -> Array:
+    """Return the stresses on nodes of the other side, (m, k), of forces at contact nodes."""
+    # Of all ranks, on nodes of this one. Collective.
+    on_nodes: Array = np.zeros((lumped.nodes.size, forces.shape[1]))
+    nodes, sums = owners.sums(jumps.masters, jumps.M.T @ forces)
     on_nodes[np.searchsorted(lumped.nodes, nodes)] = sums
     if lumped.mixing is not None:
         on_nodes = lumped.mixing.on_coefficients(owners, on_nodes)

@@ -65,47 +65,47 @@ def uniqueness(
         The body condensed onto its contact nodes, where a method has that already.
     """
     interface = problem.interface
-    jump, friction = interface.jump, interface.friction
-    known = friction.acts and friction.local and not interface.law.active
-    known = known and not problem.piezoelectric and interface.coupled.size == jump.nodes.size
-    if not known or jump.size == 0:
+    nodes, friction = interface.nodes, interface.friction
+    known = friction.acts and friction.local and not interface.layer.active
+    known = known and not problem.piezoelectric and interface.coupled.size == nodes.nodes.size
+    if not known or nodes.size == 0:
         return np.inf, False
-    if jump.size > MOST:
+    if nodes.size > MOST:
         return np.nan, False
     if condensation is None and not condensation_pays(problem, "auto"):
         return np.inf, False
-    nodal = jump.apply(state.x)
+    nodal = nodes.apply(state.x)
     pressure = interface.pressure(nodal, state.forces)
     rounding = interface.negligible(nodal, pressure)
-    closed = touching(pressure, interface.opening(nodal), interface.stiffness, rounding)
-    if jump.maximum(closed.astype(float)) == 0:
-        closed = jump.gap <= EPS * interface.diameter
+    closed = touching(pressure, interface.normal_gap(nodal), interface.stiffness, rounding)
+    if nodes.maximum(closed.astype(float)) == 0:
+        closed = interface.gap <= EPS * interface.diameter
     mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(nodal))
     condensation = condensation or Condensation(problem, Counters())
     stiffness = condensation.stiffness(state)
     if stiffness is None:
         return np.inf, False
     columns, body = [], problem.equilibrium
-    balanced = jump.maximum(pressure) > interface.rounding(nodal)
+    balanced = nodes.maximum(pressure) > interface.rounding(nodal)
     external = body.external(state.time)
     for group in groups(problem):
         free = null_space(group.supports)
-        along = group.normal[:, None, :] * jump.lift[:, :, None]
+        along = group.normal[:, None, :] * nodes.admissible_normal[:, :, None]
         columns.append((along + group.tangential) @ free)
         for motion in (group.moved @ free).T:
             most = body.product(np.abs(external), np.abs(motion))
             balanced &= bool(abs(body.product(external, motion)) <= BALANCED * most)
     motions = np.concatenate(columns, axis=2)
-    ranks = jump.comm.gather(
+    ranks = nodes.comm.gather(
         (
-            *(jump.lift, jump.tangent, state.forces.friction, closed, mu, motions),
-            jump.weight[:, None] * state.forces.vectors(jump),
-            interface.opening(nodal),
+            *(nodes.admissible_normal, nodes.tangent, state.forces.friction, closed, mu, motions),
+            nodes.weight[:, None] * state.forces.vectors(nodes),
+            interface.normal_gap(nodal),
         )
     )
 
     def found() -> tuple[float, bool]:
-        normal, tangent, force, touches, rates, moved, forces, opening = (
+        normal, tangent, force, touches, rates, moved, forces, normal_gap = (
             np.concatenate(part) for part in zip(*ranks, strict=True)
         )
         if not np.any(touches & (rates > 0)):
@@ -127,13 +127,13 @@ def uniqueness(
         if not balanced:
             return factor, False
         size = problem.domain.size
-        return factor, _free_of_contact(stiffness, normal, moved, forces, opening, size)
+        return factor, _free_of_contact(stiffness, normal, moved, forces, normal_gap, size)
 
-    return on_root(jump.comm, found)
+    return on_root(nodes.comm, found)
 
 
 def _free_of_contact(
-    stiffness: Array, normal: Array, motions: Array, forces: Array, opening: Array, size: float
+    stiffness: Array, normal: Array, motions: Array, forces: Array, normal_gap: Array, size: float
 ) -> bool:
     """Tell whether bodies can be in balance, and nowhere meet, without these contact forces."""
     # Free motions, shape (n, d, m), may be as large as the bodies.
@@ -149,9 +149,9 @@ def _free_of_contact(
     except LinAlgError:
         return False
     way = change.reshape(count, dim)
-    met = np.isfinite(opening)
+    met = np.isfinite(normal_gap)
     allowed = BALANCED * np.linalg.norm(way, axis=1).max()
-    room = (opening - np.einsum("nd,nd->n", normal, way))[met] + allowed
+    room = (normal_gap - np.einsum("nd,nd->n", normal, way))[met] + allowed
     if room.min() >= 0 or free.shape[1] == 0:
         return bool(room.min() >= 0)
     from scipy.optimize import linprog  # takes a while to load

@@ -75,12 +75,12 @@ class FixedPoint(OuterLoop):
             first = 0 if frictional and not self.options.single_loop and stuck is None else 1
             # Secant at zero strain: prescribed values strain the elements beside them alone.
             self._z = self._about(0.0, frictional and first > 0)
-            self.bound = np.zeros(interface.jump.gap.size) if stuck is None else stuck
+            self.bound = np.zeros(interface.nodes.gap.size) if stuck is None else stuck
         else:
             self.state, first = start, 1
             self._secant_at = start.x if linearised_at is None else linearised_at
-            nodal, pressure = interface.jump.apply(start.x), start.forces.pressure
-            if interface.law.normal_law(nodal) is not None:
+            nodal, pressure = interface.nodes.apply(start.x), start.forces.pressure
+            if interface.layer.normal_law(nodal) is not None:
                 pressure = interface.pressure(nodal, start.forces)
             self._z = np.column_stack([pressure, start.forces.friction])
             self.bound = interface.bound(nodal, start.forces)
@@ -90,7 +90,7 @@ class FixedPoint(OuterLoop):
 
     def _about(self, z: Array | float, friction: bool) -> Array:
         """Return z = lambda + r (u - u_0) of lambda + r u, with u_0 of the iterate."""
-        nodal = self.problem.interface.jump.apply(self.state.x)
+        nodal = self.problem.interface.nodes.apply(self.state.x)
         return z - self.r * split(self.problem.interface, nodal, friction)
 
     def _step(self, iteration: int) -> tuple[int, str]:
@@ -100,9 +100,9 @@ class FixedPoint(OuterLoop):
         if friction and self._first == 0 and iteration == 1:
             # Slip and contact without friction are a bad initial guess.
             self._z = self._about(0.0, friction)
-        state, nodal = self.state, interface.jump.apply(self.state.x)
-        blocks = augmentation(interface.jump, self.r, friction)
-        if interface.law.active:
+        state, nodal = self.state, interface.nodes.apply(self.state.x)
+        blocks = augmentation(interface.nodes, self.r, friction)
+        if interface.layer.active:
             blocks = blocks + self._current_block(nodal, interface.pressure(nodal, state.forces))
         # At zero strain the tangent is the secant.
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
@@ -130,7 +130,7 @@ class FixedPoint(OuterLoop):
 
     def _current_block(self, nodal: Array, pressure: Array) -> Array:
         """Linearise the charge, near the solution with the derivative of psi by the gap."""
-        law = self.problem.interface.law
+        law = self.problem.interface.layer
         if not law.follows_gap or not self._gap_derivative(self._residual):
             return law.current_block(nodal, pressure)
         if self.operator.symmetric:

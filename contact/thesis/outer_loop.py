@@ -68,7 +68,7 @@ class OuterLoop(ABC):
         """Take another load step of the same problem; factorisations remain."""
         self.problem, self.state = problem, problem.start()
         self.recorder = Recorder(self.monitor)
-        self.bound: Array = np.zeros(problem.interface.jump.gap.size)
+        self.bound: Array = np.zeros(problem.interface.nodes.gap.size)
 
     @property
     def history(self) -> list[Record]:
@@ -138,14 +138,14 @@ class OuterLoop(ABC):
         interface, forces, old = self.problem.interface, self.state.forces, self.bound
         if not interface.friction.acts:
             return np.nan
-        nodal = interface.jump.apply(self.state.x)
+        nodal = interface.nodes.apply(self.state.x)
         if iteration == 0:  # frictionless start: bound of zero slip
             pressure = interface.pressure(nodal, forces)
             self.bound = interface.friction.bound(pressure, np.zeros_like(pressure))
         else:
             self.bound = interface.bound(nodal, forces)
-        size = interface.jump.norm(self.bound)
-        return interface.jump.norm(self.bound - old) / size if size > 0 else 0.0
+        size = interface.nodes.norm(self.bound)
+        return interface.nodes.norm(self.bound - old) / size if size > 0 else 0.0
 
     def _thesis_criterion(self, change: float, previous: State) -> bool:
         """Tell whether (4.38) or (6.40) is met, on the change of the displacement."""

@@ -88,7 +88,7 @@ class PenalisedProblem:
         name = "penalty_snes_linesearch_type"
         default = not given.hasName(name)
         if default:
-            layer = problem.interface.law.layer
+            layer = problem.interface.layer.compliance
             given[name] = "basic" if symmetric and (layer is None or layer.lagged) else "bt"
         try:
             with petsc_options("penalty_"):
@@ -136,14 +136,14 @@ class PenalisedProblem:
         with lagged laws.
         """
         body, interface = self._body, self._interface
-        nodal = interface.jump.apply(state.x)
+        nodal = interface.nodes.apply(state.x)
         self._law, self._implicit, self._nodal = law, implicit, nodal
         self._state = state
         self._assembled = body.linear
         pressure = interface.pressure(nodal, state.forces)
-        self._response = interface.law.force(nodal, pressure)
-        self._current_block = interface.law.current_block(nodal, pressure)
-        self._layer = interface.law.normal_law(nodal)
+        self._response = interface.layer.force(nodal, pressure)
+        self._current_block = interface.layer.current_block(nodal, pressure)
+        self._layer = interface.layer.normal_law(nodal)
         if self._layer is not None:
             # Of the new iterate, as [.]^+, but for h_nu.
             self._response[:, : body.dim] = 0.0
@@ -176,20 +176,20 @@ class PenalisedProblem:
         Without contact the first system may be singular.
         """
         body, interface, nodal = self._body, self._interface, self._nodal
-        jump, state = interface.jump, self._state
+        nodes, state = interface.nodes, self._state
         # Gap of the rigid part, or of the layer alone.
-        opening = jump.normal_component(nodal) - interface.law.jump.gap
-        closest = jump.maximum(opening, -np.inf)
+        penetration = nodes.normal_component(nodal) - nodes.gap
+        closest = nodes.maximum(penetration, -np.inf)
         if closest >= 0:
             return np.zeros_like(body.owned_part(state.x))
-        stiffness = (opening >= closest - 1e-9 * interface.diameter) / self._eps.contact
-        n, d = jump.normal.shape
-        blocks = np.zeros((n, jump.block_size, jump.block_size))
-        blocks[:, :d, :d] = stiffness[:, None, None] * outer(jump.normal, jump.normal)
+        stiffness = (penetration >= closest - 1e-9 * interface.diameter) / self._eps.contact
+        n, d = nodes.normal.shape
+        blocks = np.zeros((n, nodes.block_size, nodes.block_size))
+        blocks[:, :d, :d] = stiffness[:, None, None] * outer(nodes.normal, nodes.normal)
         blocks[:, :d, :d] += self._law.block(nodal)
         self.operator.update("secant", state, interface.weighted(blocks, state.x))
         rhs = body.external(state.time) - body.internal_forces(state)
-        jump.transpose(-(jump.weight * stiffness * opening)[:, None] * jump.normal, rhs)
+        nodes.transpose(-(nodes.weight * stiffness * penetration)[:, None] * nodes.normal, rhs)
         return self.operator.solve(rhs)
 
     def _unknowns(self, iterate: PETSc.Vec) -> Array:
@@ -197,30 +197,30 @@ class PenalisedProblem:
         return self._body.local(self._unpacked(iterate.array_r))
 
     def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
-        body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
-        nodal = jump.apply(x)
+        body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
+        nodal = nodes.apply(x)
         secant_at = None if self._implicit else self._state.x
         values = body.internal_forces(replace(self._state, x=x), secant_at)
         values = values - body.external(self._state.time)
-        jump.transpose(jump.weight[:, None] * self._law.forces(nodal).vectors(jump), values)
+        nodes.transpose(nodes.weight[:, None] * self._law.forces(nodal).vectors(nodes), values)
         change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
         if self._layer is not None:
-            u_n = np.minimum(jump.normal_component(nodal), jump.gap)
-            change[:, : jump.dim] += self._layer.layer(u_n)[:, None] * jump.normal
-        jump.transpose(jump.weight[:, None] * (self._response + change), values)
+            u_n = np.minimum(nodes.normal_component(nodal), self._interface.gap)
+            change[:, : nodes.dim] += self._layer.layer(u_n)[:, None] * nodes.normal
+        nodes.transpose(nodes.weight[:, None] * (self._response + change), values)
         residual.array[:] = self._packed(body.unbalanced(values) / self._units)
 
     def _jacobian(
         self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
     ) -> None:
-        body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
-        nodal, d = jump.apply(x), body.dim
+        body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
+        nodal, d = nodes.apply(x), body.dim
         blocks = self._current_block.copy()
         blocks[:, :d, :d] += self._law.block(nodal)
         if self._layer is not None:
-            u_n = jump.normal_component(nodal)
-            slope = np.where(u_n < jump.gap, self._layer.layer_slope(u_n), 0.0)
-            blocks[:, :d, :d] += slope[:, None, None] * outer(jump.normal, jump.normal)
+            u_n = nodes.normal_component(nodal)
+            slope = np.where(u_n < self._interface.gap, self._layer.layer_slope(u_n), 0.0)
+            blocks[:, :d, :d] += slope[:, None, None] * outer(nodes.normal, nodes.normal)
         kind, linearised_at = ("tangent", x) if self._implicit else ("secant", self._state.x)
         unchanged = body.linear or (self._assembled and not self._implicit)
         blocks = self._interface.weighted(blocks, x)
@@ -302,14 +302,14 @@ class Penalty(OuterLoop):
         self._failed = implicit and bool(fault)
         if self._failed:  # go on with lagged terms
             x, fault = self.state.x, f"implicit: {fault}"
-        forces = PenalisedLaw(interface, self._eps).forces(interface.jump.apply(x))
+        forces = PenalisedLaw(interface, self._eps).forces(interface.nodes.apply(x))
         self.state = replace(self.state, x=x, forces=forces)
         return inner, fault or ("implicit" if implicit else "")
 
     def _solve(self, implicit: bool) -> tuple[Array, int, str]:
         """Return unknowns, number of iterations, and fault or ""."""
         interface = self.problem.interface
-        nodal = interface.jump.apply(self.state.x)
+        nodal = interface.nodes.apply(self.state.x)
         law = PenalisedLaw(interface, self._eps) if implicit else self._lagged(nodal)
         symmetric = not (implicit and interface.friction.acts)
         if symmetric not in self._solvers:

@@ -52,27 +52,27 @@ STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
 SHARE = 0.1
 
 
-def augmentation(jump: ContactNodes, r: float, friction: bool) -> Array:
+def augmentation(nodes: ContactNodes, r: float, friction: bool) -> Array:
     """Return the nodal blocks of r u_nu v_nu [+ r u_tau v_tau], without weights, (n, bs, bs)."""
-    n, d = jump.normal.shape
-    blocks = np.zeros((n, jump.block_size, jump.block_size))
-    blocks[:, :d, :d] = jump.normal[:, :, None] * jump.normal[:, None, :]
+    n, d = nodes.normal.shape
+    blocks = np.zeros((n, nodes.block_size, nodes.block_size))
+    blocks[:, :d, :d] = nodes.normal[:, :, None] * nodes.normal[:, None, :]
     if friction:
-        blocks[:, :d, :d] += jump.tangent
+        blocks[:, :d, :d] += nodes.tangent
     return r * blocks
 
 
 def split(interface: Interface, nodal: Array, friction: bool) -> Array:
     """Return normal displacement and slip, shape (n, 1 + d); slip 0 without friction."""
-    parts = normal_and_tangential(interface.jump, nodal, friction)
+    parts = normal_and_tangential(interface.nodes, nodal, friction)
     parts[:, 1:] -= friction * interface.friction.history.jump
     return parts
 
 
-def normal_and_tangential(jump: ContactNodes, nodal: Array, friction: bool) -> Array:
+def normal_and_tangential(nodes: ContactNodes, nodal: Array, friction: bool) -> Array:
     """Return normal and tangential displacement, shape (n, 1 + d); 0 without friction."""
-    tangential = friction * jump.tangential_component(nodal)
-    return np.column_stack([jump.normal_component(nodal), tangential])
+    tangential = friction * nodes.tangential_component(nodal)
+    return np.column_stack([nodes.normal_component(nodal), tangential])
 
 
 @dataclass
@@ -106,8 +106,8 @@ class _Projection:
 
     Attributes
     ----------
-    jump, r
-        The contact nodes, and the augmentation parameter.
+    nodes, gap, r
+        The contact nodes, the gap of the constraint, and the augmentation parameter.
     bound
         Friction bound, shape (n,).
     law
@@ -117,7 +117,8 @@ class _Projection:
         r u_0, shape (n, 1 + d).
     """
 
-    jump: ContactNodes
+    nodes: ContactNodes
+    gap: Array
     r: float
     bound: Array
     law: NormalLaw | None
@@ -127,7 +128,7 @@ class _Projection:
         """Return the new multipliers."""
         z = z + self.origin
         if self.law is None:
-            pressure = np.asarray(contact_multiplier(z[..., 0], self.r, 0.0, self.jump.gap))
+            pressure = np.asarray(contact_multiplier(z[..., 0], self.r, 0.0, self.gap))
         else:
             # Laws of users take one value per node.
             rows = z[..., 0].reshape(math.prod(z.shape[:-2]), z.shape[-2])
@@ -139,7 +140,7 @@ class _Projection:
         """Return the derivatives of the multipliers along directions, shape (n, 1 + d, k)."""
         z = z + self.origin
         if self.law is None:
-            slope = np.where(z[:, 0] > self.r * self.jump.gap, 1.0, 0.0)
+            slope = np.where(z[:, 0] > self.r * self.gap, 1.0, 0.0)
         else:
             slope = self.law.pressure_slope(z[:, 0], self.r)
         normal = slope[:, None, None] * directions[:, :1]
@@ -148,11 +149,11 @@ class _Projection:
 
     def accelerator(self, depth: int, size: Array) -> ResidualMinimiser:
         """Return the acceleration of the flat z; `size`: unit of stresses, (n,)."""
-        jump, shape = self.jump, (self.jump.weight.size, 1 + self.jump.normal.shape[1])
-        weights = np.repeat(jump.weight / size**2, shape[1])
+        nodes, shape = self.nodes, (self.nodes.weight.size, 1 + self.nodes.normal.shape[1])
+        weights = np.repeat(nodes.weight / size**2, shape[1])
 
         def inner(a: Array, b: Array) -> Array:
-            return summed(jump.comm, a.T @ (weights[:, None] * b))
+            return summed(nodes.comm, a.T @ (weights[:, None] * b))
 
         def project(flat: Array) -> Array:
             return self(flat.reshape(*flat.shape[:-1], *shape)).reshape(flat.shape)
@@ -166,12 +167,12 @@ class _Projection:
 
 def _residual(problem: Problem, state: State, secant_at: Array, layer: bool) -> Array:
     """Return the owned residual without multipliers and implicit layer. Collective."""
-    interface, jump = problem.interface, problem.interface.jump
-    residual, unknown = residual_forces(problem, state, secant_at), state.forces.vectors(jump)
+    interface, nodes = problem.interface, problem.interface.nodes
+    residual, unknown = residual_forces(problem, state, secant_at), state.forces.vectors(nodes)
     if layer:
-        pressure = interface.law.layer_pressure(jump.apply(state.x))
-        unknown += pressure[:, None] * jump.normal
-    jump.transpose(-jump.weight[:, None] * unknown, residual)
+        pressure = interface.layer.pressure(nodes.apply(state.x))
+        unknown += pressure[:, None] * nodes.normal
+    nodes.transpose(-nodes.weight[:, None] * unknown, residual)
     return residual
 
 
@@ -195,7 +196,7 @@ def uzawa_block_relaxation(
     problem, state
         The problem, and the iterate at which it is frozen.
     operator
-        Factorised operator with `augmentation(jump, r, friction)`.
+        Factorised operator with `augmentation(nodes, r, friction)`.
     bound
         Friction bound s_n, shape (n,).
     friction
@@ -211,15 +212,15 @@ def uzawa_block_relaxation(
     poll
         Called before each iteration, on all ranks.
     """
-    interface, jump = problem.interface, problem.interface.jump
-    at, own = jump.apply(state.x), problem.equilibrium.owned_part(state.x)
-    law = interface.law.normal_law(at)
+    interface, nodes = problem.interface, problem.interface.nodes
+    at, own = nodes.apply(state.x), problem.equilibrium.owned_part(state.x)
+    law = interface.layer.normal_law(at)
     constant = -_residual(problem, state, secant_at, law is not None)
     origin = r * split(interface, at, friction)
-    project = _Projection(jump, r, bound, law, origin)
+    project = _Projection(nodes, interface.gap, r, bound, law, origin)
     accelerated, over = options.acceleration == "anderson", options.relaxation
     accelerator: ResidualMinimiser | None = None
-    beside: Array = np.ones_like(jump.weight)
+    beside: Array = np.ones_like(nodes.weight)
     last: tuple[Array, Array] | None = None
     rtol = max(SHARE * options.inner, ROUNDING)
     increment: Array = np.zeros(own.size)
@@ -227,22 +228,22 @@ def uzawa_block_relaxation(
     for iteration in range(1, options.max_inner + 1):
         poll()
         # Tangential again: rounding along the normal would be amplified by the acceleration.
-        z[:, 1:] = jump.tangential_component(z[:, 1:])
+        z[:, 1:] = nodes.tangential_component(z[:, 1:])
         multiplier = project(z)
         q = 2 * multiplier - z
         rhs = constant.copy()
-        vectors = q[:, :1] * jump.normal + q[:, 1:]
-        jump.transpose(-jump.weight[:, None] * vectors, rhs)
+        vectors = q[:, :1] * nodes.normal + q[:, 1:]
+        nodes.transpose(-nodes.weight[:, None] * vectors, rhs)
         increment = operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
-        moved = jump.apply(increment)
+        moved = nodes.apply(increment)
         nodal = at + moved
-        way = r * normal_and_tangential(jump, moved, friction)
+        way = r * normal_and_tangential(nodes, moved, friction)
         # q + r (u - u_0) is the contact force of this solve.
         total = q + way
         if iteration == 1:
             beside = interface.component_norms(total)
-        layer = 0.0 if law is None else law.layer(jump.normal_component(nodal))
-        forces = Multipliers.of(jump, total[:, 0] - layer, total[:, 1:])
+        layer = 0.0 if law is None else law.layer(nodes.normal_component(nodal))
+        forces = Multipliers.of(nodes, total[:, 0] - layer, total[:, 1:])
         if options.single_loop and friction:
             project.bound = interface.bound(nodal, forces)
         residual = float(interface_residuals(interface, nodal, forces, project.bound)[0].max())
@@ -250,14 +251,14 @@ def uzawa_block_relaxation(
         image = multiplier + (1 - over) * (z - multiplier) + over * way
         done = residual <= options.inner or not np.isfinite(residual)
         # The residual is small before contact, the defect of the fixed point is not.
-        defect = jump.norm((total - project(total + way)) / beside[:, None])
+        defect = nodes.norm((total - project(total + way)) / beside[:, None])
         if domain_norm is not None:
             phi: Array = (image + origin - project(image)) * (1 / r)
             before, done = last, False
             last = increment, phi
             if before is not None:
-                change = domain_norm(increment - before[0]) ** 2 + jump.norm(phi - before[1]) ** 2
-                size = domain_norm(own + increment) ** 2 + jump.norm(phi) ** 2
+                change = domain_norm(increment - before[0]) ** 2 + nodes.norm(phi - before[1]) ** 2
+                size = domain_norm(own + increment) ** 2 + nodes.norm(phi) ** 2
                 done = change < options.eps**2 * size
                 defect = float(np.sqrt(change / size)) if size > 0 else 0.0
         stalled = not done and stagnation(defect)

@@ -152,8 +152,8 @@ def problem_of(comm: MPI.Intracomm, n: int, bodies: int, length: int = 0) -> Con
 def held(problem: ContactProblem) -> int:
     """Return the bytes of the coupling on this rank."""
     found = 0
-    for entry in problem.entries:
-        for value in vars(entry.coupling).values() if entry.coupling is not None else ():
+    for geometry in problem.geometries:
+        for value in vars(geometry.jumps).values() if geometry.jumps is not None else ():
             parts = (value.data, value.indices, value.indptr) if hasattr(value, "indptr") else value
             found += _size(parts)
     return found

@@ -203,11 +203,11 @@ def products(solution: Solution) -> float:
     shapes = body.owned_part(solution.state.x).shape, solution.problem.nodes.normal.shape
     mask = np.concatenate([body.free.ravel(), np.ones(body.global_unknowns.size)])
     a, b = ([rng.standard_normal(shape) for shape in shapes] for _ in range(2))
-    jump = solution.problem.nodes
+    nodes = solution.problem.nodes
     for pair in (a, b):
         pair[0] *= mask
-        normal = jump.normal_component(pair[1])[:, None] * jump.normal
-        pair[1] = normal + jump.tangential_component(pair[1])
+        normal = nodes.normal_component(pair[1])[:, None] * nodes.normal
+        pair[1] = normal + nodes.tangential_component(pair[1])
     x, f = linearised.solve(Equations(-a[0], -a[1]))
     y, c = linearised.solve_transposed(*b)
     one = float(np.sum(x * b[0]) + np.sum(f * b[1]))

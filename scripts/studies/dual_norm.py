@@ -28,7 +28,7 @@ class DualNorm:
 
     def __init__(self, problem: ContactProblem) -> None:
         self.problem = problem
-        body, size = problem.equilibrium, problem.interface.jump.block_size
+        body, size = problem.equilibrium, problem.interface.nodes.block_size
         self._rest = body.rest()
         coupled = problem.interface.coupled
         self._operator = SparseOperator(body, coupled)
@@ -36,11 +36,11 @@ class DualNorm:
 
     def pressure(self, q: Array) -> float:
         """Return the norm of nodal pressures, shape (n,). Collective."""
-        body, jump = self.problem.equilibrium, self.problem.interface.jump
+        body, nodes = self.problem.equilibrium, self.problem.interface.nodes
         load = np.zeros(body.owned)
-        vectors = np.zeros((q.size, jump.block_size))
-        vectors[:, : jump.dim] = (jump.weight * q)[:, None] * jump.normal
-        jump.transpose(vectors, load)
+        vectors = np.zeros((q.size, nodes.block_size))
+        vectors[:, : nodes.dim] = (nodes.weight * q)[:, None] * nodes.normal
+        nodes.transpose(vectors, load)
         load = np.where(body.free.ravel(), load, 0.0)
         return self._root(load, self._operator.solve(load))
 

@@ -150,14 +150,14 @@ def constant(kind: Mesh, domain: Domain, degree: int, levels: int) -> tuple[floa
     opposite = replace(master, normal=-master.normal)
     without = np.setdiff1d(slave.nodes, problem.nodes.nodes)
     coupling = couple(slave, opposite, 1e-6, without=without)
-    integrals = (coupling.other.T * coupling.weight).toarray()
-    jump = problem.interface.jump
-    values = np.eye(coupling.nodes.size)[np.searchsorted(coupling.nodes, jump.nodes)]
+    integrals = (coupling.M.T * coupling.weight).toarray()
+    nodes = problem.interface.nodes
+    values = np.eye(coupling.nodes.size)[np.searchsorted(coupling.nodes, nodes.nodes)]
     normal = coupling.normal[0]
 
     def on_mesh(column: Array) -> Array:
         load = np.zeros(problem.equilibrium.owned)
-        jump.transpose((jump.weight * (values @ column))[:, None] * jump.normal, load)
+        nodes.transpose((nodes.weight * (values @ column))[:, None] * nodes.normal, load)
         return load
 
     def on_reference(column: Array) -> Array:

@@ -153,8 +153,8 @@ MUTANTS = (
         "friction-sign",
         "the sign of friction among the contact forces",
         "contact/interface/multipliers.py",
-        "jump.normal + jump.tangential_component(self.friction)",
-        "jump.normal - jump.tangential_component(self.friction)",
+        "nodes.normal + nodes.tangential_component(self.friction)",
+        "nodes.normal - nodes.tangential_component(self.friction)",
         ("tests/verification/test_closed_forms.py",),
     ),
     Mutant(

@@ -103,7 +103,7 @@ class ProjectedGradients:
     def __init__(self, problem: ContactProblem, adapted: bool) -> None:
         self._problem, self._adapted = problem, adapted
         interface, body, start = problem.interface, problem.equilibrium, problem.start()
-        jump = interface.jump
+        nodes = interface.nodes
         operator = body.operator(
             interface.coupled,
             problem.constraint,
@@ -113,16 +113,16 @@ class ProjectedGradients:
         )
         assert isinstance(operator, SparseOperator)
         self._operator, self._x = operator, start.x
-        self._blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
+        self._blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))
         operator.update("secant", start, self._blocks)
         self._matrix = operator.matrix.copy()
         self._load = body.layout.mask(-residual_forces(problem, start)[: body.owned])
         self._free = body.layout.free.ravel()
-        axis = int(np.argmax(np.abs(jump.normal[0])))
-        self._axis, sign = axis, jump.normal[:, axis]
-        self._bounded = jump.nodes * jump.block_size + axis
+        axis = int(np.argmax(np.abs(nodes.normal[0])))
+        self._axis, sign = axis, nodes.normal[:, axis]
+        self._bounded = nodes.nodes * nodes.block_size + axis
         self._bound = np.full(self._load.size, np.inf)
-        self._bound[self._bounded] = jump.gap
+        self._bound[self._bounded] = interface.gap
         self._sign = np.ones(self._load.size)
         self._sign[self._bounded] = sign
         self._own = float(np.median(np.abs(self._matrix.getDiagonal().array[self._bounded])))

@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         case = load_case(CASES / f"{name}.toml", changes)
         problem = build_problem(case)
         figure, nodes = draw_setup(case, problem), problem.nodes
-        x, y, gap = (nodes.gather(part) for part in (*nodes.points.T, nodes.gap))
+        x, y, gap = (nodes.gather(part) for part in (*nodes.points.T, problem.interface.gap))
         if figure is not None:
             report.figure(
                 f"figure-{number}",

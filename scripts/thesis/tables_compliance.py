@@ -172,7 +172,7 @@ def examples(report: Report, cells: tuple[int, int]) -> None:
 def values(solution: Solution) -> tuple[object, ...]:
     """Return the columns of `examples`. Collective."""
     body, interface = solution.problem.equilibrium, solution.problem.interface
-    nodes, opening = interface.jump, interface.opening(solution.nodal)
+    nodes, opening = interface.nodes, interface.normal_gap(solution.nodal)
     rigid = nodes.gather(solution.forces.pressure - interface.stiffness * opening > 0)
     touching = nodes.gather(solution.status != "open")
     x = nodes.gather(nodes.points[:, 0])[touching]

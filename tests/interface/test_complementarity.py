@@ -42,7 +42,7 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     moved = linearise(
         interface, nodal + direction, forces, parameters, before, forces.pressure * 0.4
     )
-    difference = moved.forces.vectors(problem.nodes) - base.forces.vectors(problem.nodes)
+    difference = moved.multipliers.vectors(problem.nodes) - base.multipliers.vectors(problem.nodes)
     predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
     assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
     normal = nodes.normal_component(difference)
@@ -68,7 +68,7 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     moved = linearise(
         problem.interface, nodal + step, forces, parameters, before, softening=softening
     )
-    change = (moved.forces.friction - base.forces.friction)[:, 0] / step[0]
+    change = (moved.multipliers.friction - base.multipliers.friction)[:, 0] / step[0]
     assert np.all(change < -0.25 * 20.0)
     expected = np.maximum(change, -softening * parameters.nodal_stiffness)
     assert np.allclose(base.blocks[:, 0, 0], expected, rtol=1e-4)

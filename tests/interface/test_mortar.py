@@ -85,13 +85,13 @@ def check_a_pair(one, other, close) -> None:
     np.testing.assert_allclose(found.gap, 0.1, atol=1e-14)
     np.testing.assert_allclose(found.normal, np.broadcast_to(slave.normal[0], x.shape), atol=1e-14)
     assert found.weight.min() > 0
-    forces = found.other.T @ found.weight
+    forces = found.M.T @ found.weight
     np.testing.assert_allclose(forces, loads(master, found.masters), rtol=0, atol=close)
-    on_slave = found.own.T @ found.weight
+    on_slave = found.D.T @ found.weight
     np.testing.assert_allclose(on_slave, loads(slave, found.slaves), rtol=0, atol=close)
     # A linear field of both has the jump of the gap alone.
     field = np.random.default_rng(3).normal(size=(dim, dim))
-    jump = found.own @ (x[found.slaves] @ field) - found.other @ (y[found.masters - FIRST] @ field)
+    jump = found.D @ (x[found.slaves] @ field) - found.M @ (y[found.masters - FIRST] @ field)
     apart = -0.1 * slave.normal[0] @ field
     np.testing.assert_allclose(jump, np.broadcast_to(apart, jump.shape), atol=1e-13)
 
@@ -100,7 +100,7 @@ def check_tied(slave, master) -> None:
     """Each node is tied to the one at its place."""
     found = couple(slave, master, 1.0)
     np.testing.assert_array_equal(found.masters - FIRST, found.slaves)
-    np.testing.assert_allclose((found.own - found.other).toarray(), 0, atol=1e-12)
+    np.testing.assert_allclose((found.D - found.M).toarray(), 0, atol=1e-12)
 
 
 @pytest.mark.core
@@ -133,7 +133,7 @@ def test_what_is_partly_covered_still_reproduces_linear_fields(kind) -> None:
     assert 0 < found.nodes.size < len(x)
     most = 1.25**2 if share > 1e-3 else 1 + 1e-12
     assert found.covered.min() < 0.9 < found.covered.max() < most
-    jump = found.own @ x[found.slaves] - found.other @ y[found.masters - FIRST]
+    jump = found.D @ x[found.slaves] - found.M @ y[found.masters - FIRST]
     np.testing.assert_allclose(jump[:, :-1], 0, atol=1e-9)
     np.testing.assert_allclose(jump[:, -1], -0.05, atol=1e-9)
     np.testing.assert_allclose(found.gap, 0.05, atol=1e-9)
@@ -150,11 +150,11 @@ def test_nodes_without_a_multiplier_hand_their_functions_over(kind) -> None:
     assert not np.isin(found.nodes, rim).any()
     assert found.nodes.size == len(x) - rim.size
     assert found.weight.sum() == pytest.approx(1)
-    np.testing.assert_allclose(found.own.sum(axis=1), 1, atol=1e-12)
-    np.testing.assert_allclose(found.other.sum(axis=1), 1, atol=1e-12)
-    jump = found.own @ x[found.slaves] - found.other @ y[found.masters - FIRST]
+    np.testing.assert_allclose(found.D.sum(axis=1), 1, atol=1e-12)
+    np.testing.assert_allclose(found.M.sum(axis=1), 1, atol=1e-12)
+    jump = found.D @ x[found.slaves] - found.M @ y[found.masters - FIRST]
     np.testing.assert_allclose(jump[:, :-1], 0, atol=1e-12)
-    forces = found.other.T @ found.weight
+    forces = found.M.T @ found.weight
     close = rounding(kind)
     np.testing.assert_allclose(forces, loads(master, found.masters), rtol=0, atol=close)
 

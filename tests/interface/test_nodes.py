@@ -119,7 +119,7 @@ def test_a_direction_that_is_partly_fixed(prescribed, degree):
     problem, normal = inclined(prescribed, degree)
     nodes = problem.nodes
     assert nodes.normal == pytest.approx(np.tile(-normal, (nodes.size, 1)))
-    assert nodes.lift == pytest.approx(np.tile([0.0, -1 / normal[1]], (nodes.size, 1)))
+    assert nodes.admissible_normal == pytest.approx(np.tile([0.0, -1 / normal[1]], (nodes.size, 1)))
     assert np.abs(nodes.tangent).max() == 0
     loop = solve(problem, 1e-10)
     u = problem.nodal(loop.state)

@@ -33,7 +33,7 @@ def forces_of(solution) -> np.ndarray:
     """Return what each contact exerts, shape (contacts, d). Collective."""
     problem, nodes = solution.problem, solution.problem.nodes
     vectors = solution.forces.pressure[:, None] * nodes.normal + solution.forces.friction
-    sizes = [entry.nodes.nodes.size for entry in problem.entries]
+    sizes = [own.nodes.nodes.size for own in problem.geometries]
     groups = np.split(nodes.weight[:, None] * vectors, np.cumsum(sizes)[:-1])
     return problem.comm.allreduce(np.array([group.sum(axis=0) for group in groups]), op=MPI.SUM)
 

@@ -20,7 +20,7 @@ def test_what_a_method_leaves_at_partly_covered_nodes_is_no_pressure(share, warn
     given["fixed"].append({"on": "upper_left", "displacement": [0.0, "free"]})
     solution = solve(parse_case(given), comm=MPI.COMM_SELF)
     assert solution.converged
-    covered = solution.problem.entries[0].coupling.covered
+    covered = solution.problem.geometries[0].covered
     assert (covered < 0.5).any()
     pressure = np.where(covered < 0.5, share, 1.0) * solution.state.forces.pressure.max()
     forces = Multipliers(pressure, solution.state.forces.friction)

@@ -69,9 +69,9 @@ def test_without_friction_the_penetration_is_eps_times_the_pressure():
     state, outcome = penalty.solve()
     assert outcome.converged
     assert len(penalty.history) == 1
-    opening = problem.interface.opening(problem.nodal(state))
+    normal_gap = problem.interface.normal_gap(problem.nodal(state))
     touching = state.forces.pressure > 0
-    assert np.allclose(opening[touching], -1e-5 * state.forces.pressure[touching])
+    assert np.allclose(normal_gap[touching], -1e-5 * state.forces.pressure[touching])
     # The Signorini residual is the penetration: c eps with c = E/size = 1/4.
     assert outcome.residuals.contact == pytest.approx(0.25e-5, rel=1e-6)
 

@@ -1,7 +1,5 @@
 """What an iteration of the block relaxation is made of: projections and their acceleration."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -80,8 +78,7 @@ def test_several_points_are_projected_as_one_after_the_other(nodes, layer):
     rng = np.random.default_rng(1)
     gap = np.full(nodes, 0.5)
     law = NormalLaw(Compliance(2.0), np.ones(nodes), 0 * gap, gap) if layer else None
-    jump = SimpleNamespace(gap=gap)
-    project = _Projection(jump, 3.0, np.full(nodes, 0.4), law, np.zeros((nodes, 3)))
+    project = _Projection(None, gap, 3.0, np.full(nodes, 0.4), law, np.zeros((nodes, 3)))
     points = rng.normal(size=(5, nodes, 3))
     found = project(points)
     assert found.shape == points.shape

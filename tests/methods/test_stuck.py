@@ -51,7 +51,7 @@ def test_a_body_that_lies_lightly_on_one_that_is_bent():
     state, outcome = loop.solve()
     assert outcome.converged, outcome.reason
     assert loop.counters.linear_solves <= 150
-    pressed = problem.interface.jump.sum(state.forces.pressure * problem.nodes.normal[:, 1])
+    pressed = problem.interface.nodes.sum(state.forces.pressure * problem.nodes.normal[:, 1])
     assert abs(pressed) == pytest.approx(2e-6, rel=1e-6)  # 2 wide
 
 

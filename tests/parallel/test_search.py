@@ -136,7 +136,7 @@ def test_the_mortar_operator_of_shares(kind, held):
         np.testing.assert_allclose(
             getattr(found, name), getattr(whole, name)[own], rtol=0, atol=1e-13
         )
-    for names, matrix, count in (("slaves", "own", len(x)), ("masters", "other", len(y))):
+    for names, matrix, count in (("slaves", "D", len(x)), ("masters", "M", len(y))):
         first = FIRST if names == "masters" else 0
         one, other = (
             rows_of(c, found.nodes, getattr(c, names) - first, getattr(c, matrix), count)

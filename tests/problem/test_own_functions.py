@@ -233,8 +233,8 @@ def test_a_layer_is_named() -> None:
     )
     deep = np.zeros((problem.nodes.nodes.size, 2))
     deep[:, 1] = -1.0
-    law = problem.interface.law
-    assert np.isfinite(law.layer_pressure(0 * deep)).all()
+    law = problem.interface.layer
+    assert np.isfinite(law.pressure(0 * deep)).all()
     graph = law.normal_law(0 * deep)
     assert graph is not None
     with pytest.raises(InputError, match=r"^layer: p_nu: .* LookupError: beyond"):

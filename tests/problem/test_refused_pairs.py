@@ -110,8 +110,8 @@ def test_overlapping_bodies_are_refused():
     )
     with pytest.raises(InputError, match=r"the undeformed bodies overlap, by up to 0\.2"):
         find_pair(problem.equilibrium, "under", "over", NOTHING)
-    nodes, _ = find_pair(problem.equilibrium, "under", "over", NOTHING, press=True)
-    np.testing.assert_allclose(nodes.gap, -0.2, atol=1e-12)
+    _, geometry = find_pair(problem.equilibrium, "under", "over", NOTHING, press=True)
+    np.testing.assert_allclose(geometry.nodes.gap, -0.2, atol=1e-12)
 
 
 def test_what_is_said_of_the_choice_of_sides():

@@ -48,7 +48,7 @@ def pushed(comm, degree=1, dim=2, mu=0.3, supports=(), gap=0.0, **given):
 
 
 @pytest.mark.core
-def test_another_interface_has_its_own_constraint():
+def test_another_geometry_has_its_own_constraint():
     """A copy of the problem kept the constraint of the first one, once that had been asked for."""
     problem = pushed(MPI.COMM_SELF)
     swapped = ContactProblem(
@@ -56,7 +56,7 @@ def test_another_interface_has_its_own_constraint():
     )
     jumps = np.random.default_rng(1).standard_normal(problem.equilibrium.owned)
     first = problem.constraint.expand(jumps)
-    other = problem.with_interface(swapped.interface).constraint.expand(jumps)
+    other = problem.with_geometry(swapped.geometries).constraint.expand(jumps)
     np.testing.assert_array_equal(other, swapped.constraint.expand(jumps))
     assert np.abs(other - first).max() > 0.1
 

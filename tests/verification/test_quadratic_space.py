@@ -92,9 +92,9 @@ def test_current_through_nodes_that_are_held(comm, method):
     """Closed form 3 with all sides held: the rim of Gamma_3 cannot move, but conducts."""
     column = Column(k_e=2.0, phi_f=32.0)
     problem = column.problem(comm, 3, degree=2, degrees=30.0)
-    held = problem.interface.held
+    held = problem.interface.constrained
     assert held is not None
-    assert comm.allreduce(held.jump.nodes.size) > 0
+    assert comm.allreduce(held.nodes.nodes.size) > 0
     solution = solve(problem, replace(method, tolerance=1e-10))
     assert solution.converged
     _, bottom = column.solution()

@@ -4,13 +4,14 @@ The multiplier is sum_j lambda_j Phi_j with functions Phi_j that are dual to the
 int Phi_j N~_k = delta_jk int N~_k over the part of the slave that faces the master. The jump at
 the slave node j is then
 
-    j_j = (S u)_j - sum_l P_jl u_l,     P_jl = int Phi_j (N_l o Pi) / int N~_j,
+    j_j = (D u)_j - sum_l M_jl u_l,     M_jl = int Phi_j (N_l o Pi) / int N~_j,
 
-S being the identity, but for quadratic triangles, where N~ = A N (`dual_basis_transformation`)
-and S is made of the inverse of A^T. Constants pass: rows of S and of P have the sum 1.
+D being the identity, but for quadratic triangles, where N~ = A N (`dual_basis_transformation`)
+and D is made of the inverse of A^T. Constants pass: rows of D and of M have the sum 1. (Popp and
+others have D and M without the division by int N~_j.)
 
-`integrate` finds these integrals on the facets of one rank, `couple` sums them up, each node's at
-the rank that owns it. Where nodes carry no multiplier, their functions are handed over to others.
+`integrate` has these integrals over the facets of one rank, `couple` their sums at the rank of each
+node. Functions of nodes without multiplier go to other nodes (`Carriers`).
 
 References
 ----------
@@ -46,12 +47,12 @@ NOTHING: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class Carriers:
-    """The nodes whose dual functions act on facets, where some nodes carry no multiplier.
+    """The multipliers that act on facets where some nodes carry none.
 
     Attributes
     ----------
     nodes
-        Global numbers of the nodes whose multipliers act, shape (f, k).
+        Global numbers of their nodes, shape (f, k).
     functions
         Their functions as combinations of the facet's own, shape (f, k, k).
     """
@@ -61,17 +62,15 @@ class Carriers:
 
     @staticmethod
     def of(slave: Surface, without: NDArray[np.int64]) -> Carriers:
-        """Return the nodes that take over the dual functions of others. Collective.
+        """Return the carriers of the dual functions of nodes without multiplier. Collective.
 
-        They go in equal parts to the others of the facet, and all of those of a facet without
-        others to the nearest corner of another facet, on whatever rank.
+        These are the other nodes of the facet in equal parts, or the nearest corner of another
+        facet of any rank.
 
         Parameters
         ----------
-        slave
-            Facets of this rank.
-        without
-            Global numbers of the nodes, at least those of these facets.
+        slave, without
+            Facets of this rank, and the global numbers of their nodes without multiplier.
         """
         gone = np.isin(slave.nodes, without)
         kept = ~gone
@@ -97,12 +96,13 @@ class Parts:
         Global numbers of the facets' nodes, shape (f, k).
     carriers
         Those of the nodes whose functions Phi these are, shape (f, k).
-    own
+    D
         int Phi_i N~_j over the part that faces the master, shape (f, k, k).
     whole
         int Phi_i over all of the facet, shape (f, k).
-    normal
-        int N~_i times the direction, shape (f, k, d).
+    normal, open_normal
+        int N~_i times the direction where the facets face the master, and int Phi_i times the
+        slave's normal over all of them, shape (f, k, d).
     gap
         int Phi_i times the vector across, everywhere and where the sides do not cut each other,
         shape (f, k, 2, d).
@@ -114,9 +114,10 @@ class Parts:
 
     nodes: NDArray[np.int64]
     carriers: NDArray[np.int64]
-    own: Array
+    D: Array
     whole: Array
     normal: Array
+    open_normal: Array
     gap: Array
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
@@ -138,7 +139,8 @@ def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
     direction, found = _facing(slave, opposite)
     change = dual_basis_transformation(slave.shape, slave.degree)
     dual, weight = _dual(slave, found, change)
-    dual, own = carriers.functions @ dual, carriers.functions * weight[:, None, :]
+    dual, d_matrix = carriers.functions @ dual, carriers.functions * weight[:, None, :]
+    whole = np.einsum("fij,fj->fi", carriers.functions, integrals(slave))
     gap, normal = np.zeros((*weight.shape, 2)), np.zeros((*weight.shape, direction.shape[1]))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
     for points in found:
@@ -153,9 +155,10 @@ def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
     return Parts(
         slave.nodes,
         carriers.nodes,
-        own,
-        np.einsum("fij,fj->fi", carriers.functions, integrals(slave)),
+        d_matrix,
+        whole,
         carriers.functions @ normal,
+        whole[:, :, None] * slave.normal[:, None, :],
         gap[:, :, :, None] * direction[:, None, None, :],
         rows,
         columns,
@@ -181,10 +184,8 @@ def _functions(points: Points, slave: Surface, change: Array) -> Array:
 
 
 def _normals(points: Points, slave: Surface, master: Surface, direction: Array) -> Array:
-    """Return unit vectors at points between the normals of both sides, shape (p, d).
-
-    On straight facets they are the directions of these, for their own jump at edges.
-    """
+    """Return unit vectors at points between the normals of both sides, shape (p, d)."""
+    # On straight facets the directions of these, for their own jump at edges.
     if slave.order == 1:
         return direction[points.slave]
     i, j = points.slave, points.master
@@ -208,11 +209,9 @@ def _dual(slave: Surface, found: Sequence[Points], change: Array) -> tuple[Array
 
 
 def _middle(slave: Surface, master: Surface, found: Sequence[Points]) -> Array:
-    """Return directions between the normals of slave facets and of those opposite, shape (f, d).
-
-    Along them two curved sides see each other alike, whichever of them is the slave: the normals
-    of one alone would turn some of the closing of the gap into slip.
-    """
+    """Return directions between the normals of slave facets and of those opposite, shape (f, d)."""
+    # Two curved sides see each other alike along them; the normals of one side alone would turn
+    # some of the closing of the gap into slip.
     total = np.zeros_like(slave.normal)
     for points in found:
         _add(total, points.slave, points.weight[:, None] * master.normal[points.master])
@@ -259,19 +258,20 @@ class Coupling(Mixing):
     Attributes
     ----------
     weight
-        int Phi_j over the part that faces the master, int N~_j, shape (n,) (length^(d - 1)).
+        int Phi_j over the part that faces the master, int N~_j, shape (n,) (length^(d - 1)); over
+        all of the facets where nothing faces the master.
     normal
         Unit vectors from the slave to the master, between their normals, shape (n, d).
     gap
-        Mean distance along them, shape (n,) (length).
+        Mean distance along them, shape (n,) (length); infinite where nothing faces the master.
     apart
-        The gap as it would be if the sides did not cut each other, shape (n,). It may be negative
-        too: means are taken with functions that change their sign.
+        The gap without overlaps of the sides, shape (n,); negative means come from negative
+        functions alone.
     covered
         Share of int N~_j that faces the master, shape (n,).
     depth
-        Of the deepest overlap (length), on all ranks: how far the sides cut each other at a point,
-        both those of facets and the surfaces that straight facets approximate.
+        Of the deepest overlap at a point, of facets and of the surfaces that they approximate
+        (length), on all ranks.
     """
 
     weight: Array
@@ -283,7 +283,11 @@ class Coupling(Mixing):
 
 
 def couple(
-    slave: Surface, master: Surface, reach: float, without: NDArray[np.int64] = NOTHING
+    slave: Surface,
+    master: Surface,
+    reach: float,
+    without: NDArray[np.int64] = NOTHING,
+    nodes: NDArray[np.int64] | None = None,
 ) -> Coupling:
     """Integrate the dual mortar operator. Collective.
 
@@ -294,40 +298,67 @@ def couple(
     reach
         Largest distance at which facets face each other (length).
     without
-        Global numbers of slave nodes that carry no multiplier, at least those of this rank and of
-        its facets: their functions go to the other nodes of their facets, or to the nearest node
-        where these have none, so that the multipliers still contain the constants.
+        Global numbers of slave nodes without multiplier, at least those of this rank and of its
+        facets; others carry their functions, so that multipliers contain the constants.
+    nodes
+        Global numbers of the nodes of this rank with a multiplier, whether they face the master or
+        not; by default those that do.
     """
     opposite = Opposite.of(slave, master, reach)
     parts = integrate(slave, opposite, Carriers.of(slave, without))
     change = dual_basis_transformation(slave.shape, slave.degree)
-    return _assembled(parts, slave.owners, np.asarray(np.linalg.inv(change.T)), without)
+    return _assembled(parts, slave.owners, np.asarray(np.linalg.inv(change.T)), without, nodes)
 
 
-def _assembled(parts: Parts, owners: Owners, back: Array, without: NDArray[np.int64]) -> Coupling:
-    """Return the sums at the nodes of this rank, given those of its facets and S of a facet."""
+def _assembled(
+    parts: Parts,
+    owners: Owners,
+    back: Array,
+    without: NDArray[np.int64],
+    nodes: NDArray[np.int64] | None,
+) -> Coupling:
+    """Return the sums at the nodes of this rank, given those of its facets and A^-T."""
     f, k, _, d = parts.gap.shape
     # The integral of a quadratic function on the axis of revolution is rounding.
     around = np.broadcast_to(parts.whole.sum(axis=1, keepdims=True), parts.whole.shape)
-    shares = (parts.own.sum(axis=2), parts.whole, around, parts.normal, parts.gap)
+    shares = (
+        *(parts.D.sum(axis=2), parts.whole, around),
+        *(parts.normal, parts.open_normal, parts.gap),
+    )
     every, total = owners.sums(
         parts.carriers.ravel(),
         np.hstack([part.reshape(f * k, int(np.prod(part.shape[2:]))) for part in shares]),
     )
-    weight, whole, around, normal, *gaps = np.split(total, [1, 2, 3, 3 + d, 3 + 2 * d], axis=1)
-    weight, whole, around = weight[:, 0], whole[:, 0], around[:, 0]
+    areas, *vectors = np.split(total, 3 + d * np.arange(4), axis=1)
+    weight, whole, around = areas.T
     some = whole > NEGLIGIBLE * around
     covered = np.where(some, weight / np.where(some, whole, 1.0), 0.0)
-    kept = np.flatnonzero((covered > LEAST_COVERED) & ~np.isin(every, without))
-    nodes, weight, normal = every[kept], weight[kept], normal[kept]
+    if nodes is None:
+        nodes = every[(covered > LEAST_COVERED) & ~np.isin(every, without)]
+    kept = np.searchsorted(every, nodes)
+    faces = covered[kept] > LEAST_COVERED
+    weight = np.where(faces, weight[kept], whole[kept])
+    normal, outward, *gaps = (vector[kept] for vector in vectors)
+    normal = np.where(faces[:, None], normal, outward)
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    gap, apart = (np.einsum("nd,nd->n", vector[kept], normal) / weight for vector in gaps)
-    divide = sparse.diags_array(1 / weight)
-    # Each facet with a node has all of the node's row of S.
+    gap, apart = (
+        np.where(faces, np.einsum("nd,nd->n", vector, normal) / weight, np.inf) for vector in gaps
+    )
+    # Each facet with a node has all of the node's row of D. The jump of an open node is its u.
+    opened = nodes[~faces]
+
+    def of_facing(entries: Entries) -> Entries:
+        there = ~np.isin(entries[0], opened)
+        return entries[0][there], entries[1][there], entries[2][there]
+
     rows, columns = np.broadcast_arrays(parts.carriers[:, :, None], parts.nodes[:, None, :])
-    values = parts.own @ back
-    slaves, own = sparse_rows(nodes, owners.entries(rows.ravel(), columns.ravel(), values.ravel()))
-    masters, other = sparse_rows(nodes, owners.entries(parts.rows, parts.columns, parts.values))
-    jumps = nodes, slaves, sparse.csr_array(divide @ own), masters, sparse.csr_array(divide @ other)
+    values = (parts.D @ back).ravel()
+    row, column, value = of_facing(owners.entries(rows.ravel(), columns.ravel(), values))
+    own = np.append(row, opened), np.append(column, opened), np.append(value, weight[~faces])
+    slaves, D = sparse_rows(nodes, own)
+    entries = of_facing(owners.entries(parts.rows, parts.columns, parts.values))
+    masters, M = sparse_rows(nodes, entries)
+    divide = sparse.diags_array(1 / weight)
+    jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
     depth = owners.comm.allreduce(parts.depth, op=MPI.MAX)
     return Coupling(*jumps, weight, normal, gap, apart, covered[kept], depth)

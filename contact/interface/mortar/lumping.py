@@ -2,7 +2,7 @@
 
 At the vertices of quadratic triangles the basis functions have no mean: a constraint there would
 weigh nothing. The functions N~ = A N of `dual_basis_transformation` take their place, and with them
-the coefficients S u, S = A^-T, that of the nodal values u: in front of a rigid foundation as in
+the coefficients D u, D = A^-T, that of the nodal values u: in front of a rigid foundation as in
 front of another body. For all other facets A is the identity.
 """
 
@@ -38,7 +38,7 @@ def _integrated(surface: Surface) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Mixing:
-    """Jumps that are no nodal values, S u less P times the values of another body.
+    """Jumps that are sums over nodes, D u - M u; rows are divided by the areas of their nodes.
 
     Rows are nodes that this rank owns in ascending order of their global numbers.
 
@@ -46,27 +46,29 @@ class Mixing:
     ----------
     nodes
         Global numbers of the nodes that carry a multiplier, shape (n,).
-    slaves, own
-        Global numbers of the nodes of their side, of whatever ranks, shape (s,), and S, shape
+    slaves, D
+        Global numbers of the nodes of their side, of whatever ranks, shape (s,), and D, shape
         (n, s).
-    masters, other
-        Those of the other body, shape (m,), and P, shape (n, m); none before a rigid foundation.
+    masters, M
+        Those of the other body, shape (m,), and M, shape (n, m); none before a rigid foundation.
     """
 
     nodes: NDArray[np.int64]
     slaves: NDArray[np.int64]
-    own: sparse.csr_array
+    D: sparse.csr_array
     masters: NDArray[np.int64]
-    other: sparse.csr_array
+    M: sparse.csr_array
 
     @staticmethod
-    def alone(nodes: NDArray[np.int64], slaves: NDArray[np.int64], own: sparse.csr_array) -> Mixing:
-        """Return the jumps S u of nodes of one side, given as the attributes are."""
+    def one_sided(
+        nodes: NDArray[np.int64], slaves: NDArray[np.int64], matrix: sparse.csr_array
+    ) -> Mixing:
+        """Return the jumps D u of nodes in front of a rigid foundation."""
         none = sparse.csr_array((nodes.size, 0))
-        return Mixing(nodes, slaves, own, np.zeros(0, dtype=np.int64), none)
+        return Mixing(nodes, slaves, matrix, np.zeros(0, dtype=np.int64), none)
 
     def apply(self, owners: Owners, values: Array) -> Array:
-        """Return S times nodal values, shape (n, m). Collective.
+        """Return D times nodal values, shape (n, m). Collective.
 
         Jumps made of infinite values are NaN.
 
@@ -77,18 +79,18 @@ class Mixing:
         """
         there = owners.values(self.slaves, lambda given: values[np.searchsorted(self.nodes, given)])
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.own @ there)
+            return np.asarray(self.D @ there)
 
     def on_coefficients(self, owners: Owners, forces: Array) -> Array:
-        """Return the forces S^-T f on coefficients S u, given those on u, (n, m). Collective.
+        """Return the forces D^-T f on coefficients D u, given those on u, (n, m). Collective.
 
-        S is that of one side: mid-edge nodes, which alone have other columns, have those of
+        D is that of one side: mid-edge nodes, which alone have other columns, have those of
         vertices, whose rows are of the identity.
         """
         at = np.searchsorted(self.slaves, self.nodes)
-        diagonal = self.own.data[self.own.indices == np.repeat(at, np.diff(self.own.indptr))]
+        diagonal = self.D.data[self.D.indices == np.repeat(at, np.diff(self.D.indptr))]
         found = forces / diagonal[:, None]
-        others = -(self.own.T @ found)
+        others = -(self.D.T @ found)
         others[at] += forces
         nodes, sums = owners.sums(self.slaves, others)
         found[np.searchsorted(self.nodes, nodes)] += sums
@@ -155,15 +157,14 @@ class Lumping:
             # Facets that share nodes say the same of them: any of them may be heard.
             _, first = np.unique(np.column_stack(entries[:2]), axis=0, return_index=True)
             row, column, value = entries[0][first], entries[1][first], entries[2][first]
-            mixing = Mixing.alone(nodes, *sparse_rows(nodes, (row, column, value)))
+            mixing = Mixing.one_sided(nodes, *sparse_rows(nodes, (row, column, value)))
         return Lumping(nodes, weight[:, 0], normal, deviation, least, mixing)
 
     def without_axis(self, surface: Surface) -> Lumping:
-        """Return the areas where nodes on the axis of revolution carry no multiplier.
+        """Return the areas without multiplier on the axis of revolution.
 
-        Pressures at degree 1 are of second order by a cancellation between alike elements alone,
-        which ends at the axis; a node there has so little area that its pressure would be off by
-        several times as much as others. As at crosspoints its function goes to its neighbour.
+        The area of a node there is so small that its pressure would be off by several times as much
+        as others. As at crosspoints its function goes to its neighbour.
         """
         owners, nodes = surface.owners, self.nodes
         # A part has two ends in the half plane.
@@ -184,12 +185,12 @@ class Lumping:
             np.concatenate([np.ones(alone.size), *(weights / total[:, None]).T]),
         )
         return replace(
-            self, weight=weight, mixing=Mixing.alone(nodes, *sparse_rows(nodes, entries))
+            self, weight=weight, mixing=Mixing.one_sided(nodes, *sparse_rows(nodes, entries))
         )
 
 
 def pairs_at_axis(surface: Surface, numbers: NDArray[Any]) -> NDArray[Any]:
-    """Return the numbers of nodes on the axis of revolution and of those beside them, (k, 2).
+    """Return nodes on the axis of revolution, and those beside them, (k, 2).
 
     None of degree 2 on straight facets, where functions of nodes on the axis have no mean.
     """

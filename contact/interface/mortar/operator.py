@@ -1,7 +1,7 @@
-"""The mortar coupling operator: jumps that are sums over nodes of both bodies, on whatever rank.
+"""The mortar coupling operator T: jumps that are sums over nodes, of any rank.
 
-So are the jumps on quadratic triangles in front of a rigid foundation. Each rank has those of its
-own contact nodes, and asks neighbours for the values of theirs.
+Between bodies, and on quadratic triangles in front of a rigid foundation. Each rank has the rows of
+its own contact nodes.
 """
 
 from __future__ import annotations
@@ -30,21 +30,19 @@ class CouplingOperator:
     Attributes
     ----------
     halo
-        The nodes of this rank and those of others that take part.
+        The nodes of this rank and the ghosts in its rows.
     jumps
-        The jumps of this rank by the values at these, shape (r, nodes).
+        Rows of this rank, shape (r, nodes).
     change
-        The change of unknowns that makes them unknowns.
+        Change of basis from nodal values to jumps.
     numbers
-        The global numbers of their nodes, shape (r,).
+        Global numbers of their nodes, shape (r,).
     between
-        Whether other bodies take part.
+        Whether there are masters.
     local
-        Which nodes of this rank take part in jumps of any rank, local numbers, shape (h,).
-    places
-        Where the nodes of jumps are among some nodes of this rank, shape (k,).
-    own
-        Their rows, shape (k,).
+        Local numbers of the nodes in jumps of any rank, shape (h,).
+    places, own
+        Positions of nodes of jumps among given nodes of this rank, and their rows, shape (k,).
     """
 
     halo: Halo
@@ -65,7 +63,7 @@ class CouplingOperator:
 
     @cached_property
     def _here(self) -> sparse.csr_array:
-        """The jumps of this rank's contact nodes."""
+        """Rows at `places`."""
         return self.jumps[self.own]
 
     def apply(self, x: Array) -> Array:
@@ -111,7 +109,7 @@ def coupling_operator(
     numbers = np.concatenate([rows.nodes for rows in given])
     found = []  # each contact's jumps by the values of the nodes of all contacts
     for rows, names in zip(given, columns, strict=True):
-        own = sparse.hstack([rows.own, -rows.other], format="coo")
+        own = sparse.hstack([rows.D, -rows.M], format="coo")
         at, shape = (own.row, halo.places(names)[own.col]), (rows.nodes.size, halo.numbers.size)
         found.append(sparse.csr_array((own.data, at), shape=shape))
     jumps = sparse.vstack(found, format="csr")
@@ -143,11 +141,8 @@ def coupling_operator(
 def _cyclic(
     comm: MPI.Intracomm, halo: Halo, replaced: NDArray[np.intp], jumps: sparse.csr_array
 ) -> int:
-    """Return how many replaced nodes follow each other in circles, or lie between. Collective.
-
-    Those that follow none that is left are taken away, and then those that none follows, as long
-    as there are any.
-    """
+    """Return the number of replaced nodes in circles of nodes following each other. Collective."""
+    # Take away nodes that follow none that is left, then those that none follows.
     follows = sparse.coo_array(jumps)
     others = (replaced[follows.row] != follows.col) & (follows.data != 0)
     follows = sparse.csr_array(

@@ -1,7 +1,7 @@
-"""Contact search: the facets of the other side, of whatever rank, that slave facets may face.
+"""Contact search: the master facets of all ranks opposite to slave facets.
 
-A rank asks those whose boxes are near its facets, and is sent no more than balls around these
-contain. So messages and memory do not grow with the number of ranks.
+Ranks with boxes near the slave facets send the facets within balls around these: messages and
+memory do not grow with the number of ranks.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ DETOUR = 2.0
 
 @dataclass(frozen=True)
 class Opposite:
-    """The master facets that slave facets of this rank may face.
+    """The master facets opposite to slave facets of this rank.
 
     Attributes
     ----------
     master
-        The facets, of all ranks.
+        Master facets of all ranks.
     near
-        Those slave facets that are near enough, shape (n,).
+        Slave facets within the reach, shape (n,).
     radius
-        How far around the centres of these the others are sought, shape (n,) (length).
+        Search radius around the centres of these, shape (n,) (length).
     reach
-        Slave facets that are farther than this from all of the other side face none (length).
+        Largest distance at which facets face each other (length).
     """
 
     master: Surface
@@ -63,10 +63,7 @@ class Opposite:
         return Opposite(master.sent(facets, ranks), near, radius, reach)
 
     def pairs(self, slave: Surface) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Yield pairs of a slave and a master facet whose shadows along the slave's normal meet.
-
-        Perhaps: no others do.
-        """
+        """Yield candidate pairs of facets, whose projections along the slave's normal may meet."""
         master, near, radius = self.master, self.near, self.radius
         if near.size == 0 or master.count == 0:
             return
@@ -89,15 +86,7 @@ class Opposite:
 
 
 def nearest(comm: MPI.Intracomm, points: Array, places: Array) -> Array:
-    """Return how far points of this rank are from the nearest place of any rank. Collective.
-
-    Infinite where there are no places.
-
-    Parameters
-    ----------
-    comm, points, places
-        Communicator, and those of this rank, shapes (n, d) and (m, d).
-    """
+    """Return the distance of points to the nearest place of any rank, inf without. Collective."""
     point, rank = _holders(bounding_boxes(comm, places), points)
     asked_by, asked = exchanged(comm, rank, points[point])
     found = cKDTree(places).query(asked)[0] if len(places) else np.full(len(asked), np.inf)
@@ -110,10 +99,9 @@ def nearest(comm: MPI.Intracomm, points: Array, places: Array) -> Array:
 def nearest_named(
     comm: MPI.Intracomm, points: Array, places: Array, names: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return the name of the place of any rank that is nearest to each point. Collective.
+    """Return the name of the nearest place of any rank to each point. Collective.
 
-    Of places that are equally near the one with the least coordinates is taken; where there are no
-    places the name is -1.
+    -1 without places; of equally near ones that of the least coordinates.
     """
     least = nearest(comm, points, places)
     among = np.flatnonzero(np.isfinite(least))
@@ -134,7 +122,7 @@ def nearest_named(
 
 
 def _distances(box: Array, points: Array) -> tuple[Array, Array]:
-    """Return how far points are at least, and at most, from places in a box around these."""
+    """Return the least and the largest distance of points to places in a box."""
     lower, upper = box
     least = np.linalg.norm(np.maximum(np.maximum(lower - points, points - upper), 0.0), axis=1)
     most = np.linalg.norm(np.maximum(np.abs(lower - points), np.abs(upper - points)), axis=1)
@@ -179,10 +167,8 @@ def _holders(every: Array, points: Array) -> tuple[NDArray[np.intp], NDArray[np.
 def _within(
     places: Array, source: NDArray[np.intp], centres: Array, radius: Array
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return places that are in balls, or beside them, and the ranks that these are of.
-
-    Balls of a rank that are alike in size are taken for equally large.
-    """
+    """Return the places in balls or beside them, and the ranks of these balls."""
+    # Balls of a rank that are alike in size are taken for equally large.
     if len(places) == 0 or len(centres) == 0:
         return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
     size = np.ceil(np.log2(radius)).astype(np.intp)

@@ -61,11 +61,8 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _cut(polygon: Array, count: NDArray[np.intp], height: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Keep the part of each polygon where a linear function, by its corners, is >= 0.
-
-    Signs of rounding would make several crossings of a corner on the line, one more than there is
-    room for, and another corner would be lost.
-    """
+    """Keep the part of each polygon where a linear function, given at the corners, is >= 0."""
+    # Signs of rounding would make several crossings of a corner on the line, and lose another.
     n, most, _ = polygon.shape
     present = np.arange(most)[None, :] < count[:, None]
     largest = np.abs(np.where(present, height, 0.0)).max(axis=1)[:, None]
@@ -104,8 +101,8 @@ class Points:
     gap
         Distance from the slave to the master facet along the slave's direction, shape (p,).
     clear
-        The largest that it may be, of the facets or of the surfaces that they approximate,
-        shape (p,): below 0 the bodies overlap.
+        Upper bound of it, of the facets or of the surfaces that they approximate, shape (p,):
+        below 0 the bodies overlap.
     """
 
     slave: NDArray[np.intp]
@@ -178,24 +175,8 @@ def common_points(
 def _on_planes(
     slave: Surface, facets: NDArray[np.intp], direction: Array, sides: Sequence[Array]
 ) -> list[Array]:
-    """Return points, projected onto average planes of slave facets, and their heights above.
-
-    Coordinates on a plane are those of the reference facet, by the slope of its map in the middle:
-    of an affine facet they are its own.
-
-    Parameters
-    ----------
-    slave, facets
-        The slave side, and its facet for each plane, shape (n,).
-    direction
-        Of the projection, and of the heights, shape (n, d).
-    sides
-        Points, shapes (n, m, d).
-
-    Returns
-    -------
-    Coordinates and heights of each side, shapes (n, m, d).
-    """
+    """Return points on average planes of slave facets with their heights, (n, m, d) a side."""
+    # Coordinates are those of the reference facet, by the slope of its map in the middle.
     shape, points = slave.shape, slave.points[facets]
     origin = shape.lagrange(slave.order, shape.middle) @ points
     slope = jacobians(shape, points, shape.middle)[:, 0]
@@ -207,13 +188,10 @@ def _on_planes(
 def _degrees(
     slave: Surface, master: Surface, i: NDArray[np.intp], j: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Return the degree of the polynomials that are to be integrated over each pair, shape (n,).
-
-    The inverse of a bilinear map is analytic up to where its determinant, 1 + w (eta, xi), is 0:
-    beside a rule on [-1, 1] that is at 1/(2 b), the bend b being |w|/4, and errors fall with each
-    degree by the sum of the half axes of the ellipse through it. That of a quadratic map, by which
-    the middle of an edge is b aside, ends at 1/(4 b) from there.
-    """
+    """Return the degree of the polynomials to be integrated over each pair, shape (n,)."""
+    # The inverse of a bilinear map of the bend b = |w|/4 is analytic up to 1/(2 b) beside a rule on
+    # [-1, 1], where its determinant 1 + w (eta, xi) is 0; that of a quadratic map up to 1/(4 b).
+    # Errors fall with each degree by the sum of the half axes of the ellipse through the pole.
     total = sum(side.degree * (1 if side.shape.simplex else 2) for side in (slave, master))
     bend = np.maximum(slave.bend[i], master.bend[j])
     pole = 1 / np.clip(2 * bend, ROUNDING, 0.9)
@@ -232,19 +210,7 @@ def _pieces(side: Surface, nodes: Array) -> Array:
 
 
 def _common(own: Array, other: Array, degree: int) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return the points of a rule on the common parts of pieces of facets, and their weights.
-
-    Parameters
-    ----------
-    own, other
-        Convex pieces of both facets of each pair, shapes (n, pieces, corners, dim).
-    degree
-        Of the polynomials that are integrated exactly.
-
-    Returns
-    -------
-    The pair of each point, ascending, shape (p,), the points, (p, dim), and their weights, (p,).
-    """
+    """Return the pair, point and weight of each point of a rule on the common parts of facets."""
     first, second = own[:, :, None], other[:, None]
     low = np.maximum(first.min(axis=3), second.min(axis=3))
     high = np.minimum(first.max(axis=3), second.max(axis=3))
@@ -269,25 +235,9 @@ def _common(own: Array, other: Array, degree: int) -> tuple[NDArray[np.intp], Ar
 def _slivers(
     side: Surface, nodes: Array, by: Array, degree: int
 ) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return the points of a rule between curved edges of facets and their straight pieces.
-
-    Over the half of an edge from p along e, the nodes of which are in the middle of the edge by b
-    aside from its chord, these are p + t e + s t (1 - t) b, with the measure t (1 - t) |e x b|.
-    Weights are negative where the edge bends inwards.
-
-    Parameters
-    ----------
-    side, nodes
-        Whose facets, and the nodes of each pair's, on the plane, shape (n, nodes, d).
-    by
-        Convex pieces of the facets of the other side, shape (n, pieces, corners, 2).
-    degree
-        Of the rule.
-
-    Returns
-    -------
-    As of `_common`.
-    """
+    """Return the same between curved edges of facets and their straight pieces."""
+    # Half of an edge from p along e, its middle by b aside: p + t e + s t (1 - t) b, with the
+    # measure t (1 - t) |e x b|, negative where the edge bends inwards.
     shape, flat = side.shape, nodes[..., :2]
     first, second = np.array(shape.edges).T
     half = flat[:, shape.corners : shape.corners + len(first)]
@@ -312,20 +262,8 @@ def _slivers(
 
 
 def _within(begin: Array, along: Array, polygons: Array) -> tuple[Array, Array, Array]:
-    """Return which part of segments is in convex polygons (Cyrus and Beck, Comput. Graph. 3, 1978).
-
-    Parameters
-    ----------
-    begin, along
-        One end, and the vector to the other one, shape (n, 2).
-    polygons
-        Corners in their order, either way round, shape (n, k, 2).
-
-    Returns
-    -------
-    Where it begins and ends, from 0 to 1, shape (n,), nothing where the end is not beyond the
-    beginning, and the share of the polygon in it: a half of a segment that is on its edge.
-    """
+    """Return where segments in convex polygons begin and end, 0 to 1, and the share of these."""
+    # Cyrus and Beck, Comput. Graph. 3 (1978); a segment on an edge is half in the polygon.
     edges = np.roll(polygons, -1, axis=1) - polygons
     turn = np.sign(_cross(edges[:, 0], edges[:, 1]))[:, None] / np.linalg.norm(edges, axis=2)
     height = turn * _cross(edges, begin[:, None] - polygons)
@@ -345,17 +283,7 @@ def _slopes(gradients: Array, nodes: Array) -> Array:
 
 
 def _carried_back(side: Surface, nodes: Array, y: Array) -> Array:
-    """Return points of the reference facet that are projected to points, shape (p, dim).
-
-    Newton's method; of an affine facet it needs one step.
-
-    Parameters
-    ----------
-    side, nodes
-        Whose facets, and their projected nodes for each point, shape (p, nodes, d).
-    y
-        The points on the planes, shape (p, dim).
-    """
+    """Return points of the reference facet, given their projections, (p, dim): Newton's method."""
     shape = side.shape
     at = np.repeat(shape.middle, len(y), axis=0)
     for _ in range(20):

@@ -74,14 +74,13 @@ class Surface:
         Of the curved surface from straight facets (`contact.mesh.deviation`), shape
         (f, edges).
     unknown
-        How much of it the vertices do not tell, shape (f, edges); of curved facets, how far they
-        are from the surface that they interpolate.
+        Its uncertainty, shape (f, edges); of curved facets that of the surface between the nodes.
     degree
         Of the space.
     revolved
         Whether the facets stand for the rings through them, about the axis x = 0.
-    refined
-        Whether straight edges have been cut in two since the mesh met a curved boundary.
+    levels
+        How often straight edges have been cut in two since the mesh met a curved boundary.
     owners
         The ranks that own the nodes.
     """
@@ -93,8 +92,37 @@ class Surface:
     unknown: Array
     degree: int
     revolved: bool = False
-    refined: bool = False
+    levels: int = 0
     owners: Owners = ALONE
+
+    def moved(self, displacement: Array) -> Surface:
+        """Return the surface at a displacement of the owned nodes, shape (nodes, d). Collective."""
+        shape, begin, d = self.shape, self.owners.begin, displacement.shape[1]
+        u = self.owners.values(self.nodes.ravel(), lambda given: displacement[given - begin])
+        functions = shape.lagrange(self.degree, shape.nodes(self.order))
+        points = self.points + functions @ u.reshape(*self.nodes.shape, d)
+        before, after = (
+            area_vectors(jacobians(shape, x, shape.middle)[:, 0]) for x in (self.points, points)
+        )
+        outward = np.sign(np.einsum("fd,fd->f", before, self.normal))[:, None] * after
+        normal = outward / np.linalg.norm(outward, axis=1)[:, None]
+        return replace(self, points=points, normal=normal).with_deviations()
+
+    def with_deviations(self) -> Surface:
+        """Return the surface with its deviations from straight facets. Collective."""
+        corners = self.nodes[:, : self.shape.corners]
+        deviation, unknown = deviations(
+            corners, self.corners, self.normal, self.owners, self.levels
+        )
+        if self.order > 1:
+            deviation = np.zeros_like(deviation)
+            unknown = 0.5 * unknown + 2 * _of_arcs(self.shape, self.points, self.normal)
+        return replace(self, deviation=deviation, unknown=unknown)
+
+    @property
+    def refined(self) -> bool:
+        """Whether straight edges have been cut in two."""
+        return self.levels > 0
 
     @property
     def count(self) -> int:
@@ -135,10 +163,9 @@ class Surface:
 
     @cached_property
     def bend(self) -> Array:
-        """How far facets are from affine images of the reference facet, shape (f,).
+        """Largest deviation of nodes from the affine map of the middle, shape (f,).
 
-        It is the largest difference between a node and its image under the slope of the map in the
-        middle, in the coordinates of the reference facet.
+        In the coordinates of the reference facet.
         """
         shape = self.shape
         middle = shape.lagrange(self.order, shape.middle) @ self.points
@@ -170,10 +197,7 @@ class Surface:
 
     @property
     def unknown_deviation(self) -> float:
-        """The largest part of the deviations that gaps do not have (length), on this rank.
-
-        Where gaps are those of the facets it is all; else the part that vertices do not tell.
-        """
+        """Largest part of the deviations that gaps do not contain (length), on this rank."""
         return float(self.unknown.max(initial=0.0)) / 4 if self.follows else self.largest_deviation
 
     @property
@@ -185,13 +209,12 @@ class Surface:
     def follows(self) -> bool:
         """Whether gaps are those of the curved surface that straight facets approximate.
 
-        At degree 1 displacements cannot follow a curve, and parts of an edge that has been refined
-        lie on one chord.
+        Not at degree 1, where displacements do not follow a curve, nor on refined chords.
         """
         return self.degree == 2 and not self.refined and self.order == 1
 
     def height(self, facets: NDArray[np.intp], at: Array) -> Array:
-        """Return how far the surface is above straight facets at points along normals, (p,).
+        """Return the height of the surface above points of straight facets, (p,).
 
         Over an edge of the length L that is an arc of the sagitta f = c/4, whose height h over a
         point is, with w = l_i l_j L^2 the product of the distances to the ends,
@@ -213,9 +236,8 @@ class Surface:
         return np.asarray(np.sum(along * heights, axis=1))
 
     def height_bounds(self, facets: NDArray[np.intp], at: Array) -> tuple[Array, Array]:
-        """Return the least and the largest height of the surface above points of facets, (p,).
+        """Return bounds of the height of a smooth surface above points of facets, (p,).
 
-        So it is to be expected of smooth surfaces, whose curvature neighbours of a facet tell.
         Parts of an edge that has been refined are anywhere on its chord.
 
         Parameters
@@ -253,21 +275,20 @@ class Surface:
         return np.asarray(self._bubbles(self.shape.nodes(self.degree))[1].argmax(axis=0))
 
     def told_by(self, values: Array) -> tuple[NDArray[np.int64], Array]:
-        """Return how a function that depends on the curve is told by its values at the corners.
+        """Return the third-order reconstruction of a function from its corner values. Collective.
 
-        As the corners' places tell the surface, on which its values elsewhere depend: both are of
-        third order where they are smooth. The less the neighbours of an edge differ, the more each
-        of both counts (weights of Jiang and Shu, as in `deviations`). Collective.
+        The smoother of both, function and surface, has the larger weight (Jiang and Shu, as in
+        `deviations`).
 
         Parameters
         ----------
         values
-            Those at the corners of facets, shape (f, c), infinite where there is none.
+            Values at the corners of facets, shape (f, c), infinite for none.
 
         Returns
         -------
-        The nodes of this rank that facets have, ascending, and at each the value; its weight beside
-        that on the surface, from 0 to 1; and the part that is unknown then; shape (n, 3).
+        The nodes of this rank, ascending, and at each the value, its weight against that on the
+        surface, from 0 to 1, and the unknown part; shape (n, 3).
         """
         corners, places = self.nodes[:, : self.shape.corners], self.shape.nodes(self.degree)
         rise, other = deviations(corners, self.points, self.normal, self.owners, values=values)
@@ -283,10 +304,9 @@ class Surface:
         return nodes, np.column_stack([told, weight, (1 - weight) * mine + weight * other])
 
     def distance(self, facets: NDArray[np.intp], at: Array, direction: Array) -> Array:
-        """Return how far the surface is from points of straight facets along directions, (p,).
+        """Return the distance of the surface from points of straight facets along rays, (p,).
 
-        The foot of a point of an arc is beside the point where its ray leaves the chord: without
-        that gaps would be off by the fourth order, as by a parabola in place of the arc.
+        With the foot of each point of an arc beside the origin of its ray, to the fourth order.
 
         Parameters
         ----------
@@ -324,10 +344,7 @@ class Surface:
 
     @property
     def node_heights(self) -> Array:
-        """Heights of the surface above the nodes of each facet, shape (f, k, 2) (length).
-
-        That from which gaps are measured, and the least one.
-        """
+        """Height of the surface at nodes in gaps, and its lower bound, shape (f, k, 2) (length)."""
         places = self.shape.nodes(self.degree)
         facets, at = np.repeat(np.arange(self.count), len(places)), np.tile(places, (self.count, 1))
         known = self.height(facets, at) if self.follows else np.zeros(len(at))
@@ -377,25 +394,17 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
     names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
     normal = unit_normals(shape.facet, points, x.mean(axis=1))
-    corners = shape.facet.corners
-    owners = Owners.of(space.dofmap.index_map, domain.comm)
-    straight = names[:, :corners], points[:, :corners], normal
-    deviation, unknown = deviations(*straight, owners, domain.levels)
-    if order > 1:
-        deviation = np.zeros_like(deviation)
-        unknown = 0.5 * unknown + 2 * _of_arcs(shape.facet, points, normal)
-    refined = domain.levels > 0
-    return Surface(
-        names, points, normal, deviation, unknown, degree, domain.revolved, refined, owners
+    owners, none = Owners.of(space.dofmap.index_map, domain.comm), np.zeros((len(facets), 0))
+    straight = Surface(
+        names, points, normal, none, none, degree, domain.revolved, domain.levels, owners
     )
+    return straight.with_deviations()
 
 
 def _of_arcs(shape: Shape, points: Array, normal: Array) -> Array:
-    """Return 4 f^3/L^2 of curved edges, shape (f, edges).
-
-    A parabola through the ends and the middle of an arc of the sagitta f over the chord L is off
-    by 4 f^3/L^2 s^2 (1 - s^2) for s from -1 to 1.
-    """
+    """Return 4 f^3/L^2 of curved edges, shape (f, edges)."""
+    # A parabola through the ends and the middle of an arc of the sagitta f over the chord L is off
+    # by 4 f^3/L^2 s^2 (1 - s^2) for s from -1 to 1.
     first, second = np.array(shape.edges).T
     begin, end, middle = (
         points[:, nodes] for nodes in (first, second, shape.corners + np.arange(len(first)))

@@ -1,4 +1,4 @@
-"""Several obstacles in front of one body: each with its own laws."""
+"""Several contacts of one body: each with its own laws."""
 
 import numpy as np
 import pytest
@@ -96,8 +96,7 @@ def test_the_smoothed_pressure_stays_on_its_foot() -> None:
     friction = {**coulomb(0.3), "radius": 5.0}
     contact = [{"on": name, "friction": friction} for name in PIECES]
     problem = build_problem(case(contact))
-    entries = problem.entries
-    sizes = [entry.nodes.nodes.size for entry in entries]
+    sizes = [geometry.nodes.nodes.size for geometry in problem.geometries]
     pressure = np.repeat([1.0, 3.0], sizes)
     bound = problem.interface.friction.bound(pressure, np.zeros(sum(sizes)))
     np.testing.assert_allclose(bound, 0.3 * pressure, rtol=1e-12)

@@ -1,0 +1,144 @@
+"""The geometry of contact is a function of positions: by a motion, or on the moved mesh."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Body
+from contact.methods.method import METHODS
+from contact.methods.options import OPTIONS
+from contact.model.body import Fixed
+from contact.model.contact import Contact
+from contact.model.obstacle import GapFunction, Sphere
+from contact.problem.problem import ContactProblem
+from forms.hencky import Linear
+from tests.problems.blocks import Blocks
+from tests.problems.mechanics import constant
+
+COMM = MPI.COMM_WORLD
+APART = 0.05
+ARRAYS = ("weight", "normal", "admissible_normal", "tangent", "gap", "deviation")
+
+
+def shifted(x):
+    return x + np.arange(1, x.shape[1] + 1) / 7
+
+
+def turned(x):
+    """Turn about a point beside the bodies, by more than a right angle."""
+    angle, found = np.deg2rad(130), x.copy()
+    a, b = x[:, 0] - 3, x[:, -1] + 1
+    found[:, 0] = np.cos(angle) * a - np.sin(angle) * b
+    found[:, -1] = np.sin(angle) * a + np.cos(angle) * b
+    return found
+
+
+def slid(x):
+    """Move the upper block beyond the rim of the lower one."""
+    along = np.eye(x.shape[1])[0]
+    return x + 0.6 * (x[:, -1:] > 1 + APART / 2) * along
+
+
+def pair(domain, degree):
+    zero, down = constant(0.0, domain.dim), constant(-APART - 0.01, domain.dim)
+    supports = [Fixed("bottom", [zero] * domain.dim)]
+    supports.append(Fixed("top", [*[zero] * (domain.dim - 1), down]))
+    contact = Contact("under", GapFunction(lambda x: np.zeros(len(x))), against="over")
+    return ContactProblem(domain, Body(Linear(1.0, 0.3), supports), contact, degree=degree)
+
+
+def on_a_ball(domain, degree):
+    d = domain.dim
+    ball = Sphere(centre=(0.5,) * (d - 1) + (-3.0,), radius=2.5)
+    supports = [Fixed("top", [constant(0.0, d)] * d)]
+    body = Body(Linear(1.0, 0.3), supports)
+    return ContactProblem(domain, body, Contact("bottom", ball), degree=degree)
+
+
+def displaced(problem, motion):
+    """Return the geometry at a motion of the bodies."""
+    body = problem.equilibrium
+    x = body.space.tabulate_dof_coordinates()[: body.layout.index_map.size_local, : body.dim]
+    (placement,) = problem.placements
+    return placement.at(motion(x) - x)
+
+
+def move(domain, motion):
+    """Move a mesh; its values at corners are those of degree 1 and 2."""
+    x, d = domain.mesh.geometry.x, domain.dim
+    x[:, :d] = motion(x[:, :d].copy())
+
+
+def check_alike(found, expected, kept=slice(None)):
+    for name in ARRAYS:
+        mine, theirs = getattr(found.nodes, name)[kept], getattr(expected.nodes, name)
+        np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-11, err_msg=name)
+    if found.jumps is None:
+        return
+    for names, of in (("slaves", "D"), ("masters", "M")):
+        numbers = np.union1d(getattr(found.jumps, names), getattr(expected.jumps, names))
+        dense = []
+        for jumps, rows in ((found.jumps, kept), (expected.jumps, slice(None))):
+            matrix = np.zeros((jumps.nodes.size, numbers.size))
+            matrix[:, np.searchsorted(numbers, getattr(jumps, names))] = getattr(
+                jumps, of
+            ).toarray()
+            dense.append(matrix[rows])
+        np.testing.assert_allclose(*dense, rtol=0, atol=1e-11, err_msg=of)
+
+
+@pytest.mark.core("shifted-2-1", "turned-2-2", "slid-2-1", "slid-3-2")
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("motion", [shifted, turned, slid], ids=lambda motion: motion.__name__)
+def test_of_two_bodies(motion, dim, degree) -> None:
+    """Nodes that are moved off the other body are open in the one, and absent in the other."""
+    domain = Blocks(dim, 3, 4, gap=APART).domain(COMM)
+    found = displaced(pair(domain, degree), motion)
+    move(domain, motion)
+    (expected,) = pair(domain, degree).geometries
+    kept = np.isin(found.nodes.nodes, expected.nodes.nodes)
+    opened = COMM.allreduce(np.count_nonzero(~kept))
+    assert (opened > 0) == (motion is slid)
+    assert np.isinf(found.nodes.gap[~kept]).all() and (found.nodes.weight > 0).all()
+    check_alike(found, expected, kept)
+    np.testing.assert_allclose(found.covered[kept], expected.covered, atol=1e-12)
+
+
+@pytest.mark.core("2-1", "3-2")
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_in_front_of_a_ball(dim, degree) -> None:
+    domain = Blocks(dim, 3, 4).domain(COMM)
+
+    def motion(x):
+        return x @ np.diag([1.1] * (dim - 1) + [0.9]) + 0.05
+
+    found = displaced(on_a_ball(domain, degree), motion)
+    move(domain, motion)
+    check_alike(found, *on_a_ball(domain, degree).geometries)
+
+
+@pytest.mark.core
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+def test_solutions_are_those_of_the_moved_mesh(degree) -> None:
+    """The body is the same but for the place of its upper block, and the constraint another one."""
+    domain = Blocks(2, 4, 6, gap=APART).domain(COMM)
+    problem = pair(domain, degree)
+    before = problem.constraint
+    moved = problem.with_geometry([displaced(problem, slid)])
+    assert problem.constraint is before and moved.constraint is not before
+    states = []
+    for condense in (True, False):
+        options = OPTIONS["newton"](tolerance=1e-12, condense=condense)
+        state, outcome = METHODS["newton"](moved, options, None).solve()
+        assert outcome.converged
+        states.append(state.x)
+    move(domain, slid)
+    expected, outcome = METHODS["newton"](pair(domain, degree), options, None).solve()
+    assert outcome.converged and problem.nodes.maximum(expected.forces.pressure) > 1e-3
+    for x in states:
+        np.testing.assert_allclose(x, expected.x, rtol=0, atol=1e-10)
