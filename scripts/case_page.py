@@ -26,7 +26,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "case-file.md"
 INTRODUCTION = f"""\
 # The case file
 
-<!-- Made by `python3 -m scripts.case_page`; edit the models in contact/case/ instead. -->
+<!-- Made by `python3 -m scripts.case_page`; edit contact/model/, contact/case/ instead. -->
 
 A case file is a TOML file with a problem and its method:
 

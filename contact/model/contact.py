@@ -82,8 +82,13 @@ class Contact(Described):
 
     Examples
     --------
+    In Python a gap may stand for the foundation, ``press=True`` for ``overlap="press"``, and
+    ``conductor`` for ``electric``; a thickness or a `Layer` means the compliant law.
+
     >>> Contact(["left", "right"], gap=0.01).on
     'left+right'
+    >>> Contact("bottom", -0.01, press=True).overlap
+    'press'
     """
 
     on: Part
