@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 #: Pairs of tensor indices in the order of Voigt's notation.
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
-#: The rotation after which a plane body's x, y and z stand for the crystal's X2, X3 and X1.
+#: The rotation of the crystal's axes X2, X3, X1 into x, y, z of a plane body.
 PLANE = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
@@ -89,8 +89,8 @@ def coupling_tensor(voigt: ArrayLike) -> NDArray[np.float64]:
 
 
 def isotropic_about_x3(*tensors: ArrayLike) -> bool:
-    """Tell whether tensors are the same however they are turned about X3."""
-    # A tensor of rank 4 that one turn by an odd angle leaves alone is left alone by all.
+    """Return true if tensors are invariant under rotations about X3."""
+    # A tensor of rank 4 that is invariant under one rotation by an odd angle is so under all.
     turn = about_z(40.0)
     return all(
         np.allclose(turned(t, turn), t, rtol=0, atol=1e-9 * max(np.abs(t).max(), 1e-300))

@@ -32,8 +32,7 @@ class Anisotropic:
         C in Voigt's notation (11, 22, 33, 23, 13, 12), shape (6, 6), in the axes of the body, or a
         UFL expression of that shape (stress).
     placed
-        Whether the axes of a crystal have been turned into those of the body: by `rotated`, or
-        `in_plane`.
+        True if a crystal's axes are turned into those of the body, by `rotated` or `in_plane`.
     """
 
     stiffness: NDArray[np.float64] | Expr

@@ -2,8 +2,7 @@
 
 Equations (1.11)-(1.13), (7.7)-(7.9). The deviator is three-dimensional in plane strain too.
 Laws are written as functions of q = |dev eps|^2, which is smooth at zero strain where
-|dev eps| is not; `Hencky.g` and its companions take t = |dev eps| and are meant for reading
-and plotting.
+|dev eps| is not.
 """
 
 from __future__ import annotations
@@ -263,15 +262,7 @@ Law: TypeAlias = Hencky | Anisotropic | HistoryLaw
 
 @dataclass(frozen=True, eq=False)
 class Graded:
-    """A law as forms see it where its stresses are multiplied by a function of position.
-
-    Attributes
-    ----------
-    law
-        The law.
-    factor
-        The function, in UFL.
-    """
+    """A law in forms whose stresses are multiplied by a function of position, in UFL."""
 
     law: Hencky | Anisotropic
     factor: Expr
@@ -281,12 +272,12 @@ class Graded:
         return self.factor * secant_stress(self.law, frozen, eps)
 
 
-#: Laws as forms take them.
+#: Laws in forms.
 FormLaw: TypeAlias = Hencky | Anisotropic | QuadratureLaw | Graded
 
 
 def is_linear(law: Law) -> bool:
-    """Tell whether the stress is a linear function of the strain."""
+    """Return true if the stress is a linear function of the strain."""
     return isinstance(law, Linear | Anisotropic)
 
 

@@ -92,7 +92,7 @@ class Response:
 
 @runtime_checkable
 class HistoryLaw(Protocol):
-    """A law of the stress with internal variables, which a step changes; see `hencky.Hencky`.
+    """A law of the stress with internal variables; see `hencky.Hencky`.
 
     A subclass of `forms.hencky.Isotropic` has the elastic constants. `symmetric`, where a law has
     that and it is False, says that its stiffness is not symmetric. `differential`, where it has
@@ -230,7 +230,7 @@ def _end(
 
 @dataclass(frozen=True)
 class QuadratureLaw:
-    """A law with internal variables as forms see it: its stress and stiffness at given points.
+    """A law with internal variables in forms: its stress and stiffness at quadrature points.
 
     Attributes
     ----------

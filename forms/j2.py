@@ -182,7 +182,7 @@ class J2(Isotropic):
 
     @property
     def symmetric(self) -> bool:
-        """Whether the tangent is: not with recovery."""
+        """True if the tangent is symmetric: without recovery."""
         return all(recovery == 0 for _, recovery in self._terms)
 
     @property

@@ -1,8 +1,7 @@
 """Kinematics: small strains, the deviator, and the normal/tangential split.
 
-Strains are 3 x 3 tensors whatever the body: in 3-D, in plane strain, or of a body of revolution,
-whose half plane is meshed. How a displacement is differentiated there, and how much of the body
-a piece of the mesh stands for, is stated by a `Kinematics`.
+Strains are 3 x 3 tensors in 3-D, in plane strain, and of a body of revolution, of which the half
+plane is meshed. A `Kinematics` has the gradient of a displacement, and the extent 2 pi r of a ring.
 """
 
 from __future__ import annotations
@@ -16,18 +15,22 @@ from ufl.core.expr import Expr
 from ufl.domain import extract_unique_domain
 
 
-class Kinematics(Protocol):
-    """How the displacement of a mesh deforms the body that it stands for."""
-
-    @property
-    def added_degree(self) -> int:
-        """The degree that the extent adds to that of a quadrature rule."""
+class Strained(Protocol):
+    """The gradient of a displacement, whose symmetric part is the strain."""
 
     def gradient(self, u: Expr) -> Expr:
         """Return the displacement gradient, a 3 x 3 tensor."""
 
+
+class Kinematics(Strained, Protocol):
+    """The kinematics of a body by its mesh."""
+
+    @property
+    def added_degree(self) -> int:
+        """The degree of the extent, added to that of a quadrature rule."""
+
     def extent(self, x: Expr) -> Expr | None:
-        """Return how much of the body a unit of the mesh stands for; None for a unit of it."""
+        """Return the size of the body by unit of the mesh; None for 1."""
 
     def mean_gradient(self, u: Expr, centroid: Expr | None = None) -> Expr:
         """Return the mean of the gradient of a quadratic u over a cell, a straight simplex.
@@ -39,13 +42,6 @@ class Kinematics(Protocol):
         centroid
             The centroid of the cell; None where the gradient is evaluated there.
         """
-
-
-class Strained(Protocol):
-    """All that strains ask of a `Kinematics`."""
-
-    def gradient(self, u: Expr) -> Expr:
-        """Return the displacement gradient, a 3 x 3 tensor."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +71,8 @@ class Axisymmetric:
     Parameters
     ----------
     on_axis
-        Whether points on the axis are asked for, where u_r/r is its limit u_r,r. The points of
-        a quadrature rule lie inside the cells.
+        True for points on the axis too, with the limit u_r,r of u_r/r. The points of a quadrature
+        rule lie inside the cells.
     """
 
     on_axis: bool = False
@@ -119,7 +115,7 @@ class Axisymmetric:
 
 @dataclass(frozen=True)
 class Isochoric:
-    """Another kinematics without its change of volume: strains are dev eps."""
+    """The deviator of another kinematics: strains are dev eps."""
 
     base: Strained
 
@@ -130,7 +126,7 @@ class Isochoric:
 
 @dataclass(frozen=True)
 class CellMean:
-    """The mean of another kinematics over each cell, to be taken at its centroid."""
+    """The mean of another kinematics over each cell, evaluated at its centroid."""
 
     base: Kinematics
 
@@ -141,7 +137,7 @@ class CellMean:
 
 @dataclass(frozen=True)
 class MeanDilatation:
-    """Another kinematics whose volumetric strain is averaged over each cell: nothing locks.
+    """Another kinematics with the mean volumetric strain of each cell, against locking.
 
     eps_bar = dev eps + (1/3) mean(tr eps) I (Nagtegaal, Parks and Rice, CMAME 4, 1974; the B-bar
     method of Hughes, IJNME 15, 1980): with quadratic displacements on straight simplices P2-P0 with
@@ -168,10 +164,9 @@ class MeanDilatation:
 class MultilinearMean:
     """The same on quadrilaterals and hexahedra of degree 1: Q1-P0 with the pressure condensed.
 
-    The mean of tr grad u is a sum of weights times the displacements of the corners, and these are
-    sums over sets of axes of the cell: the derivative of u along the axes of the set, times the way
-    to the corner along each of them. All but `base` are functions: of UFL's own Jacobian no form
-    can be differentiated.
+    The mean of tr grad u is a sum of weights times the displacements of the corners, each a Taylor
+    sum over sets of axes of the cell: derivatives of u along the set's axes times the distances to
+    the corner. Jacobian and moments are functions, for UFL cannot differentiate its own Jacobian.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Assumption (h1) on Hencky's law, sampled: whether the stress is strongly monotone."""
+"""Assumption (h1) on Hencky's law, strong monotonicity of the stress, by samples."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ class MonotonicityReport:
 
     @property
     def bounded(self) -> bool:
-        """Whether 0 < g_0 <= g <= (d/2) k_0: (h1)(a)."""
+        """True if 0 < g_0 <= g <= (d/2) k_0: (h1)(a)."""
         return self.g_0 > 0 and self.largest <= self.ceiling
 
     @property
     def hardens(self) -> bool:
-        """Whether alpha > 0: (h1)(b)."""
+        """True if alpha > 0: (h1)(b)."""
         return self.alpha > 0
 
     @property
     def holds(self) -> bool:
-        """Whether (h1) holds."""
+        """True if (h1) holds."""
         return self.bounded and self.hardens
 
 

@@ -22,7 +22,7 @@ Condition: TypeAlias = bool | NDArray[np.bool_] | Expr
 
 
 def is_symbolic(*values: Value | Condition) -> bool:
-    """Tell whether any of the values is a UFL expression."""
+    """Return true if any of the values is a UFL expression."""
     return any(isinstance(value, Expr) for value in values)
 
 
@@ -32,7 +32,7 @@ def symbolic(a: Value) -> Expr:
 
 
 def is_unlimited(limit: Value) -> bool:
-    """Tell whether a limit is infinite: compiled forms know no infinity."""
+    """Return true for an infinite limit, which compiled forms cannot have."""
     return isinstance(limit, float) and limit == np.inf
 
 
@@ -120,7 +120,7 @@ def tan(a: Value) -> Value:
 
 def absolute(a: Value) -> Value:
     """Return the absolute value."""
-    # UFL would make one of it that contains itself, and never come back.
+    # UFL would nest it in itself without end.
     if isinstance(a, Abs):
         return a
     return abs(a) if is_symbolic(a) else np.abs(a)

@@ -6,9 +6,9 @@ Sign convention, stated once, equations (1.23) and (8.2), with the potential phi
     D     = e eps(u) - beta grad(phi),    D_i = e_ijk eps_jk - beta_ij phi_,j
 
 With the outward normal, D.nu = q_2 on a charged part, div D = q_0 in the body and
-D.nu = psi(u_nu - rho) phi_L(phi - phi_F) on a conductive foundation. Tested with xi, the saddle
-form takes these as - q_2 xi, + q_0 xi and + psi phi_L xi; the symmetrised form, in which xi is
-negated, with the opposite signs (`electric_load`, and `forms.foundation.electric_contact`).
+D.nu = psi(u_nu - rho) phi_L(phi - phi_F) on a conductive foundation. On the left-hand side of the
+saddle form these are + q_2 xi, - q_0 xi and + psi phi_L xi, (5.10), (5.14); the symmetrised form,
+in which xi is negated, has the opposite signs, (5.28), (5.29).
 
 The stored energy is (1/2) eps : F eps + (1/2) E . beta E with E = -grad(phi): the coupling
 does no work on its own, so that it is positive if F and beta are, whatever e.
@@ -160,6 +160,11 @@ def coupling_number(law: Law, piezo: Piezo) -> float:
     return float(np.linalg.eigvals(np.linalg.solve(stiffness, induced)).real.max())
 
 
+def _tensor(values: NDArray[np.float64] | Expr) -> Expr:
+    """Return a tensor of numbers in UFL."""
+    return ufl.as_tensor(values.tolist()) if isinstance(values, np.ndarray) else values
+
+
 def gradient(phi: Expr, kinematics: Strained = CARTESIAN) -> Expr:
     """Return grad(phi) as a vector of three components, its mean where strains are means."""
     if isinstance(kinematics, Isochoric):
@@ -174,7 +179,7 @@ def gradient(phi: Expr, kinematics: Strained = CARTESIAN) -> Expr:
 def coupling_stress(piezo: Piezo, phi: Expr, kinematics: Strained = CARTESIAN) -> Expr:
     """Return e^T grad(phi), a 3 x 3 stress."""
     i, j, k = ufl.indices(3)
-    e = ufl.as_tensor(piezo.e.tolist()) if isinstance(piezo.e, np.ndarray) else piezo.e
+    e = _tensor(piezo.e)
     return ufl.as_tensor(e[i, j, k] * gradient(phi, kinematics)[i], (j, k))
 
 
@@ -183,54 +188,66 @@ def electric_displacement(
 ) -> Expr:
     """Return D = e eps - beta grad(phi), a vector of three components."""
     i, j, k = ufl.indices(3)
-    e = ufl.as_tensor(piezo.e.tolist()) if isinstance(piezo.e, np.ndarray) else piezo.e
-    beta = ufl.as_tensor(piezo.beta.tolist()) if isinstance(piezo.beta, np.ndarray) else piezo.beta
+    e = _tensor(piezo.e)
     induced = ufl.as_tensor(e[i, j, k] * embed(eps)[j, k], (i,))
-    return induced - ufl.dot(beta, gradient(phi, kinematics))
+    return induced - ufl.dot(_tensor(piezo.beta), gradient(phi, kinematics))
+
+
+def mechanical_work(
+    law: FormLaw,
+    piezo: Piezo,
+    u_0: Expr,
+    u: Expr,
+    phi: Expr,
+    v: Expr,
+    kinematics: Strained = CARTESIAN,
+) -> Expr:
+    """Return sigma : eps(v) = F eps(u) : eps(v) + e^T grad(phi) : eps(v), with secants at u_0."""
+    frozen, eps, test = (strain(f, kinematics) for f in (u_0, u, v))
+    sigma = secant_stress(law, frozen, eps) + coupling_stress(piezo, phi, kinematics)
+    return ufl.inner(sigma, test)
+
+
+def electric_work(
+    piezo: Piezo, u: Expr, phi: Expr, xi: Expr, kinematics: Strained = CARTESIAN
+) -> Expr:
+    """Return D . grad(xi) = e eps(u) . grad(xi) - beta grad(phi) . grad(xi)."""
+    d = electric_displacement(piezo, strain(u, kinematics), phi, kinematics)
+    return ufl.inner(d, gradient(xi, kinematics))
 
 
 def saddle_form(
     law: FormLaw,
     piezo: Piezo,
+    u_0: Expr,
     u: Expr,
+    phi: Expr,
     v: Expr,
-    eta: Expr,
-    w: Expr,
     xi: Expr,
     kinematics: Strained = CARTESIAN,
 ) -> Expr:
-    """Return the integrand of B(x; y, z): positive, not symmetric, equation (5.16).
+    """Return the integrand of B(x_0; x, y): positive, not symmetric. At x_0 = x: A, (5.16).
 
-    x = (u, .) is where the secant modulus is frozen, y = (v, eta) the unknown and
-    z = (w, xi) the test function.
+    x_0 = (u_0, .) is where the secant modulus is frozen, x = (u, phi) the unknown and
+    y = (v, xi) the test function.
     """
-    frozen, eps, test = (strain(f, kinematics) for f in (u, v, w))
-    sigma = secant_stress(law, frozen, eps) + coupling_stress(piezo, eta, kinematics)
-    d = electric_displacement(piezo, eps, eta, kinematics)
-    return ufl.inner(sigma, test) - ufl.inner(d, gradient(xi, kinematics))
+    of_stresses = mechanical_work(law, piezo, u_0, u, phi, v, kinematics)
+    return of_stresses - electric_work(piezo, u, phi, xi, kinematics)
 
 
 def symmetrised_form(
     law: FormLaw,
     piezo: Piezo,
+    u_0: Expr,
     u: Expr,
+    phi: Expr,
     v: Expr,
-    eta: Expr,
-    w: Expr,
     xi: Expr,
     kinematics: Strained = CARTESIAN,
 ) -> Expr:
-    """Return the integrand of B-check(x; y, z) = B(x; y, (w, -xi)), equations (5.27), (5.31).
+    """Return the integrand of B-check(x_0; x, y) = B(x_0; x, (v, -xi)), (5.27), (5.31).
 
-    Symmetric and indefinite: convex in v, concave in eta.
+    Symmetric and indefinite: convex in u, concave in phi.
     """
-    return saddle_form(law, piezo, u, v, eta, w, -xi, kinematics)
-
-
-def electric_load(xi: Expr, surface: Expr | float = 0.0, body: Expr | float = 0.0) -> Expr:
-    """Return the integrand q_2 xi or - q_0 xi on the right-hand side of the symmetrised form.
-
-    The saddle form takes it with -xi. `surface` is q_2 = D.nu on a part of the boundary and
-    `body` q_0 = div D; give one of them, they are integrated over different sets.
-    """
-    return (surface - body) * xi
+    of_stresses = mechanical_work(law, piezo, u_0, u, phi, v, kinematics)
+    return of_stresses + electric_work(piezo, u, phi, xi, kinematics)

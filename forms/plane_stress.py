@@ -1,10 +1,9 @@
-"""Plane stress: laws without stress across a plane body, which is free to grow thinner.
+"""Plane stress: laws with sigma_zz = 0.
 
-Of a linear material the strain across is eliminated from the constants, which are those of the
-Schur complement on the stress sigma_zz: no element and no form notices. Of other laws it is found
-at each point, by Newton's method on sigma_zz = 0 (de Souza Neto, Peric and Owen, Computational
-Methods for Plasticity, 2008, section 9.2) and by bisection where that does not end, and is one of
-their internal variables.
+Of a linear material eps_zz is eliminated from the constants, by a Schur complement: elements and
+forms are those of plane strain. Of other laws it is an internal variable, found at each point by
+Newton's method on sigma_zz = 0 (de Souza Neto, Peric and Owen, Computational Methods for
+Plasticity, 2008, section 9.2), and by bisection where that does not converge.
 """
 
 from __future__ import annotations
@@ -79,7 +78,7 @@ def without_stress_across(stiffness: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Around:
-    """A law made of another one, whose elastic constants it has."""
+    """A law with the elastic constants of its base."""
 
     base: Hencky | HistoryLaw
 
@@ -123,7 +122,7 @@ class PlaneStressHistory(_Around):
 
     @property
     def symmetric(self) -> bool:
-        """Whether the tangent is a symmetric matrix."""
+        """True if the tangent is a symmetric matrix."""
         return bool(getattr(self.base, "symmetric", True))
 
     def variables(self, size: int) -> Mapping[str, ArrayLike]:
@@ -155,10 +154,9 @@ class PlaneStressHistory(_Around):
     ) -> tuple[Array, Response, NDArray[np.bool_]]:
         """Return strains with those across at which no stress acts, the response, and where so.
 
-        Newton's steps are taken inside of the bracket of the signs that were seen, its middle in
-        place of those that leave it, and after the last one (Press et al. 2007, section 9.4); while
-        all signs are the same, strains at least double. So it ends for every continuous stress that
-        is pressure for some strain across and tension for another.
+        Newton's steps within the bracket of the signs so far, bisection in place of others and
+        after the last one (Press et al. 2007, section 9.4); strains double without a bracket. It
+        converges for every continuous stress that changes its sign.
         """
         eps = strain.copy()
         eps[:, 2] = start

@@ -1,7 +1,7 @@
-"""The norms of forces that are compared with each other, and with no others.
+"""Norms of forces and charges, by connected component of the mesh.
 
-Forces and charges have no common unit. And bodies that nothing connects have none in common:
-beside the loads of another component of the mesh any error of one may be small.
+Forces and charges have no common unit, and separate bodies no common scale: beside the loads of
+another body any error of one may be small.
 """
 
 from __future__ import annotations
@@ -23,25 +23,23 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class ComponentNorms:
-    """The forces, and the charges, of each of k connected components.
+    """Norms of the forces, and of the charges, of each of k connected components.
 
-    Components count as one where something that moves freely joins them: a plate, a foundation,
-    or an electrode. Those that touch each other are not: contact forces act on both.
+    A plate, a foundation or an electrode that is free to move joins components to one; contact does
+    not.
 
     Attributes
     ----------
     comm
         Communicator.
-    component
-        The component of each owned node, shape (nodes,).
-    behind
-        That of each global unknown, shape (m,).
+    component, behind
+        The component of each owned node, shape (nodes,), and of each global unknown, shape (m,).
     count
-        How many components there are.
+        Number k of components.
     block_size, dim
-        Unknowns a node, and how many of them are displacements.
+        Unknowns a node, and number of displacements among them.
     global_mechanical
-        Which of the global unknowns are motions, shape (m,).
+        Mask of motions among the global unknowns, shape (m,).
     """
 
     comm: MPI.Intracomm
@@ -54,12 +52,12 @@ class ComponentNorms:
 
     @property
     def mechanical(self) -> NDArray[np.bool_]:
-        """Which of owned values, global ones behind them, are displacements or forces."""
+        """Mask of displacements, or forces, among owned values with the global ones behind."""
         nodal = np.tile(np.arange(self.block_size) < self.dim, self.component.size)
         return np.concatenate([nodal, self.global_mechanical])
 
     def at(self, nodes: NDArray[np.int32]) -> ComponentNorms:
-        """Return those of some owned nodes alone."""
+        """Return the norms of some owned nodes alone."""
         none = np.zeros(0, dtype=np.intp)
         component = self.component[nodes]
         return ComponentNorms(
@@ -73,12 +71,7 @@ class ComponentNorms:
         return Subsystems(self.comm, of, self.count) if self.count > 1 else None
 
     def norms(self, values: Array) -> Array:
-        """Return the Euclidean norms of owned values, by field and component. Collective.
-
-        Returns
-        -------
-        Shape (1, k), or (2, k) where there is a potential: of forces, and of charges.
-        """
+        """Return the norms of forces, and of charges if any, shape (1 or 2, k). Collective."""
         if self.block_size == self.dim:
             return self._by_component(values)[None]
         chosen = self.mechanical
@@ -97,7 +90,7 @@ class ComponentNorms:
         return np.sqrt(squares + np.bincount(self.behind, other**2, minlength=self.count))
 
     def spread(self, norms: Array) -> Array:
-        """Return for each owned value the norm that it is compared with."""
+        """Return for each owned value the norm of its kind and component."""
         component = np.concatenate([np.repeat(self.component, self.block_size), self.behind])
         return np.where(self.mechanical, norms[0, component], norms[-1, component])
 
@@ -108,7 +101,7 @@ def component_norms_of(
     global_unknowns: GlobalUnknowns,
     components: tuple[NDArray[np.int32], int],
 ) -> ComponentNorms:
-    """Return which forces of a body of given components are compared. Collective."""
+    """Return the norms of a body of given connected components. Collective."""
     (component, count), members, d = components, global_unknowns.members, domain.dim
     if count > 1 and members:
         touched = np.zeros((len(members), count), dtype=np.intc)
@@ -119,7 +112,7 @@ def component_norms_of(
                 at[component[nodes[nodes < component.size]]] = 1
         domain.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
         member_of, piece_of = np.nonzero(touched)
-        # A part whose motion is given joins nothing: forces of its own hold it there.
+        # A part with a given motion has reactions of its own, and joins nothing.
         count, label = graph_components(member_of, len(members) + piece_of, len(members) + count)
         component, of_members = label[len(members) + component], label[: len(members)]
     else:

@@ -1,11 +1,10 @@
 """Cuts through a body with a jump of the displacement across them: pretension sections of bolts.
 
-Across a cut the displacement jumps by a shortening s: one side is moved towards the other, as a nut
-is that is turned. All unknowns of nodes are those of the continuous part u, the displacement is
-u - s psi n with psi = 1 at the nodes of the cut, seen from the side to which n points, and 0 at all
-others. That is the body of a mesh whose nodes at the cut are doubled, with u+ - u- = -s n, and
-needs no other mesh. s is a global unknown, dual to the section force N = int sigma : eps(-psi n):
-it is given, or free under a force that is.
+Across a cut the displacement jumps by a shortening s, as a nut is turned. Nodal unknowns are those
+of the continuous part u; the displacement is u - s psi n with psi = 1 at the nodes of the cut, seen
+from the side to which n points, and 0 at all others. That is a mesh with double nodes at the cut
+and u+ - u- = -s n. s is a global unknown, dual to the section force N = int sigma : eps(-psi n):
+given, or free under a given force.
 """
 
 from __future__ import annotations
@@ -23,34 +22,31 @@ from numpy.typing import NDArray
 
 from contact.body.description import Body
 from contact.body.global_unknowns import GlobalUnknowns
-from contact.body.loads import Loads
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices, cell_facets, distributed_components
 from contact.mesh.parts import members
 from contact.model.body import Bolt
-from contact.model.fields import constant
-from contact.ranks import summed
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """The pieces into which cuts of free shortenings divide a body, and where these meet.
+    """The connected components between cuts of free shortenings, and the nodes at these cuts.
 
     Attributes
     ----------
     places
-        Where these shortenings are among the global unknowns, shape (k,).
+        Columns of these shortenings in q, shape (k,).
     component, count
-        The piece of each owned node, at a cut the one below it, and how many there are.
+        The component of each owned node, at a cut that below it, and the number of components.
     points
-        Nodes of this rank at the cuts, once for each of the pieces above, shape (n, d).
+        Nodes of this rank at the cuts, once for each component above, shape (n, d).
     below, above
-        The pieces on both sides there, shape (n,).
+        The components on both sides there, shape (n,).
     normals
-        By how much those below move farther, by unit shortenings, shape (n, d, k).
+        Displacement of the one below relative to that above, by unit shortenings, shape (n, d, k).
     """
 
     places: list[int]
@@ -70,20 +66,18 @@ class Cuts:
     domain, space
         Mesh, and space of the unknowns.
     places
-        Where the shortenings are among the global unknowns, shape (k,).
+        Columns of the shortenings in q, shape (k,).
     body
-        The body as it is described: its bolts are the cuts, and its loads act on both sides.
+        Description of the body, whose bolts are the cuts.
 
     Attributes
     ----------
-    places
-        As given.
-    parts
-        Names of the cuts.
+    places, parts
+        Columns of q, and names of the cuts.
     directions
         The functions -psi n, discontinuous, of unit shortenings.
     jump, secant_jump
-        The jumps of the unknowns `at` and `secant_at` of the weak forms.
+        The jumps of the unknowns `at` and `secant_at` of `contact.body.assembly`.
     """
 
     def __init__(
@@ -102,27 +96,21 @@ class Cuts:
         self._ends = [(nodes, normal) for _, nodes, normal, _ in found]
         self._space, self._moved = space, [moved for _, _, _, moved in found]
         self._free = [k for k, bolt in enumerate(body.bolts) if bolt.shortening is None]
-        zero = constant(domain.mesh, 0.0)
-        self._loads = [Loads(domain, body, direction, zero, 1) for direction in self.directions]
         self.jump, self.secant_jump = fem.Function(whole), fem.Function(whole)
 
     @staticmethod
     def of(
         domain: Domain, space: fem.FunctionSpace, unknowns: GlobalUnknowns, body: Body
     ) -> Cuts | None:
-        """Return those of a body; None without any. Collective."""
+        """Return the cuts of a body; None without any. Collective."""
         places = [m.begin for m in unknowns.members if isinstance(m.description, Bolt)]
         return Cuts(domain, space, places, body) if places else None
 
-    def external(self, time: float) -> Array:
-        """Return the work of the loads at a time by unit shortenings, shape (k,). Collective."""
-        return summed(self._comm, [loads.at(time)[0] for loads in self._loads])
-
     @cached_property
     def pieces(self) -> Pieces | None:
-        """The pieces between cuts under given forces; None without any. Collective.
+        """The components between cuts under given forces; None without any. Collective.
 
-        A node at a cut stands for two, that of the cells above is moved with these.
+        A node at a cut stands for two, of which one moves with the cells above.
         """
         if not self._free:
             return None
@@ -148,21 +136,13 @@ class Cuts:
         )
 
     def check(self, nodes: NDArray[np.int32], along: Array, text: str) -> None:
-        """Refuse anything that acts on nodes of a cut by their displacement across it. Collective.
-
-        There it would be that of one side.
+        """Refuse a constraint across a cut, where the displacement is that of one side. Collective.
 
         Parameters
         ----------
-        nodes, along
-            Owned nodes, shape (n,), and the directions in which it acts, shape (n, d, k).
-        text
-            Words for it.
-
-        Raises
-        ------
-        InputError
-            On all ranks.
+        nodes, along, text
+            Owned nodes, shape (n,), constrained directions there, shape (n, d, k), and words for
+            the message.
         """
         for part, (ends, normal) in zip(self.parts, self._ends, strict=True):
             here = np.einsum("nik,i->nk", along[np.isin(nodes, ends)], normal)
@@ -183,13 +163,7 @@ class Cuts:
 def _direction(
     domain: Domain, space: fem.FunctionSpace, whole: fem.FunctionSpace, part: str
 ) -> tuple[fem.Function, NDArray[np.int32], Array, NDArray[np.bool_]]:
-    """Return -psi n of a cut, its owned nodes, n, and which nodes of cells it moves. Collective.
-
-    Raises
-    ------
-    InputError
-        If the cut is not plane, or ends within the body.
-    """
+    """Return -psi n of a cut, its owned nodes, n, and moved nodes by cell (mask). Collective."""
     mesh, d, comm = domain.mesh, domain.dim, domain.comm
     facets = domain.facets_anywhere(part)
     if not all(name in domain.inside for name in members(part)):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from dolfinx import fem
@@ -11,9 +13,14 @@ from contact.errors import InputError
 from contact.mesh.cells import Shape, rule, shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import geometry_nodes, integration_weights, inverse, jacobians
+from contact.model.material import Material
 from contact.typing import Array
+from forms.hencky import is_linear
+from forms.history import HistoryLaw
 from forms.kinematics import (
     Axisymmetric,
+    CellMean,
+    Isochoric,
     Kinematics,
     MeanDilatation,
     MultilinearMean,
@@ -24,7 +31,10 @@ from forms.kinematics import (
 #: Elements by the names that the case file has for them.
 STANDARD, MEAN_DILATATION = ELEMENTS = ("standard", "mean_dilatation")
 
-#: Why the mean dilatation asks for a degree.
+#: A quadrature rule: its degree, and the kinematics of its strains with their signs.
+Rule: TypeAlias = tuple[int, tuple[tuple[int, Strained], ...]]
+
+#: Reasons for the degree of the mean dilatation.
 CONSTANT = (
     "the strain of triangles and tetrahedra of degree 1 is constant in the cell, is its own mean, "
     "and locks with it or without"
@@ -33,13 +43,7 @@ ENOUGH = "quadrilaterals and hexahedra of degree 2 hardly lock"
 
 
 def check_element(element: str, degree: int, shape: Shape, order: int = 1) -> None:
-    """Refuse elements that are none on cells of a shape.
-
-    Raises
-    ------
-    InputError
-        If the degree is none, the element has no such name, or not this degree, or these cells.
-    """
+    """Refuse an unknown element, or one without this degree on cells of a shape."""
     if degree not in (1, 2):
         raise InputError(f"degree: given {degree!r}; accepted: 1 or 2", "value")
     if element not in ELEMENTS:
@@ -54,7 +58,7 @@ def check_element(element: str, degree: int, shape: Shape, order: int = 1) -> No
 
 
 def needed(element: str, degree: int, shape: Shape, order: int = 1) -> str | None:
-    """Return the degree and cells that an element asks for; None where it has them."""
+    """Return the accepted degree or cells of an element; None if these are."""
     if element != MEAN_DILATATION:
         return None
     if order > 1:
@@ -65,7 +69,7 @@ def needed(element: str, degree: int, shape: Shape, order: int = 1) -> str | Non
 
 
 def unlocked(element: str, degree: int, shape: Shape) -> str | None:
-    """Return the remedy for elements that lock where volumes hardly change; None if none do."""
+    """Return the remedy for volumetric locking of an element; None without locking."""
     if degree > 1 or element == MEAN_DILATATION:
         return None
     if not shape.simplex:
@@ -74,17 +78,7 @@ def unlocked(element: str, degree: int, shape: Shape) -> str | None:
 
 
 def kinematics_of(domain: Domain, element: str, on_axis: bool = False) -> Strained:
-    """Return how displacements of an element deform the body. Collective.
-
-    Parameters
-    ----------
-    domain
-        The mesh.
-    element
-        One of `ELEMENTS`.
-    on_axis
-        Whether strains are asked for on the axis of a body of revolution.
-    """
+    """Return the kinematics of an element, of rings also valid at r = 0 if on_axis. Collective."""
     kinematics = domain.kinematics
     if isinstance(kinematics, Axisymmetric):
         kinematics = replace(kinematics, on_axis=on_axis)
@@ -95,6 +89,29 @@ def kinematics_of(domain: Domain, element: str, on_axis: bool = False) -> Strain
     centroid = fem.Function(fem.functionspace(domain.mesh, ("DG", 0, (domain.dim,))))
     centroid.interpolate(lambda x: np.asarray(x[: domain.dim]))
     return MeanDilatation(kinematics, centroid)
+
+
+def quadrature_degree(domain: Domain, materials: Sequence[Material], degree: int) -> int:
+    """Return the degree of the quadrature of stresses, exact for linear laws on straight cells."""
+    # Stresses at points are no function that more of them would integrate more exactly.
+    smooth = all(is_linear(m.law) or isinstance(m.law, HistoryLaw) for m in materials)
+    # Strains of straight simplices are of one degree less than displacements, of others of the
+    # same.
+    straight = shape_of(domain.mesh).simplex and domain.order == 1
+    exact = max(2 * degree - 2, 1) if straight else 2 * degree
+    return exact + 2 * (degree == 2 and not smooth) + domain.kinematics.added_degree
+
+
+def rules_of(domain: Domain, element: str, exact: int, kinematics: Strained) -> list[Rule]:
+    """Return the quadrature rules whose sum has the kinematics of an element.
+
+    Stresses of laws with internal variables are at the points of the first rule.
+    """
+    if element == STANDARD or not shape_of(domain.mesh).simplex:
+        return [(exact, ((1, kinematics),))]
+    # P2-P0: all that changes of volume do is taken at the centroid, the rest in full.
+    base, mean = domain.kinematics, CellMean(domain.kinematics)
+    return [(exact, ((1, Isochoric(base)),)), (1, ((1, mean), (-1, Isochoric(mean))))]
 
 
 def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean:
@@ -120,15 +137,7 @@ def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean
 
 
 def _in_cells(domain: Domain, values: Array) -> fem.Function:
-    """Return a function that is linear along each axis of a cell by its corners. Collective.
-
-    Parameters
-    ----------
-    domain
-        The mesh.
-    values
-        At the corners, shape (cells, corners, ...).
-    """
+    """Return the multilinear function of corner values (cells, corners, ...). Collective."""
     space = fem.functionspace(domain.mesh, ("DG", 1, values.shape[2:]))
     made, dofs = fem.Function(space), space.dofmap.list[: len(values)]
     made.x.array.reshape(-1, space.dofmap.index_map_bs)[dofs] = values.reshape(*dofs.shape, -1)

@@ -1,17 +1,16 @@
 """Equilibrium of one body: its residual and operators at a state.
 
-Unknowns are held in one blocked Lagrange space: d displacement components a node and, for a
+Unknowns are in one blocked Lagrange space: d displacement components a node and, for a
 piezoelectric body, the potential divided by `phi_scale` = sqrt(mu1/beta). In these units both
-blocks of the operator have the same size, whatever the unit system.
+blocks of the operator are of one magnitude in any unit system.
 
-A state's unknowns are a local array, those of the ghosts behind the owned ones, and at the end
-global ones, if there are any (`contact.body.global_unknowns`). No state is kept here: every query
-is given the state that it is about.
+The unknowns of a state are a local array: owned nodes, ghosts, then global unknowns, if any
+(`contact.body.global_unknowns`). No state is kept here: every query is given its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -25,6 +24,7 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact._compat import destroy_unused
+from contact.body.assembly import Assembly
 from contact.body.component_norms import component_norms_of
 from contact.body.cuts import Cuts
 from contact.body.description import Body
@@ -35,7 +35,6 @@ from contact.body.materials import cells_of, factor_of
 from contact.body.pointwise import Pointwise
 from contact.body.rollers import Rollers
 from contact.body.supports import free_components, supports_of, without_field
-from contact.body.weak_forms import WeakForms
 from contact.history import BodyState, Evaluated
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout, congruent, masked, projectors, times
@@ -88,11 +87,10 @@ class BodyEquilibrium:
             charged = np.concatenate([self.cells[i] for i in np.flatnonzero(coupled)])
             self.supports.append(without_field(self.space, charged))
         index_map = self.space.dofmap.index_map
-        #: Which unknowns of the owned nodes no support holds, shape (nodes, block size).
+        #: Mask of the owned nodal unknowns without support, shape (nodes, block size).
         self.unsupported = free_components(self.space, self.supports)
         self.rollers = Rollers(domain, self.space, body, self.unsupported)
         self.global_unknowns = make_global_unknowns(domain, self.space, body, self.unsupported)
-        #: Which forces are compared with each other.
         self.components = connected_components(self.space)
         self.component_norms = component_norms_of(
             domain, self.space, self.global_unknowns, self.components
@@ -110,21 +108,20 @@ class BodyEquilibrium:
         self.rollers.check_apart(self.global_unknowns.tied)
         #: The jumps across cuts of bolts; None without any.
         self.cuts = Cuts.of(domain, self.space, self.global_unknowns, body)
-        #: Where the forms are evaluated is written anew by each query.
-        self.forms = WeakForms(
-            domain, body, self.space, self.cells, degree, element, self.pointwise, self.cuts
+        #: Each query writes the state of the forms anew.
+        self.forms = Assembly(
+            domain, body, self.space, self.cells, element, self.pointwise, self.cuts
         )
         self._at = self.forms.at
         #: The laws with internal variables: the body's part of a history.
         self.laws = self.forms.laws
-        test = self.forms.split(ufl.TestFunction(self.space))
-        self._loads = Loads(domain, body, *test, self.owned)
+        self._loads = self.loads_along(self.space)
         # Values that are no numbers, or contradict each other, are refused first of all.
         self.prescribe(self.rest())
         if self.cuts is not None:
             every = np.arange(len(self.free), dtype=np.int32)
-            held = projectors(self.unsupported, self.layout.inclined)[:, : self.dim, : self.dim]
-            self.cuts.check(every, np.eye(self.dim) - held, "a support holds")
+            free = projectors(self.unsupported, self.layout.inclined)[:, : self.dim, : self.dim]
+            self.cuts.check(every, np.eye(self.dim) - free, "a support holds")
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -133,30 +130,27 @@ class BodyEquilibrium:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which unknowns of the owned nodes are their own, shape (nodes, block size).
-
-        They are neither fixed nor do they follow a rigid part or an electrode.
-        """
+        """Mask of the owned nodal unknowns that are neither fixed nor tied, (nodes, block size)."""
         return self.layout.free
 
     @property
     def owned(self) -> int:
-        """Number of unknowns of the nodes that this rank owns."""
+        """Number of owned nodal unknowns."""
         return self.free.size
 
     @property
     def linear(self) -> bool:
-        """Whether the operator is the same at all states."""
+        """True if the operator is the same at all states."""
         return self.body.linear
 
     @property
     def symmetric(self) -> bool:
-        """Whether its tangent is a symmetric matrix."""
+        """True if the tangent is a symmetric matrix."""
         return self.body.symmetric
 
     @property
     def piezoelectric(self) -> bool:
-        """Whether there is a potential."""
+        """True if there is a potential."""
         return self.body.piezo is not None
 
     def split(self, x: Expr) -> tuple[Expr, Expr | None]:
@@ -178,11 +172,11 @@ class BodyEquilibrium:
         return values[values.size - self.global_unknowns.size :]
 
     def owned_part(self, x: Array) -> Array:
-        """Return the owned ones of local unknowns, and the global ones behind them."""
+        """Return the owned part of local unknowns, with the global ones behind."""
         return np.concatenate([x[: self.owned], self.motion(x)])
 
     def rest(self) -> Array:
-        """Return the unknowns of the undeformed body, without prescribed values."""
+        """Return the unknowns of the reference configuration, without prescribed values."""
         return np.zeros(self._at.x.array.size + self.global_unknowns.size)
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
@@ -201,7 +195,7 @@ class BodyEquilibrium:
         return np.concatenate([at.array, q])
 
     def local(self, owned: Array) -> Array:
-        """Return owned unknowns with those of the ghosts behind them. Collective."""
+        """Return owned unknowns with those of the ghosts behind. Collective."""
         at = self._at.x
         at.array[: self.owned] = owned[: self.owned]
         at.scatter_forward()
@@ -212,7 +206,7 @@ class BodyEquilibrium:
         return self.local(self.owned_part(x) + increment)
 
     def forces_of_laws(self) -> Array:
-        """Return the forces of the stresses that the laws with history were given. Collective."""
+        """Return the forces of the stresses in the laws with history. Collective."""
         self.forms.at.x.array[:] = 0.0  # no other material has stresses
         return self._assembled()
 
@@ -222,17 +216,9 @@ class BodyEquilibrium:
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
     def tangent_transposed(self, state: Evaluated, weights: Array) -> Array:
-        """Return the derivatives of weighted internal forces by the owned unknowns. Collective.
-
-        Parameters
-        ----------
-        state
-            Where.
-        weights
-            Those of the forces on the owned unknowns, those of supports among them.
-        """
+        """Return K^T w, owned values, with the tangent K without supports. Collective."""
         matrix = self.create_matrix()
-        self.assemble(matrix, "tangent", state, held=False)
+        self.assemble(matrix, "tangent", state, constrained=False)
         own = times(matrix, weights[: self.owned], transposed=True)
         found = np.concatenate([own, np.zeros(self.global_unknowns.size)])
         matrix.destroy()
@@ -247,15 +233,14 @@ class BodyEquilibrium:
         return forces
 
     def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
-        """Return the owned nodal forces of the stresses at a state. Collective.
+        """Return the owned internal forces at a state. Collective.
 
         Parameters
         ----------
         state
-            The unknowns, and the history with which their step began.
+            The unknowns, and the history at the beginning of their step.
         secant_at
-            Unknowns at which the secant modulus is taken; those of the state by default: the
-            material law itself.
+            Unknowns of the secant modulus; those of the state by default: the material law itself.
         """
         destroy_unused(self.comm, self.domain.mesh.comm)
         forms, secant = self.forms, secant_at is not None and not self.linear
@@ -275,61 +260,60 @@ class BodyEquilibrium:
         self.forms.put(self.nodal(x), self.motion(x))
         return [assembled(form, self.owned) for form in self.forms.elastic_forces]
 
+    def loads_along(
+        self, space: fem.FunctionSpace, on: Sequence[str | None] | None = None
+    ) -> Loads:
+        """Return the loads on the owned functions of a space, of some parts alone if named."""
+        size = space.dofmap.index_map.size_local * self.block_size
+        return self.forms.loads(self.forms.split(ufl.TestFunction(space)), size, on)
+
     @cached_property
     def loads_by_cell(self) -> tuple[fem.FunctionSpace, Loads]:
-        """Discontinuous cubics, and the loads on those of the owned cells. Collective."""
+        """Discontinuous cubics, and the loads on them in owned cells. Collective."""
         space = fem.functionspace(self.domain.mesh, ("DG", 3, (self.block_size,)))
-        test = self.forms.split(ufl.TestFunction(space))
-        size = space.dofmap.index_map.size_local * self.block_size
-        return space, Loads(self.domain, self.body, *test, size)
+        return space, self.loads_along(space)
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""
-        on_q = self.global_unknowns.forces(time)
-        if self.cuts is not None:
-            on_q[self.cuts.places] += self.cuts.external(time)
+        global_unknowns = self.global_unknowns
+        on_q = global_unknowns.forces(time)
+        on_q += self.forms.loads_on_global(time, global_unknowns.size)
         return np.concatenate([self._loads.at(time), on_q])
 
     def unbalanced(self, forces: Array) -> Array:
-        """Return the forces that have to vanish in equilibrium. Collective.
-
-        Forces on nodes that follow a rigid part or an electrode act on that.
-        """
+        """Return the residual on the free unknowns, that on tied nodes gathered. Collective."""
         global_unknowns, own = self.global_unknowns, forces[: self.owned]
         q = np.where(global_unknowns.free, self.motion(forces) + global_unknowns.gathered(own), 0.0)
         return np.concatenate([self.layout.mask(own), q])
 
     def reactions(self, forces: Array) -> Array:
-        """Return the forces that supports bear, and those that hold given motions. Collective."""
+        """Return the reactions of supports and of given motions. Collective."""
         global_unknowns, own = self.global_unknowns, forces[: self.owned]
         q = np.where(global_unknowns.free, 0.0, self.motion(forces) + global_unknowns.gathered(own))
         return np.concatenate([own - masked(self.unsupported, self.layout.inclined, own), q])
 
     @cached_property
     def _projection(self) -> PETSc.Mat:
-        """The projector onto the directions that no roller holds. Collective."""
+        """The projector onto the directions free of rollers. Collective."""
         assert self.layout.inclined is not None
         return self.layout.inclined.projection(self.layout)
 
     def movable(self, nodes: NDArray[np.int32]) -> Array:
-        """Return the projectors onto the directions in which owned nodes can move, (n, d, d)."""
+        """Return the projectors onto the free directions of owned nodes, shape (n, d, d)."""
         return projectors(*self.layout.at(nodes))[:, : self.dim, : self.dim]
 
     def create_matrix(self) -> PETSc.Mat:
-        """Return an empty matrix with the pattern of the body. Collective."""
+        """Return a matrix with the pattern of the body. Collective."""
         return create_matrix(self.forms.pattern)
 
-    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated, held: bool = True) -> None:
+    def assemble(
+        self, matrix: PETSc.Mat, kind: str, state: Evaluated, constrained: bool = True
+    ) -> None:
         """Assemble Kacanov's "secant", Newton's "tangent" or its "symmetric" part. Collective.
 
-        Parameters
-        ----------
-        matrix, kind, state
-            The matrix, which of them, and the state.
-        held
-            Whether rows and columns of unknowns that supports hold are those of the identity.
+        Rows and columns of supported unknowns are those of the identity if these are constrained.
         """
-        forms, conditions = self.forms, [s.condition for s in self.supports] if held else []
+        forms, conditions = self.forms, [s.condition for s in self.supports] if constrained else []
         for secant in (False, True):
             forms.put(self.nodal(state.x), self.motion(state.x), secant)
         self.laws.set(state, kind)
@@ -339,7 +323,7 @@ class BodyEquilibrium:
             matrix.assemble(PETSc.Mat.AssemblyType.FLUSH)  # keeps entries yet to be filled
         matrix.assemble()
         inclined = self.layout.inclined
-        if held and inclined is not None:
+        if constrained and inclined is not None:
             # P K P + 1 - P, as of fixed unknowns: P has the pattern of the nodes' blocks.
             product = congruent(matrix, self._projection)
             product.copy(matrix)
@@ -364,10 +348,9 @@ class BodyEquilibrium:
         Parameters
         ----------
         nodes
-            Contact nodes, then others that have blocks, local numbers.
+            Contact nodes, then others with blocks, local numbers.
         constraint
-            The constraint after which the blocks are those of single nodes; None where they are
-            and there are no global unknowns.
+            The constraint after which blocks belong to single nodes; None if they do without.
         symmetric, counters, kind
             As of `SparseOperator`.
         """
@@ -387,7 +370,7 @@ class BodyEquilibrium:
         return float(summed(self.comm, own) + np.dot(one[n:], other[n:]))
 
     def norms(self, values: Array) -> Array:
-        """Return the norms of forces, and of charges, of each component apart. Collective."""
+        """Return the norms of forces, and of charges, by component. Collective."""
         return self.component_norms.norms(values)
 
     def load_norms(self, time: float = 1.0) -> Array:

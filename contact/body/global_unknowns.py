@@ -1,13 +1,13 @@
-"""Global unknowns beside those of the nodes: rigid motions, electrodes, cuts of bolts.
+"""Global unknowns q: rigid motions, potentials of electrodes, shortenings of bolts.
 
 A rigid body moves by u = R q, R = [I, -(x - x_c) x]; an electrode has one potential. Each
-component of q is given, or free under a force, moment or charge that is given. Nodes of a rigid
-plate or of an electrode follow q: their unknowns are no longer their own. A foundation that moves
-takes nothing from the body: only its distance changes (`contact.interface.nodes`).
+component of q is given, or free under a given force, moment or charge. Nodes of a rigid part or of
+an electrode are tied to q. A moving foundation ties no nodes: it changes gaps alone
+(`contact.interface.nodes`).
 
-A state's unknowns have q behind those of the ghosts; forces have those dual to q at their end.
-All ranks hold the same values of both. Rotations count as lengths, times the size of the body, and
-potentials as those of the nodes: all of q is then of one kind.
+q is behind the unknowns of the ghosts in a state, its duals at the end of forces, with the same
+values on all ranks. Rotations are multiplied by the diameter of the body, and potentials are scaled
+as those of the nodes.
 """
 
 from __future__ import annotations
@@ -34,16 +34,9 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class Member:
-    """A rigid body or an electrode: its unknowns among the global ones.
+    """A rigid body, an electrode or a bolt with its columns of q, from `begin` on.
 
-    Attributes
-    ----------
-    description
-        The rigid part or electrode as it is given.
-    begin
-        The first of its unknowns.
-    scale
-        How much a rotation of 1 counts (length), or the unit of the potential.
+    `scale` is the length of a rotation of 1, or the unit of the potential.
     """
 
     description: Rigid | Electrode | Bolt
@@ -52,22 +45,22 @@ class Member:
 
     @property
     def foundation(self) -> bool:
-        """Whether it is a foundation: no node follows it."""
+        """True for a foundation, without tied nodes."""
         return isinstance(self.description, Rigid) and self.description.foundation
 
     @property
-    def followed(self) -> bool:
-        """Whether nodes follow it: those of a rigid part, or an electrode."""
+    def tying(self) -> bool:
+        """True for a rigid part or an electrode, whose nodes are tied to it."""
         return not (self.foundation or isinstance(self.description, Bolt))
 
     @property
     def columns(self) -> slice:
-        """Where its unknowns are."""
+        """Its columns of q."""
         return slice(self.begin, self.begin + len(self.description.values))
 
     @property
     def units(self) -> Array:
-        """How much an unknown of 1 is of a translation, a rotation or a potential."""
+        """Translation, rotation, potential or shortening of each unknown of 1."""
         if not isinstance(self.description, Rigid):
             return np.full(1, self.scale)
         rigid = self.description
@@ -76,11 +69,11 @@ class Member:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which of its unknowns are not given."""
+        """Mask of its unknowns without given values."""
         return np.array([value is None for value in self.description.values])
 
     def given(self, time: float) -> Array:
-        """Return the given values of its unknowns at a time, 0 where they are free."""
+        """Return the given values at a time, 0 for free unknowns."""
         given = self.description
         return numbers_at(given.values, given.amplitude, time) / self.units
 
@@ -113,11 +106,11 @@ class GlobalUnknowns:
     members
         Rigid bodies and electrodes.
     free
-        Which of the unknowns are not given, shape (m,).
+        Mask of the unknowns without given values, shape (m,).
     ties
-        R at the owned unknowns that follow q, shape (owned, m).
+        R at the tied owned unknowns, shape (owned, m).
     tied
-        Which unknowns of the owned nodes follow, shape (nodes, block size).
+        Mask of the tied unknowns of owned nodes, shape (nodes, block size).
     """
 
     comm: MPI.Intracomm
@@ -133,15 +126,15 @@ class GlobalUnknowns:
 
     @property
     def mechanical(self) -> NDArray[np.bool_]:
-        """Which of them are motions, shape (m,)."""
+        """Mask of the motions, shape (m,)."""
         moves = [not isinstance(m.description, Electrode) for m in self.members]
         flags = [np.full(m.free.size, own) for m, own in zip(self.members, moves, strict=True)]
         return np.concatenate([np.zeros(0, dtype=bool), *flags])
 
     @property
     def tying(self) -> bool:
-        """Whether any node follows."""
-        return any(member.followed for member in self.members)
+        """True if there are tied nodes."""
+        return any(member.tying for member in self.members)
 
     def member(self, part: str) -> Member | None:
         """Return the moving foundation in front of a part; None where it is fixed."""
@@ -179,15 +172,7 @@ class GlobalUnknowns:
         return summed(self.comm, self.ties.T @ forces)
 
     def with_foundations(self, nodes: NDArray[np.int32], motion: Array) -> sparse.csr_array:
-        """Return R at the nodes that follow and at contact nodes, shape (owned, m).
-
-        Parameters
-        ----------
-        nodes
-            The owned contact nodes, local numbers, shape (n,).
-        motion
-            R there, shape (n, block size, m).
-        """
+        """Return R at tied nodes, and as given, (n, b, m), at contact nodes, shape (owned, m)."""
         there = _rows(nodes, motion, slice(0, self.size), self.ties.shape)
         return (self.ties + there).tocsr()
 
@@ -195,22 +180,12 @@ class GlobalUnknowns:
 def make_global_unknowns(
     domain: Domain, space: fem.FunctionSpace, body: Body, free: NDArray[np.bool_]
 ) -> GlobalUnknowns:
-    """Return the global unknowns of a body. Collective.
-
-    Parameters
-    ----------
-    domain, space
-        Mesh and space of the unknowns.
-    body
-        The body as it is described.
-    free
-        Which unknowns of the owned nodes are not fixed, shape (nodes, block size).
+    """Return the global unknowns of a body, given the mask of free nodal unknowns. Collective.
 
     Raises
     ------
     InputError
-        If parts that are tied to different things share nodes, or a support holds a node of a
-        part that is free to move.
+        If rigid parts or electrodes share nodes, or a free one shares nodes with a support.
     """
     members: list[Member] = []
     described: list[Rigid | Electrode | Bolt] = [*body.rigid, *body.electrodes, *body.bolts]
@@ -226,13 +201,13 @@ def make_global_unknowns(
     tied = np.zeros(free.shape, dtype=bool)
     ties = sparse.csr_array((free.size, size))
     for member in members:
-        if member.followed:
+        if member.tying:
             ties = ties + _tie(domain, space, member, free, tied, size)
     return GlobalUnknowns(domain.comm, tuple(members), unknown, ties, tied)
 
 
 def _moving(rigid: Rigid, domain: Domain) -> Rigid:
-    """Return a rigid part with all components of its motion, if that is one of the body."""
+    """Return a rigid part with all components of its motion, checked for the dimension."""
     place = f"{rigid.name} on {rigid.on!r}: "
     for key in ("displacement", "force", "centre"):
         given = getattr(rigid, key)
@@ -262,7 +237,7 @@ def _tie(
     tied: NDArray[np.bool_],
     size: int,
 ) -> sparse.csr_array:
-    """Return the rows of a plate or an electrode, and mark them as tied. Collective."""
+    """Return the rows of R of a rigid part or an electrode, and mark them as tied. Collective."""
     d, key = domain.dim, f"{member.description.name} on {member.description.on!r}"
     domain.mesh.topology.create_connectivity(d - 1, d)
     nodes = fem.locate_dofs_topological(space, d - 1, domain.facets_anywhere(member.description.on))
@@ -276,7 +251,7 @@ def _tie(
             f"{key}: it shares nodes with another rigid part or electrode; accepted: parts apart",
             "rigid-part",
         )
-    # A node that a support holds cannot follow.
+    # A supported node cannot be tied.
     moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > NEGLIGIBLE
     if _anywhere(domain, moves & follows & ~free[nodes]):
         if isinstance(member.description, Electrode):
@@ -299,7 +274,7 @@ def _tie(
 def _rows(
     nodes: NDArray[np.int32], motion: Array, columns: slice, shape: tuple[int, int]
 ) -> sparse.csr_array:
-    """Return R at some nodes, (n, block size, columns), as rows of a matrix of all unknowns."""
+    """Return R at nodes, (n, block size, columns), as rows of a matrix of all unknowns."""
     dofs = nodes[:, None] * motion.shape[1] + np.arange(motion.shape[1])
     every = np.broadcast_arrays(dofs[:, :, None], np.arange(columns.start, columns.stop))
     places = tuple(numbers.ravel() for numbers in every)

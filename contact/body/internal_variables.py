@@ -1,8 +1,7 @@
 """Laws with internal variables at quadrature points: their stresses, and the history of a body.
 
-A law of the stress that has some (`forms.history.HistoryLaw`) is given the strains at the end of a
-step and the variables at its beginning. Forms look at the stress and the stiffness that it returns.
-Nothing else in the program knows of them.
+A `forms.history.HistoryLaw` maps strains at the end of a step and variables at its beginning to
+stresses and stiffness, functions at the quadrature points that forms contain.
 """
 
 from __future__ import annotations
@@ -48,22 +47,18 @@ OF_STRAIN = ""
 
 
 class QuadratureLaws:
-    """The laws with internal variables among the materials of a body. They share those of one name.
+    """The laws with internal variables among the materials of a body, which share names.
 
     Parameters
     ----------
-    domain, materials
-        The mesh, and the materials.
-    cells
-        The owned cells of each.
-    degree
-        Of the quadrature.
-    kinematics
-        Of the strains that the laws see.
+    domain, materials, cells
+        The mesh, the materials, and the owned cells of each.
+    degree, kinematics
+        Of the quadrature, and of the strains.
     pointwise
         Evaluates expressions of the unknowns.
     fitted
-        Degree of the polynomials that stand for values between the points of a cell.
+        Degree of the polynomials between the points of a cell.
 
     Attributes
     ----------
@@ -71,11 +66,6 @@ class QuadratureLaws:
         Communicator of the mesh.
     initial
         The variables in the reference configuration; None without any.
-
-    Raises
-    ------
-    InputError
-        If materials give different shapes to a variable of one name, or a law fails on one rank.
     """
 
     def __init__(
@@ -90,7 +80,7 @@ class QuadratureLaws:
     ) -> None:
         self.comm = domain.comm
         self._domain, self._degree, self._pointwise = domain, degree, pointwise
-        self._kinematics = kinematics
+        self.kinematics = kinematics
         self._size, self._fitted = components(domain.dim), fitted
         pairs = zip((material.law for material in materials), cells, strict=True)
         self._laws = [(law, own) for law, own in pairs if isinstance(law, HistoryLaw)]
@@ -98,14 +88,14 @@ class QuadratureLaws:
         self._owned = mesh.topology.index_map(mesh.topology.dim).size_local
         for law, _ in self._laws:
             check_law(law, self._size, self.comm)
-        #: With which variables, kind and unknowns the forms' functions were evaluated last.
+        #: Variables, kind and unknowns of the last stresses.
         self._seen: tuple[InternalVariables | None, str, Array] | None = None
         self.initial: InternalVariables | None = None
         if self._laws:
             self.initial = InternalVariables(QUADRATURE_POINTS, self._first_values())
 
     def _first_values(self) -> dict[str, Array]:
-        """Return the variables in the reference configuration, one cell after the other."""
+        """Return the variables in the reference configuration, by cell and point."""
         values: dict[str, Array] = {}
         for law, own in self._laws:
             for name, value in law.variables(self._size).items():
@@ -154,45 +144,37 @@ class QuadratureLaws:
 
     @cached_property
     def places(self) -> Array:
-        """The quadrature points of the owned cells, one cell after the other, (places, d)."""
+        """The quadrature points of the owned cells, by cell and point, shape (places, d)."""
         space = self._function().function_space
         at = space.tabulate_dof_coordinates()[space.dofmap.list[: self._owned]]
         return np.asarray(at.reshape(-1, at.shape[-1])[:, : self._domain.dim])
 
     @cached_property
     def volumes(self) -> Array:
-        """The volume of the body that each place stands for, shape (places,)."""
+        """The volume of each quadrature point, shape (places,)."""
         shape, of = shape_of(self._domain.mesh), geometry_nodes(self._domain)
         return integration_weights(self._domain.revolved, shape, of, *self._rule).ravel()
 
     def law(self, law: Law | Graded) -> FormLaw:
-        """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""
+        """Return a law for forms, with the stress and stiffness of `set`."""
         return QuadratureLaw(self._stress, self._stiffness) if isinstance(law, HistoryLaw) else law
 
     def fitted_law(self, law: Law | Graded) -> FormLaw:
-        """Return a law with the stress that `fit` has evaluated last, for any points."""
+        """Return a law for any points, with the stress of the last `fit`."""
         return QuadratureLaw(self.fits["stress"]) if isinstance(law, HistoryLaw) else law
 
     def of(self, state: Evaluated) -> InternalVariables | None:
-        """Return the variables that the step of a state began with; None without any."""
+        """Return the variables at the beginning of a state's step; None without any."""
         part = state.history.get(VARIABLES, self.initial)
         assert part is None or isinstance(part, InternalVariables)
         return part
 
     def _strain(self, at: fem.Function) -> Expr:
         u = ufl.as_vector([at[i] for i in range(self._domain.dim)])
-        return to_vector(strain(u, self._kinematics), self._size)
+        return to_vector(strain(u, self.kinematics), self._size)
 
     def _responses(self, state: Evaluated, kind: str = "") -> Iterator[tuple[Indices, Response]]:
-        """Yield some cells after others, and the response at their points.
-
-        Parameters
-        ----------
-        state
-            The state.
-        kind
-            "tangent", its "symmetric" part, or "secant"; empty without stiffness.
-        """
+        """Yield chunks of cells and the response, with "tangent", "symmetric" part or "secant"."""
         for law, cells, strains, variables in self._points(state, state.x):
             found = respond(law, strains, variables, "tangent" if kind == "symmetric" else kind)
             yield cells, found.symmetrised() if kind == "symmetric" else found
@@ -200,7 +182,7 @@ class QuadratureLaws:
     def _points(
         self, state: Evaluated, x: Array
     ) -> Iterator[tuple[HistoryLaw, Indices, Array, dict[str, Array]]]:
-        """Yield a law, some of its cells, and at their points strains of x and variables before."""
+        """Yield a law, a chunk of cells, strains of x and the variables before at their points."""
         before = self.of(state)
         for law, own in self._laws:
             assert before is not None
@@ -212,16 +194,16 @@ class QuadratureLaws:
                 yield law, cells, found.reshape(-1, self._size), variables
 
     def _at(self, arrays: Mapping[str, Array], law: HistoryLaw, cells: Indices) -> dict[str, Array]:
-        """Return those of the variables of a law at the points of some of its cells."""
+        """Return the variables of a law at the points of some cells."""
         return {name: self._in(cells, arrays[name]) for name in law.variables(self._size)}
 
     def _in(self, cells: Indices, array: Array) -> Array:
-        """Return values by place in ascending cells, those themselves where the cells are all."""
+        """Return values at the points of ascending cells, without a copy if these are all."""
         if cells.size == self._owned:
             found = array.view()
         else:
             found = self.by_cell(array)[cells].reshape(-1, *array.shape[1:])
-        found.flags.writeable = False  # a law of the user's shall not change the history
+        found.flags.writeable = False  # a user's law cannot change the history
         return found
 
     def by_cell(self, array: Array) -> Array:
@@ -236,7 +218,7 @@ class QuadratureLaws:
 
     @collective
     def set(self, state: Evaluated, kind: str = "") -> None:
-        """Let the forms of the laws look at the response at a state from now on. Collective."""
+        """Set stresses, and the stiffness of a kind, to those at a state. Collective."""
         before = self.of(state)
         if before is None:
             return
@@ -266,7 +248,7 @@ class QuadratureLaws:
     def _differentials(
         self, state: Evaluated, along: Array, change: InternalVariables
     ) -> Iterator[tuple[Indices, Response]]:
-        """Yield some cells after others, and how the response at their points changes."""
+        """Yield chunks of cells and the differential of the response at their points."""
         moved = self._points(state, along)
         for (law, cells, strains, variables), (_, _, way, _) in zip(
             self._points(state, state.x), moved, strict=True
@@ -278,15 +260,7 @@ class QuadratureLaws:
     def commit_along(
         self, state: Evaluated, along: Array, change: InternalVariables
     ) -> InternalVariables:
-        """Return how the variables at the end of a step change. Collective.
-
-        Parameters
-        ----------
-        state
-            The state that the step has led to.
-        along, change
-            Changes of its local unknowns, and of the variables at the beginning.
-        """
+        """Return the differential of `commit`, by unknowns and variables before. Collective."""
         arrays = {name: np.zeros_like(array) for name, array in change.arrays.items()}
         for cells, found in self._differentials(state, along, change):
             self._put(arrays, cells, found.variables)
@@ -294,13 +268,7 @@ class QuadratureLaws:
 
     @collective
     def before_along(self, state: Evaluated, change: InternalVariables) -> None:
-        """Let the forms look at how stresses change with the variables before a step. Collective.
-
-        Parameters
-        ----------
-        state, change
-            As of `commit_along`.
-        """
+        """Set stresses to their differential by the variables before a step. Collective."""
         self._seen = None
         self._stress.x.array[:] = 0.0
         for cells, found in self._differentials(state, np.zeros_like(state.x), change):
@@ -308,17 +276,9 @@ class QuadratureLaws:
 
     @collective
     def commit_transposed(self, state: Evaluated, after: InternalVariables) -> None:
-        """Let the forms look at the stresses whose forces are those of the variables' derivatives.
+        """Set stresses whose forces are derivatives of a quantity by the unknowns. Collective.
 
-        Collective.
-
-        Parameters
-        ----------
-        state
-            The state that a step has led to.
-        after
-            Derivatives of a quantity by the variables at the end of the step. The forces are then
-            its derivatives by the unknowns.
+        `after` has its derivatives by the variables at the end of the step.
         """
         self._seen = None
         self._stress.x.array[:] = 0.0
@@ -335,14 +295,8 @@ class QuadratureLaws:
     ) -> InternalVariables | None:
         """Return the derivatives of a quantity by the variables before a step. Collective.
 
-        Parameters
-        ----------
-        state
-            As of `commit_transposed`.
-        along
-            Its derivatives by the forces of the stresses, local values.
-        after
-            Its derivatives by the variables at the end of the step; None for a last step.
+        `along` has its derivatives by the forces of the stresses, local values; `after` those by
+        the variables at the end of the step, None for a last step.
         """
         before = self.of(state)
         if before is None:
@@ -360,15 +314,7 @@ class QuadratureLaws:
         return before.replaced(arrays)
 
     def weigh(self, state: Evaluated, after: InternalVariables) -> None:
-        """Let the form of `divided` look at a sum of weighted variables at the end of a step.
-
-        Parameters
-        ----------
-        state
-            As of `commit_transposed`.
-        after
-            The weights.
-        """
+        """Set the density of `divided` to the sum of weighted variables at the end of a step."""
         ends = self.commit(state)
         assert ends is not None
         total = sum(_dot(after.arrays[name], ends.arrays[name]) for name in after.arrays)
@@ -376,14 +322,14 @@ class QuadratureLaws:
         _fill(self._weighed, cells, total / self.volumes)
 
     def divided(self, functions: ufl.Argument) -> fem.Form | None:
-        """Return the form of the sum of `weigh`, divided among functions; None without any."""
+        """Return the form of the sum of `weigh` by test function; None without variables."""
         if self.initial is None:
             return None
         dx = self._domain.dx(metadata={"quadrature_degree": self._degree})
         return fem.form(functions * self._weighed * dx)
 
     def energies(self, state: Evaluated) -> tuple[float, float | None]:
-        """Return the energy lost in a step, and that stored at its end, if stated. Collective."""
+        """Return the dissipation of a step, and the stored energy if laws have it. Collective."""
         sums, stated, volumes = np.zeros(2), self.initial is not None, self.by_cell(self.volumes)
         with on_all_ranks(self.comm):
             for cells, response in self._responses(state):
@@ -395,7 +341,7 @@ class QuadratureLaws:
         return lost, stored if self.comm.allreduce(stated, op=MPI.LAND) else None
 
     def silence(self) -> None:
-        """Let the forms see no stress of the laws."""
+        """Set the stresses of the laws to zero."""
         self._seen = None
         if self.initial is not None:
             self._stress.x.array[:] = 0.0
@@ -411,7 +357,7 @@ class QuadratureLaws:
 
     @cached_property
     def fits(self) -> dict[str, fem.Function]:
-        """Polynomials in each cell that stand for the stress and the variables between points."""
+        """Polynomials of stress and variables in each cell, by name."""
         if self.initial is None:
             return {}
         shapes = {name: array.shape[1:] for name, array in self.initial.arrays.items()}
@@ -424,7 +370,7 @@ class QuadratureLaws:
 
     @cached_property
     def _fitting(self) -> Array:
-        """Values at points -> coefficients of the polynomial nearest to them, (dofs, points)."""
+        """Matrix of the least squares fit of polynomials to values at points, (dofs, points)."""
         cell = self._domain.mesh.topology.cell_name()
         element = basix.ufl.element("DG", cell, self._fitted)
         return np.linalg.pinv(element.tabulate(0, self.points)[0])
@@ -440,7 +386,7 @@ class QuadratureLaws:
 
     @collective
     def fit(self, state: Evaluated) -> None:
-        """Let `fits` be those at the end of the step that led to a state. Collective."""
+        """Set `fits` to stress and variables at a state. Collective."""
         fits = self.fits
         for cells, response in self._responses(state):
             for name, values in {**response.variables, "stress": response.stress}.items():
@@ -455,17 +401,10 @@ def _gradient(
     given: Mapping[str, Array],
     name: str,
 ) -> Array:
-    """Return a derivative of the response at each point, component by component.
+    """Return the derivative of a weighted sum of the response at each point.
 
-    Parameters
-    ----------
-    law, strain, variables
-        The law, and the points.
-    given
-        Weights of the variables at the end, and of the stress under `OF_STRAIN`, whose sum is
-        differentiated.
-    name
-        By which variable at the beginning; `OF_STRAIN` by the strain.
+    `given` weighs the variables at the end and, under `OF_STRAIN`, the stress; the derivative is
+    by the variable `name` at the beginning, or the strain.
     """
     still = {key: np.zeros_like(value) for key, value in (*variables.items(), (OF_STRAIN, strain))}
     slopes = np.zeros((len(strain), still[name][:1].size))
@@ -485,7 +424,7 @@ def _dot(one: Array, other: Array) -> Array:
 
 
 def _fill(function: fem.Function, cells: Indices, values: Array) -> None:
-    """Write values in cells: those of their dofs, one after the other."""
+    """Write values in cells, by dof."""
     blocks = function.x.array.reshape(-1, function.function_space.dofmap.index_map_bs)
     dofs = function.function_space.dofmap.list[cells]
     blocks[dofs] = values.reshape(*dofs.shape, blocks.shape[1])

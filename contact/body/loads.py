@@ -1,8 +1,9 @@
-"""Loads: the work of given forces and charges, as functions of time."""
+"""Given loads: their values in UFL, and their nodal forces and charges as functions of time."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import field as default
 from functools import cached_property
@@ -18,45 +19,20 @@ from ufl.corealg.traversal import traverse_unique_terminals
 
 from contact.arguments import check_finite, naming, real
 from contact.body.description import Body
+from contact.body.weak_form import Given, Term
 from contact.errors import InputError
 from contact.mesh.domain import Domain
-from contact.mesh.geometry import area, volume
+from contact.mesh.geometry import area
 from contact.mesh.integrals import compiled
 from contact.model.body import Load
 from contact.model.fields import Amplitude, Field, Moving, at_time, constant
 from contact.ranks import on_all_ranks
 from contact.tolerances import HUGE
 from contact.typing import Array
-from forms.piezo import electric_load
 
 
-@dataclass
-class _Share:
-    """Loads with one amplitude: assembled once, or where they know the time, for each time."""
-
-    amplitude: Amplitude
-    moving: bool
-    works: list[ufl.Form]
-    vector: Array = default(default_factory=lambda: np.zeros(0))
-    time: float = np.nan
-
-    @cached_property
-    def forms(self) -> list[fem.Form]:
-        """The compiled works: one form for each, that other bodies have too."""
-        return [compiled(work) for work in self.works]
-
-
-class Loads:
-    """The nodal forces and charges that are given, at any time. Equation (5.29).
-
-    Parameters
-    ----------
-    domain, body
-        Mesh, and the loads on the body.
-    v, xi
-        Test functions of the displacement and the potential; None for a body without.
-    owned
-        Number of owned unknowns.
+def given_loads(domain: Domain, body: Body, time: fem.Constant) -> Mapping[str, Sequence[Given]]:
+    """Return the loads of a body for its weak form, by their keys; in UFL at a time. Collective.
 
     Raises
     ------
@@ -64,27 +40,91 @@ class Loads:
         If a part is missing, a force has the wrong length, or a charge acts on a body without
         a potential.
     """
+    found: dict[str, list[Given]] = defaultdict(list)
+    x = ufl.SpatialCoordinate(domain.mesh)
+    for number, load in enumerate(body.loads):
+        _check(domain, body, load, f"load.{number}")
+        over = domain.dx if load.on is None else domain.ds(load.on)
+        vectors: dict[tuple[str, bool], list[Expr]] = {}
+        for name, field in load.named.items():
+            value = expression(domain, field, x, time, f"load.{number}.{name}")
+            moving, (key, *component) = isinstance(field, Moving), name.split(".")
+            if not component:
+                found[key].append(Given(value, over, load.on, load.factor, moving))
+                continue
+            if key == "force":
+                assert load.on is not None
+                value /= constant(domain.mesh, area(domain, load.on))
+            none = [constant(domain.mesh, 0.0) for _ in range(domain.dim)]
+            vectors.setdefault((key, moving), none)[int(component[0])] = value
+        for (key, moving), values in vectors.items():
+            given = Given(ufl.as_vector(values), over, load.on, load.factor, moving)
+            found["traction" if key == "force" else key].append(given)
+    return found
 
-    def __init__(
-        self,
-        domain: Domain,
-        body: Body,
-        v: Expr,
-        xi: Expr | None,
-        owned: int,
-    ) -> None:
-        self._owned = owned
-        self._time = constant(domain.mesh, 0.0)
+
+def _check(domain: Domain, body: Body, load: Load, key: str) -> None:
+    """Refuse a load of the wrong length, without effect, or that needs a potential."""
+    place = repr(load.on) if load.on is not None else "'the body'"
+    for force in (load.density, load.force):
+        if force is not None and len(force) != domain.dim:
+            raise InputError(
+                f"load on {place}: the force has {len(force)} components, the body has "
+                f"{domain.dim}",
+                "components",
+            )
+    if body.piezo is None and any(name.endswith("charge") for name in load.named):
+        raise InputError(f"load on {place}: a charge needs a piezoelectric material", "piezo")
+    if domain.revolved and load.force is not None and not getattr(load.force[0], "is_zero", False):
+        raise InputError(
+            f"{key}.force.0: given one across the axis, where it cancels over the full turn; "
+            "accepted: 0, or a traction or pressure",
+            "value",
+        )
+
+
+@dataclass
+class _Share:
+    """Loads with one amplitude: assembled once, or at each time where their values know it."""
+
+    amplitude: Amplitude
+    moving: bool
+    terms: list[ufl.Form]
+    vector: Array = default(default_factory=lambda: np.zeros(0))
+    time: float = np.nan
+
+    @cached_property
+    def forms(self) -> list[fem.Form]:
+        """The compiled terms: one form for each, that other bodies have too."""
+        return [compiled(term) for term in self.terms]
+
+
+class Loads:
+    """The nodal forces and charges of the loads of a residual, at any time.
+
+    Parameters
+    ----------
+    residual
+        Terms of a weak form; those of loads count.
+    owned
+        Number of owned unknowns of their test functions.
+    time
+        The time of the values in UFL.
+    """
+
+    def __init__(self, residual: Sequence[Term], owned: int, time: fem.Constant) -> None:
+        self._owned, self._time = owned, time
         self._shares: list[_Share] = []
         self._last: tuple[float, Array] | None = None
-        for number, load in enumerate(body.loads):
-            for work, moving in _works(domain, load, f"load.{number}", v, xi, self._time):
-                kind = load.factor, moving
-                share = next((s for s in self._shares if (s.amplitude, s.moving) == kind), None)
-                if share is None:
-                    self._shares.append(_Share(*kind, [work]))
-                else:
-                    share.works.append(work)
+        for form, load in residual:
+            if load is None:
+                continue
+            kind = load.amplitude, load.moving
+            share = next((s for s in self._shares if (s.amplitude, s.moving) == kind), None)
+            if share is None:
+                self._shares.append(_Share(*kind, [form]))
+            else:
+                share.terms.append(form)
 
     def at(self, time: float) -> Array:
         """Return the owned nodal loads at a time. Collective where loads know the time."""
@@ -96,7 +136,7 @@ class Loads:
                 self._time.value = time
                 share.vector = np.sum([assembled(f, self._owned) for f in share.forms], axis=0)
                 share.time = time
-            total += share.amplitude(time) * share.vector
+            total -= share.amplitude(time) * share.vector  # in a residual loads are negative
         self._last = time, total
         return total
 
@@ -108,51 +148,6 @@ def assembled(form: fem.Form, owned: int) -> Array:
     vector = fem.assemble_vector(form)
     vector.scatter_reverse(InsertMode.add)
     return np.asarray(vector.array[:owned].copy())
-
-
-def _works(
-    domain: Domain, load: Load, key: str, v: Expr, xi: Expr | None, time: fem.Constant
-) -> list[tuple[ufl.Form, bool]]:
-    """Return the work of each part of a load, and whether it knows the time."""
-    x = ufl.SpatialCoordinate(domain.mesh)
-    measure = domain.dx if load.on is None else domain.ds(load.on)
-    place = repr(load.on) if load.on is not None else "'the body'"
-    for force in (load.density, load.force):
-        if force is not None and len(force) != domain.dim:
-            raise InputError(
-                f"load on {place}: the force has {len(force)} components, the body has "
-                f"{domain.dim}",
-                "components",
-            )
-    if xi is None and any(name.endswith("charge") for name in load.named):
-        raise InputError(f"load on {place}: a charge needs a piezoelectric material", "piezo")
-    if domain.revolved and load.force is not None and not getattr(load.force[0], "is_zero", False):
-        raise InputError(
-            f"{key}.force.0: given one across the axis, where it cancels over the full turn; "
-            "accepted: 0, or a traction or pressure",
-            "value",
-        )
-    works = []
-    vectors: dict[tuple[str, bool], list[Expr]] = {}
-    for name, field in load.named.items():
-        given = expression(domain, field, x, time, f"{key}.{name}")
-        moving = isinstance(field, Moving)
-        if name == "pressure":
-            works.append((-given * ufl.dot(ufl.FacetNormal(domain.mesh), v), moving))
-        elif name.endswith("charge"):
-            place = "body" if load.on is None else "surface"
-            works.append((electric_load(xi, **{place: given}), moving))
-        else:
-            kind, component = name.split(".")
-            none = [constant(domain.mesh, 0.0) for _ in range(domain.dim)]
-            vectors.setdefault((kind, moving), none)[int(component)] = given
-    for (kind, moving), given in vectors.items():
-        work = ufl.dot(ufl.as_vector(given), v)
-        if kind == "force":
-            size = volume(domain) if load.on is None else area(domain, load.on)
-            work /= constant(domain.mesh, size)
-        works.append((work, moving))
-    return [(work * measure, moving) for work, moving in works]
 
 
 def expression(

@@ -1,10 +1,9 @@
-"""Where the materials of a body are: each cell has one."""
+"""The cells of each material, and the materials in UFL for the weak form."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 import ufl
@@ -13,9 +12,12 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
 from contact.arguments import expect
+from contact.body.elements import Rule
+from contact.body.internal_variables import QuadratureLaws
 from contact.body.pointwise import CHUNK
+from contact.body.weak_form import Solid
 from contact.errors import InputError
-from contact.mesh.domain import Domain, Indices, Measure
+from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import geometry_nodes
 from contact.model.fields import constant, values_at
@@ -25,10 +27,6 @@ from forms.elasticity import Anisotropic
 from forms.hencky import Graded, Law
 from forms.history import HistoryLaw
 from forms.piezo import Piezo
-
-#: A material with form constants for its numbers, and the measure of its cells, whose number is 0:
-#: the forms of materials of one law are one and the same, each with its own constants.
-MaterialMeasure: TypeAlias = tuple[Law | Graded, Piezo | None, Measure]
 
 
 def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
@@ -68,17 +66,7 @@ def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
 def young_behind(
     domain: Domain, materials: Sequence[Material], cells: Sequence[Indices], on: str
 ) -> float:
-    """Return the largest Young's modulus right behind a part. Collective.
-
-    Parameters
-    ----------
-    domain, materials
-        The mesh, and the materials of the body.
-    cells
-        The owned cells of each.
-    on
-        The part.
-    """
+    """Return the largest Young's modulus in the cells at a part. Collective."""
     behind, _ = cells_at(domain.mesh, domain.facets(on))
     every = zip(materials, cells, strict=True)
     found = [float(material.law.young) for material, own in every if np.isin(behind, own).any()]
@@ -86,7 +74,7 @@ def young_behind(
 
 
 def _check_all(domain: Domain, owner: Indices) -> None:
-    """Refuse cells without a material, and name their region."""
+    """Refuse cells without a material, by the name of their region."""
     left = domain.comm.allreduce(int(np.count_nonzero(owner < 0)), op=MPI.SUM)
     if left == 0:
         return
@@ -109,37 +97,35 @@ def _count(domain: Domain) -> int:
     return int(domain.mesh.topology.index_map(domain.dim).size_local)
 
 
-def in_parts(domain: Domain, cells: Sequence[Indices]) -> list[list[Indices]]:
-    """Divide the cells of each material, into as many parts on all ranks. Collective.
-
-    A large body has several: for each function of a form dolfinx packs the values in all of its
-    cells, which are more than the unknowns by far.
-    """
-    most = domain.comm.allreduce(max(own.size for own in cells), op=MPI.MAX)
-    parts = [np.array_split(own, most // (4 * CHUNK) + 1) for own in cells]
-    return [[*part] for part in zip(*parts, strict=True)]
-
-
-def material_measures(
+def solids_of(
     domain: Domain,
     materials: Sequence[Material],
     cells: Sequence[Indices],
-    degree: int,
-) -> Iterator[MaterialMeasure]:
-    """Yield each material with the measure of its cells.
+    rules: Sequence[Rule],
+    laws: QuadratureLaws,
+) -> list[Solid]:
+    """Return the materials for the weak form, by quadrature rule and part of the body. Collective.
 
-    Parameters
-    ----------
-    domain, materials, cells
-        As in and from `cells_of`.
-    degree
-        Of the quadrature.
+    Numbers are form constants and the subdomain of each measure is 0: materials of one law share
+    the compiled form. Large bodies are divided, for dolfinx packs the values of each function in
+    all cells of a form, far more values than unknowns.
     """
-    metadata = {"quadrature_degree": degree}
-    for material, own in zip(materials, cells, strict=True):
-        law, piezo = form_law(material, domain.mesh), material.piezo
-        constants = None if piezo is None else piezo_with_constants(piezo, domain.mesh)
-        yield law, constants, domain.dx_over(own)(metadata=metadata)
+    most = domain.comm.allreduce(max(own.size for own in cells), op=MPI.MAX)
+    parts = [np.array_split(own, most // (4 * CHUNK) + 1) for own in cells]
+    solids = []
+    for number, (degree, strains) in enumerate(rules):
+        for part in zip(*parts, strict=True):
+            for material, own in zip(materials, part, strict=True):
+                piezo, seen = material.piezo, strains
+                if isinstance(material.law, HistoryLaw):
+                    seen = ((1, laws.kinematics),)  # stresses at points are those of all strains
+                    if number > 0:
+                        continue
+                law = laws.law(form_law(material, domain.mesh))
+                constants = None if piezo is None else piezo_with_constants(piezo, domain.mesh)
+                dx = domain.dx_over(own)(metadata={"quadrature_degree": degree})
+                solids.append(Solid(law, constants, seen, dx))
+    return solids
 
 
 def form_law(material: Material, mesh: Mesh) -> Law | Graded:
@@ -151,13 +137,7 @@ def form_law(material: Material, mesh: Mesh) -> Law | Graded:
 
 
 def factor_of(domain: Domain, material: Material, cells: Indices) -> Array:
-    """Return the factor of a material in the middle of some cells, shape (cells,). Collective.
-
-    Raises
-    ------
-    InputError
-        If it is not positive.
-    """
+    """Return the factor of a material > 0 in the middle of cells, shape (cells,). Collective."""
     if material.factor is None:
         return np.ones(cells.size)
     middles = geometry_nodes(domain, cells).mean(axis=1)

@@ -22,22 +22,13 @@ def in_chunks(cells: NDArray[np.integer[Any]]) -> list[NDArray[Any]]:
 
 
 class Pointwise:
-    """Values of expressions at points of the cells.
-
-    Each expression is compiled once for a body: to find the code of one again takes as long as a
-    small problem.
-
-    Parameters
-    ----------
-    space
-        Of the unknowns.
-    """
+    """Expressions of the unknowns in a space, compiled once, evaluated at points of cells."""
 
     def __init__(self, space: fem.FunctionSpace) -> None:
         self._space = space
         self._at: fem.Function | None = None
         self._made: dict[Hashable, fem.Expression] = {}
-        #: Whose unknowns are in the function.
+        #: The last caller, whose unknowns are in the function.
         self._reader = object()
 
     def values(
@@ -54,16 +45,12 @@ class Pointwise:
 
         Parameters
         ----------
-        name
-            Name of the expression from the first time on.
-        expression
-            Makes it of the unknowns.
+        name, expression
+            Name, and the function that makes the expression of the unknowns at its first use.
         points
             Points of the reference cell, shape (points, d).
-        x
-            The local unknowns; those behind the nodes' are not looked at.
-        cells
-            Local numbers of cells.
+        x, cells
+            Local unknowns, of which the global ones are ignored, and local numbers of cells.
         """
         at = self._at = self._at or fem.Function(self._space)
         if name not in self._made:

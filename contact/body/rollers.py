@@ -1,4 +1,4 @@
-"""Rollers: prescribed displacements along the normal of a part, which no axis need be."""
+"""Rollers: prescribed displacements along the normal of a part, in any direction."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from contact.typing import Array
 #: Least cosine of the angle between the normals of a node and of a facet there. More is an edge.
 SMOOTH = 0.8
 
-#: Least singular value of the normals of a node that hold it in as many directions: the sine of the
-#: angle between a normal and the plane, or line, that is held.
+#: Least singular value of the normals of a node that count as independent: the sine of the angle
+#: between one normal and the span of the others.
 APART = 0.2
 
 
@@ -36,18 +36,18 @@ class Roller:
     Attributes
     ----------
     number
-        Which of the body's `fixed` it is.
+        Index among the body's `fixed`.
     nodes, points, normal
         Owned nodes, their coordinates (length) and unit normals, shapes (n,) and (n, d).
     lift
-        How its nodes move by a unit of it, in directions along which nothing else holds them,
+        Displacement of the nodes by a unit along the normal, in directions free of other supports,
         shape (n, d).
     slack
-        Part of it that may be missing where others hold its nodes already, shape (n,).
+        Relative error allowed where other supports constrain the nodes already, shape (n,).
     field, amplitude
         The prescribed function and its factor as a function of time.
     comm
-        The ranks that ask together.
+        Communicator.
     """
 
     number: int
@@ -66,7 +66,7 @@ class Roller:
         return self.amplitude(time) * values_at(self.field, self.points, time, name, self.comm)
 
     def along(self, nodal: Array) -> Array:
-        """Return those of nodal unknowns, (nodes, >= d), shape (n,)."""
+        """Return the normal displacements of nodal unknowns, (nodes, >= d), shape (n,)."""
         d = self.normal.shape[1]
         return np.asarray(np.einsum("ni,ni->n", self.normal, nodal[self.nodes, :d]))
 
@@ -74,13 +74,7 @@ class Roller:
 def nodal_normals(
     domain: Domain, space: fem.FunctionSpace, part: str
 ) -> tuple[NDArray[np.int32], Array, float]:
-    """Return the owned nodes of a part and their normals, means over facets. Collective.
-
-    Returns
-    -------
-    The nodes, shape (n,); unit normals out of the body, shape (n, d); and the least cosine of their
-    angles to those of facets.
-    """
+    """Return owned nodes of a part, their mean unit normals, and the least cosine to facets'."""
     d, facets = domain.dim, domain.facets(part)
     degree, shape = space.ufl_element().embedded_superdegree, shape_of(domain.mesh)
     cells, place, normal = facet_normals(domain, part, degree)
@@ -103,26 +97,26 @@ def nodal_normals(
 
 
 class Rollers:
-    """The rollers of a body, which hold the nodes that they share together.
+    """The rollers of a body, which constrain shared nodes together.
 
-    At a node with normals n_i, and A their parts along components that no other support fixes, the
-    displacement is that of least squares, by A's pseudo-inverse. The forces are their transpose:
-    each roller bears a force along its own normal, and the least of several that are dependent.
-    Nothing depends on their order. Collective to make.
+    At a node with normals n_i, and A their parts along components without other supports, the
+    displacement is that of least squares, by A's pseudo-inverse. The forces are its transpose:
+    each roller bears a force along its own normal, of dependent normals the least.
+    The order of rollers has no effect. Collective to make.
 
     Parameters
     ----------
     domain, space, body
-        Mesh, space of the unknowns, and the body as it is described.
+        Mesh, space of the unknowns, and description of the body.
     unsupported
-        Which unknowns of the owned nodes no other support holds, shape (nodes, block size).
+        Mask of the owned nodal unknowns without other supports, shape (nodes, block size).
 
     Attributes
     ----------
     each
         The rollers.
     inclined
-        The directions that they hold; None where there are no rollers.
+        Their constrained directions; None without rollers.
 
     Raises
     ------
@@ -165,13 +159,13 @@ class Rollers:
         left, values, right = np.linalg.svd(
             normals * unsupported[every, None, :d], full_matrices=False
         )
-        holds = values > APART
-        inverse = np.divide(1.0, values, out=np.zeros_like(values), where=holds)
+        independent = values > APART
+        inverse = np.divide(1.0, values, out=np.zeros_like(values), where=independent)
         lift = np.einsum("mkr,mr,mrd->mkd", left, inverse, right)
         across = np.zeros((every.size, size, size))
-        across[:, :d, :d] = np.einsum("mrd,mr,mre->mde", right, holds, right)
+        across[:, :d, :d] = np.einsum("mrd,mr,mre->mde", right, independent, right)
         # Normals that are nearly parallel are one direction, and their values differ a little.
-        slack = np.maximum(np.where(holds, 0.0, values).max(axis=1), ROUNDING**0.5)
+        slack = np.maximum(np.where(independent, 0.0, values).max(axis=1), ROUNDING**0.5)
         for k, (place, (number, fixed)) in enumerate(zip(places, chosen, strict=True)):
             assert fixed.normal is not None
             nodes = every[place]
@@ -179,14 +173,14 @@ class Rollers:
             own = normals[place, k], lift[place, k], slack[place]
             given = fixed.normal, fixed.factor, domain.comm
             self.each.append(Roller(number, nodes, points, *own, *given))
-        some = holds.any(axis=1)
+        some = independent.any(axis=1)
         self.inclined = Inclined(every[some], across[some])
         self._nodes, self._borne = every, np.einsum("mki,mkj->mij", normals, lift)
-        spare = bool((count > holds.sum(axis=1)).any())
+        spare = bool((count > independent.sum(axis=1)).any())
         self._spare = domain.comm.allreduce(spare, op=MPI.LOR)
 
     def check_apart(self, tied: NDArray[np.bool_]) -> None:
-        """Refuse rollers whose nodes follow a rigid part; `GlobalUnknowns.tied`. Collective."""
+        """Refuse rollers on tied nodes, the mask `GlobalUnknowns.tied`. Collective."""
         for roller in self.each:
             shared = bool(tied[roller.nodes, : self._domain.dim].any())
             if self._domain.comm.allreduce(shared, op=MPI.LOR):
@@ -199,12 +193,7 @@ class Rollers:
     def set(self, nodal: Array, time: float) -> None:
         """Put the displacements at a time into nodal unknowns, (nodes, >= d). Collective.
 
-        Components that other supports hold at the nodes remain.
-
-        Raises
-        ------
-        InputError
-            On all ranks, if they contradict each other or other supports.
+        Components of other supports remain. Contradictions are refused on all ranks.
         """
         given = [roller.given(time) for roller in self.each]
         missing = [g - roller.along(nodal) for g, roller in zip(given, self.each, strict=True)]
@@ -214,7 +203,7 @@ class Rollers:
             self._check(given, [roller.along(nodal) for roller in self.each])
 
     def _check(self, given: Sequence[Array], met: Sequence[Array]) -> None:
-        """Refuse displacements that cannot be met at nodes of several supports. Collective."""
+        """Refuse contradictory displacements at nodes of several supports. Collective."""
         comm, least = self._domain.comm, ROUNDING * self._domain.size
         worst = (0.0, 0, 0, np.zeros(0), 0.0, 0.0)
         for k, (roller, asked, got) in enumerate(zip(self.each, given, met, strict=True)):
@@ -247,27 +236,19 @@ class Rollers:
         )
 
     def forces(self, number: int, nodes: NDArray[np.int32]) -> Array:
-        """Return the matrices from residuals at nodes to the forces of a roller, (n, d, d).
-
-        Parameters
-        ----------
-        number
-            Which of the body's `fixed`.
-        nodes
-            Which of the owned nodes.
-        """
+        """Return the matrices from residuals at owned nodes to a roller's forces, (n, d, d)."""
         roller = next(roller for roller in self.each if roller.number == number)
         return _at(nodes, roller.nodes, np.einsum("ni,nj->nij", roller.normal, roller.lift))
 
     def borne(self, nodes: NDArray[np.int32]) -> Array:
-        """Return those to the forces of all rollers, likewise."""
+        """Return the matrices from residuals at owned nodes to the forces of all rollers."""
         if not self.each:
             return np.zeros((nodes.size, self._domain.dim, self._domain.dim))
         return _at(nodes, self._nodes, self._borne)
 
 
 def _at(nodes: NDArray[np.int32], known: NDArray[np.int32], values: Array) -> Array:
-    """Return values at some nodes, 0 at those that are not known."""
+    """Return values at nodes, 0 at those without."""
     found = np.zeros((nodes.size, *values.shape[1:]))
     _, at, own = np.intersect1d(nodes, known, return_indices=True)
     found[at] = values[own]

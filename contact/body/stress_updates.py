@@ -1,4 +1,4 @@
-"""Checks of laws with internal variables, which may be a user's own, and of their responses."""
+"""Checks of laws with internal variables, built in or a user's own, and of their responses."""
 
 from __future__ import annotations
 
@@ -22,20 +22,14 @@ OPTIONAL = "stiffness", *ENERGIES
 
 
 def name_of(law: object) -> str:
-    """Return the name of a law's class in messages: in plane stress that of the law within."""
+    """Return a law's class for messages, in plane stress that of its base."""
     while isinstance(law, PlaneStressHistory | HenckyAtPoints):
         law = law.base
     return type(law).__name__
 
 
 def first_values(law: HistoryLaw, size: int) -> dict[str, Array]:
-    """Return the variables in the reference configuration, with s = `size` components.
-
-    Raises
-    ------
-    InputError
-        If the law returns something else, or a name that is no identifier.
-    """
+    """Return the variables in the reference configuration, with s = `size` components, checked."""
     place = f"{name_of(law)}: variables"
     with naming(place):
         given = law.variables(size)
@@ -52,18 +46,7 @@ def first_values(law: HistoryLaw, size: int) -> dict[str, Array]:
 def respond(
     law: HistoryLaw, strain: Array, variables: Mapping[str, Array], kind: str = ""
 ) -> Response:
-    """Return the response of a law at n points, with the stiffness that is asked for.
-
-    Parameters
-    ----------
-    law, strain, variables, kind
-        As of `HistoryLaw.respond`.
-
-    Raises
-    ------
-    InputError
-        If the law raises something, or returns something else.
-    """
+    """Return `HistoryLaw.respond` of a law at n points, checked, with the stiffness of `kind`."""
     place, (n, size) = f"{name_of(law)}: respond", strain.shape
     with naming(place):
         found = law.respond(strain, variables, kind)
@@ -85,13 +68,13 @@ def respond(
 
 
 def _returned(given: object, accepted: str, fits: bool) -> None:
-    """Refuse a value that a law returns, inside `naming`, unless it fits."""
+    """Refuse a returned value unless it fits, inside `naming`."""
     if not fits:
         raise Returned(f"the function returns {shorten(repr(given))}; accepted: {accepted}")
 
 
 def _check_array(given: object, shape: tuple[int, ...]) -> None:
-    """Refuse anything but an array of real numbers of a shape, inside `naming`."""
+    """Refuse all but real arrays of a shape, inside `naming`."""
     accepted = f"an array of real numbers of shape {shape}, a row per point"
     _returned(given, accepted, isinstance(given, np.ndarray))
     assert isinstance(given, np.ndarray)
@@ -101,22 +84,7 @@ def _check_array(given: object, shape: tuple[int, ...]) -> None:
 
 
 def check_law(law: HistoryLaw, size: int, comm: MPI.Intracomm) -> None:
-    """Refuse a law that fails without strain or at small ones, on any rank. Collective.
-
-    Parameters
-    ----------
-    law
-        The law; in plane stress the one within is asked.
-    size
-        Number of components of a tensor.
-    comm
-        The ranks that ask together.
-
-    Raises
-    ------
-    InputError
-        On all ranks.
-    """
+    """Refuse, on all ranks, a law that fails at zero or small strains of `size` components."""
     law = law.base if isinstance(law, PlaneStressHistory) else law
     with on_all_ranks(comm):
         first = first_values(law, size)

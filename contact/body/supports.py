@@ -1,22 +1,28 @@
-"""Supports: prescribed displacements and potentials as Dirichlet conditions."""
+"""Supports: prescribed displacements and potentials as Dirichlet conditions, and elastic ones."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import ufl
 from dolfinx import fem
 from dolfinx.la import InsertMode
-from dolfinx.mesh import entities_to_geometry
+from dolfinx.mesh import compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact._compat import collapse, lasting
 from contact.body.description import Body
+from contact.body.loads import expression
+from contact.body.weak_form import ElasticSupport
 from contact.errors import InputError
 from contact.mesh.domain import Domain, on_axis
 from contact.model.fields import Amplitude, Field, Moving, steady, values_at
+from contact.model.formula import Expression
+from contact.ranks import on_all_ranks
 from contact.typing import Array
 
 
@@ -27,21 +33,19 @@ class Support:
     Attributes
     ----------
     condition
-        The Dirichlet condition; its values are those without the amplitude.
+        The Dirichlet condition, with values without the amplitude.
     amplitude
         Factor as a function of time.
     field
         The prescribed function; None for zero.
-    values
-        Where the condition takes its values from.
-    dofs, points
-        Which of these, shape (n,), and their coordinates, shape (n, d).
+    values, dofs, points
+        The function of the condition's values, its dofs, shape (n,), their coordinates, (n, d).
     scale
         Unit of the component in the unknowns.
     name, comm
-        Its name in messages, and the ranks that ask together.
+        Name in messages, and communicator.
     check
-        Refuses values that cannot be prescribed, on all ranks together; None for any.
+        Check of the values, collective; None for any values.
     """
 
     condition: fem.DirichletBC
@@ -56,7 +60,7 @@ class Support:
     check: Callable[[Array], None] | None = None
 
     def evaluate(self, time: float) -> None:
-        """Give the condition its values at a time. Collective where the field is."""
+        """Set the values of the condition at a time. Collective where the field is."""
         if self.field is None:
             return
         given = values_at(self.field, self.points, time, self.name, self.comm)
@@ -72,9 +76,7 @@ class Support:
 
 
 def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Support]:
-    """Return a body's supports and electrodes, one a component. Collective.
-
-    On the axis of a body of revolution u_r = 0, without being asked for.
+    """Return a body's supports, one a component, and u_r = 0 on an axis of revolution. Collective.
 
     Raises
     ------
@@ -111,8 +113,56 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
     return supports
 
 
+def elastic_supports_of(domain: Domain, body: Body) -> list[ElasticSupport]:
+    """Return the elastic supports for the weak form. Collective.
+
+    Raises
+    ------
+    InputError
+        If a part is missing, or a stiffness has the wrong length or is negative somewhere.
+    """
+    found, x = [], ufl.SpatialCoordinate(domain.mesh)
+    for number, support in enumerate(body.elastic):
+        axes, on = support.stiffness or (), support.on
+        if axes and len(axes) != domain.dim:
+            raise InputError(
+                f"elastic on {on!r}: the stiffness has {len(axes)} components, the body "
+                f"has {domain.dim}",
+                "elastic",
+            )
+        given: dict[str, Field | Moving] = {f"stiffness.{i}": value for i, value in enumerate(axes)}
+        given["normal"] = Expression(0.0) if support.normal is None else support.normal
+        for key, value in given.items():
+            _check_stiffness(domain, on, value, f"elastic.{number}.{key}")
+        *along, normal = (
+            expression(domain, value, x, 0.0, f"elastic.{number}.{key}")
+            for key, value in given.items()
+        )
+        found.append(ElasticSupport(along, normal, domain.ds(on)))
+    return found
+
+
+def _check_stiffness(domain: Domain, on: str, value: Any, key: str) -> None:
+    """Refuse a stiffness with values on a part that are not >= 0. Collective."""
+    mesh, facets = domain.mesh, domain.facets(on)
+    points = compute_midpoints(mesh, domain.dim - 1, facets)
+    if facets.size > 0:  # dolfinx divides by their number
+        corners = np.unique(entities_to_geometry(mesh, domain.dim - 1, facets))
+        points = np.concatenate([points, mesh.geometry.x[corners]])
+    with on_all_ranks(domain.comm), np.errstate(all="ignore"):
+        values = np.asarray(value.numpy(points[:, : domain.dim]))
+    wrong = ~(np.isfinite(values) & (values >= 0))
+    found = domain.comm.allgather(values[wrong][:1].tolist())
+    worst = [one for own in found for one in own]
+    if worst:
+        raise InputError(
+            f"{key}: given {worst[0]:g} on {on!r}; accepted: numbers >= 0 everywhere",
+            "negative-stiffness",
+        )
+
+
 def _check_across(key: str, domain: Domain, on: str, axis: int) -> None:
-    """Refuse a part that lies in no plane across an axis. Collective."""
+    """Refuse a part outside a plane across an axis. Collective."""
     name = "xyz"[axis]
     if axis >= domain.dim or (domain.revolved and axis == 0):
         known = "y" if domain.revolved else " or ".join("xyz"[: domain.dim])
@@ -142,7 +192,7 @@ def _axis(domain: Domain, space: fem.FunctionSpace) -> Support:
 def _nothing(
     subspace: fem.FunctionSpace, zero: fem.Function, dofs: Sequence[NDArray[np.int32]]
 ) -> Support:
-    """Return the condition that a component is 0 at some of its dofs."""
+    """Return the homogeneous condition on a component at some of its dofs."""
     condition = fem.dirichletbc(zero, dofs, subspace)
     none, comm = np.zeros((dofs[1].size, 0)), lasting(subspace.mesh.comm)
     return Support(condition, steady, None, zero, dofs[1], none, 1.0, "", comm)
@@ -176,6 +226,7 @@ def _support(
     amplitude: Amplitude,
     name: str,
 ) -> Support:
+    """Return the support of a component on a part. Collective."""
     dim, facets = domain.dim, domain.facets_anywhere(part)
     subspace = space.sub(component)
     scalar, _ = collapse(subspace)
@@ -193,17 +244,9 @@ def _support(
 
 
 def without_field(space: fem.FunctionSpace, cells: NDArray[np.int32]) -> Support:
-    """Return the condition phi = 0 at the nodes that belong to no piezoelectric cell. Collective.
+    """Return the condition phi = 0 at all nodes outside owned piezoelectric cells. Collective.
 
-    There is no electric field in other materials: a current that reaches its surface
-    ends there, as at that of an insulator.
-
-    Parameters
-    ----------
-    space
-        Of displacement and potential.
-    cells
-        Owned piezoelectric cells.
+    There is no electric field in other materials, whose surface is that of an insulator.
     """
     subspace = space.sub(space.dofmap.index_map_bs - 1)
     scalar, to_whole = collapse(subspace)
@@ -217,7 +260,7 @@ def without_field(space: fem.FunctionSpace, cells: NDArray[np.int32]) -> Support
 
 
 def free_components(space: fem.FunctionSpace, supports: Sequence[Support]) -> NDArray[np.bool_]:
-    """Return which components of the owned nodes are not fixed, shape (nodes, block size)."""
+    """Return the mask of the owned nodes' unsupported unknowns, shape (nodes, block size)."""
     index_map, bs = space.dofmap.index_map, space.dofmap.index_map_bs
     free = np.ones(index_map.size_local * bs, dtype=bool)
     for support in supports:

@@ -9,7 +9,7 @@ the body, in the sign of the given charges q_2 = D.nu.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -166,11 +166,9 @@ class DrivenPart:
             return None
         parts, body = set(members(on)), problem.equilibrium
         held = [at for part, at in holding(problem, electric=False).items() if part in parts]
-        loads = problem.body.loads
-        own = tuple(load for load in loads if load.on and parts >= set(members(load.on)))
-        test = body.forms.split(ufl.TestFunction(body.space))
-        acting = Loads(problem.domain, replace(problem.body, loads=own), *test, body.owned)
-        return DrivenPart(on, nodes_of(problem, on), held, acting)
+        within = [load.on for load in problem.body.loads if load.on]
+        within = [name for name in within if parts >= set(members(name))]
+        return DrivenPart(on, nodes_of(problem, on), held, body.loads_along(body.space, within))
 
     def way(self, problem: ContactProblem, state: State) -> Array:
         """Return the mean displacement of its nodes, shape (d,). Collective."""

@@ -136,9 +136,9 @@ MUTANTS = (
     Mutant(
         "elastic-half",
         "the force k u of an elastic support",
-        "contact/body/weak_forms.py",
-        "sum((k * u[i] * v[i] for i, k in enumerate(parts))",
-        "sum((k / 2 * u[i] * v[i] for i, k in enumerate(parts))",
+        "contact/body/weak_form.py",
+        "work += k * x.u[i] * z.u[i]",
+        "work += k / 2 * x.u[i] * z.u[i]",
         ("tests/body/test_elastic.py",),
     ),
     Mutant(

@@ -1,0 +1,164 @@
+"""The weak form of one body: its residual, the sum of its named terms.
+
+The unknowns x = (u, phi) of a body under given loads satisfy, for all test functions z = (v, xi)
+that vanish where displacements and potentials are prescribed,
+
+    R(x; z) = internal_forces + elastic_supports
+            + body_forces + tractions + pressures + charges = contact forces.
+
+That is (10) of docs/theory.md, and (5.26) of the thesis, without a potential (3.9): the test
+function of the potential is negated, so that the derivative of R is symmetric. Loads are negative
+terms: R = <F(x), z> - <f, z>. Stresses are those of `forms`; contact is `contact.interface`.
+
+Measures, fields and laws in UFL are made by `contact.body.materials` and `contact.body.loads`;
+`contact.body.assembly` compiles the terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import ufl
+from ufl.core.expr import Expr
+
+from contact.mesh.integrals import Measure
+from contact.model.fields import Amplitude
+from forms.hencky import FormLaw, secant_form
+from forms.history import QuadratureLaw
+from forms.kinematics import Strained
+from forms.piezo import Piezo, symmetrised_form
+
+
+class Fields(NamedTuple):
+    """A displacement and a potential, None without coupling: x = (u, phi), or z = (v, xi)."""
+
+    u: Expr
+    phi: Expr | None
+
+
+class Solid(NamedTuple):
+    """Cells of one material: law, tensors, signed kinematics of the strains, and measure."""
+
+    law: FormLaw
+    piezo: Piezo | None
+    strains: tuple[tuple[int, Strained], ...]
+    dx: Measure
+
+
+class ElasticSupport(NamedTuple):
+    """An elastic support: k_i along the axes, if given, k_nu along the normal, and measure."""
+
+    axes: Sequence[Expr]
+    normal: Expr
+    ds: Measure
+
+
+class Given(NamedTuple):
+    """A given load: a vector or a number, measure, part, factor; and if the value knows time."""
+
+    value: Expr
+    over: Measure
+    on: str | None
+    amplitude: Amplitude
+    moving: bool
+
+
+class Term(NamedTuple):
+    """A term of the residual; of a load, without its amplitude."""
+
+    form: ufl.Form
+    load: Given | None = None
+
+
+@dataclass(frozen=True)
+class WeakForm:
+    """The residual R(x; z) of one body.
+
+    Attributes
+    ----------
+    nu
+        The unit normal out of the body.
+    solids, elastic
+        Materials and elastic supports.
+    loads
+        Given loads by their keys in the case file, ``traction`` with resultants as well.
+    """
+
+    nu: Expr
+    solids: Sequence[Solid]
+    elastic: Sequence[ElasticSupport]
+    loads: Mapping[str, Sequence[Given]]
+
+    def residual(
+        self, x: Fields, z: Fields, secant_at: Expr | None = None, history_at: Expr | None = None
+    ) -> list[Term]:
+        """Return the terms of R(x; z), of each material, support and load one.
+
+        Parameters
+        ----------
+        x, z
+            Unknowns, and test functions.
+        secant_at
+            The displacement of the secant modulus (Kacanov); that of x by default.
+        history_at
+            That about which stresses of laws with internal variables are linearised, likewise.
+        """
+        return (
+            self.internal_forces(x, z, secant_at, history_at)
+            + self.elastic_supports(x, z)
+            + self.body_forces(z)
+            + self.tractions(z)
+            + self.pressures(z)
+            + self.charges(z)
+        )
+
+    def internal_forces(
+        self, x: Fields, z: Fields, secant_at: Expr | None, history_at: Expr | None
+    ) -> list[Term]:
+        """Return int_Omega sigma : eps(v) + D . grad(xi) dx, equations (1), (4); (3.10), (5.27)."""
+        terms = []
+        for law, piezo, strains, dx in self.solids:
+            u_0 = history_at if isinstance(law, QuadratureLaw) else secant_at
+            u_0, work = x.u if u_0 is None else u_0, 0
+            for sign, kinematics in strains:
+                if piezo is None:
+                    work += sign * secant_form(law, u_0, x.u, z.u, kinematics)
+                else:
+                    work += sign * symmetrised_form(law, piezo, u_0, *x, *z, kinematics)
+            terms.append(Term(work * dx))
+        return terms
+
+    def elastic_supports(self, x: Fields, z: Fields) -> list[Term]:
+        """Return int k_i u_i v_i + k_nu u_nu v_nu da of the tractions -k_i u_i, -k_nu u_nu nu."""
+        terms = []
+        for axes, normal, ds in self.elastic:
+            work = normal * ufl.dot(x.u, self.nu) * ufl.dot(z.u, self.nu)
+            for i, k in enumerate(axes):
+                work += k * x.u[i] * z.u[i]
+            terms.append(Term(work * ds))
+        return terms
+
+    def body_forces(self, z: Fields) -> list[Term]:
+        """Return - int_Omega f_0 . v dx, of (3.8)."""
+        given = self.loads.get("body_force", ())
+        return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in given]
+
+    def tractions(self, z: Fields) -> list[Term]:
+        """Return - int_Gamma_2 f_2 . v da, of (3.8); of a resultant force F, f_2 = F/|Gamma_2|."""
+        given = self.loads.get("traction", ())
+        return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in given]
+
+    def pressures(self, z: Fields) -> list[Term]:
+        """Return int_Gamma_2 p v_nu da: the traction f_2 = -p nu."""
+        given = self.loads.get("pressure", ())
+        return [Term(p.value * ufl.dot(self.nu, z.u) * p.over, p) for p in given]
+
+    def charges(self, z: Fields) -> list[Term]:
+        """Return int_Omega q_0 xi dx - int_Gamma_b q_2 xi da, of (5.29)."""
+        volume, surface = (self.loads.get(key, ()) for key in ("body_charge", "charge"))
+        return [
+            *(Term(q.value * z.phi * q.over, q) for q in volume),
+            *(Term(-q.value * z.phi * q.over, q) for q in surface),
+        ]
