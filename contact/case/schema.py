@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -19,6 +21,9 @@ from contact.settings import ReadWith
 
 #: Version of the schema's own language.
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+#: Ends the text of a docstring, before its keys.
+DOCUMENTED = re.compile(r"\n\n(?:Attributes|Parameters|Examples)\n")
 
 LENGTH = {"type": "number", "exclusiveMinimum": 0}
 
@@ -44,6 +49,10 @@ def schema() -> dict[str, Any]:
     tables = made["$defs"]
     for name, section in below(Case).items():
         tables[name]["additionalProperties"] = False  # pydantic says so of models alone
+        # Those of dataclasses have no keys described by pydantic, those of models have them twice.
+        tables[name]["description"] = DOCUMENTED.split(inspect.getdoc(section) or "")[0]
+        for key, field in keys_of(section).items():
+            tables[name]["properties"][key].setdefault("description", field.description)
         rules = _material_rules() if section is Material else _rules(section, _defaults(section))
         if rules:
             tables[name] |= _unseen({"allOf": rules})

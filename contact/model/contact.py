@@ -40,6 +40,7 @@ from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
 
+#: A further shape is a dataclass in `contact.model.obstacle` with its name as `shape`.
 SHAPES = (Plane, Sphere, Cylinder, Cone, Paraboloid, Punch, Level, Heights, Triangles)
 
 
@@ -52,7 +53,7 @@ def _kind(given: Any) -> Any:
     return "own" if hasattr(given, "measure") else None
 
 
-#: A further shape is a dataclass in `contact.model.obstacle` with its name as `shape`.
+#: A table, by the name of its shape, or an object with `measure`.
 Foundation: TypeAlias = Annotated[
     Annotated[Plane, FromTable, Tag("plane")]
     | Annotated[Sphere, FromTable, Tag("sphere")]
@@ -172,6 +173,7 @@ class Contact(Described):
         *,
         electric: Electric | Conductor | None = None,
         rigid: Motion | None = None,
+        law: Literal["signorini", "compliance"] | None = None,
         direction: Literal["foundation", "body", "axis"] = "foundation",
         axis: Sequence[float] | Array | None = None,
         overlap: Literal["refuse", "press"] = "refuse",
@@ -194,7 +196,7 @@ class Contact(Described):
         super().__init__(
             on=on,
             name=name,
-            law="signorini" if layer is None else "compliance",
+            law=law or ("signorini" if layer is None else "compliance"),
             against=against,
             gap=gap,
             foundation=foundation,
@@ -283,7 +285,7 @@ class Contact(Described):
 
     @property
     def obstacle(self) -> Obstacle:
-        """Return the rigid foundation, or the gap, as contact nodes see it."""
+        """The rigid foundation, or the gap, as contact nodes see it."""
         if self.foundation is None:
             assert self.gap is not None  # filled in
             return GapFunction.of(self.gap)
@@ -294,7 +296,7 @@ class Contact(Described):
 
     @property
     def compliant_layer(self) -> Layer | None:
-        """Return the layer in front of the rigid foundation; None without one."""
+        """The layer in front of the rigid foundation; None without one."""
         if isinstance(self.layer, Layer | None) or self.law == "signorini":
             return self.layer if isinstance(self.layer, Layer) else None
         factor = PotentialFactor(self.stiffness, self.potential_factor, self.potential_range)
