@@ -162,13 +162,7 @@ def write_checkpoint(solution: Solution, path: str | Path) -> None:
 
 
 def read_checkpoint(path: str | Path, problem: ContactProblem) -> State:
-    """Return the state in a file that `write_checkpoint` wrote, on any number of ranks. Collective.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it is of another problem.
-    """
+    """Return the state in a file of `write_checkpoint`, on any number of ranks. Collective."""
     return _Reader(problem).read(Path(path))[0]
 
 

@@ -49,14 +49,7 @@ def write_fields(solution: Solution, folder: Path) -> None:
     file has one kind of elements only. ``fields.xdmf`` has those at the nodes, of degree 1 at
     most; of several regions the means of the cells. Averages stay in their region. Of an evolution
     each has all steps; ``fields.vtu`` has the last one, and ``fields.pvd`` names files with the
-    main fields of all.
-
-    Raises
-    ------
-    InputError
-        If dolfinx has no ADIOS2 for VTX files, or a file cannot be written.
-    OSError
-        On a rank where the library fails all the same; others may wait for it.
+    main fields of all. A library may fail by an OSError on one rank, while others wait for it.
     """
     problem, frames = solution.problem, _frames(solution)
     match solution.output.fields:
@@ -175,10 +168,8 @@ def _points_of(
 ) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp]]:
     """Return the points of a grid: a node between groups of cells has one for each. Collective.
 
-    Returns
-    -------
-    The number of the point of each local node and group over all ranks, shape (nodes, groups), -1
-    for none; the nodes and the groups of the points of this rank.
+    The number over all ranks of the point of each local node and group, -1 for none, and nodes and
+    groups of the points of this rank.
     """
     space, groups = derived.body.space, derived.groups
     index_map, count = space.dofmap.index_map, derived.group_count
