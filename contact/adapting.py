@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from mpi4py import MPI
@@ -16,8 +15,6 @@ from contact.mesh.domain import Domain, Indices
 from contact.mesh.transfer import with_parents
 from contact.methods.report import tell
 from contact.nesting import prolong
-from contact.problem.problem import ContactProblem
-from contact.problem.state import State
 from contact.results.error_estimate import estimated
 from contact.results.intervals import intervals
 from contact.results.quantities import values_of
@@ -28,13 +25,8 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.adapt")
 
-
-class Solver(Protocol):
-    """Solves a problem from an initial guess; the solution is not reviewed."""
-
-    def __call__(self, problem: ContactProblem, *, start: State | None) -> Solution:
-        """Return the solution. Collective."""
-
+#: Solves a problem from an initial guess, `start`; the solution is not reviewed.
+Solver = Callable[..., Solution]
 
 #: Cells whose indicator is within that of the last one marked are marked too: rounding, which
 #: differs by the number of ranks, decides nothing.

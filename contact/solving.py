@@ -254,20 +254,12 @@ def solve_problem(
 
     Parameters
     ----------
-    problem, settings, monitor
-        The problem, the options of a method, and a function called after every outer iteration.
     start, guess
         Initial guess of a single step, None for zero, and its name in messages.
     times
         Begin and ends of the load steps; none for a single step to the problem's own time.
     kept, keep
         Records of the steps of an earlier run, to continue from; called with that of each step.
-
-    Raises
-    ------
-    InputError
-        If a linear system is singular, the potential is not determined, or the initial guess is
-        that of another problem.
     """
     clock = time.perf_counter()
     check_variables(problem.equilibrium)
@@ -309,21 +301,8 @@ def reviewed(
 ) -> Solution:
     """Return a solution with its warnings, and the titles of its case. Collective.
 
-    Parameters
-    ----------
-    solution
-        The solution.
-    case
-        The case that it is of.
-    clock
-        When its setup began (`time.perf_counter`).
-    described
-        Whether the case is the whole description, with no objects in place of its parts.
-
-    Raises
-    ------
-    SolveInterrupted
-        With the solution, if a signal has ended the solve.
+    Setup began at `clock`. A case with objects in place of its parts is not fully `described`.
+    If a signal has ended the solve, `SolveInterrupted` is raised with the solution.
     """
     announce(solution)
     if case is not None:
