@@ -219,12 +219,12 @@ def _stuck(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
     """Return the slave nodes of this rank whose normal is fixed."""
     _, local = owned_among(body.layout.index_map, coupling.nodes)
     moves = body.free[local, : body.dim]
-    held = np.linalg.norm(coupling.normal * moves, axis=1) <= APART
-    return coupling.nodes[held]
+    constrained = np.linalg.norm(coupling.normal * moves, axis=1) <= APART
+    return coupling.nodes[constrained]
 
 
 def _one_sided(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> NDArray[np.bool_]:
-    """Tell which components of slave nodes are fixed, but free on the other side. Collective."""
+    """Return which components of slave nodes are fixed but free opposite. Collective."""
 
     def fixed(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which components of nodes of this rank are fixed."""
@@ -245,8 +245,8 @@ def _given(
         return np.abs(body.movable(local)).reshape(local.size, body.dim**2)
 
     moves = np.abs(coupling.M) @ owners.values(coupling.masters, free)
-    held = np.eye(body.dim) - movable
-    along = held @ moves.reshape(-1, body.dim, body.dim)
+    constrained = np.eye(body.dim) - movable
+    along = constrained @ moves.reshape(-1, body.dim, body.dim)
     return np.asarray(np.abs(along).max(axis=(1, 2), initial=0.0) <= ROUNDING)
 
 
@@ -257,10 +257,10 @@ def _check_rim(
     lost = [slave.owners.among(nodes, slave.nodes.ravel()) for nodes in lost]
     facets, filled = body.domain.facets(part), False
     for support in body.body.fixed:
-        held = np.isin(facets, body.domain.facets_anywhere(support.on))
+        supported = np.isin(facets, body.domain.facets_anywhere(support.on))
         for given, nodes in zip(support.displacement or (), lost, strict=False):
             if given is not None:
-                filled |= bool((held & np.isin(slave.nodes, nodes).all(axis=1)).any())
+                filled |= bool((supported & np.isin(slave.nodes, nodes).all(axis=1)).any())
     if body.comm.allreduce(filled, op=MPI.LOR):
         raise InputError(
             f"{label}: supports hold the first along its surface, where friction would pull at "
@@ -288,7 +288,7 @@ def _refuse_overlap(body: BodyEquilibrium, coupling: Coupling, owners: Owners, l
 
 
 def _connected(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> bool:
-    """Tell whether both sides are on the same connected component. Collective."""
+    """Return whether both sides are on one connected component. Collective."""
     piece, count = body.components
     found = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):
