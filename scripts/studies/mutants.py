@@ -274,7 +274,7 @@ MUTANTS = (
     Mutant(
         "late-steps",
         "the ends of the steps of a case: one step late",
-        "contact/case/evolution.py",
+        "contact/model/evolution.py",
         "* (k + 1) / count",
         "* k / count",
         ("tests/case/test_evolution.py",),
