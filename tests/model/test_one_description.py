@@ -132,3 +132,16 @@ def test_foundations_move_by_the_contact() -> None:
 def test_wrong_values_are_named(make, key) -> None:
     with pytest.raises(InputError, match=rf"\b{key}: .*; accepted: "):
         make()
+
+
+def test_the_potential_of_a_foundation_in_time() -> None:
+    """From the beginning, unless it has an amplitude; formulas and functions of time."""
+    domain, half = block(), lambda t: 0.5 * t
+    for electric, values in (
+        (Electric(1.0, 32.0), (32.0, 32.0)),
+        (Electric(1.0, "32*t"), (8.0, 32.0)),
+        (Electric(1.0, 32.0, amplitude=half), (4.0, 16.0)),
+        (Electric(1.0, lambda t: 2 * t, amplitude="constant"), (0.5, 2.0)),
+    ):
+        conductor = electric.conductor(domain, "bottom")
+        assert tuple(conductor.at(time).phi_f for time in (0.25, 1.0)) == pytest.approx(values)
