@@ -52,14 +52,14 @@ def given_loads(domain: Domain, body: Body, time: fem.Constant) -> Mapping[str, 
             if not component:
                 found[key].append(Given(value, over, load.on, load.factor, moving))
                 continue
-            if key == "force":
-                assert load.on is not None
-                value /= constant(domain.mesh, area(domain, load.on))
             none = [constant(domain.mesh, 0.0) for _ in range(domain.dim)]
             vectors.setdefault((key, moving), none)[int(component[0])] = value
         for (key, moving), values in vectors.items():
-            given = Given(ufl.as_vector(values), over, load.on, load.factor, moving)
-            found["traction" if key == "force" else key].append(given)
+            vector = ufl.as_vector(values)
+            if key == "force":
+                assert load.on is not None
+                key, vector = "traction", vector / constant(domain.mesh, area(domain, load.on))
+            found[key].append(Given(vector, over, load.on, load.factor, moving))
     return found
 
 
