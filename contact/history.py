@@ -84,8 +84,8 @@ class History(dict[str, Part]):
         )
 
 
-class Evaluated(Protocol):
-    """Unknowns of a body and history at the beginning of the step: a `State`, or these alone."""
+class LinearisationPoint(Protocol):
+    """Unknowns x and history at the beginning of the step, for forces and tangents of a body."""
 
     @property
     def x(self) -> Array:
@@ -98,7 +98,7 @@ class Evaluated(Protocol):
 
 @dataclass(frozen=True)
 class BodyState:
-    """Unknowns and history of a body without contact forces; see `Evaluated`."""
+    """Unknowns and history of a body without contact forces; see `LinearisationPoint`."""
 
     x: Array
     history: History = field(default_factory=History)

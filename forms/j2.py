@@ -229,7 +229,7 @@ class J2(Isotropic):
             shear[plastic] *= 1 - flow.turn
             stiffness = isotropic_stiffness(self.bulk, shear, size)
             if kind == "tangent":
-                stiffness[plastic] += flow.softening()
+                stiffness[plastic] += flow.tangent_minus_secant()
         return Response(stress, new, stiffness, dissipation, self._energy(strain, stress, new))
 
     def _energy(self, strain: Array, stress: Array, variables: Mapping[str, Array]) -> Array:
@@ -404,7 +404,7 @@ class _Flow:
             found -= (recovery * ROOT * part**2)[:, None] * b
         return found
 
-    def softening(self) -> Array:
+    def tangent_minus_secant(self) -> Array:
         """Return the tangent less the secant."""
         normal, g2 = self._normal, 2 * self._law.shear
         left = (g2 * self.turn - g2**2 / self._slope)[:, None] * normal

@@ -35,7 +35,7 @@ from contact.body.materials import cells_of, factor_of
 from contact.body.pointwise import Pointwise
 from contact.body.rollers import Rollers
 from contact.body.supports import free_components, supports_of, without_field
-from contact.history import BodyState, Evaluated
+from contact.history import BodyState, LinearisationPoint
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout, congruent, masked, projectors, times
 from contact.linear.operator import Counters, SparseOperator
@@ -215,7 +215,7 @@ class BodyEquilibrium:
         forces = sum(assembled(form, self.owned) for form in self.forms.law_forces)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
-    def tangent_transposed(self, state: Evaluated, weights: Array) -> Array:
+    def tangent_transposed(self, state: LinearisationPoint, weights: Array) -> Array:
         """Return K^T w, owned values, with the tangent K without supports. Collective."""
         matrix = self.create_matrix()
         self.assemble(matrix, "tangent", state, constrained=False)
@@ -224,7 +224,7 @@ class BodyEquilibrium:
         matrix.destroy()
         return found
 
-    def forces_without_history(self, state: Evaluated) -> Array:
+    def forces_without_history(self, state: LinearisationPoint) -> Array:
         """Return the owned nodal forces of all materials without internal variables. Collective."""
         self.laws.silence()
         self.forms.put(self.nodal(state.x), self.motion(state.x))
@@ -232,7 +232,7 @@ class BodyEquilibrium:
         forces[self.owned :] += self.forms.on_global(self.global_unknowns.size)
         return forces
 
-    def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
+    def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
         """Return the owned internal forces at a state. Collective.
 
         Parameters
@@ -307,7 +307,7 @@ class BodyEquilibrium:
         return create_matrix(self.forms.pattern)
 
     def assemble(
-        self, matrix: PETSc.Mat, kind: str, state: Evaluated, constrained: bool = True
+        self, matrix: PETSc.Mat, kind: str, state: LinearisationPoint, constrained: bool = True
     ) -> None:
         """Assemble Kacanov's "secant", Newton's "tangent" or its "symmetric" part. Collective.
 
@@ -377,7 +377,7 @@ class BodyEquilibrium:
         """Return the `norms` of the nodal loads at a time. Collective."""
         return self.norms(self.external(time))
 
-    def exchanged(self, state: Evaluated) -> Array:
+    def exchanged(self, state: LinearisationPoint) -> Array:
         """Return the `norms` of the potential's forces and the strain's charges. Collective."""
         if not self.piezoelectric:
             return np.zeros((1, self.component_norms.count))

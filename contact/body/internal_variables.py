@@ -21,7 +21,7 @@ from ufl.core.expr import Expr
 from contact.body.pointwise import Pointwise
 from contact.body.stress_updates import check_law, respond
 from contact.errors import InputError
-from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
+from contact.history import QUADRATURE_POINTS, InternalVariables, LinearisationPoint
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.geometry import geometry_nodes, integration_weights
@@ -163,7 +163,7 @@ class QuadratureLaws:
         """Return a law for any points, with the stress of the last `fit`."""
         return QuadratureLaw(self.fits["stress"]) if isinstance(law, HistoryLaw) else law
 
-    def of(self, state: Evaluated) -> InternalVariables | None:
+    def of(self, state: LinearisationPoint) -> InternalVariables | None:
         """Return the variables at the beginning of a state's step; None without any."""
         part = state.history.get(VARIABLES, self.initial)
         assert part is None or isinstance(part, InternalVariables)
@@ -173,14 +173,16 @@ class QuadratureLaws:
         u = ufl.as_vector([at[i] for i in range(self._domain.dim)])
         return to_vector(strain(u, self.kinematics), self._size)
 
-    def _responses(self, state: Evaluated, kind: str = "") -> Iterator[tuple[Indices, Response]]:
+    def _responses(
+        self, state: LinearisationPoint, kind: str = ""
+    ) -> Iterator[tuple[Indices, Response]]:
         """Yield chunks of cells and the response, with "tangent", "symmetric" part or "secant"."""
         for law, cells, strains, variables in self._points(state, state.x):
             found = respond(law, strains, variables, "tangent" if kind == "symmetric" else kind)
             yield cells, found.symmetrised() if kind == "symmetric" else found
 
     def _points(
-        self, state: Evaluated, x: Array
+        self, state: LinearisationPoint, x: Array
     ) -> Iterator[tuple[HistoryLaw, Indices, Array, dict[str, Array]]]:
         """Yield a law, a chunk of cells, strains of x and the variables before at their points."""
         before = self.of(state)
@@ -217,7 +219,7 @@ class QuadratureLaws:
             by_cell[cells] = found.reshape(by_cell[cells].shape)
 
     @collective
-    def set(self, state: Evaluated, kind: str = "") -> None:
+    def set(self, state: LinearisationPoint, kind: str = "") -> None:
         """Set stresses, and the stiffness of a kind, to those at a state. Collective."""
         before = self.of(state)
         if before is None:
@@ -235,7 +237,7 @@ class QuadratureLaws:
         self._seen = before, kind, state.x.copy()
 
     @collective
-    def commit(self, state: Evaluated) -> InternalVariables | None:
+    def commit(self, state: LinearisationPoint) -> InternalVariables | None:
         """Return the variables at the end of the step that led to a state. Collective."""
         before = self.of(state)
         if before is None:
@@ -246,7 +248,7 @@ class QuadratureLaws:
         return before.replaced(arrays)
 
     def _differentials(
-        self, state: Evaluated, along: Array, change: InternalVariables
+        self, state: LinearisationPoint, along: Array, change: InternalVariables
     ) -> Iterator[tuple[Indices, Response]]:
         """Yield chunks of cells and the differential of the response at their points."""
         moved = self._points(state, along)
@@ -258,7 +260,7 @@ class QuadratureLaws:
 
     @collective
     def commit_along(
-        self, state: Evaluated, along: Array, change: InternalVariables
+        self, state: LinearisationPoint, along: Array, change: InternalVariables
     ) -> InternalVariables:
         """Return the differential of `commit`, by unknowns and variables before. Collective."""
         arrays = {name: np.zeros_like(array) for name, array in change.arrays.items()}
@@ -267,7 +269,7 @@ class QuadratureLaws:
         return change.replaced(arrays)
 
     @collective
-    def before_along(self, state: Evaluated, change: InternalVariables) -> None:
+    def before_along(self, state: LinearisationPoint, change: InternalVariables) -> None:
         """Set stresses to their differential by the variables before a step. Collective."""
         self._seen = None
         self._stress.x.array[:] = 0.0
@@ -275,7 +277,7 @@ class QuadratureLaws:
             _fill(self._stress, cells, found.stress)
 
     @collective
-    def commit_transposed(self, state: Evaluated, after: InternalVariables) -> None:
+    def commit_transposed(self, state: LinearisationPoint, after: InternalVariables) -> None:
         """Set stresses whose forces are derivatives of a quantity by the unknowns. Collective.
 
         `after` has its derivatives by the variables at the end of the step.
@@ -291,7 +293,7 @@ class QuadratureLaws:
 
     @collective
     def before_transposed(
-        self, state: Evaluated, along: Array, after: InternalVariables | None
+        self, state: LinearisationPoint, along: Array, after: InternalVariables | None
     ) -> InternalVariables | None:
         """Return the derivatives of a quantity by the variables before a step. Collective.
 
@@ -313,7 +315,7 @@ class QuadratureLaws:
             self._put(arrays, cells, {name: _gradient(*points, name) for name in variables})
         return before.replaced(arrays)
 
-    def weigh(self, state: Evaluated, after: InternalVariables) -> None:
+    def weigh(self, state: LinearisationPoint, after: InternalVariables) -> None:
         """Set the density of `divided` to the sum of weighted variables at the end of a step."""
         ends = self.commit(state)
         assert ends is not None
@@ -328,7 +330,7 @@ class QuadratureLaws:
         dx = self._domain.dx(metadata={"quadrature_degree": self._degree})
         return fem.form(functions * self._weighed * dx)
 
-    def energies(self, state: Evaluated) -> tuple[float, float | None]:
+    def energies(self, state: LinearisationPoint) -> tuple[float, float | None]:
         """Return the dissipation of a step, and the stored energy if laws have it. Collective."""
         sums, stated, volumes = np.zeros(2), self.initial is not None, self.by_cell(self.volumes)
         with on_all_ranks(self.comm):
@@ -376,7 +378,7 @@ class QuadratureLaws:
         return np.linalg.pinv(element.tabulate(0, self.points)[0])
 
     @collective
-    def secant_shear(self, state: Evaluated) -> Array:
+    def secant_shear(self, state: LinearisationPoint) -> Array:
         """Return the mean secant shear moduli of owned cells, 0 without history. Collective."""
         found = np.zeros(self._owned)
         for cells, response in self._responses(state, "secant"):
@@ -385,7 +387,7 @@ class QuadratureLaws:
         return found
 
     @collective
-    def fit(self, state: Evaluated) -> None:
+    def fit(self, state: LinearisationPoint) -> None:
         """Set `fits` to stress and variables at a state. Collective."""
         fits = self.fits
         for cells, response in self._responses(state):

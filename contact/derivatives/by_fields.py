@@ -20,7 +20,7 @@ from contact.body.loads import assembled
 from contact.derivatives.by_parameters import LoadPath, backwards, parameters_of, quantities_of
 from contact.derivatives.differences import Parameter, family_of
 from contact.errors import InputError
-from contact.history import Evaluated, InternalVariables
+from contact.history import InternalVariables, LinearisationPoint
 from contact.results.quantity import Differentiable, Functional
 from contact.results.solution import Solution
 from contact.typing import Array
@@ -159,7 +159,11 @@ class _FieldWork:
         self._weighted = body.laws.divided(functions)
 
     def __call__(
-        self, state: Evaluated, along: Array, phi_scale: float, after: InternalVariables | None
+        self,
+        state: LinearisationPoint,
+        along: Array,
+        phi_scale: float,
+        after: InternalVariables | None,
     ) -> Array:
         """Return the values of the functions of this rank. Collective.
 

@@ -7,7 +7,7 @@ Where to find
 complementarity functions, their residuals and generalised derivative
     `complementarity`, with the parameters c and gamma (`ComplementarityParameters`).
 active set (open, stick, slip)
-    `active_set`: `ActiveSet` and `touching`, its only definition.
+    `active_set`: `ActiveSet` and `constraint_active`, its only definition.
 all laws together
     `interface.Interface`: normal gap, slip, pressure, friction bound, forces on the body.
 friction
@@ -27,6 +27,4 @@ mortar coupling
     `mortar`: `search` of the facets opposite on all ranks, `coupling` (D and M, by integrals over
     `segments`), `operator` (their application), `lumping` (areas of nodes); the deviation of curved
     surfaces from their chords is in `contact.mesh.deviation`. Each rank has the rows of its nodes.
-rigid shapes
-    `obstacle`: `protocol` is the base class of shapes, which `shapes` and `triangles` are.
 """

@@ -16,10 +16,10 @@ from contact.tolerances import EPS
 from contact.typing import Array
 
 
-def touching(
+def constraint_active(
     pressure: Array, normal_gap: Array, c: float, rounding: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Return where the rigid part presses: p - c g_N > 0, shape (n,).
+    """Return where the non-penetration constraint is active, p - c g_N > 0: shape (n,).
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class ActiveSet:
     Attributes
     ----------
     closed
-        Where the rigid part presses, shape (n,).
+        Where the non-penetration constraint is active, shape (n,).
     sticks, slips
         Where friction is below its bound, and at it, shape (n,). With a smoothed pressure or
         Tresca's law open nodes have a bound, and do either.
@@ -62,13 +62,13 @@ class ActiveSet:
         Parameters
         ----------
         closed
-            Where the rigid part presses, shape (n,).
+            Where the non-penetration constraint is active, shape (n,).
         friction, slip
             lambda_f and the slip of the step, shape (n, d).
         bound
             Friction bound s, shape (n,).
         c, rounding
-            As in `touching`.
+            As in `constraint_active`.
         """
         # At the bound and without slip yet a node sticks, to rounding.
         allowed = bound * (1 + 100 * EPS) + rounding

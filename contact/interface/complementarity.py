@@ -101,7 +101,7 @@ def interface_residuals(
     """
     # Closing a gap at one node takes a stress of E/h: with stretched cells E/diameter would hide
     # errors of the pressure far above the tolerance.
-    c = interface.elongation * interface.stiffness
+    c = interface.elongation * interface.c_0
     normal_gap = interface.normal_gap(nodal)
     contact = multipliers.pressure - project_half_line(multipliers.pressure - c * normal_gap)
     # Friction along the normal violates the law wherever a node sticks or slips.
@@ -113,13 +113,13 @@ def interface_residuals(
     before = np.linalg.norm(interface.friction.history.jump, axis=1)
     now = np.linalg.norm(nodal[:, : interface.dim], axis=1)
     way = np.maximum(now, before)
-    closing = interface.stiffness * interface.norms(
+    closing = interface.c_0 * interface.norms(
         np.minimum(np.minimum(np.abs(normal_gap), way), interface.diameter)
     )
     pressed = interface.norms(interface.pressure(nodal, multipliers))
     # Without pressure nodes may just touch: their gaps are rounding too.
     moved = interface.norms(np.full_like(way, interface.rounding(nodal)))
-    covered = interface.stiffness * interface.norms(np.minimum(now, interface.diameter))
+    covered = interface.c_0 * interface.norms(np.minimum(now, interface.diameter))
     closing = np.where(pressed <= moved, np.maximum(closing, covered), closing)
     scale = np.maximum(pressed, 1e-4 * closing)
     scale = np.maximum(scale, EPS * scale.max())
@@ -230,23 +230,23 @@ def linearise(
         friction[sticks] = (lam + parameters.gamma * slip)[sticks]
         blocks[sticks, :d, :d] += parameters.gamma * nodes.tangent[sticks]
 
-        along = trial / np.maximum(norm, 1e-300)[:, None]
-        across = nodes.tangent - along[:, :, None] * along[:, None, :]
-        # Across z = lambda + c u_tau the new multiplier is s/|u_tau| times the new slip:
-        # lambda = s z/|z|, linearised in u and lambda and solved for the latter.
-        least = np.maximum(bound * c / parameters.gamma, 1e-300)  # turning is at most gamma
-        turning = bound * c / np.maximum(norm - bound, least)
-        sliding = turning[:, None, None] * across
-        friction[slips] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slips]
+        e = trial / np.maximum(norm, 1e-300)[:, None]
+        projector = nodes.tangent - e[:, :, None] * e[:, None, :]
+        # lambda = s z/|z|, z = lambda + c u_tau, linearised and solved for the new lambda:
+        # orthogonal to z it is theta times the new slip, theta = s c/(|z| - s).
+        least = np.maximum(bound * c / parameters.gamma, 1e-300)  # theta is at most gamma
+        theta = bound * c / np.maximum(norm - bound, least)
+        sliding = theta[:, None, None] * projector
+        friction[slips] = (bound[:, None] * e + np.einsum("nij,nj->ni", sliding, slip))[slips]
         limit = softening * parameters.nodal_stiffness if unchanged else None
         rate = _bound_gradient(interface, total, slip, length, limit)
         # The bound follows the pressure of this very step.
         by_pressure = interface.friction.by_pressure(total, length)
-        ahead = -by_pressure * parameters.gamma * np.where(closed, normal_gap, 0.0)
+        bound_shift = -by_pressure * parameters.gamma * np.where(closed, normal_gap, 0.0)
         rate[:, :d] += by_pressure[:, None] * slope
         rate += by_pressure[:, None] * interface.layer.pressure_gradient(nodal)
-        friction[slips] += (ahead[:, None] * along)[slips]
-        blocks[slips, :d, :] += along[slips, :, None] * rate[slips, None, :]
+        friction[slips] += (bound_shift[:, None] * e)[slips]
+        blocks[slips, :d, :] += e[slips, :, None] * rate[slips, None, :]
         blocks[slips, :d, :d] += sliding[slips]
     return LinearisedContact(Multipliers(pressure, friction), blocks, active, unchanged)
 

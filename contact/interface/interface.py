@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.interface.active_set import ActiveSet, touching
+from contact.interface.active_set import ActiveSet, constraint_active
 from contact.interface.friction import NodalFriction
 from contact.interface.law import InterfaceLaw
 from contact.interface.multipliers import Multipliers, SlipHistory
@@ -55,8 +55,8 @@ class Interface:
         Friction.
     constrained
         Current through nodes without a free displacement, but with a free potential, or None.
-    stiffness
-        Complementarity parameter c = E/diameter (stress/length), E behind Gamma_3.
+    c_0
+        Complementarity parameter c_0 = E/diameter (stress/length), E behind Gamma_3.
     diameter
         Largest extent of the body (length).
     elongation
@@ -74,7 +74,7 @@ class Interface:
     layer: InterfaceLaw
     friction: NodalFriction
     constrained: InterfaceLaw | None
-    stiffness: float
+    c_0: float
     diameter: float
     elongation: float
     component: NDArray[np.intp]
@@ -168,10 +168,10 @@ class Interface:
         nodal, multipliers, bound
             Unknowns, multipliers and friction bound.
         c, rounding
-            As in `touching`; `stiffness` by default.
+            As in `constraint_active`; c_0 by default.
         """
-        c = self.stiffness if c is None else c
-        closed = touching(multipliers.pressure, self.normal_gap(nodal), c, rounding)
+        c = self.c_0 if c is None else c
+        closed = constraint_active(multipliers.pressure, self.normal_gap(nodal), c, rounding)
         if not self.friction.acts:
             return ActiveSet.without_slip(closed, False)
         return ActiveSet.of(closed, multipliers.friction, self.slip(nodal), bound, c, rounding)
@@ -187,7 +187,7 @@ class Interface:
     def rounding(self, nodal: Array) -> float:
         """Return the pressure of a rounding of the displacements (stress). Collective."""
         displacement = np.abs(nodal[:, : self.nodes.dim]).max(axis=1, initial=0.0)
-        return 2 * ROUNDING * self.stiffness * self.nodes.maximum(displacement)
+        return 2 * ROUNDING * self.c_0 * self.nodes.maximum(displacement)
 
     def negligible(self, nodal: Array, pressure: Array) -> float:
         """Return the rounding of pressures, by displacements or the largest one. Collective."""

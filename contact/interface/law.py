@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.interface.active_set import touching
+from contact.interface.active_set import constraint_active
 from contact.interface.layer import NormalLaw
 from contact.interface.nodes import ContactNodes
 from contact.model.electric import Conductor
@@ -32,14 +32,14 @@ TINY = np.finfo(float).tiny
 class InterfaceLaw:
     """Layer and conductor at the contact nodes; potentials come divided by `phi_scale`.
 
-    `contact_scale` (stress/length) weighs penetrations against pressures.
+    `c_0` (stress/length) weighs penetrations against pressures.
     """
 
     nodes: ContactNodes
     compliance: Layer | None
     conductor: Conductor | None
     phi_scale: float
-    contact_scale: float
+    c_0: float
 
     @property
     def active(self) -> bool:
@@ -130,14 +130,14 @@ class InterfaceLaw:
     def resting(self, x: Array) -> Array:
         """Return rounding pressures, by which constrained nodes that touch conduct, shape (n,)."""
         reach = np.abs(self.nodes.gap) + np.linalg.norm(x[:, : self.nodes.dim], axis=1)
-        return np.maximum(1e-12 * self.contact_scale * reach, TINY)
+        return np.maximum(1e-12 * self.c_0 * reach, TINY)
 
     def _pressed(self, x: Array, pressure: Array) -> NDArray[np.bool_]:
         """Return where the rigid part presses, shape (n,)."""
         # u_nu = rho holds to the tolerance of the inner loop, which a steep ramp makes a thousand
         # times larger; so large a multiplier at an open node is no pressure.
         normal_gap = self.constrained_gap - self.nodes.normal_component(x)
-        return touching(pressure - self.pressure(x), normal_gap, self.contact_scale)
+        return constraint_active(pressure - self.pressure(x), normal_gap, self.c_0)
 
     def force(self, x: Array, pressure: Array) -> Array:
         """Return the nodal residual density, shape (n, block size), in scaled unknowns."""

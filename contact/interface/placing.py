@@ -45,7 +45,7 @@ class Candidates:
     front
         Points from which gaps are measured, shape (n, d) (length): given gaps from the nodes, gaps
         to a shape from the curved surface, as nodes in the middle of straight edges are on chords.
-    explained
+    chord_penetration
         Depth of the nodes, shape (n,) (length), in a shape that the curved surface, or the straight
         facets, touch, and rounding.
     direction, measured
@@ -65,7 +65,7 @@ class Candidates:
     weight: Array
     facing: Array
     front: Array
-    explained: Array
+    chord_penetration: Array
     direction: Array
     measured: Array
     gap: Array
@@ -108,11 +108,11 @@ def candidates(
     points = body.space.tabulate_dof_coordinates()[nodes, : body.dim] + displacement[nodes]
     normal = lumped.normal / np.linalg.norm(lumped.normal, axis=1)[:, None]
     known = np.einsum("nd,nd->n", lumped.deviation, normal)
-    explained = np.maximum(known, known - lumped.least)
+    chord_penetration = np.maximum(known, known - lumped.least)
     if facets.refined and facets.order == 1:
         # The last edges of a part are halves of one chord, which tell nothing of the curve.
-        most = comm.allreduce(float(explained.max(initial=0.0)), op=MPI.MAX)
-        explained = np.full_like(explained, most)
+        most = comm.allreduce(float(chord_penetration.max(initial=0.0)), op=MPI.MAX)
+        chord_penetration = np.full_like(chord_penetration, most)
     front = points + lumped.deviation if obstacle.is_shape else points
     direction, gap = measured(obstacle, front, normal, comm, key)
     if comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
@@ -132,7 +132,7 @@ def candidates(
         weight,
         np.einsum("ni,ni->n", direction, normal),
         front,
-        ROUNDED * body.domain.size + 1.1 * explained,  # the direction may be a little aside
+        ROUNDED * body.domain.size + 1.1 * chord_penetration,  # the direction may be a little aside
         direction,
         gap,
         curved,
@@ -154,7 +154,7 @@ def _from_curve(
     values = facets.owners.values(
         corners.ravel(), lambda given: gap[np.searchsorted(numbers, given)]
     )
-    own, found = facets.told_by(values.reshape(corners.shape))
+    own, found = facets.reconstructed(values.reshape(corners.shape))
     told, weight, rest = found[np.searchsorted(own, numbers)].T
     with np.errstate(invalid="ignore"):
         return np.where(weight > 0, (1 - weight) * gap + weight * told, gap), rest
@@ -199,7 +199,7 @@ class FoundationPlacement:
         points = body.space.tabulate_dof_coordinates()[of, : body.dim]
         direction, gap, cut = found.direction[self.contact], found.gap, 0.0
         if self.obstacle.is_shape and not self.press:
-            chord = (found.facing > 0) & (gap < 0) & (-gap <= found.explained)
+            chord = (found.facing > 0) & (gap < 0) & (-gap <= found.chord_penetration)
             cut = body.comm.allreduce(float(np.max(-gap[chord], initial=0.0)), op=MPI.MAX)
             gap = np.where(chord, 0.0, gap)
         nodes = ContactNodes(
@@ -379,7 +379,7 @@ def _refuse_overlap(body: BodyEquilibrium, found: Candidates) -> None:
     # Nodes on straight facets of a curved part may lie in a ball that the facets' corners touch.
     depth = np.where(found.facing > 0, -found.gap, 0.0)
     cut = body.comm.allreduce(np.max(depth, initial=0.0), op=MPI.MAX)
-    if body.comm.allreduce(bool(np.any(depth > found.explained)), op=MPI.LOR):
+    if body.comm.allreduce(bool(np.any(depth > found.chord_penetration)), op=MPI.LOR):
         raise InputError(
             f"foundation: the undeformed body cuts it, by up to {cut:.3g}; accepted: gaps "
             f">= 0 but for {ROUNDED * body.domain.size:.1g} (rounding), and the deviation of "

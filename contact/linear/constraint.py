@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from contact.history import Evaluated
+from contact.history import LinearisationPoint
 from contact.linear.layout import Layout, congruent, times
 from contact.linear.operator import Bulk, Counters, SparseOperator
 from contact.mesh.owners import Halo
@@ -205,7 +205,7 @@ class ConstrainedBulk:
         K R and R^T K R of the last matrix, shapes (owned, m) and (m, m).
     """
 
-    def __init__(self, bulk: Bulk, constraint: Constraint, rest: Evaluated) -> None:
+    def __init__(self, bulk: Bulk, constraint: Constraint, rest: LinearisationPoint) -> None:
         self._bulk, self.constraint, self._rest = bulk, constraint, rest
         self._plain: PETSc.Mat | None = None
         self.columns: Array = np.zeros(constraint.motions.shape)
@@ -227,7 +227,7 @@ class ConstrainedBulk:
         product.setLGMap(*made.getLGMap())
         return product
 
-    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
+    def assemble(self, matrix: PETSc.Mat, kind: str, state: LinearisationPoint) -> None:
         """Assemble Q^T K Q, 0 at fixed and tied unknowns, and the border. Collective."""
         if self._plain is None:
             self._bulk.assemble(matrix, kind, state)
@@ -291,7 +291,9 @@ class ConstrainedOperator:
         """Whether the blocks are symmetric too."""
         return self._inner.symmetric
 
-    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
+    def update(
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, constant: bool = False
+    ) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
         if not self._inner.update(kind, state, blocks, constant=constant):
             return False

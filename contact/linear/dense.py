@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
 
-from contact.history import Evaluated
+from contact.history import LinearisationPoint
 from contact.linear.layout import Inclined, masked, masked_blocks
 from contact.linear.operator import Counters
 from contact.ranks import on_root
@@ -145,7 +145,9 @@ class DenseOperator:
         self._inclined = inclined
         self.counters = counters
 
-    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
+    def update(
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, constant: bool = False
+    ) -> bool:
         """Factorise with blocks; see `operator.SparseOperator.update`. Collective."""
         gathered = self._comm.gather(masked_blocks(self._free, self._inclined, blocks))
         self._blocks = np.concatenate(gathered or [blocks])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from contact.history import Evaluated
+from contact.history import LinearisationPoint
 from contact.linear import multigrid
 from contact.linear.block import BlockPreconditioner
 from contact.linear.faults import (
@@ -50,7 +50,7 @@ class Bulk(Protocol):
         It must not outlive the mesh, whose communicator it has (segmentation fault in PETSc).
         """
 
-    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
+    def assemble(self, matrix: PETSc.Mat, kind: str, state: LinearisationPoint) -> None:
         """Assemble the "secant", the "tangent" or its "symmetric" part. Collective."""
 
     def border(self, kind: str) -> tuple[Array, Array] | None:
@@ -82,7 +82,9 @@ class Operator(Protocol):
     def symmetric(self) -> bool:
         """Whether the blocks are symmetric too."""
 
-    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
+    def update(
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, constant: bool = False
+    ) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
@@ -157,7 +159,9 @@ class SparseOperator:
         """Return the matrix, or its transpose, times owned values. Collective."""
         return times(self.matrix, values, transposed)
 
-    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
+    def update(
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, constant: bool = False
+    ) -> bool:
         """Assemble the operator at a state. Collective.
 
         Parameters

@@ -251,7 +251,7 @@ def _penetrating(
     nodal = interface.nodes.apply(state.x)
     depth = np.where(inside, 0.0, -interface.normal_gap(nodal))
     deepest = interface.nodes.maximum(depth)
-    rounding = interface.rounding(nodal) / interface.stiffness
+    rounding = interface.rounding(nodal) / interface.c_0
     count = int(summed(interface.comm, np.count_nonzero(depth > rounding)))
     return deepest, count
 

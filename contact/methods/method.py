@@ -29,7 +29,7 @@ class Method(Protocol):
 
     @property
     def history(self) -> list[Record]:
-        """The outer iterations."""
+        """Records of the outer iterations."""
 
     @property
     def counters(self) -> Counters:
@@ -40,7 +40,7 @@ class Method(Protocol):
         """The last iterate: the end of a solve after a signal."""
 
     def set_load_step(self, problem: ContactProblem) -> None:
-        """Take another load step of the same problem; factorisations remain, the history is new."""
+        """Take another load step of the same problem; factorisations remain, records start anew."""
 
     def solve(
         self, start: State | None = None, linearised_at: Array | None = None

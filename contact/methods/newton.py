@@ -177,25 +177,26 @@ class Newton:
         chord.begin()
         tangent = state.active_set is not None and linearised_at is None and not body.linear
         for _ in range(min(options.max_iterations, self.whole.steps_left)):
-            before, residuals, last = loop.residuals, loop.residuals.significant, state
-            state, keep = chord.choose(state, residuals, linearised_at)
-            known = loop.internal if state is last and linearised_at is None else None
+            previous, previous_residuals = state, loop.residuals
+            largest = previous_residuals.significant
+            state, keep = chord.choose(state, largest, linearised_at)
+            known = loop.internal if state is previous and linearised_at is None else None
             kind = "tangent" if tangent else "secant"
             condensed = self.condensation.linearise(kind, state, keep, linearised_at, known)
             if condensed is None:
-                return last, loop.outcome(NOT_CONDENSED)
+                return previous, loop.outcome(NOT_CONDENSED)
             # Inexact Newton: no more digits than the linearised material has.
             enough = 0.1 * options.tolerance
             if not body.linear and not keep:
-                enough = max(enough, CONTACT_PART * min(residuals, 1.0))
+                enough = max(enough, CONTACT_PART * min(largest, 1.0))
             contact = self._on_contact_nodes(condensed, enough)
             end, outcome = solve_contact(contact, replace(state, x=condensed.equilibrium.at))
             records = tuple(contact.recorder.records)
             self.counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
-            unsolved = outcome.residuals.significant > max(enough, UNSOLVED * residuals)
+            unsolved = outcome.residuals.significant > max(enough, UNSOLVED * largest)
             if unsolved and not overloaded:
-                return last, loop.outcome(NOT_CONDENSED)
+                return previous, loop.outcome(NOT_CONDENSED)
             increment = self.condensation.expand(condensed, end.x)
             state = replace(end, x=body.moved(state.x, increment), history=state.history)
             linearised_at = None
@@ -210,7 +211,8 @@ class Newton:
             if (found := loop.ended(state)) is not None:
                 return found
             if not body.linear:
-                falls = loop.residuals.equilibrium < max(before.equilibrium, options.tolerance)
+                reference = max(previous_residuals.equilibrium, options.tolerance)
+                falls = loop.residuals.equilibrium < reference
                 tangent = falls or not tangent
             if (stalled := loop.stalled()) is not None:
                 return state, stalled

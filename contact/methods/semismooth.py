@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contact.interface.active_set import touching
+from contact.interface.active_set import constraint_active
 from contact.interface.multipliers import Multipliers
 from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
@@ -87,7 +87,7 @@ class SemismoothNewton:
         interface, c = self.problem.interface, self.step.parameters.c
         nodal = interface.nodes.apply(start.x)
         # Rounding of the pressure at an open node would be a friction bound, and make it stick.
-        closed = touching(start.forces.pressure, interface.normal_gap(nodal), c)
+        closed = constraint_active(start.forces.pressure, interface.normal_gap(nodal), c)
         pressure = np.where(closed, start.forces.pressure, 0.0)
         forces = Multipliers.of(interface.nodes, pressure, start.forces.friction)
         bound = interface.bound(nodal, forces)
@@ -112,7 +112,7 @@ class SemismoothNewton:
         linearised_at
             Unknowns of the first secant; those of the state by default.
         note
-            Note of the steps in the history.
+            Note of the steps in their records.
         stagnation_limit
             Stagnation limit; that of the options by default.
         give_up
@@ -129,9 +129,9 @@ class SemismoothNewton:
         # At zero strain the secant is the tangent; an initial guess with an active set is near.
         tangent = state.active_set is not None and linearised_at is None and not linear
         for _ in range(min(options.max_iterations, self.steps_left)):
-            before, residuals = state, loop.residuals
+            previous, previous_residuals = state, loop.residuals
             known = loop.internal if linearised_at is None else None
-            taken = step(problem, state, tangent, residuals, linearised_at, known, exact)
+            taken = step(problem, state, tangent, previous_residuals, linearised_at, known, exact)
             if taken is None:
                 return state, loop.outcome(step.fault)
             state, linearised_at = taken, None
@@ -139,15 +139,16 @@ class SemismoothNewton:
             worse = step.conductivity_derivative.worsened(loop.residuals.significant)
             loop.record(state, "tangent" * tangent, "rejected" * worse)
             if worse:
-                state = before
+                state = previous
                 loop.evaluate(state)
             if (found := loop.ended(state)) is not None:
                 return found
-            if give_up and before.active_set is None:
+            if give_up and previous.active_set is None:
                 if _overestimates_stiffness(problem, step.parameters.c, state):
                     return state, loop.outcome(OVERESTIMATED)
             if not linear:
-                falls = loop.residuals.equilibrium < max(residuals.equilibrium, options.tolerance)
+                reference = max(previous_residuals.equilibrium, options.tolerance)
+                falls = loop.residuals.equilibrium < reference
                 # The secant (Kacanov) after a tangent that overshoots, as at unloading.
                 tangent = falls or not tangent
             if (stalled := loop.stalled()) is not None:

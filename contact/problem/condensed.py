@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from scipy.linalg import lu_factor, lu_solve
 
 from contact.body.component_norms import ComponentNorms
-from contact.history import BodyState, Evaluated
+from contact.history import BodyState, LinearisationPoint
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
@@ -116,7 +116,7 @@ class CondensedBody:
         """Return all unknowns: there are no ghosts."""
         return x
 
-    def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
+    def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
         """Return S (x - x_0) + r_0: internal forces minus loads. Collective."""
         moved = np.concatenate(self.comm.allgather(state.x - self.at))
         return np.asarray(self.rows @ moved + self.residual[self.own])
@@ -141,7 +141,7 @@ class CondensedBody:
         """Return the `norms` of loads, reactions and coupling forces of the whole body."""
         return self.acting
 
-    def exchanged(self, state: Evaluated) -> Array:
+    def exchanged(self, state: LinearisationPoint) -> Array:
         """Return zero: part of `load_norms`."""
         return np.zeros_like(self.acting)
 

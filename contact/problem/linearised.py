@@ -81,8 +81,8 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     along = unit_vectors(slip)
     friction = nodes.tangential_component(vectors)
     slides = friction - np.where(active.slips, bound, 0.0)[:, None] * along
-    tangential = np.where(active.sticks[:, None], interface.stiffness * slip, slides)
-    closing = -interface.stiffness * interface.normal_gap(nodal)
+    tangential = np.where(active.sticks[:, None], interface.c_0 * slip, slides)
+    closing = -interface.c_0 * interface.normal_gap(nodal)
     normal = np.where(active.closed, closing, nodes.normal_component(vectors))
     conditions = normal[:, None] * nodes.normal + tangential
     # Forces on nodes of a rigid part as forces on it: a parameter may be its moment arm.
@@ -95,7 +95,7 @@ def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float
     body, nodes, scales = problem.equilibrium, problem.nodes, problem.scales
     least = WEAK * scales.young * scales.area
     forces = body.norm(body.internal_forces(state)) + body.norm(body.external(state.time))
-    moved = problem.interface.stiffness * problem.nodal(state)[:, : problem.dim]
+    moved = problem.interface.c_0 * problem.nodal(state)[:, : problem.dim]
     stresses = nodes.norm(moved) + nodes.norm(state.forces.vectors(nodes))
     return forces + least, stresses + least / scales.area**0.5
 
@@ -107,7 +107,7 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     solution has one-sided derivatives only.
     """
     interface, nodal, forces = problem.interface, problem.nodal(state), state.forces
-    active, c = active_set(problem, state), interface.stiffness
+    active, c = active_set(problem, state), interface.c_0
     moved = c * np.linalg.norm(nodal[:, : problem.dim], axis=1)
     small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(nodal, forces), moved))
     normal_gap, length = np.abs(interface.normal_gap(nodal)), interface.slip_length(nodal)
@@ -153,7 +153,7 @@ class Linearised:
         self._conditions(nodal)
         regular = self._by_force.copy()
         normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
-        small = interface.stiffness / parameters.gamma
+        small = interface.c_0 / parameters.gamma
         regular -= np.where(self.active.closed, small, 0.0)[:, None, None] * normal
         sticks = np.where(self.active.sticks, small, 0.0)
         regular -= sticks[:, None, None] * nodes.tangent
@@ -189,9 +189,9 @@ class Linearised:
         self._layer = interface.layer.pressure_gradient(nodal)
         local = self._rate * friction.local
         self._by_jump = np.zeros((length.size, d, nodes.block_size))
-        self._by_jump[:, :, :d] = np.where(closed, interface.stiffness * normal, 0.0)
+        self._by_jump[:, :, :d] = np.where(closed, interface.c_0 * normal, 0.0)
         #: Derivative of the conditions by the slip alone, and by its length.
-        self.by_slip = np.where(sticks, interface.stiffness * nodes.tangent, 0.0)
+        self.by_slip = np.where(sticks, interface.c_0 * nodes.tangent, 0.0)
         self.by_slip -= np.where(slips, falls, 0.0)
         self.by_length = -by_slip[:, None] * self._along
         self._by_jump[:, :, :d] += self.by_slip

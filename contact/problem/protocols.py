@@ -9,7 +9,7 @@ from typing import Protocol
 from mpi4py import MPI
 
 from contact.body.component_norms import ComponentNorms
-from contact.history import Evaluated
+from contact.history import LinearisationPoint
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.interface import Interface
 from contact.linear.operator import Counters, Operator
@@ -116,7 +116,7 @@ class Equilibrium(Protocol):
     def moved(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment of the owned ones. Collective."""
 
-    def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
+    def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
         """Return the owned nodal forces of the stresses at a state. Collective."""
 
     def external(self, time: float = 1.0) -> Array:
@@ -134,7 +134,7 @@ class Equilibrium(Protocol):
     def load_norms(self, time: float = 1.0) -> Array:
         """Return the `norms` of the loads at a time. Collective."""
 
-    def exchanged(self, state: Evaluated) -> Array:
+    def exchanged(self, state: LinearisationPoint) -> Array:
         """Return the `norms` of the piezoelectric coupling forces and charges. Collective."""
 
     def norm(self, values: Array) -> float:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from contact.interface.active_set import touching
+from contact.interface.active_set import constraint_active
 from contact.interface.complementarity import interface_residuals, worst
 from contact.interface.interface import Interface
 from contact.problem.protocols import Problem
@@ -36,8 +36,8 @@ class Residuals:
         force the reference is the residual of the zero initial guess, and rounding counts as 0.
     contact
         |p - max(0, p - c (gap - u_nu))| / |p| in L2(Gamma_3), the largest of all connected
-        components; c = E/length of the touching bodies, less by the factor by which cells behind
-        Gamma_3 are longer than twice their facets (`contact.mesh.entities.elongation`).
+        components; c = c_0 = E/length of the touching bodies, times the elongation >= 1 of the
+        cells behind Gamma_3 (`contact.mesh.entities.elongation`).
     friction
         |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s.
     floors
@@ -182,7 +182,7 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     """
     nodal, own = interface.nodes.apply(state.x), state.forces.pressure
     rounding = interface.rounding(nodal)
-    on = touching(own, interface.normal_gap(nodal), interface.stiffness, rounding)
+    on = constraint_active(own, interface.normal_gap(nodal), interface.c_0, rounding)
     pressed = interface.norms(interface.pressure(nodal, state.forces) - own * ~on)
     much = (pressed > 0) & (pressed > EPS * pressed.max())
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())

@@ -180,7 +180,7 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
         return
     residual = body.unbalanced(residual_forces(problem, solution.state))
     left = float(np.linalg.norm(body.norms(residual)[0]))
-    whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
+    whole = problem.interface.c_0 * problem.nodes.sum(np.ones_like(problem.nodes.weight))
     largest = solution.max_displacement
     for group, free in modes:
         shares, motions = _least_constrained(solution, group, free, solution.status != "open")

@@ -22,7 +22,7 @@ from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import form_law, piezo_with_constants
 from contact.body.stress_updates import NAME, name_of
-from contact.history import BodyState, Evaluated
+from contact.history import BodyState, LinearisationPoint
 from contact.mesh.cells import shape_of
 from contact.mesh.geometry import volumes
 from contact.mesh.parts import disjoint_pieces
@@ -212,7 +212,7 @@ class DerivedFields:
     """
 
     def __init__(
-        self, body: BodyEquilibrium, state: Evaluated, points: Array | None = None
+        self, body: BodyEquilibrium, state: LinearisationPoint, points: Array | None = None
     ) -> None:
         self.body = body
         #: Reference points of a cell at which the fields are evaluated.
@@ -265,7 +265,7 @@ class DerivedFields:
         """Yield owned cells and the values there, shape (cells, points, components)."""
         return chain.from_iterable(map(self.of_material, range(len(self.body.cells))))
 
-    def move_to(self, state: Evaluated) -> None:
+    def move_to(self, state: LinearisationPoint) -> None:
         """Look at the fields of another state of the same body from now on."""
         self._state, self._x = state, self.body.nodal(state.x).flatten()
         self._q = self.body.motion(state.x)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
-from contact.interface.active_set import touching
+from contact.interface.active_set import constraint_active
 from contact.linear.operator import Counters
 from contact.problem.condensed import Condensation, condensation_pays
 from contact.problem.problem import ContactProblem
@@ -77,7 +77,7 @@ def uniqueness(
     nodal = nodes.apply(state.x)
     pressure = interface.pressure(nodal, state.forces)
     rounding = interface.negligible(nodal, pressure)
-    closed = touching(pressure, interface.normal_gap(nodal), interface.stiffness, rounding)
+    closed = constraint_active(pressure, interface.normal_gap(nodal), interface.c_0, rounding)
     if nodes.maximum(closed.astype(float)) == 0:
         closed = interface.gap <= EPS * interface.diameter
     mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(nodal))

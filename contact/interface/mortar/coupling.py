@@ -11,7 +11,7 @@ and D is made of the inverse of A^T. Constants pass: rows of D and of M have the
 others have D and M without the division by int N~_j.)
 
 `integrate` has these integrals over the facets of one rank, `couple` their sums at the rank of each
-node. Functions of nodes without multiplier go to other nodes (`Carriers`).
+node. Functions of nodes without multiplier go to other nodes (`ModifiedDualBasis`).
 
 References
 ----------
@@ -46,7 +46,7 @@ NOTHING: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
-class Carriers:
+class ModifiedDualBasis:
     """The multipliers that act on facets where some nodes carry none.
 
     Attributes
@@ -61,7 +61,7 @@ class Carriers:
     functions: Array
 
     @staticmethod
-    def of(slave: Surface, without: NDArray[np.int64]) -> Carriers:
+    def of(slave: Surface, without: NDArray[np.int64]) -> ModifiedDualBasis:
         """Return the carriers of the dual functions of nodes without multiplier. Collective.
 
         These are the other nodes of the facet in equal parts, or the nearest corner of another
@@ -83,7 +83,7 @@ class Carriers:
         alone, beside = alone[beside >= 0], beside[beside >= 0]
         nodes[alone, 0] = beside
         functions[alone, 0] = 1.0
-        return Carriers(nodes, functions)
+        return ModifiedDualBasis(nodes, functions)
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class Parts:
     depth: float
 
 
-def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
+def integrate(slave: Surface, opposite: Opposite, carriers: ModifiedDualBasis) -> Parts:
     """Integrate the dual functions of slave facets, alone and with the facets opposite.
 
     Parameters
@@ -305,7 +305,7 @@ def couple(
         not; by default those that do.
     """
     opposite = Opposite.of(slave, master, reach)
-    parts = integrate(slave, opposite, Carriers.of(slave, without))
+    parts = integrate(slave, opposite, ModifiedDualBasis.of(slave, without))
     change = dual_basis_transformation(slave.shape, slave.degree)
     return _assembled(parts, slave.owners, np.asarray(np.linalg.inv(change.T)), without, nodes)
 

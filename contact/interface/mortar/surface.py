@@ -274,7 +274,7 @@ class Surface:
         """The local numbers of the nodes of degree 2 in the middle of the edges."""
         return np.asarray(self._bubbles(self.shape.nodes(self.degree))[1].argmax(axis=0))
 
-    def told_by(self, values: Array) -> tuple[NDArray[np.int64], Array]:
+    def reconstructed(self, values: Array) -> tuple[NDArray[np.int64], Array]:
         """Return the third-order reconstruction of a function from its corner values. Collective.
 
         The smoother of both, function and surface, has the larger weight (Jiang and Shu, as in
