@@ -20,6 +20,8 @@ import contact
 ANYTHING = {
     "parse_case: data": "tables of a file, whose values are checked one by one, with a message",
     "Solution.view: return": "what pyvista shows in a notebook; nothing after a window",
+    "Solution.movements: return": "tables as in summary.json, of numbers and lists",
+    "Solution: source": "the Case, whose module is above that of results",
     "make_material: keys": "keys of a table, in which there are lists and tables",
 }
 

@@ -62,7 +62,7 @@ def _check_plane_stress(case: Case) -> None:
         accepted = '"standard" in plane stress, where nothing locks'
         raise fault("space.element", case.space.element, accepted, "plane-stress")
     for key, material in case.materials:
-        if material.piezoelectric and material.kind in ("log", "j2"):
+        if material.piezoelectric and material.kind not in ("linear", "anisotropic"):
             accepted = '"linear" or "anisotropic" in plane stress with piezoelectric constants'
             raise fault(f"{key}.law", material.kind, accepted, "plane-stress")
 

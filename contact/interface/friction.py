@@ -25,7 +25,7 @@ from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoother
 from contact.model.fields import Field, Moving, values_at
 from contact.model.formula import Expression
-from contact.model.friction import Friction, SlipLaw
+from contact.model.friction import Friction, MuLaw
 from contact.ranks import on_all_ranks
 from contact.tolerances import EPS
 from contact.typing import Array
@@ -41,7 +41,7 @@ def law_at(friction: Friction, nodes: ContactNodes) -> FrictionLaw | None:
         If a bound or coefficient is negative or no number at a node, or without slip; or a wrong
         derivative, maximum or Lipschitz constant.
     """
-    given: Any = friction.mu.coefficient if isinstance(friction.mu, SlipLaw) else friction.mu
+    given: Any = friction.mu.coefficient if isinstance(friction.mu, MuLaw) else friction.mu
     if friction.law == "none":
         return None
     if friction.law == "tresca":

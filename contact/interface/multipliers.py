@@ -1,8 +1,8 @@
 """Multipliers and slip history at the contact nodes.
 
-`Multipliers` are dual to the jump T x (`ContactNodes`). `SlipHistory` is (T x)_tau at the end of the
-last step of an evolution, and the accumulated slip: friction acts against the slip since then, and
-a coefficient mu(slip) depends on the accumulated one. A static problem is one step from zero.
+`Multipliers` are dual to the jump T x (`ContactNodes`). `SlipHistory` is (T x)_tau at the end of
+the last step of an evolution, and the accumulated slip: friction acts against the slip since then,
+and a coefficient mu(slip) depends on the accumulated one. A static problem is one step from zero.
 """
 
 from __future__ import annotations

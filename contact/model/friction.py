@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -20,7 +21,18 @@ COEFFICIENT = ("maximum", "lipschitz", "__call__", "derivative")
 LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 
 
-class SlipLaw(Section):
+class MuLaw(Section, ABC):
+    """A table `mu = { law = ..., ... }`; its `law` names it."""
+
+    law: str
+
+    @property
+    @abstractmethod
+    def coefficient(self) -> FrictionCoefficient | FrictionLaw:
+        """The coefficient, or the law of friction, itself."""
+
+
+class SlipLaw(MuLaw):
     """`mu = { law = "slip", ... }`: coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
 
     law: Literal["slip"]
@@ -47,15 +59,14 @@ def _own(given: Any) -> Any:
 
 
 def _kind(given: Any) -> str:
-    if isinstance(given, Mapping | SlipLaw):
+    if isinstance(given, Mapping | MuLaw):
         return str(given.get("law") if isinstance(given, Mapping) else given.law)
     # One that lacks something is no function of position.
     named = ("maximum", "lipschitz", "derivative", "by_slip", "by_pressure")
     return "own" if any(hasattr(given, name) for name in named) else "formula"
 
 
-#: A coefficient of friction. A further law is a section like that above, and a line here with its
-#: `law`.
+#: A coefficient of friction. A further law is a subclass of `MuLaw`, and a line here.
 Mu: TypeAlias = Annotated[
     Annotated[NonNegativeValue, Tag("formula")]
     | Annotated[SlipLaw, Tag("slip")]
