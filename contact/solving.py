@@ -67,7 +67,7 @@ class SolveInterrupted(SystemExit):
         self.code = SIGNALLED + solution.outcome.signal
 
 
-class _Pressed(SolveInterrupted, KeyboardInterrupt):
+class _CtrlC(SolveInterrupted, KeyboardInterrupt):
     """Ctrl-C."""
 
 
@@ -312,7 +312,7 @@ def reviewed(
     if clock is not None:
         solution.seconds["setup"] += time.perf_counter() - clock - sum(solution.seconds.values())
     if solution.outcome.signal:
-        ended = _Pressed if solution.outcome.signal == signal.SIGINT else SolveInterrupted
+        ended = _CtrlC if solution.outcome.signal == signal.SIGINT else SolveInterrupted
         raise ended(solution)
     return solution
 

@@ -103,7 +103,8 @@ class WeakForm:
         secant_at
             The displacement of the secant modulus (Kacanov); that of x by default.
         history_at
-            That about which stresses of laws with internal variables are linearised, likewise.
+            Displacement at which stress updates with internal variables are linearised; that of
+            x by default.
         """
         return (
             self.internal_forces(x, z, secant_at, history_at)

@@ -163,7 +163,7 @@ class NodalFriction:
         """Whether the bound at a node depends on the values there alone: R = identity."""
         return self.smoothing.radius == 0
 
-    def _all(self, slip: Array) -> Array:
+    def _accumulated(self, slip: Array) -> Array:
         """Return the accumulated slip at the end of a step with this slip, shape (n,)."""
         return self.history.accumulated + slip
 
@@ -171,13 +171,15 @@ class NodalFriction:
         """Return s, mu |R p| by Coulomb's law, shape (n,). Collective."""
         if self.law is None:
             return np.zeros_like(slip)
-        return np.asarray(self.law(self._all(slip), self.smooth(pressure)), dtype=float)
+        return np.asarray(self.law(self._accumulated(slip), self.smooth(pressure)), dtype=float)
 
     def by_slip(self, pressure: Array, slip: Array) -> Array:
         """Return the derivative of the bound by the slip, shape (n,). Collective."""
         if self.law is None:
             return np.zeros_like(slip)
-        return np.asarray(self.law.by_slip(self._all(slip), self.smooth(pressure)), dtype=float)
+        return np.asarray(
+            self.law.by_slip(self._accumulated(slip), self.smooth(pressure)), dtype=float
+        )
 
     def by_pressure(self, pressure: Array, slip: Array) -> Array:
         """Return the derivative of the bound by the pressure at the node, shape (n,).
@@ -186,7 +188,9 @@ class NodalFriction:
         """
         if self.law is None or not self.local:
             return np.zeros_like(slip)
-        return np.asarray(self.law.by_pressure(self._all(slip), self.smooth(pressure)), dtype=float)
+        return np.asarray(
+            self.law.by_pressure(self._accumulated(slip), self.smooth(pressure)), dtype=float
+        )
 
     def smooth(self, pressure: Array) -> Array:
         """Return |R p|, shape (n,). Collective."""

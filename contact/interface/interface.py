@@ -218,7 +218,7 @@ class Interface:
     ) -> None:
         """Add the change of the current with local unknowns, psi frozen, to owned values."""
         for law, nodal, pressure in self.acting(x, multipliers):
-            block = law.current_block(nodal, pressure)
+            block = law.charge_block(nodal, pressure)
             density = np.einsum("nij,nj->ni", block, law.nodes.apply(change))
             law.nodes.transpose(law.nodes.weight[:, None] * density, residual)
 
@@ -247,5 +247,5 @@ class Interface:
             return weighted
         there = self.constrained.nodes
         nodal = there.apply(x)
-        block = self.constrained.current_block(nodal, self.constrained.resting(nodal))
+        block = self.constrained.charge_block(nodal, self.constrained.resting(nodal))
         return np.concatenate([weighted, there.weight[:, None, None] * block])

@@ -1,4 +1,4 @@
-"""The interface law: layer and current, beside the unilateral constraint and friction.
+"""The interface law: layer and charge, beside the unilateral constraint and friction.
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
@@ -6,7 +6,7 @@ node by node. Newton's method takes `force` and its full derivative.
 
 The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer with the
 unilateral constraint, as the one monotone graph `NormalLaw` of Figure 1.6, and the current
-through `current_block` in the operator. A linearised layer would not do there: a column that
+through `charge_block` in the operator. A linearised layer would not do there: a column that
 is stiff enough cycles for ever between the slopes of an open and of a saturated layer.
 """
 
@@ -96,7 +96,7 @@ class InterfaceLaw:
         phi_f = self.conductor.phi_f if self.conductor is not None else 0.0
         return self.phi_scale * x[:, -1] - phi_f
 
-    def _penetration(self, x: Array) -> Array:
+    def _past_rigid_part(self, x: Array) -> Array:
         """Return u_nu - rho at the nodes."""
         return self.nodes.normal_component(x) - self.nodes.gap
 
@@ -105,9 +105,9 @@ class InterfaceLaw:
         if self.compliance is None:
             return np.zeros(x.shape[0])
         stiffness = self.compliance.h_nu(self._difference(x))
-        return np.asarray(stiffness * self.compliance.p_nu(self._depth(x)), dtype=float)
+        return np.asarray(stiffness * self.compliance.p_nu(self._layer_penetration(x)), dtype=float)
 
-    def _depth(self, x: Array) -> Array:
+    def _layer_penetration(self, x: Array) -> Array:
         """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""
         # An iterate may go beyond the rigid part; the excess pressure belongs to the multiplier.
         return np.minimum(self.nodes.normal_component(x), self.constrained_gap) - self.touch
@@ -124,7 +124,7 @@ class InterfaceLaw:
         pressed = self._pressed(x, pressure)
         # A multiplier of the size of rounding on an open node is no pressure.
         loaded = pressed | (self.pressure(x) > 0)
-        psi = self.conductor.psi.at(self._penetration(x), pressed, loaded)
+        psi = self.conductor.psi.at(self._past_rigid_part(x), pressed, loaded)
         return np.asarray(self.conductor.share * psi)
 
     def resting(self, x: Array) -> Array:
@@ -152,7 +152,7 @@ class InterfaceLaw:
         total = np.zeros((x.shape[0], self.nodes.block_size))
         if self.compliance is None:
             return total
-        depth, difference = self._depth(x), self._difference(x)
+        depth, difference = self._layer_penetration(x), self._difference(x)
         inside = self.nodes.normal_component(x) < self.constrained_gap
         slope = self.compliance.h_nu(difference) * self.compliance.p_nu.derivative(depth) * inside
         total[:, : self.nodes.dim] = slope[:, None] * self.nodes.normal
@@ -173,7 +173,7 @@ class InterfaceLaw:
         total[:, : self.nodes.dim] = self.nodes.normal[:, :, None] * gradient[:, None, :]
         return total
 
-    def current_block(self, x: Array, pressure: Array, full: bool = False) -> Array:
+    def charge_block(self, x: Array, pressure: Array, full: bool = False) -> Array:
         """Return the derivative of the charge in `force`, shape (n, block size, block size).
 
         Parameters
@@ -193,7 +193,7 @@ class InterfaceLaw:
         total[:, -1, -1] = -(self.phi_scale**2) * slope
         if full:
             # The contact flag of the perfect conductor is kept; at kinks a one-sided derivative.
-            closing = conductor.psi.gap_slope(self._penetration(x), self._pressed(x, pressure))
+            closing = conductor.psi.gap_slope(self._past_rigid_part(x), self._pressed(x, pressure))
             closing = self.phi_scale * conductor.share * closing * conductor.phi_l(difference)
             total[:, -1, :d] = -np.asarray(closing)[:, None] * self.nodes.normal
         return total
@@ -204,7 +204,7 @@ class InterfaceLaw:
         Without the derivatives of h_nu and psi, and thus symmetric, unless `full`; then that of a
         lagged layer and current too.
         """
-        total = self.current_block(x, pressure, full)
+        total = self.charge_block(x, pressure, full)
         if self.compliance is not None and (full or not self.compliance.lagged):
             total += self.pressure_block(x, full)
         return total

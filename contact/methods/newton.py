@@ -102,7 +102,7 @@ class Newton:
         self._modes = UnconstrainedModes(problem)
         self._step = self._newton_step(problem, options, self.counters)
         self._condensable = options.condense and condensable(problem, options.linear)
-        self._pays = options.condense and condensation_pays(problem, options.linear)
+        self._condense_first = options.condense and condensation_pays(problem, options.linear)
         self._chord = Chord(options.tolerance, MOST_STEPS if options.keep != "never" else 0.0)
         #: The condensed body; None before the first condensed step.
         self.condensation: Condensation | None = None
@@ -151,7 +151,7 @@ class Newton:
         elif start is None:
             linearised_at = body.rest()
         whole.at = state
-        if self._pays:
+        if self._condense_first:
             begin = state
             state, outcome = self._condensed_steps(state, linearised_at)
             if not (outcome.converged or outcome.overloaded or whole.steps_left <= 0):

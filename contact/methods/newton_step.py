@@ -217,7 +217,7 @@ class NewtonStep:
         follow = contact.unchanged
         if law.follows_gap:
             follow = self.conductivity_derivative(reached, follow)
-        return law.current_block(nodal, interface.pressure(nodal, contact.multipliers), follow)
+        return law.charge_block(nodal, interface.pressure(nodal, contact.multipliers), follow)
 
 
 def linearised_layer(

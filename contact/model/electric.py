@@ -44,7 +44,7 @@ class Conductor:
     phi_f_at
         phi_f as a function of time; None where it is always the same.
     share
-        Part of the conductivity that is taken, from 0 to 1: for continuations.
+        Continuation factor of the conductivity, from 0 to 1.
     """
 
     psi: Conductivity

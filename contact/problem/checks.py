@@ -315,7 +315,7 @@ def _flows(
     if state is None:
         return _conducts(law, interface.diameter), _conducts(held, interface.diameter)
     found = [
-        law.current_block(nodal, pressure, full=True)[:, -1, -1] != 0
+        law.charge_block(nodal, pressure, full=True)[:, -1, -1] != 0
         for law, nodal, pressure in interface.acting(state.x, state.forces)
     ]
     return found[0], found[1] if held is not None else np.zeros(0, dtype=bool)

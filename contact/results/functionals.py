@@ -272,7 +272,7 @@ class FoundationCharge:
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
         for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
             full = law is problem.interface.layer
-            slope = -law.current_block(nodal, pressure, full)[:, -1] / law.phi_scale
+            slope = -law.charge_block(nodal, pressure, full)[:, -1] / law.phi_scale
             law.nodes.transpose(law.nodes.weight[:, None] * slope, by_x)
         return by_x, np.zeros_like(problem.nodes.normal)
 

@@ -68,12 +68,12 @@ class FixedPoint(OuterLoop):
         problem, interface = self.problem, self.problem.interface
         frictional = interface.friction.acts
         if start is None:
+            # Secant at zero strain: prescribed values so far strain only the elements beside them.
             self.state, self._secant_at = problem.start(), problem.equilibrium.rest()
             stuck = UnconstrainedModes(problem).stuck_bound()
             # Iteration 0 is the frictionless problem of the thesis: none with a bound that is
             # updated in the relaxation, or with a mode that friction alone constrains.
             first = 0 if frictional and not self.options.single_loop and stuck is None else 1
-            # Secant at zero strain: prescribed values strain the elements beside them alone.
             self._z = self._about(0.0, frictional and first > 0)
             self.bound = np.zeros(interface.nodes.gap.size) if stuck is None else stuck
         else:
@@ -132,10 +132,10 @@ class FixedPoint(OuterLoop):
         """Linearise the charge, near the solution with the derivative of psi by the gap."""
         law = self.problem.interface.layer
         if not law.follows_gap or not self._gap_derivative(self._residual):
-            return law.current_block(nodal, pressure)
+            return law.charge_block(nodal, pressure)
         if self.operator.symmetric:
             self.operator = self._new_operator(symmetric=False)
-        return law.current_block(nodal, pressure, full=True)
+        return law.charge_block(nodal, pressure, full=True)
 
     def _target(self, residuals: Residuals) -> float:
         """Return the largest residual."""

@@ -142,7 +142,7 @@ class PenalisedProblem:
         self._assembled = body.linear
         pressure = interface.pressure(nodal, state.forces)
         self._response = interface.layer.force(nodal, pressure)
-        self._current_block = interface.layer.current_block(nodal, pressure)
+        self._current_block = interface.layer.charge_block(nodal, pressure)
         self._layer = interface.layer.normal_law(nodal)
         if self._layer is not None:
             # Of the new iterate, as [.]^+, but for h_nu.

@@ -2,7 +2,7 @@
 
 One step solves for u, projects the auxiliary variables phi and updates the multipliers lambda,
 (3.34)-(3.36): the alternating direction method of multipliers. It is a fixed-point map of
-lambda + r u, whose projection is the next multiplier, and r phi the rest; `acceleration` speeds it
+lambda + r u: its projection is the next multiplier, the remainder r phi; `acceleration` speeds it
 up. The variable is z = lambda + r (u - u_0), with u_0 of the outer iterate, against rounding of a
 small lambda beside a large slip.
 
@@ -220,7 +220,7 @@ def uzawa_block_relaxation(
     project = _Projection(nodes, interface.gap, r, bound, law, origin)
     accelerated, over = options.acceleration == "anderson", options.relaxation
     accelerator: ResidualMinimiser | None = None
-    beside: Array = np.ones_like(nodes.weight)
+    stress_unit: Array = np.ones_like(nodes.weight)
     last: tuple[Array, Array] | None = None
     rtol = max(SHARE * options.inner, ROUNDING)
     increment: Array = np.zeros(own.size)
@@ -237,21 +237,21 @@ def uzawa_block_relaxation(
         increment = operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.apply(increment)
         nodal = at + moved
-        way = r * normal_and_tangential(nodes, moved, friction)
+        augmented_jump = r * normal_and_tangential(nodes, moved, friction)
         # q + r (u - u_0) is the contact force of this solve.
-        total = q + way
+        total = q + augmented_jump
         if iteration == 1:
-            beside = interface.component_norms(total)
+            stress_unit = interface.component_norms(total)
         layer = 0.0 if law is None else law.layer(nodes.normal_component(nodal))
         forces = Multipliers.of(nodes, total[:, 0] - layer, total[:, 1:])
         if options.single_loop and friction:
             project.bound = interface.bound(nodal, forces)
         residual = float(interface_residuals(interface, nodal, forces, project.bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
-        image = multiplier + (1 - over) * (z - multiplier) + over * way
+        image = multiplier + (1 - over) * (z - multiplier) + over * augmented_jump
         done = residual <= options.inner or not np.isfinite(residual)
         # The residual is small before contact, the defect of the fixed point is not.
-        defect = nodes.norm((total - project(total + way)) / beside[:, None])
+        defect = nodes.norm((total - project(total + augmented_jump)) / stress_unit[:, None])
         if domain_norm is not None:
             phi: Array = (image + origin - project(image)) * (1 / r)
             before, done = last, False
@@ -263,11 +263,11 @@ def uzawa_block_relaxation(
                 defect = float(np.sqrt(change / size)) if size > 0 else 0.0
         stalled = not done and stagnation(defect)
         if done or stalled:
-            return Relaxed(increment, forces, image - way, iteration, stalled)
+            return Relaxed(increment, forces, image - augmented_jump, iteration, stalled)
         z = image
         if accelerated:
             if accelerator is None:
-                accelerator = project.accelerator(options.depth, beside)
-            newest = (total + way).ravel()
+                accelerator = project.accelerator(options.depth, stress_unit)
+            newest = (total + augmented_jump).ravel()
             z = accelerator.next(total.ravel(), newest, image.ravel()).reshape(z.shape)
-    return Relaxed(increment, forces, z - way, options.max_inner)
+    return Relaxed(increment, forces, z - augmented_jump, options.max_inner)
