@@ -211,9 +211,7 @@ class Newton:
             if (found := loop.ended(state)) is not None:
                 return found
             if not body.linear:
-                reference = max(previous_residuals.equilibrium, options.tolerance)
-                falls = loop.residuals.equilibrium < reference
-                tangent = falls or not tangent
+                tangent = loop.next_is_tangent(tangent, previous_residuals)
             if (stalled := loop.stalled()) is not None:
                 return state, stalled
         return state, loop.out_of_steps()

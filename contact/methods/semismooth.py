@@ -147,10 +147,7 @@ class SemismoothNewton:
                 if _overestimates_stiffness(problem, step.parameters.c, state):
                     return state, loop.outcome(OVERESTIMATED)
             if not linear:
-                reference = max(previous_residuals.equilibrium, options.tolerance)
-                falls = loop.residuals.equilibrium < reference
-                # The secant (Kacanov) after a tangent that overshoots, as at unloading.
-                tangent = falls or not tangent
+                tangent = loop.next_is_tangent(tangent, previous_residuals)
             if (stalled := loop.stalled()) is not None:
                 return state, stalled
         return state, loop.out_of_steps()
@@ -180,7 +177,7 @@ class Iteration:
     @property
     def converged(self) -> bool:
         """Whether the residuals of the last iterate are below tolerance, or rounding."""
-        return self.residuals.significant <= self._options.tolerance
+        return not self.residuals.excess(self._options.allowed)
 
     def evaluate(self, state: State) -> None:
         """Evaluate the residuals of an iterate. Collective."""
@@ -203,6 +200,11 @@ class Iteration:
         if not np.isfinite(self.residuals.significant):
             return state, self.outcome("Newton's method diverged")
         return None
+
+    def next_is_tangent(self, tangent: bool, previous: Residuals) -> bool:
+        """Whether the tangent is next: the secant (Kacanov) is after a tangent that overshoots."""
+        reference = max(previous.equilibrium, self._options.tolerance)
+        return self.residuals.equilibrium < reference or not tangent
 
     def stalled(self) -> Outcome | None:
         """Count a step; return the outcome at the stagnation limit, else None."""
