@@ -1,6 +1,6 @@
 """Cost of the methods: factorisations, solves and iterations, not seconds.
 
-Other tests assert no counts, but of the thesis's algorithms, whose counts are results.
+Other tests count where that is what they test: a body that is condensed, or kept, or solved once.
 """
 
 from __future__ import annotations
