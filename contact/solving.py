@@ -22,8 +22,7 @@ from contact._compat import destroy_unused
 from contact.adapting import adapted
 from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, Replacements, build_problem, named, replaced_by
-from contact.case.file import Case, load_case
-from contact.case.text import to_toml
+from contact.case.file import Case, load_case, to_toml
 from contact.errors import InputError
 from contact.methods.load_stepping import LoadStepping, solve_step
 from contact.methods.method import METHODS, Method

@@ -22,8 +22,7 @@ from mpi4py import MPI
 
 from contact.case.build import build_problem, named
 from contact.case.digest import check_files, check_same, digest
-from contact.case.file import Case, load_case
-from contact.case.text import literal, to_toml
+from contact.case.file import Case, literal, load_case, to_toml
 from contact.errors import InputError, counted, nearest
 from contact.io.folder import write_whole
 from contact.io.tables import write_csv

@@ -15,8 +15,7 @@ from pathlib import Path
 from pydantic.fields import FieldInfo
 
 import meshes
-from contact.case.file import DEFAULT, Case
-from contact.case.text import literal
+from contact.case.file import DEFAULT, Case, literal
 from contact.model import formula as formulas
 from contact.model.messages import accepted_by, either, keys_of, kinds_of, sections_of, shown
 from contact.settings import ReadWith

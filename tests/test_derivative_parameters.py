@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import InputError, load_case, parse_case, sensitivity, solve
-from contact.case.text import number_at, with_number
+from contact.case.file import number_at, with_number
 from scripts.studies.derivatives import by_both, values
 
 SELF = MPI.COMM_SELF

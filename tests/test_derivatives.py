@@ -31,7 +31,7 @@ from contact import (
     solve_steps,
 )
 from contact.case.build import build_problem
-from contact.case.text import number_at, with_number
+from contact.case.file import number_at, with_number
 from contact.derivatives.by_parameters import logger
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import InputError, identify, parse_case, read_data, solve
-from contact.case.text import number_at, to_toml, with_number
+from contact.case.file import number_at, to_toml, with_number
 from contact.cli.identify import report
 from contact.cli.main import main
 from contact.derivatives.identification import _accepted

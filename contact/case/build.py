@@ -15,9 +15,8 @@ from contact.errors import InputError
 from contact.mesh.domain import Domain, revolved
 from contact.model.body import Bolt, Electrode, Fixed, Load
 from contact.model.contact import Contact
-from contact.model.electric import Electric
+from contact.model.foundation import Electric, Layer
 from contact.model.friction import Friction
-from contact.model.layer import Layer
 from contact.model.material import Material
 from contact.model.obstacle import Obstacle
 from contact.model.rigid import Motion, Rigid

@@ -7,20 +7,22 @@ from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 from contact.body.elements import needed
-from contact.case.units import check_units
-from contact.errors import nearest
+from contact.errors import nearest, shown
 from contact.mesh.parts import meet, members
 from contact.model.body import ZERO
 from contact.model.fields import CONSTANT
 from contact.model.formula import Expression
 from contact.model.messages import Words, fault, listed
-from contact.model.section import as_given, walk
-from contact.model.values import AMPLITUDE, PART
+from contact.model.section import AMPLITUDE, PART, as_given, walk
+from contact.model.units import SYSTEMS, System, system_named
 from contact.settings import SPATIAL
 from contact.tolerances import HUGE
 
 #: `contact.case.file.Case`, which calls these checks.
 Case: TypeAlias = Any
+
+#: Quantities that the constants of a material have: elastic, and piezoelectric.
+ELASTIC, ELECTRIC = ("length", "stress"), ("length", "stress", "potential", "charge")
 
 #: Beginnings of the keys that may depend on the time.
 TIMED = ("fixed.", "load.", "rigid.", "electrode.", "bolt.")
@@ -35,7 +37,7 @@ def check_sections(case: Case) -> None:
         if AMPLITUDE in marks and value is not None:
             _check_amplitude(case, path, value)
     _check_regions(case)
-    check_units(case)
+    _check_units(case)
     piezoelectric = any(material.piezoelectric for _, material in case.materials)
     if piezoelectric:
         _check_potential(case)
@@ -228,3 +230,37 @@ def _check_rigid(case: Case) -> None:
         for i, on in enumerate(parts):
             if any(meet(on, other) for other in parts[:i]):
                 raise fault(f"{key}.{i}.on", on, f"a part that no other [[{key}]] has")
+
+
+def _check_units(case: Case) -> None:
+    """Raise a fault unless the materials by name have one system, and the labels are of it."""
+    labels = case.case.units.given
+    first: tuple[str, Any, System] | None = None
+    for path, material in case.materials:
+        if material.entry is None:
+            continue
+        own = material.system(labels)
+        kinds = ELECTRIC if material.piezoelectric else ELASTIC
+        known = {key: labels[key] for key in kinds if key in labels}
+        quantity = own.contradicted(known)
+        if quantity is not None:
+            words = Words(
+                f"{_units_of(material)} has {own.labels[quantity]} for {quantity}, and "
+                f'case.units.{quantity} = "{labels[quantity]}"'
+            )
+            fitting = [k for k in SYSTEMS if system_named(k, labels).contradicted(known) is None]
+            accepted = listed([*map(shown, fitting)]) or (
+                "labels of one system: stress = force / length^2, charge = force length / potential"
+            )
+            raise fault(f"{path}.units", words, accepted, "units")
+        if first is None:
+            first = path, material, own
+        elif own != first[2]:
+            words = Words(f"{_units_of(material)}, and {first[0]} has {_units_of(first[1])}")
+            raise fault(f"{path}.units", words, "one system of units for all materials", "units")
+
+
+def _units_of(material: Any) -> str:
+    """Return the units of a material as given."""
+    given = material.units
+    return shown(given if isinstance(given, str) else given.model_dump())

@@ -16,8 +16,7 @@ from contact.errors import InputError
 from contact.library.materials import PACKAGED
 from contact.mesh.reader import mesh_files
 from contact.model.messages import shown
-from contact.model.section import walk
-from contact.model.values import FilePath
+from contact.model.section import FilePath, walk
 
 #: Key of the mesh file.
 MESH = "mesh.file"

@@ -6,20 +6,17 @@
 
 from __future__ import annotations
 
+import json
+import os
+import re
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from functools import reduce
-from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import (
-    AfterValidator,
-    Discriminator,
     Field,
-    PlainSerializer,
     PrivateAttr,
-    Tag,
     ValidationError,
     model_validator,
 )
@@ -27,22 +24,33 @@ from pydantic_core import PydanticCustomError
 
 from contact.case.checks import check_mesh, check_sections
 from contact.case.mesh import Mesh, cut_about_axis
-from contact.case.units import Labels, share
 from contact.errors import InputError, clipped
-from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
+from contact.methods.options import FixedPointOptions, NewtonOptions, Options
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
 from contact.model.contact import Contact
-from contact.model.electric import Electric
 from contact.model.evolution import Evolution
 from contact.model.fields import CONSTANT, Amplitude, Ramp, steady
+from contact.model.foundation import Electric
 from contact.model.friction import Friction
 from contact.model.material import Material
 from contact.model.messages import describe, describe_fault, fault, keys_of, path_of, shown
 from contact.model.rigid import Motion, Rigid
-from contact.model.section import FromTable, Section, check_conditions, without_effect
-from contact.model.values import OneOrSome, Text, as_tuple
+from contact.model.section import (
+    FromTable,
+    OneOrSome,
+    Section,
+    Text,
+    as_tuple,
+    check_conditions,
+    without_effect,
+)
+from contact.model.units import NAMES, SYSTEMS, system_named
 from contact.results.options import OutputOptions, Units
 from contact.settings import Accepted
+
+if TYPE_CHECKING:
+    Solver: TypeAlias = Options
+
 
 #: Key of the case -> the arguments of `build_problem` of which one replaces it.
 REPLACEABLE = {
@@ -88,16 +96,6 @@ def _read_by(options: Options) -> dict[str, Any]:
 
 
 #: `[solver]`: the options of one method, by its name: one of those that `OPTIONS` lists.
-if TYPE_CHECKING:
-    Solver: TypeAlias = Options
-else:
-    Solver = Annotated[
-        reduce(or_, (Annotated[kind, FromTable, Tag(name)] for name, kind in OPTIONS.items())),
-        Discriminator(_method_of),
-        AfterValidator(_check_options),
-        PlainSerializer(_read_by),
-        Accepted("a table"),
-    ]
 
 
 class Space(Section):
@@ -114,6 +112,21 @@ class Space(Section):
     is free to grow thinner; or a body of revolution, of which the mesh is the half plane x = r, y
     along the axis. Displacements across the axis are then 0 without a support, and loads, forces
     and charges are those of the full turn."""
+
+
+def _labels(given: Any) -> Any:
+    """Return the names of the units of a system that is given by its own name."""
+    by_name = isinstance(given, str) and given in SYSTEMS
+    return system_named(given, {}).labels if by_name else given
+
+
+#: `[case] units`: labels, or the name of a system, whose labels they then are.
+Labels: TypeAlias = Annotated[
+    Units,
+    FromTable,
+    BeforeValidator(_labels),
+    Accepted(f"{NAMES}, or a table {{ length, stress, potential, charge }} of names"),
+]
 
 
 class About(Section):
@@ -223,7 +236,7 @@ class Case(Section):
     @model_validator(mode="before")
     @classmethod
     def _fill_in(cls, given: Any) -> Any:
-        return cut_about_axis(share(given))
+        return cut_about_axis(_share_units(given))
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -236,6 +249,22 @@ class Case(Section):
             check_mesh(self, dimension, parts)
         except PydanticCustomError as error:
             raise describe_fault(error).within(f"{self._source}: ") from None
+
+
+def _share_units(given: Any) -> Any:
+    """Give the system of `[case] units` to the materials by name that have none of their own."""
+    about = given.get("case") if isinstance(given, Mapping) else None
+    name = about.get("units") if isinstance(about, Mapping) else None
+    if not isinstance(name, str) or name not in SYSTEMS:
+        return given
+    tables = given.get("material")
+
+    def shared(table: Any) -> Any:
+        by_name = isinstance(table, Mapping) and table.get("name") is not None
+        return {"units": name, **table} if by_name else table
+
+    many = isinstance(tables, list | tuple)
+    return {**given, "material": [*map(shared, tables)] if many else shared(tables)}
 
 
 def _entries(key: str, given: Kind | tuple[Kind, ...]) -> tuple[tuple[str, Kind], ...]:
@@ -409,3 +438,96 @@ def _index(place: list[Any], key: str, above: list[str], path: str, source: str)
 
 def _refusal(source: str, path: str, words: str) -> InputError:
     return InputError(f"{source}: --set {clipped(path)}: {words}", "set")
+
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def to_toml(case: Case, dimension: int | None = None, anchored: bool = False) -> str:
+    """Return a case file that gives the same case again, without the keys that its method ignores.
+
+    Parameters
+    ----------
+    case
+        The case.
+    dimension
+        Of its mesh, if it is known: keys without effect there are left out.
+    anchored
+        Whether files are given with their whole paths, for a case that is read from anywhere.
+    """
+    ignored = {"space": {"kinematics"}} if dimension == 3 else None
+    context = {"path": os.path.abspath} if anchored else None
+    data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored, context=context)
+    return "\n".join(_table(data, ())).strip() + "\n"
+
+
+def number_at(case: Case, key: str) -> float:
+    """Return the number at a key of a case, ``load.0.traction.1``.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    place: Any = tomllib.loads(to_toml(case))
+    for name in key.split("."):
+        if isinstance(place, list) and name.isdigit() and int(name) < len(place):
+            place = place[int(name)]
+        else:
+            # Parameters of a mesh generator may stand in [mesh] itself.
+            inner = place.get("parameters", {}) if isinstance(place, Mapping) else {}
+            place = {**inner, **place}.get(name) if isinstance(place, Mapping) else None
+    if isinstance(place, bool) or not isinstance(place, int | float):
+        words = "nothing" if place is None else f"{place!r}"
+        raise InputError(
+            f"{case.source}: {key}: {words} stands there; accepted: a key with a number",
+            "no-number",
+        )
+    return float(place)
+
+
+def with_number(case: Case, key: str, value: float) -> Case:
+    """Return a case with another number at a key; see `number_at`."""
+    data = tomllib.loads(to_toml(case, anchored=True))
+    override(data, f"{key}={float(value)!r}", case.source)
+    return parse_case(data, ".", case.source)
+
+
+def _table(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
+    """Write the values of a table, then the tables in it."""
+    inner = {key: value for key, value in table.items() if _holds_tables(value)}
+    for key, value in table.items():
+        if key not in inner and value != {} and not (value == () and not path):
+            yield f"{_key(key)} = {literal(value)}"
+    for key, value in inner.items():
+        place = (*path, key)
+        name = ".".join(_key(part) for part in place)
+        many = not isinstance(value, Mapping)
+        for entry in value if many else (value,):
+            # A table that holds nothing but tables needs no heading of its own.
+            if many or not all(_holds_tables(item) for item in entry.values()):
+                yield f"\n[[{name}]]" if many else f"\n[{name}]"
+            yield from _table(entry, place)
+
+
+def _holds_tables(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        return bool(value)
+    return isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value)
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else literal(key)
+
+
+def literal(value: Any) -> str:
+    """Return a number, text, switch, or a list or table of these as TOML."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(literal(item) for item in value)}]"
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{_key(key)} = {literal(item)}' for key, item in value.items())} }}"
+    return str(value)

@@ -26,8 +26,18 @@ from contact.mesh.transfer import check_adaptable, refined
 from contact.methods.signals import killed_on_signal
 from contact.model.formula import Expression
 from contact.model.messages import UNKNOWN, Words, fault
-from contact.model.section import Section
-from contact.model.values import Axis, Either, Few, File, Formula, Name, OneOrSome, Vector, as_tuple
+from contact.model.section import (
+    Axis,
+    Either,
+    Few,
+    File,
+    Formula,
+    Name,
+    OneOrSome,
+    Section,
+    Vector,
+    as_tuple,
+)
 from contact.ranks import on_all_ranks
 from contact.settings import Accepted, Count, Number, Positive
 from contact.typing import Array

@@ -13,8 +13,7 @@ from contact.body.elements import unlocked
 from contact.body.pointwise import CHUNK
 from contact.case.build import build_problem
 from contact.case.checks import growing
-from contact.case.file import Case, load_case
-from contact.case.text import to_toml
+from contact.case.file import Case, load_case, to_toml
 from contact.cli.acting import acting
 from contact.cli.geometry import parts, regions
 from contact.cli.main import CONVERGED

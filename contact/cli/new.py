@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.case.text import literal
+from contact.case.file import literal
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.interface.pairing import facing_parts

@@ -18,8 +18,7 @@ from matplotlib.figure import Figure
 from scipy.spatial import KDTree
 
 from contact import _compat
-from contact.case.file import Case
-from contact.case.text import literal
+from contact.case.file import Case, literal
 from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets

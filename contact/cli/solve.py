@@ -15,8 +15,7 @@ from mpi4py import MPI
 
 from contact.case.build import build_problem, named
 from contact.case.digest import check_same
-from contact.case.file import Case, load_case, override, parse_case
-from contact.case.text import to_toml
+from contact.case.file import Case, load_case, override, parse_case, to_toml
 from contact.cli.check import amplitude_notes
 from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress

@@ -30,8 +30,7 @@ import numpy as np
 
 from contact.arguments import expect
 from contact.case.build import build_problem
-from contact.case.file import Case
-from contact.case.text import number_at, with_number
+from contact.case.file import Case, number_at, with_number
 from contact.derivatives.differences import Family, Parameter, at, family_of
 from contact.errors import InputError, counted
 from contact.history import History

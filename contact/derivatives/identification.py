@@ -22,8 +22,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from contact.arguments import expect
-from contact.case.file import Case
-from contact.case.text import number_at, with_number
+from contact.case.file import Case, number_at, with_number
 from contact.derivatives.by_parameters import sensitivity
 from contact.errors import InputError
 from contact.methods.report import Monitor

@@ -27,9 +27,8 @@ from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes, Geometry
 from contact.interface.smoothing import Smoothing
 from contact.linear.layout import Inclined, projectors
-from contact.model.electric import Conductor
+from contact.model.foundation import Conductor, Layer
 from contact.model.friction import Friction
-from contact.model.layer import Layer
 from contact.typing import Array
 from forms.laws import (
     Compliance,

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from contact.interface.active_set import constraint_active
 from contact.interface.layer import NormalLaw
 from contact.interface.nodes import ContactNodes
-from contact.model.electric import Conductor
-from contact.model.layer import Layer
+from contact.model.foundation import Conductor, Layer
 from contact.typing import Array
 
 #: A pressure above zero.

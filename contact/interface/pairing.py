@@ -27,7 +27,7 @@ from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at, connected_components, owned_among
 from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle
-from contact.model.obstacle.protocol import measured
+from contact.model.obstacle.shapes import measured
 from contact.tolerances import ROUNDING, TOUCHING
 from contact.typing import Array
 

@@ -23,7 +23,7 @@ from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle, Shape
-from contact.model.obstacle.protocol import measured
+from contact.model.obstacle.shapes import measured
 from contact.ranks import on_all_ranks
 from contact.typing import Array
 

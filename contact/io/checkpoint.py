@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from contact.case.digest import check_files, check_same, digest
-from contact.case.file import Case
-from contact.case.text import to_toml
+from contact.case.file import Case, to_toml
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.multipliers import Multipliers

@@ -24,8 +24,8 @@ from contact.model.fields import (
 )
 from contact.model.formula import Expression
 from contact.model.messages import Words, fault
-from contact.model.section import Described, as_given
-from contact.model.values import (
+from contact.model.section import (
+    Described,
     FactorOfTime,
     Few,
     Free,
@@ -35,6 +35,7 @@ from contact.model.values import (
     Timed,
     Value,
     Values,
+    as_given,
 )
 from contact.settings import SPATIAL, Accepted, Switch
 

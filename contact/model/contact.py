@@ -13,11 +13,10 @@ from contact.arguments import expect, one_of
 from contact.mesh.domain import Domain
 from contact.mesh.parts import meet
 from contact.model.body import ZERO
-from contact.model.electric import Conductor, Electric
 from contact.model.fields import Static
 from contact.model.formula import Expression
+from contact.model.foundation import Conductor, Electric, Layer
 from contact.model.friction import Friction
-from contact.model.layer import Layer
 from contact.model.messages import Words, fault
 from contact.model.obstacle import (
     Cone,
@@ -34,8 +33,7 @@ from contact.model.obstacle import (
     Triangles,
 )
 from contact.model.rigid import Motion
-from contact.model.section import Described, FromTable, Own
-from contact.model.values import Direction, Part, StaticValue
+from contact.model.section import Described, Direction, FromTable, Own, Part, StaticValue
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor

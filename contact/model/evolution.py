@@ -12,8 +12,7 @@ from pydantic import Field, model_validator
 
 from contact.errors import InputError
 from contact.model.messages import Words, fault
-from contact.model.section import Described
-from contact.model.values import File, Text, as_tuple
+from contact.model.section import Described, File, Text, as_tuple
 from contact.settings import Accepted, Count, Number
 
 #: Share of an amplitude's range from which on an extreme value that no step meets is told.

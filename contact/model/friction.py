@@ -11,8 +11,7 @@ from pydantic import AfterValidator, Discriminator, Tag
 from contact.arguments import expect
 from contact.errors import InputError
 from contact.model.fields import Scalar
-from contact.model.section import Described, Own, Section
-from contact.model.values import NonNegativeValue
+from contact.model.section import Described, NonNegativeValue, Own, Section
 from contact.settings import Accepted, NonNegative, ReadWith
 from forms.laws import FrictionCoefficient, FrictionLaw, SlipCoefficient
 

@@ -14,8 +14,17 @@ from contact.model.body import ZERO
 from contact.model.fields import Amplitude, GivenAmplitude, GivenTimed, amplitude_of
 from contact.model.formula import Expression, as_number
 from contact.model.messages import Words, fault
-from contact.model.section import Described, as_given
-from contact.model.values import Either, FactorOfTime, FewTimed, FreeTimed, Part, Timed, Vector
+from contact.model.section import (
+    Described,
+    Either,
+    FactorOfTime,
+    FewTimed,
+    FreeTimed,
+    Part,
+    Timed,
+    Vector,
+    as_given,
+)
 from contact.settings import SPATIAL, Accepted
 from contact.typing import Array
 

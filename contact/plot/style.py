@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from contact.errors import InputError
-from contact.library.units import force_of
+from contact.model.units import force_of
 from contact.results.options import Units
 from contact.results.quantities import quantities
 from contact.results.quantity import BODY

@@ -39,7 +39,7 @@ from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
 from contact.mesh.geometry import area, volume
 from contact.model.contact import Contact, check_laws
-from contact.model.electric import Conductor, Electric
+from contact.model.foundation import Conductor, Electric
 from contact.model.friction import Friction
 from contact.model.rigid import Rigid
 from contact.problem.protocols import Scales

@@ -12,7 +12,7 @@ from itertools import chain
 import numpy as np
 from mpi4py import MPI
 
-from contact.model.electric import Conductor
+from contact.model.foundation import Conductor
 from contact.problem.checks import meeting_supports
 from contact.problem.residuals import residual_as_pressures, residual_forces
 from contact.problem.rigid_modes import constrained_by_supports

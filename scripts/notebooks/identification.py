@@ -33,7 +33,7 @@ from contact import (
     load_case,
     solve,
 )
-from contact.case.text import number_at, with_number
+from contact.case.file import number_at, with_number
 from contact.mesh.domain import from_mesh
 from scripts.cases import CASES
 

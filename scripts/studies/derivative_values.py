@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from contact import field_gradient, gap_gradient, load_case, parse_case, sensitivity
-from contact.case.file import Case
-from contact.case.text import number_at, to_toml, with_number
+from contact.case.file import Case, number_at, to_toml, with_number
 from contact.derivatives.by_parameters import LoadPath
 from contact.results.quantities import named_functionals
 from contact.results.solution import Solution

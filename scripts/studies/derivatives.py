@@ -13,8 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import solve
-from contact.case.file import Case, parse_case
-from contact.case.text import number_at, to_toml, with_number
+from contact.case.file import Case, number_at, parse_case, to_toml, with_number
 from contact.derivatives.by_parameters import (
     ADJOINT,
     TANGENT,

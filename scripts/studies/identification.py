@@ -15,8 +15,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from contact import identify, load_case, sensitivity
-from contact.case.file import Case
-from contact.case.text import number_at, with_number
+from contact.case.file import Case, number_at, with_number
 from contact.cli.identify import draw
 from contact.results.solution import Solution
 from contact.typing import Array

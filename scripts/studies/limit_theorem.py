@@ -16,7 +16,7 @@ import numpy as np
 
 from contact import Case, NotConvergedError, build_problem, load_case
 from contact.model.contact import Contact
-from contact.model.layer import Layer
+from contact.model.foundation import Layer
 from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from contact.typing import Array

@@ -17,7 +17,7 @@ from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
-from contact.model.electric import Conductor
+from contact.model.foundation import Conductor
 from contact.model.friction import Friction
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem

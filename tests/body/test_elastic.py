@@ -17,7 +17,7 @@ from contact import (
     solve,
 )
 from contact.case.build import build_problem
-from contact.case.text import to_toml
+from contact.case.file import to_toml
 from contact.errors import InputError
 from contact.mesh.grid import rectangle
 

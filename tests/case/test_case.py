@@ -6,8 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from contact.case.file import load_case, parse_case
-from contact.case.text import to_toml
+from contact.case.file import load_case, parse_case, to_toml
 from contact.errors import InputError
 from contact.model.formula import Expression
 from contact.model.friction import SlipLaw

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from contact import InputError, load_case, parse_case, solve
 from contact.case.build import build_problem
 from contact.case.digest import digest
-from contact.case.text import to_toml
+from contact.case.file import to_toml
 from tests.problems.bar import changed
 
 STEPS = {"times": [0.0, 1.0, 3.0], "steps": [1, 2]}

@@ -5,8 +5,7 @@ import shutil
 import pytest
 
 from contact.case.digest import check_files, check_same, digest
-from contact.case.file import load_case
-from contact.case.text import to_toml
+from contact.case.file import load_case, to_toml
 from contact.errors import InputError
 from contact.library.materials import PACKAGED
 

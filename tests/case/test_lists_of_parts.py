@@ -10,7 +10,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, InputError, Linear, Load, Problem, parse_case, solve
-from contact.case.text import to_toml
+from contact.case.file import to_toml
 from contact.mesh.grid import rectangle
 from contact.mesh.parts import Together, members, part
 

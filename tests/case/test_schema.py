@@ -12,9 +12,8 @@ import pytest
 from pydantic import ValidationError
 
 import meshes
-from contact.case.file import Case, load_case, parse_case
+from contact.case.file import Case, load_case, parse_case, to_toml
 from contact.case.schema import below, schema
-from contact.case.text import to_toml
 from contact.errors import InputError
 from contact.model.messages import keys_of, sections_of
 from contact.model.section import FromTable, Section

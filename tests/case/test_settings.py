@@ -4,8 +4,7 @@ import tomllib
 
 import pytest
 
-from contact.case.file import Case, parse_case
-from contact.case.text import to_toml
+from contact.case.file import Case, parse_case, to_toml
 from contact.methods.options import OPTIONS, NewtonOptions, with_method
 from contact.model.messages import keys_of, sections_of
 from scripts import case_page, output_page

@@ -15,8 +15,8 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.model.body import Fixed
 from contact.model.contact import Contact
+from contact.model.foundation import Layer
 from contact.model.friction import Friction
-from contact.model.layer import Layer
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear

@@ -12,8 +12,7 @@ from mpi4py import MPI
 
 from contact.interface.law import InterfaceLaw
 from contact.interface.nodes import ContactNodes
-from contact.model.electric import Conductor
-from contact.model.layer import Layer
+from contact.model.foundation import Conductor, Layer
 from forms.foundation import compliance, electric_contact
 from forms.laws import (
     Compliance,

@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.case.text import to_toml
+from contact.case.file import to_toml
 from contact.cli.main import main
 from contact.errors import InputError
 from contact.io.folder import LOCK, STAGE, ResultFolder, result_folder, settle

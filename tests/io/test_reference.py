@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from contact import sensitivity
-from contact.case.text import number_at, with_number
+from contact.case.file import number_at, with_number
 from contact.io.reference import files_help
 from contact.plot.run import read_grid
 from contact.results import quantities as registry

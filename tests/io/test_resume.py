@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, solve
-from contact.case.text import to_toml
+from contact.case.file import to_toml
 from contact.cli.main import main
 from contact.cli.solve import solve_and_keep
 from contact.errors import InputError

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import contact
-from contact.case.file import load_case, parse_case
-from contact.case.text import to_toml
+from contact.case.file import load_case, parse_case, to_toml
 from contact.cli.main import main
 from contact.errors import InputError
 from contact.library.materials import PACKAGED, find, library

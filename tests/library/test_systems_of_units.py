@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import contact
-from contact.case.file import parse_case
-from contact.case.text import to_toml
+from contact.case.file import parse_case, to_toml
 from contact.errors import InputError
-from contact.library.units import SYSTEMS, System, system_named
+from contact.model.units import SYSTEMS, System, system_named
 
 STEEL = {"name": "steel"}
 
@@ -74,11 +73,11 @@ def test_a_piezoelectric_problem_is_the_same_in_all_systems(name):
         name="PZT-5A",
     )
     other = contact.solve(case)
-    assert np.allclose(other.pressure * system.stress, si.pressure, rtol=1e-8)
+    assert np.allclose(other.pressure * system.unit("stress"), si.pressure, rtol=1e-8)
     phi, given = si.potential.x.array, other.potential.x.array * system.potential
     assert np.allclose(given, phi, rtol=0, atol=1e-8 * volts)
     # Of a plane body, a unit of length thick.
-    charge = other.charges.electrodes["left"] * system.charge / system.length
+    charge = other.charges.electrodes["left"] * system.unit("charge") / system.length
     assert charge == pytest.approx(si.charges.electrodes["left"], rel=1e-7)
     assert np.abs(phi).max() > 1 and si.charges.electrodes["left"] != 0
 

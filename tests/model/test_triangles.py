@@ -19,7 +19,7 @@ from contact.model.obstacle import (
     Level,
     Triangles,
 )
-from contact.model.obstacle.triangles import read_stl
+from contact.model.obstacle.surfaces import read_stl
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant

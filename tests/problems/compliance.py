@@ -10,8 +10,7 @@ from contact.body.description import Body
 from contact.mesh.grid import box, rectangle
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
-from contact.model.electric import Conductor
-from contact.model.layer import Layer
+from contact.model.foundation import Conductor, Layer
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import (

@@ -10,7 +10,7 @@ from contact.body.description import Body
 from contact.mesh.grid import box, rectangle
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
-from contact.model.electric import Conductor
+from contact.model.foundation import Conductor
 from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -8,7 +8,7 @@ import ufl
 from mpi4py import MPI
 
 from contact import load_case, parse_case, sensitivity, solve
-from contact.case.text import number_at, with_number
+from contact.case.file import number_at, with_number
 from contact.results.functionals import Integral
 from contact.results.quantities import named_functionals
 from contact.results.quantity import Differentiable

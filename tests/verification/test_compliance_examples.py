@@ -9,8 +9,8 @@ from mpi4py import MPI
 
 from contact import InputError, Solution, build_problem, load_case, solve
 from contact.model.formula import Expression
+from contact.model.foundation import Layer
 from contact.model.friction import Friction
-from contact.model.layer import Layer
 from contact.problem.problem import ContactProblem
 from contact.results.surface import contact_table
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient

@@ -9,7 +9,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Electrode, Fixed
 from contact.model.contact import Contact
-from contact.model.electric import Conductor
+from contact.model.foundation import Conductor
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate

@@ -4,18 +4,19 @@ Each shape has its signed distance with normals, and its chord rule; gaps along 
 follow (`protocol.Shape`).
 """
 
-from contact.model.obstacle.heights import Heights
-from contact.model.obstacle.protocol import GapFunction, Obstacle, Shape
 from contact.model.obstacle.shapes import (
     Cone,
     Cylinder,
+    GapFunction,
     Level,
+    Obstacle,
     Paraboloid,
     Plane,
     Punch,
+    Shape,
     Sphere,
 )
-from contact.model.obstacle.triangles import Triangles
+from contact.model.obstacle.surfaces import Heights, Triangles
 
 __all__ = [
     "Cone",

@@ -19,7 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import InputError, Solution, build_problem, solve
-from contact.case.text import to_toml
+from contact.case.file import to_toml
 from contact.methods.options import OPTIONS, with_method
 from contact.writing import write_outputs
 from scripts.reporting import Report, append, parser
