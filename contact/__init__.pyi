@@ -26,10 +26,10 @@ from contact.model.body import Fixed as Fixed
 from contact.model.body import Load as Load
 from contact.model.contact import Contact as Contact
 from contact.model.data import read_data as read_data
-from contact.model.electric import Conductor as Conductor
-from contact.model.electric import Electric as Electric
+from contact.model.foundation import Conductor as Conductor
+from contact.model.foundation import Electric as Electric
+from contact.model.foundation import Layer as Layer
 from contact.model.friction import Friction as Friction
-from contact.model.layer import Layer as Layer
 from contact.model.material import Material as Material
 from contact.model.material import make_material as make_material
 from contact.model.obstacle import Cone as Cone

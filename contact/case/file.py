@@ -1,6 +1,7 @@
 """The case file: one TOML file that says all about a problem and how to solve it.
 
-`load_case` reads a file, `parse_case` a dictionary. Every mistake is reported as one
+`load_case` reads a file, `parse_case` a dictionary; `to_toml` writes one that says the same, with
+the defaults. Every mistake is reported as one
 `contact.errors.InputError` that names the file, the key, the given and the accepted values.
 """
 
@@ -11,12 +12,19 @@ import os
 import re
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
     Field,
+    PlainSerializer,
     PrivateAttr,
+    Tag,
     ValidationError,
     model_validator,
 )
@@ -25,7 +33,7 @@ from pydantic_core import PydanticCustomError
 from contact.case.checks import check_mesh, check_sections
 from contact.case.mesh import Mesh, cut_about_axis
 from contact.errors import InputError, clipped
-from contact.methods.options import FixedPointOptions, NewtonOptions, Options
+from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.evolution import Evolution
@@ -47,10 +55,6 @@ from contact.model.section import (
 from contact.model.units import NAMES, SYSTEMS, system_named
 from contact.results.options import OutputOptions, Units
 from contact.settings import Accepted
-
-if TYPE_CHECKING:
-    Solver: TypeAlias = Options
-
 
 #: Key of the case -> the arguments of `build_problem` of which one replaces it.
 REPLACEABLE = {
@@ -96,6 +100,16 @@ def _read_by(options: Options) -> dict[str, Any]:
 
 
 #: `[solver]`: the options of one method, by its name: one of those that `OPTIONS` lists.
+if TYPE_CHECKING:
+    Solver: TypeAlias = Options
+else:
+    Solver = Annotated[
+        reduce(or_, (Annotated[kind, FromTable, Tag(name)] for name, kind in OPTIONS.items())),
+        Discriminator(_method_of),
+        AfterValidator(_check_options),
+        PlainSerializer(_read_by),
+        Accepted("a table"),
+    ]
 
 
 class Space(Section):

@@ -1,4 +1,7 @@
-"""A conductive foundation: its description, and its law at the nodes in front of it."""
+"""Laws of a foundation: a compliant layer in front of its rigid part, and its conductivity.
+
+The layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2.
+"""
 
 from __future__ import annotations
 

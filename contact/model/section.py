@@ -1,4 +1,8 @@
-"""Building blocks of descriptions: tables of a case file; for kinds of values see `values`."""
+"""Building blocks of descriptions: tables of a case file, and kinds of their values.
+
+Each kind of value carries the accepted ones in words, and where it matters a mark by which `walk`
+finds it: `SPATIAL`, `PART`, `AMPLITUDE`, `FilePath`.
+"""
 
 from __future__ import annotations
 

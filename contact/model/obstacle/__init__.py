@@ -1,7 +1,7 @@
 """Rigid foundations: shapes, triangles, and gaps given as functions.
 
 Each shape has its signed distance with normals, and its chord rule; gaps along other directions
-follow (`protocol.Shape`).
+follow (`shapes.Shape`).
 """
 
 from contact.model.obstacle.shapes import (

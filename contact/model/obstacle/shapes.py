@@ -1,6 +1,6 @@
-"""Rigid shapes: plane, sphere, cylinder, cone, paraboloid, punch, and one by its signed distance.
+"""Obstacles as the contact nodes see them: rigid shapes, and gaps that are given as such.
 
-A shape is a class that returns signed distances with normals (`protocol.Shape.distance`); all else
+A shape is a class that returns signed distances with normals (`Shape.distance`); all else
 follows from it.
 """
 

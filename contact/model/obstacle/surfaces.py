@@ -1,4 +1,4 @@
-"""A rigid surface by its heights over a line or a plane, as profilometers measure it."""
+"""Measured rigid surfaces: heights over a line or a plane, and triangles of an STL file."""
 
 from __future__ import annotations
 
