@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from contact.history import BodyState
-from contact.linear.dense import DenseOperator, DenseStiffness
 from contact.linear.operator import Counters
+from contact.linear.schur import DenseOperator, DenseStiffness
 from contact.ranks import largest, on_all_ranks, on_root, summed
 from tests.conftest import _covering, pytest_collection_modifyitems
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.global_unknowns import GlobalUnknowns
-from contact.linear.refinement import Subsystems
+from contact.linear.petsc import Subsystems
 from contact.mesh.domain import Domain
 from contact.mesh.entities import component_sums, graph_components
 from contact.ranks import summed

@@ -21,11 +21,10 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
 from contact.linear.constraint import ConstrainedBulk, Constraint
-from contact.linear.dense import DenseOperator, DenseStiffness
-from contact.linear.faults import check_overflow, petsc_options
 from contact.linear.layout import Inclined, balance, masked
 from contact.linear.operator import Counters
-from contact.linear.schur import SchurComplement
+from contact.linear.petsc import check_overflow, petsc_options
+from contact.linear.schur import DenseOperator, DenseStiffness, SchurComplement
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Scales
 from contact.problem.state import State

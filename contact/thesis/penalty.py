@@ -24,8 +24,8 @@ from petsc4py import PETSc
 
 from contact.errors import InputError, SingularError
 from contact.interface.penalised import PenalisedLaw, Regularisation, outer
-from contact.linear.faults import petsc_options
 from contact.linear.operator import Counters
+from contact.linear.petsc import petsc_options
 from contact.methods.options import PenaltyOptions
 from contact.methods.report import Outcome
 from contact.methods.signals import Interrupted

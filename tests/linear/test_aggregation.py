@@ -8,10 +8,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact.body.description import Body
-from contact.linear import aggregation
-from contact.linear.aggregation import Aggregation, tentative
 from contact.linear.layout import hidden, options
-from contact.linear.multigrid import DEFAULTS, masked_motions
+from contact.linear.multigrid import AGGREGATES, DEFAULTS, Aggregation, masked_motions, tentative
 from contact.linear.operator import SparseOperator
 from contact.mesh.grid import box
 from contact.model.body import Fixed, Load
@@ -38,7 +36,7 @@ def aggregates(matrix: PETSc.Mat, threshold: str = "0.01") -> PETSc.Mat:
     """Return the tentative interpolation of a matrix. Collective."""
     names = {k: v for k, v in DEFAULTS.items() if k.startswith("pc_gamg_")}
     names["pc_gamg_threshold"] = threshold
-    with options("coarsened_", names | aggregation.AGGREGATES):
+    with options("coarsened_", names | AGGREGATES):
         found = tentative(matrix, "coarsened_")
     assert found is not None
     return found

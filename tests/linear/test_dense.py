@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from contact.history import BodyState
-from contact.linear.dense import DenseOperator, DenseStiffness
 from contact.linear.operator import Counters
+from contact.linear.schur import DenseOperator, DenseStiffness
 
 NODES, SIZE = 40, 2
 

@@ -248,7 +248,7 @@ def test_a_factorisation_takes_the_workspace_it_needs(degree: int) -> None:
 
 def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Several right-hand sides are refused with the words of one."""
-    monkeypatch.setattr("contact.linear.faults.MOST_WORKSPACE", 0)
+    monkeypatch.setattr("contact.linear.petsc.MOST_WORKSPACE", 0)
     problem = mechanics.bar(SELF, 16)
     operator = operator_of(problem, "lu")
     operator.ksp.setOperators(operator.matrix)

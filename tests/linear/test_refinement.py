@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.linear.refinement import Subsystems, refine
+from contact.linear.petsc import Subsystems, refine
 
 SIZE = np.array([2.0, 3.0, 4.0, 5.0])
 

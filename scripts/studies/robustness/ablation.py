@@ -26,7 +26,8 @@ import numpy as np
 from contact import Solution, load_case, nesting, solve
 from contact.case.file import Case, parse_case
 from contact.interface import complementarity
-from contact.linear import block, dense, multigrid
+from contact.linear import multigrid, schur
+from contact.linear.operator import BlockPreconditioner
 from contact.methods import (
     fallbacks,
     interior_point,
@@ -334,17 +335,17 @@ LINEAR = (
     Device("static condensation", (Newton._condensed_steps,), "Guyan 1965", (),
            (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
-           ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _own("lying")),
+           ((schur, "dpotrf", lambda *_, **__: (None, 1)),), (), _own("lying")),
     Device("elimination of unknowns without contact", (), "Golub and Van Loan 2013",
-           ((dense, "_cholesky", lambda _, rows: (np.zeros((0, 0)), int(rows.size > 0))),), (),
+           ((schur, "_cholesky", lambda _, rows: (np.zeros((0, 0)), int(rows.size > 0))),), (),
            _own("lying")),
     Device("coarse levels kept from step to step", (multigrid.Hierarchy,),
            "Karlin, Manasse, Rudolph and Sleator 1988", ((multigrid, "PRICE", 0),), (), _block),
     Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",
            ((multigrid.StiffNodes, "follow", _nothing),
             (multigrid.StiffNodes, "jump", lambda _, rhs: rhs.duplicate())), (), _block),
-    Device("piezoelectric block preconditioner", (block,), "Silvester and Wathen 1994",
-           ((multigrid, "LARGE", {**multigrid.LARGE, (3, True): 10**9}),), (),
+    Device("piezoelectric block preconditioner", (BlockPreconditioner,),
+           "Silvester and Wathen 1994", ((multigrid, "LARGE", {**multigrid.LARGE, (3, True): 10**9}),), (),
            partial(load_case, CASES / "piezo-column.toml", ["mesh.cells=[20, 20, 40]"])),
 )  # fmt: skip
 
