@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem
-from contact.body import pointwise
+from contact.body import elements
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import constrained_by_supports
 from contact.results.error_estimate import estimated
@@ -72,6 +72,6 @@ def growth(action: Callable[[ContactProblem], object]) -> float:
 
 def test_review_and_rigid_modes_need_less_than_the_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
     """That takes some 520 bytes an unknown, and is no more, or not all yet, then."""
-    monkeypatch.setattr(pointwise, "CHUNK", 500)
+    monkeypatch.setattr(elements, "CHUNK", 500)
     assert growth(lambda problem: estimated(problem, problem.start())) < 450
     assert growth(constrained_by_supports) < 200

@@ -13,13 +13,12 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact._compat import lasting
-from contact.body.cuts import Cuts
 from contact.body.description import Body
-from contact.body.elements import kinematics_of, quadrature_degree, rules_of
+from contact.body.elements import Pointwise, kinematics_of, quadrature_degree, rules_of
+from contact.body.global_unknowns import Cuts
 from contact.body.internal_variables import QuadratureLaws
 from contact.body.loads import Loads, assembled, given_loads
 from contact.body.materials import solids_of
-from contact.body.pointwise import Pointwise
 from contact.body.supports import elastic_supports_of
 from contact.body.weak_form import Fields, Term, WeakForm
 from contact.mesh.domain import Domain

@@ -12,9 +12,8 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
 from contact.arguments import expect
-from contact.body.elements import Rule
+from contact.body.elements import CHUNK, Rule
 from contact.body.internal_variables import QuadratureLaws
-from contact.body.pointwise import CHUNK
 from contact.body.weak_form import Solid
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices

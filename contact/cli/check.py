@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.elements import unlocked
-from contact.body.pointwise import CHUNK
+from contact.body.elements import CHUNK, unlocked
 from contact.case.build import build_problem
 from contact.case.checks import growing
 from contact.case.file import Case, load_case, to_toml

@@ -64,7 +64,7 @@ class Interface:
         of the residuals is larger.
     component, components
         Connected component of each contact node, shape (n,), and their number
-        (`contact.body.component_norms`).
+        (`contact.body.equilibrium`).
     proximal
         The term of a proximal-point method, or None.
     """

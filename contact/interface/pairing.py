@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from contact import _compat
 from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.rollers import APART
+from contact.body.supports import APART
 from contact.errors import InputError
 from contact.interface.mortar.coupling import Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from contact.arguments import naming
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.rollers import APART
+from contact.body.supports import APART
 from contact.errors import InputError, counted
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import Surface, surface_of

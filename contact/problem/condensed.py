@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.linalg import lu_factor, lu_solve
 
-from contact.body.component_norms import ComponentNorms
+from contact.body.equilibrium import ComponentNorms
 from contact.history import BodyState, LinearisationPoint
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers

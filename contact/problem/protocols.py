@@ -8,7 +8,7 @@ from typing import Protocol
 
 from mpi4py import MPI
 
-from contact.body.component_norms import ComponentNorms
+from contact.body.equilibrium import ComponentNorms
 from contact.history import LinearisationPoint
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.interface import Interface

@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.cuts import Pieces
+from contact.body.global_unknowns import Pieces
 from contact.model.body import Bolt
 from contact.model.rigid import Rigid, rigid_motions
 from contact.problem.problem import ContactProblem

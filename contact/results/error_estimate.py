@@ -23,10 +23,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
-from contact.body.elements import MEAN_DILATATION
+from contact.body.elements import MEAN_DILATATION, in_chunks
 from contact.body.loads import expression
 from contact.body.materials import factor_of
-from contact.body.pointwise import in_chunks
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cells_at

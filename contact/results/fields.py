@@ -20,8 +20,8 @@ from contact import _compat
 from contact.arguments import expect
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.internal_variables import NAME, name_of
 from contact.body.materials import form_law, piezo_with_constants
-from contact.body.stress_updates import NAME, name_of
 from contact.history import BodyState, LinearisationPoint
 from contact.mesh.cells import shape_of
 from contact.mesh.geometry import volumes

@@ -15,7 +15,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from contact import _compat
-from contact.body.pointwise import in_chunks
+from contact.body.elements import in_chunks
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cell_facets

@@ -6,7 +6,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.body import pointwise
+from contact.body import elements
 from contact.history import BodyState
 from contact.results.fields import DerivedFields
 from forms.hencky import Linear
@@ -28,7 +28,7 @@ def stretched(body, by: float) -> np.ndarray:
 
 @pytest.mark.parallel
 def test_two_readers_of_one_body_do_not_disturb_each_other(monkeypatch, body):
-    monkeypatch.setattr(pointwise, "CHUNK", 5)
+    monkeypatch.setattr(elements, "CHUNK", 5)
     cells = np.arange(body.domain.mesh.topology.index_map(2).size_local, dtype=np.int32)
     middle = np.full((1, 2), 1 / 3)
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from contact.body.pointwise import CHUNK
+from contact.body.elements import CHUNK
 from contact.interface.mortar.surface import Surface
 from contact.ranks import bounding_boxes, exchanged
 from contact.tolerances import ROUNDING

@@ -345,7 +345,8 @@ LINEAR = (
            ((multigrid.StiffNodes, "follow", _nothing),
             (multigrid.StiffNodes, "jump", lambda _, rhs: rhs.duplicate())), (), _block),
     Device("piezoelectric block preconditioner", (BlockPreconditioner,),
-           "Silvester and Wathen 1994", ((multigrid, "LARGE", {**multigrid.LARGE, (3, True): 10**9}),), (),
+           "Silvester and Wathen 1994",
+           ((multigrid, "LARGE", {**multigrid.LARGE, (3, True): 10**9}),), (),
            partial(load_case, CASES / "piezo-column.toml", ["mesh.cells=[20, 20, 40]"])),
 )  # fmt: skip
 
