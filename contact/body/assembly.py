@@ -21,9 +21,8 @@ from contact.body.loads import Loads, assembled, given_loads
 from contact.body.materials import solids_of
 from contact.body.supports import elastic_supports_of
 from contact.body.weak_form import Fields, Term, WeakForm
-from contact.mesh.domain import Domain
+from contact.mesh.domain import Domain, compiled
 from contact.mesh.entities import Indices
-from contact.mesh.integrals import compiled
 from contact.model.fields import constant
 from contact.ranks import summed
 from contact.typing import Array

@@ -27,9 +27,8 @@ from scipy import sparse
 
 from contact.body.description import Body
 from contact.errors import InputError
-from contact.mesh.domain import Domain
+from contact.mesh.domain import Domain, members
 from contact.mesh.entities import Indices, cell_facets, distributed_components
-from contact.mesh.parts import members
 from contact.model.body import Bolt, Electrode
 from contact.model.messages import describe_fault
 from contact.model.rigid import Rigid, numbers_at, rigid_motions

@@ -21,9 +21,8 @@ from contact.arguments import check_finite, naming, real
 from contact.body.description import Body
 from contact.body.weak_form import Given, Term
 from contact.errors import InputError
-from contact.mesh.domain import Domain
+from contact.mesh.domain import Domain, compiled
 from contact.mesh.geometry import area
-from contact.mesh.integrals import compiled
 from contact.model.body import Load
 from contact.model.fields import Amplitude, Field, Moving, at_time, constant
 from contact.ranks import on_all_ranks

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import ufl
 from ufl.core.expr import Expr
 
-from contact.mesh.integrals import Measure
+from contact.mesh.domain import Measure
 from contact.model.fields import Amplitude
 from forms.hencky import FormLaw, secant_form
 from forms.history import QuadratureLaw

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from contact.body.elements import needed
 from contact.errors import nearest, shown
-from contact.mesh.parts import meet, members
+from contact.mesh.domain import meet, members
 from contact.model.body import ZERO
 from contact.model.fields import CONSTANT
 from contact.model.formula import Expression

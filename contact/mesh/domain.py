@@ -1,4 +1,4 @@
-"""A mesh with names: parts of its boundary and regions of its cells.
+"""A mesh with names: parts of its boundary and regions of its cells, and measures over them.
 
 Each name stands for one set of indices, so that parts, and regions, may overlap (the side
 ``top`` and a piece ``loaded`` of it). Of a body of revolution the mesh is the half plane, x the
@@ -7,7 +7,8 @@ radius and y the axis.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -15,19 +16,159 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 import ufl
+from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from numpy.typing import NDArray
+from ufl.core.expr import Expr
 
 from contact import _compat
-from contact.errors import InputError
+from contact.errors import InputError, nearest
 from contact.mesh.cells import SHAPES, shape_of
-from contact.mesh.contents import BODY
-from contact.mesh.entities import Indices, extent, exterior_facets
-from contact.mesh.integrals import ExtendedMeasure, Measure
-from contact.mesh.parts import disjoint_pieces, known_name, members
+from contact.mesh.entities import Indices, combinations, extent, exterior_facets
 from contact.typing import Array
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
+
+PART_ACCEPTED = "the name of a part, or a list of names"
+
+
+class Together(str):
+    """The name of several parts together: their names with + between, one word in tables.
+
+    Attributes
+    ----------
+    members
+        The parts.
+    """
+
+    __slots__ = ("members",)
+
+    members: tuple[str, ...]
+
+    def __new__(cls, members: Iterable[str]) -> Together:
+        """Join names."""
+        names = tuple(members)
+        made = super().__new__(cls, "+".join(names))
+        made.members = names
+        return made
+
+    def __getnewargs__(self) -> tuple[tuple[str, ...]]:  # type: ignore[override]
+        """Return the names, of which copies are made: a text alone does not say where one ends."""
+        return (self.members,)
+
+
+def part_name(given: str | Sequence[str]) -> str:
+    """Return the name of a part, or of several together, of a name or a list of names."""
+    names = [given] if isinstance(given, str) else given
+    named = isinstance(names, list | tuple) and all(isinstance(n, str) and n for n in names)
+    if not named or not names:
+        raise InputError(f"given {given!r}; accepted: {PART_ACCEPTED}", "value")
+    different = list(dict.fromkeys(names))
+    return different[0] if len(different) == 1 else Together(different)
+
+
+def members(name: str) -> tuple[str, ...]:
+    """Return the parts that a name stands for."""
+    return name.members if isinstance(name, Together) else (name,)
+
+
+def meet(one: str, other: str) -> bool:
+    """Tell whether two names have a part in common."""
+    return not set(members(one)).isdisjoint(members(other))
+
+
+def disjoint_pieces(
+    comm: MPI.Intracomm, count: int, parts: Iterable[Indices]
+) -> list[tuple[tuple[int, ...], Indices]]:
+    """Divide the facets 0, ..., count - 1 into pieces in the same of some parts. Collective.
+
+    A piece is the parts by their positions, and the facets in exactly these; all ranks have the
+    same ones in the same order, some without facets.
+    """
+    numbers, combined = combinations(count, parts)
+    own = {combined[k]: np.flatnonzero(numbers == k).astype(np.int32) for k in np.unique(numbers)}
+    there = sorted(set().union(*comm.allgather(tuple(own))) - {()})
+    return [(found, own.get(found, np.empty(0, dtype=np.int32))) for found in there]
+
+
+def known_name(kind: str, name: str, names: Mapping[str, Indices]) -> str:
+    """Return a name, or raise an InputError with the nearest one and all names."""
+    if name in names:
+        return name
+    hint = nearest(str(name), names, "; did you mean '{}'?")
+    raise InputError(
+        f"the mesh has no {kind} {name!r}{hint} (its {kind}s: {', '.join(sorted(names))})",
+        "part-name",
+    )
+
+
+@dataclass(frozen=True)
+class ExtendedMeasure:
+    """A measure of UFL over a half plane, times the extent of the body there.
+
+    It is used like a measure of UFL: it multiplies an integrand from the right.
+
+    Attributes
+    ----------
+    measure
+        dx or ds of the mesh.
+    extent
+        2 pi r, the length of the ring through a point.
+    """
+
+    measure: ufl.Measure
+    extent: Expr
+
+    def __call__(self, *arguments: Any, **settings: Any) -> ExtendedMeasure:
+        """Return the measure with a subdomain or metadata of its own."""
+        return ExtendedMeasure(self.measure(*arguments, **settings), self.extent)
+
+    def __rmul__(self, integrand: Any) -> ufl.Form:
+        """Return the integral over the whole body."""
+        return (self.extent * integrand) * self.measure
+
+
+#: Measure of a body or of a part of its boundary.
+Measure: TypeAlias = ufl.Measure | ExtendedMeasure
+
+
+def compiled(form: ufl.Form) -> fem.Form:
+    """Compile a form whose subdomains are renumbered from 0. Collective.
+
+    UFL's signature of a form, by which FFCx finds compiled code, contains the numbers of
+    subdomains: an integrand on another part would be compiled again. Subdomains with the same
+    integrals become one.
+
+    Parameters
+    ----------
+    form
+        With the measures of one `Domain`.
+    """
+    everywhere, subdomains = [], defaultdict(list)
+    for integral in form.integrals():
+        numbers = integral.subdomain_id()
+        if numbers == "everywhere":
+            everywhere.append(integral)
+            continue
+        for number in numbers if isinstance(numbers, tuple) else (numbers,):
+            subdomains[integral.integral_type(), number].append(integral)
+    groups: dict[Any, tuple[list[ufl.Integral], list[Indices]]] = {}
+    for (kind, number), own in sorted(subdomains.items(), key=lambda item: item[0]):
+        same = kind, *((one.integrand(), repr(one.metadata())) for one in own)
+        entities = dict(own[0].subdomain_data())[number]
+        groups.setdefault(same, (own, []))[1].append(entities)
+    # One object a kind of integrals, as dolfinx demands.
+    data: dict[str, list[tuple[int, Indices]]] = defaultdict(list)
+    made = [one.reconstruct(subdomain_data=data[one.integral_type()]) for one in everywhere]
+    for (kind, *_), (own, entities) in groups.items():
+        number = len(data[kind])
+        made += [one.reconstruct(subdomain_id=number, subdomain_data=data[kind]) for one in own]
+        data[kind].append((number, np.concatenate(entities)))
+    return fem.form(ufl.Form(made))
+
+
+#: The region of a mesh without named regions.
+BODY = "body"
 
 #: Uses of facets inside of the body.
 UNLESS = (

@@ -19,12 +19,9 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.mesh.abaqus import included_files, read_abaqus
-from contact.mesh.contents import Contents
+from contact.mesh.contents import Cells, Contents, Groups, check
 from contact.mesh.domain import Domain, Indices, exterior_facets, with_names
-from contact.mesh.exodus import read_exodus
-from contact.mesh.gmsh_model import model_contents, read_msh, session
-from contact.mesh.med import read_med
-from contact.mesh.validity import Cells, Groups, check
+from contact.mesh.formats import model_contents, read_exodus, read_med, read_msh, session
 from contact.mesh.xdmf import (
     array_files,
     distributed_arrays,

@@ -31,8 +31,7 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.mesh.cells import Shape
-from contact.mesh.contents import Contents, Ints
-from contact.mesh.validity import Cells, Groups
+from contact.mesh.contents import Cells, Contents, Groups, Ints
 from contact.ranks import on_root
 
 #: First words of the names of topologies, and names of cells.

@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, WithJsonSchema, model_validator
 
 from contact.arguments import expect, one_of
-from contact.mesh.domain import Domain
-from contact.mesh.parts import meet
+from contact.mesh.domain import Domain, meet
 from contact.model.body import ZERO
 from contact.model.fields import Static
 from contact.model.formula import Expression

@@ -53,7 +53,7 @@ from ufl.core.expr import Expr
 from contact import settings
 from contact.arguments import OfTime
 from contact.errors import InputError
-from contact.mesh import parts as mesh_parts
+from contact.mesh.domain import PART_ACCEPTED, part_name
 from contact.model.fields import Amplitude, Field, GivenAmplitude, Moving, field, own_amplitude
 from contact.model.formula import Expression, of_time
 from contact.model.messages import (
@@ -365,7 +365,7 @@ def _not_negative(expression: Any) -> Any:
 
 def _part(given: Any) -> str:
     try:
-        return mesh_parts.part(given)
+        return part_name(given)
     except InputError:
         raise PydanticCustomError("part", "part") from None
 
@@ -436,7 +436,7 @@ Part: TypeAlias = Annotated[
     PlainValidator(_part),
     PlainSerializer(lambda name: [*getattr(name, "members", ())] or name),
     PART,
-    Accepted(mesh_parts.ACCEPTED),
+    Accepted(PART_ACCEPTED),
     _NAMES,
 ]
 Vector: TypeAlias = Annotated[settings.Vector, as_tuple]

@@ -27,10 +27,9 @@ from contact.body.elements import MEAN_DILATATION, in_chunks
 from contact.body.loads import expression
 from contact.body.materials import factor_of
 from contact.mesh.cells import rule, shape_of
-from contact.mesh.domain import Domain, Indices
+from contact.mesh.domain import Domain, Indices, members, part_name
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import geometry_nodes, integration_weights
-from contact.mesh.parts import members, part
 from contact.model.body import Bolt
 from contact.model.fields import constant
 from contact.model.material import Material
@@ -308,7 +307,7 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     domain, d, nodal = body.domain, body.dim, problem.nodal(state)
     sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
     squares = np.zeros(domain.mesh.topology.index_map(d).size_local)
-    cells, place = cells_at(domain.mesh, domain.facets(part(sides)))
+    cells, place = cells_at(domain.mesh, domain.facets(part_name(sides)))
     shape = shape_of(domain.mesh)
     closures = shape.facet_nodes(body.degree)[place]
     nodes = np.take_along_axis(body.space.dofmap.list[cells], closures, axis=1)

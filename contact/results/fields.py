@@ -24,8 +24,8 @@ from contact.body.internal_variables import NAME, name_of
 from contact.body.materials import form_law, piezo_with_constants
 from contact.history import BodyState, LinearisationPoint
 from contact.mesh.cells import shape_of
+from contact.mesh.domain import disjoint_pieces
 from contact.mesh.geometry import volumes
-from contact.mesh.parts import disjoint_pieces
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
 from contact.body.loads import assembled
-from contact.mesh.integrals import compiled
+from contact.mesh.domain import compiled
 from contact.model.body import Bolt, Electrode
 from contact.model.rigid import Rigid
 from contact.problem.energy import dissipated

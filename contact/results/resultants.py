@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 from contact.body.description import Body
 from contact.body.loads import Loads, assembled, expression
 from contact.errors import InputError
+from contact.mesh.domain import compiled, members
 from contact.mesh.geometry import area
-from contact.mesh.integrals import compiled
-from contact.mesh.parts import members
 from contact.model.body import Bolt, Electrode
 from contact.model.fields import constant, knows_time, steady
 from contact.problem.problem import ContactProblem

@@ -18,9 +18,9 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.mesh.cells import TETRAHEDRON
+from contact.mesh.contents import Cells, Groups
 from contact.mesh.geometry import area, volume
 from contact.mesh.reader import from_file
-from contact.mesh.validity import Cells, Groups
 from contact.mesh.xdmf import write_distributed
 from scripts.benchmarks.bench_one import memory
 

@@ -8,8 +8,8 @@ from mpi4py import MPI
 from contact import Body, Elastic, Fixed, Linear, Load
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.loads import assembled
+from contact.mesh.domain import compiled
 from contact.mesh.grid import rectangle
-from contact.mesh.integrals import compiled
 from tests.problems.piezo import SCALED
 
 COMM = MPI.COMM_WORLD

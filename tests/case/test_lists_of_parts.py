@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, InputError, Linear, Load, Problem, parse_case, solve
 from contact.case.file import to_toml
+from contact.mesh.domain import Together, members, part_name
 from contact.mesh.grid import rectangle
-from contact.mesh.parts import Together, members, part
 
 BLOCK = """
 [mesh]
@@ -73,7 +73,7 @@ def test_measures_count_what_is_in_two_parts_once():
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
     x = ufl.SpatialCoordinate(domain.mesh)
     for given, expected in (("top", 2.0), (["top", "left"], 3.0), (["top", "top"], 2.0)):
-        form = fem.form((1 + 0 * x[0]) * domain.ds(part(given)))
+        form = fem.form((1 + 0 * x[0]) * domain.ds(part_name(given)))
         assert fem.assemble_scalar(form) == pytest.approx(expected)
 
 
@@ -144,7 +144,7 @@ def test_several_parts_are_one_electrode_and_one_rigid_body():
     solution = solve(parse_case(tomllib.loads(text)))
     assert solution.converged
     assert solution.contact_force[1] == pytest.approx(-1e7)
-    facets = solution.problem.domain.facets(part(["one", "two"]))
+    facets = solution.problem.domain.facets(part_name(["one", "two"]))
     for function, column in ((solution.displacement, 1), (solution.potential, 0)):
         sides = fem.locate_dofs_topological(function.function_space, 1, facets)
         nodal = function.x.array.reshape(-1, function.function_space.dofmap.bs)[sides, column]

@@ -15,7 +15,7 @@ from vtkmodules import vtkCommonDataModel
 import contact
 from contact.errors import InputError
 from contact.mesh.cells import SHAPES, Shape, rule, shape_of
-from contact.mesh.domain import revolved
+from contact.mesh.domain import compiled, revolved
 from contact.mesh.geometry import (
     area,
     geometry_nodes,
@@ -27,7 +27,6 @@ from contact.mesh.geometry import (
     volumes,
 )
 from contact.mesh.grid import box, rectangle
-from contact.mesh.integrals import compiled
 from contact.mesh.transfer import refined
 from tests.problems.quadrilaterals import unit_block
 from tests.problems.sizes import integral

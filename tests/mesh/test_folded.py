@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.mesh.cells import HEXAHEDRON
+from contact.mesh.contents import _may_fold
 from contact.mesh.geometry import determinant, jacobians
 from contact.mesh.reader import from_file
-from contact.mesh.validity import _may_fold
 
 #: One of them, by its corners in the order of dolfinx.
 TWISTED = np.array(

@@ -9,8 +9,8 @@ from mpi4py import MPI
 import meshes
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
+from contact.mesh.contents import SERENDIPITY
 from contact.mesh.reader import from_file, mesh_files
-from contact.mesh.validity import SERENDIPITY
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD

@@ -7,9 +7,8 @@ from mpi4py import MPI
 
 from contact import Body, Fixed, Linear, Load
 from contact.body.equilibrium import BodyEquilibrium
-from contact.mesh.domain import from_mesh
+from contact.mesh.domain import compiled, from_mesh
 from contact.mesh.grid import Piece, rectangle
-from contact.mesh.integrals import compiled
 from contact.model.material import Material
 from tests.problems.sizes import integral
 

@@ -11,9 +11,8 @@ from mpi4py import MPI
 import meshes
 from contact.errors import InputError
 from contact.mesh.cells import FACES, simplices
-from contact.mesh.contents import Contents
+from contact.mesh.contents import Cells, Contents, Groups, check
 from contact.mesh.reader import from_file
-from contact.mesh.validity import Cells, Groups, check
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD

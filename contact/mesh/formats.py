@@ -1,0 +1,310 @@
+"""Readers of mesh files: Gmsh's .msh and models by physical groups, MED, Exodus.
+
+A MED file of Salome and code_aster has families of cells and nodes, and a family is in groups;
+family 0 is in none. Where all are in it the array of families may be missing, which meshio's reader
+refuses. Of Exodus files meshio drops side sets and names, and refuses elements of MOOSE, such as
+TET10, and node sets without names.
+
+References
+----------
+Schoof and Yarberry, EXODUS II: a finite element data model, Sandia report SAND92-2137 (1994),
+tables of the nodes and the sides of elements.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact.errors import InputError
+from contact.mesh.cells import joined_facets
+from contact.mesh.contents import Contents, Ints, decoded
+
+
+@contextmanager
+def session() -> Iterator[Any]:
+    """Provide a new model of Gmsh, leaving a running Gmsh as it was."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # OSError: one of its shared libraries is missing.
+        raise InputError(f"the Python module gmsh is needed ({error})", "gmsh") from error
+    started = not gmsh.isInitialized()
+    if started:
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+    # Gmsh's errors are exceptions, too: no need to print them.
+    terminal = gmsh.option.getNumber("General.Terminal")
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.add("contact")
+    try:
+        yield gmsh
+    except Exception as error:
+        # The class of Gmsh's errors; others are faults of the program.
+        if type(error) is not Exception:
+            raise
+        raise InputError(f"Gmsh says: {error}", "mesh-file") from error
+    finally:
+        gmsh.model.remove()
+        gmsh.option.setNumber("General.Terminal", terminal)
+        if started:
+            gmsh.finalize()
+
+
+def read_msh(file: Path) -> Contents:
+    """Read a .msh file; execute nothing in it or beside it.
+
+    Gmsh executes files of another beginning as scripts, unpacks those of some endings by other
+    programs, and reads options from a file beside: the file is checked, and read by another name.
+
+    Raises
+    ------
+    InputError
+        If it begins otherwise, is cut off, or Gmsh refuses it.
+    """
+    with file.open("rb") as stream:
+        start = re.match(rb"\$MeshFormat[ \t]*\r?\n\s*([24])[. \t]", stream.read(100))
+        stream.seek(max(0, file.stat().st_size - 100))
+        end = stream.read()
+    if start is None:
+        raise InputError("this is no Gmsh .msh file; accepted: formats 2.2 and 4.1", "mesh-file")
+    if re.search(rb"\$End\w+\s*$", end) is None:  # Gmsh takes half a section for a whole one
+        raise InputError("it is cut off: it does not end as a section does", "mesh-file")
+    with session() as gmsh, tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / "mesh.msh"
+        plain.symlink_to(file.resolve())
+        # Format 2 names the group of each element, but Gmsh keeps one set of groups an entity. With
+        # the two tags of an element switched, the entities are the groups.
+        switch = start[1] == b"2"
+        gmsh.option.setNumber("Mesh.SwitchElementTags", switch)
+        try:
+            gmsh.merge(str(plain))
+        finally:
+            gmsh.option.setNumber("Mesh.SwitchElementTags", 0)
+        return model_contents(gmsh.model, entities_are_groups=switch)
+
+
+def model_contents(model: Any, entities_are_groups: bool = False) -> Contents:
+    """Return nodes, elements and groups, physical ones or entities, of ``gmsh.model``.
+
+    A group without a name goes by its number.
+    """
+    tags, points, _ = model.mesh.getNodes()
+    order = np.argsort(tags)
+    tags = tags[order].astype(np.int64)
+    if np.any(tags[1:] == tags[:-1]):
+        raise InputError("it has several nodes of one number", "mesh-file")
+    blocks: list[tuple[str, Ints]] = []
+    at: dict[tuple[int, int], range] = {}
+    for dim, entity in model.getEntities():
+        first = len(blocks)
+        for kind, _, nodes in zip(*model.mesh.getElements(dim, entity), strict=True):
+            name, _, _, count, *_ = model.mesh.getElementProperties(kind)
+            nodes = nodes.astype(np.int64).reshape(-1, count)
+            rows = np.minimum(np.searchsorted(tags, nodes), max(tags.size - 1, 0))
+            if tags.size == 0 or np.any(tags[rows] != nodes):
+                raise InputError("it has elements whose nodes it does not have", "mesh-file")
+            blocks.append((name.split()[0].lower(), rows))
+        at[dim, entity] = range(first, len(blocks))
+    made = Contents(points.reshape(-1, 3)[order], blocks, repeats=True, by_groups=True)
+    groups = [pair for pair in at if pair[1]] if entities_are_groups else model.getPhysicalGroups()
+    for dim, tag in groups:
+        entities = [tag] if entities_are_groups else model.getEntitiesForPhysicalGroup(dim, tag)
+        group = made.groups.setdefault(model.getPhysicalName(dim, tag) or str(tag), {})
+        for entity in entities:
+            group |= {b: np.arange(len(blocks[b][1])) for b in at[dim, entity]}
+    return made
+
+
+#: Names of elements in MED without their number of nodes, and in meshio.
+MED_KINDS = {"SE": "line", "TR": "triangle", "QU": "quad", "TE": "tetra", "T": "tetra"}
+MED_KINDS |= {"HE": "hexahedron", "H": "hexahedron", "PE": "wedge", "P": "wedge", "PY": "pyramid"}
+
+
+def read_med(file: Path) -> Contents:
+    """Read a MED file of one mesh; raise errors of any kind if it is damaged."""
+    import h5py
+
+    with h5py.File(file, "r") as data:
+        meshes = list(data["ENS_MAA"])
+        if len(meshes) != 1:
+            raise ValueError(f"{len(meshes)} meshes; accepted: one")
+        whole = data["ENS_MAA"][meshes[0]]
+        steps = [whole] if "NOE" in whole else [whole[step] for step in whole]
+        if len(steps) != 1:
+            raise ValueError(f"a mesh at {len(steps)} times; accepted: one")
+        families = data.get(f"FAS/{meshes[0]}", whole.get("FAS", {}))
+        return _med_contents(steps[0], int(whole.attrs["ESP"]), families)
+
+
+def _med_contents(mesh: Any, dim: int, families: Any) -> Contents:
+    """Return the contents of a mesh at a time."""
+    coordinates = np.asarray(mesh["NOE/COO"][()], dtype=float).reshape(dim, -1).T
+    points = np.zeros((len(coordinates), 3))
+    points[:, :dim] = coordinates
+    blocks: list[tuple[str, Ints]] = []
+    made = Contents(points, blocks)
+    named = _med_names(families.get("ELEME", {}))
+    for kind, given in mesh["MAI"].items():
+        if kind == "PO1":
+            continue
+        stem = kind.rstrip("0123456789")
+        if stem not in MED_KINDS:
+            raise ValueError(f"elements {kind} that are not known")
+        name, count = "pyramid" if kind == "P13" else MED_KINDS[stem], int(kind[len(stem) :])
+        rows = np.asarray(given["NOD"][()], dtype=np.int64).reshape(count, -1).T - 1
+        for group, members in _med_groups(given, named).items():
+            made.groups.setdefault(group, {})[len(blocks)] = members
+        blocks.append((name, rows))
+    made.nodes |= _med_groups(mesh["NOE"], _med_names(families.get("NOEUD", {})))
+    return made
+
+
+def _med_names(families: Any) -> dict[int, list[str]]:
+    """Return the names of the groups of each family."""
+    found = {}
+    for family in families.values():
+        none = np.zeros((0, 80), dtype=np.uint8)
+        given = np.asarray(family["GRO/NOM"][()]).view(np.uint8) if "GRO" in family else none
+        texts = [decoded(bytes(row).split(b"\0")[0]) for row in given]
+        found[int(family.attrs["NUM"])] = [text.strip() for text in texts]
+    return found
+
+
+def _med_groups(given: Any, names: dict[int, list[str]]) -> dict[str, Ints]:
+    """Return the members of each group among elements of a kind, or nodes."""
+    found: dict[str, Ints] = {}
+    numbers = np.asarray(given["FAM"][()]) if "FAM" in given else np.zeros(0, dtype=np.int64)
+    for family in np.unique(numbers):
+        members = np.flatnonzero(numbers == family)
+        for name in names.get(int(family), []):
+            found[name] = np.union1d(found.get(name, members), members)
+    return found
+
+
+#: Beginnings of the names of elements, and meshio's names without a number; "" for points.
+EXODUS_KINDS = {
+    "SPHERE": "",
+    "BEAM": "line",
+    "BAR": "line",
+    "TRUSS": "line",
+    "EDGE": "line",
+    "TRI": "triangle",
+    "QUAD": "quad",
+    "SHELL": "quad",
+    "TET": "tetra",
+    "PYR": "pyramid",
+    "WEDGE": "wedge",
+    "HEX": "hexahedron",
+}
+
+#: Corners of the sides of elements, by meshio's names without a number.
+EXODUS_SIDES = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1, 3), (1, 2, 3), (0, 3, 2), (0, 2, 1)),
+    "pyramid": ((0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 4, 3), (0, 3, 2, 1)),
+    "wedge": ((0, 1, 4, 3), (1, 2, 5, 4), (0, 3, 5, 2), (0, 2, 1), (3, 4, 5)),
+    "hexahedron": (
+        (0, 1, 5, 4),
+        (1, 2, 6, 5),
+        (2, 3, 7, 6),
+        (0, 4, 7, 3),
+        (0, 3, 2, 1),
+        (4, 5, 6, 7),
+    ),
+}
+
+#: The first two sides of shells in 3-D, the whole cell; the others are edges, no facets of solids.
+EXODUS_SHELLS = {"triangle": ((0, 1, 2), (0, 2, 1)), "quad": ((0, 1, 2, 3), (0, 3, 2, 1))}
+
+
+def read_exodus(file: Path) -> Contents:
+    """Read an Exodus file; raise errors of any kind if it is damaged."""
+    import netCDF4
+
+    with netCDF4.Dataset(str(file)) as data:
+        data.set_auto_mask(False)
+        points = np.zeros((len(data.dimensions["num_nodes"]), 3))
+        if "coord" in data.variables:
+            given = np.asarray(data.variables["coord"][:], dtype=float)
+            points[:, : len(given)] = given.T
+        else:
+            for axis, name in enumerate(("coordx", "coordy", "coordz")):
+                if name in data.variables:
+                    points[:, axis] = data.variables[name][:]
+        made = Contents(points, [])
+        _add_exodus_blocks(data, made)
+        _add_exodus_sets(data, made)
+    return made
+
+
+def _add_exodus_blocks(data: Any, made: Contents) -> None:
+    """Add the elements, and each block as a group."""
+    blocks: list[tuple[str, Ints]] = []
+    for number, name in enumerate(_exodus_names(data, "eb", _count(data, "num_el_blk"))):
+        if f"connect{number + 1}" not in data.variables:  # a block of no elements
+            blocks.append(("vertex", np.zeros((0, 1), dtype=np.int64)))
+            continue
+        given = data.variables[f"connect{number + 1}"]
+        rows = np.asarray(given[:], dtype=np.int64) - 1
+        kind = str(given.elem_type).upper()
+        known = [own for begins, own in EXODUS_KINDS.items() if kind.startswith(begins)]
+        if not known:
+            raise ValueError(f"elements {kind} that are not known")
+        blocks.append((known[0] or "vertex", rows))
+        made.groups.setdefault(name, {})[number] = np.arange(len(rows), dtype=np.int64)
+    made.blocks = blocks
+
+
+def _add_exodus_sets(data: Any, made: Contents) -> None:
+    """Add node sets and side sets."""
+    for number, name in enumerate(_exodus_names(data, "ns", _count(data, "num_node_sets")), 1):
+        if f"node_ns{number}" in data.variables:
+            chosen = np.asarray(data.variables[f"node_ns{number}"][:], dtype=np.int64) - 1
+            made.nodes[name] = np.union1d(made.nodes.get(name, chosen), chosen)
+    for number, name in enumerate(_exodus_names(data, "ss", _count(data, "num_side_sets")), 1):
+        if f"elem_ss{number}" in data.variables:
+            elements, sides = (
+                np.asarray(data.variables[f"{of}_ss{number}"][:], dtype=np.int64) - 1
+                for of in ("elem", "side")
+            )
+            made.surfaces[name] = _side_facets(made, elements, sides)
+
+
+def _count(data: Any, dimension: str) -> int:
+    """Return a dimension of the file, 0 without it."""
+    return len(data.dimensions[dimension]) if dimension in data.dimensions else 0
+
+
+def _exodus_names(data: Any, kind: str, count: int) -> list[str]:
+    """Return the names of blocks or sets; one without a name goes by its number."""
+    numbers = data.variables.get(f"{kind}_prop1")
+    names = data.variables.get(f"{kind}_exodus_names")
+    found = []
+    for k in range(count):
+        said = b"" if names is None else b"".join(names[k])
+        number = k + 1 if numbers is None else int(numbers[k])
+        found.append(decoded(said.split(b"\0")[0]).strip() or str(number))
+    return found
+
+
+def _side_facets(contents: Contents, elements: Ints, sides: Ints) -> Ints:
+    """Return the sides of elements by their corners."""
+    found: list[Ints] = []
+    tables, first = EXODUS_SIDES, 0
+    if {name for name, _ in contents.blocks} & {"tetra", "pyramid", "wedge", "hexahedron"}:
+        tables = EXODUS_SIDES | EXODUS_SHELLS
+    for name, nodes in contents.blocks:
+        here = (elements >= first) & (elements < first + len(nodes))
+        table = tables.get(name, ())
+        for side in np.unique(sides[here]):
+            if side < len(table):
+                rows = nodes[elements[here & (sides == side)] - first]
+                found.append(rows[:, list(table[side])])
+        first += len(nodes)
+    return joined_facets(found)
