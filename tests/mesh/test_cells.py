@@ -38,7 +38,7 @@ NAMES = [shape.name for shape in SHAPES]
 
 #: Where names of shapes stand: with their definition, in formats of files and input, and for the
 #: pieces into which facets are cut.
-FORMATS = ("cells", "grid", "abaqus", "exodus", "med", "xdmf", "contents")
+FORMATS = ("cells", "grid", "abaqus", "formats", "xdmf", "contents")
 NAMING = [
     *(f"mesh/{name}" for name in FORMATS),
     "case/mesh",
