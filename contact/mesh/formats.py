@@ -284,7 +284,7 @@ def _count(data: Any, dimension: str) -> int:
 def _exodus_names(data: Any, kind: str, count: int) -> list[str]:
     """Return the names of blocks or sets; one without a name goes by its number."""
     numbers = data.variables.get(f"{kind}_prop1")
-    names = data.variables.get(f"{kind}_exodus_names")
+    names = data.variables.get(f"{kind}_names")
     found = []
     for k in range(count):
         said = b"" if names is None else b"".join(names[k])
