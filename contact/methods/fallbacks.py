@@ -4,16 +4,16 @@ Where Newton's steps have ended without convergence the state with all nodes ope
 linear solve, where the supports constrain all rigid-body modes, and from there contact at one node
 more in turn (`working_set`). If neither is a solution these follow, in this order:
 
-1. on a condensed body with a conducting foundation, continuation in its conductivity
+1. where friction has to constrain a rigid-body mode, proximal points: an elastic bed about the last
+   iterate, which becomes softer (`proximal_points`);
+2. on a condensed body with a conducting foundation, continuation in its conductivity
    (`continuation`);
-2. on a condensed body with a rigid-body mode that the supports do not constrain, a rigid motion to
+3. on a condensed body with a rigid-body mode that the supports do not constrain, a rigid motion to
    a state with all nodes open (`unconstrained_modes`);
-3. a primal-dual interior point on the same operator, which finds the active sets, with the friction
+4. a primal-dual interior point on the same operator, which finds the active sets, with the friction
    bound updated outside, and Newton's last steps from there (`interior_point`). A fallback is also
    tried where Newton's method has converged to a solution at which a rigid-body mode has become
    unconstrained, although friction could constrain it;
-4. where friction has to constrain a rigid-body mode, proximal points: an elastic bed about the last
-   iterate, which becomes softer (`proximal_points`);
 5. steps on the condensed body, where it has too many contact nodes for these to pay.
 
 The notes of the history name the first four. A condensed contact problem has 1 to 4 of its own.
@@ -69,9 +69,12 @@ FIRST_PART = FACTOR**-3
 #: Stagnation limit in a continuation; Example 8.4 with ten times its conductivity needs it.
 CONTINUATION_LIMIT = 20
 
-#: Proximal points: first stiffness of the bed over c, its factors after success and after failure,
-#: and most problems.
-PROXIMAL_STIFFNESS, SOFTER, STIFFER, PROXIMAL_PROBLEMS = 1e-2, 0.2, 4.0, 40
+#: Proximal points: first stiffness of the bed over c, and its factors after success and failure.
+PROXIMAL_STIFFNESS, SOFTER, STIFFER = 1e-2, 0.2, 4.0
+
+#: Ratio of the residual without the bed to the least so far that counts as progress, and most
+#: problems in succession without it: friction cannot hold the body then.
+NEARER, IN_VAIN = 0.9, 8
 
 #: Residual without the bed below which Newton's last steps are tried.
 NEARLY_BALANCED = 0.03
@@ -156,8 +159,13 @@ def fall_back(
 ) -> tuple[State, Outcome]:
     """Try the fallbacks in turn, from the zero initial guess. Collective."""
     problem, singular = newton.problem, None
+    by_friction = problem.interface.friction.acts and not newton.modes.constrained_by_supports
     if isinstance(problem, CondensedProblem):
         found = _in_the_conductivity(newton, problem) or _separated(newton, problem, outcome)
+        if found is not None:
+            return found
+    if by_friction and newton.steps_left > 0:
+        found = proximal_points(newton)
         if found is not None:
             return found
     if newton.steps_left > 0:
@@ -170,11 +178,6 @@ def fall_back(
             newton.step.renew()
             singular = error
         newton.reserved = 0
-    by_friction = problem.interface.friction.acts and not newton.modes.constrained_by_supports
-    if by_friction and not outcome.converged and newton.steps_left > 0:
-        found = proximal_points(newton)
-        if found is not None:
-            return found
     if last is not None and not (outcome.converged or outcome.overloaded) and newton.steps_left > 0:
         logger.info("%s; going on with the condensed body", outcome.ended)
         found = last(problem.start())
@@ -318,7 +321,9 @@ def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
     problem, interface = newton.problem, newton.problem.interface
     nodes, state = interface.nodes, problem.start()
     stiffness = PROXIMAL_STIFFNESS * newton.step.parameters.c
-    for number in range(PROXIMAL_PROBLEMS):
+    least, in_vain = np.inf, 0
+    while in_vain < IN_VAIN:
+        in_vain += 1
         term = Proximal(stiffness, nodes.tangential_component(nodes.apply(state.x)))
         method = newton.on(problem.with_laws(replace(interface, proximal=term)))
         try:
@@ -328,11 +333,14 @@ def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
             return None
         if outcome.converged:
             state, stiffness = balanced, SOFTER * stiffness
-            if evaluate(problem, state).significant <= NEARLY_BALANCED:
+            residual = evaluate(problem, state).significant
+            if residual < NEARER * least:
+                least, in_vain = residual, 0
+            if residual <= NEARLY_BALANCED:
                 found = newton.iterate(newton.started(state), note=PROXIMAL_POINT)
                 if found[1].converged:
                     return found
-        elif number == 0 or newton.steps_left <= 0:
+        elif least == np.inf or newton.steps_left <= 0:
             return None
         else:
             stiffness = STIFFER * stiffness

@@ -1,10 +1,11 @@
-"""Bodies that friction alone holds: belts, arched leaves and strips near their limit.
+"""Bodies that friction alone holds: belts, leaves, strips, clips, rings, blocks near their limit.
 
 `python3 -m scripts.studies.held_by_friction [--out DIR] [--coarse]`, on one rank. Belts around
-60 to 300 degrees of a drum are pulled with up to 5 % less than exp(mu theta) allows, arched leaves
-are pressed between two plates, and strips that lie on a plane are pulled with up to 99 % of
-their friction, in 2-D and 3-D. The table says how many are solved, by which fallback, in how many
-linear solves; all are drawn with a fixed seed.
+60 to 300 degrees of a drum are pulled with up to 5 % less than exp(mu theta) allows, arched leaves,
+one or two on each other, are pressed between two plates, strips that lie on a plane are pulled
+with up to 99 % of their friction, clips grip a bar, rings a shaft (bodies of revolution), and
+blocks hang between two jaws (3-D). The table says how many are solved, by which fallback, in how
+many linear solves; all are drawn with a fixed seed.
 """
 
 from __future__ import annotations
@@ -12,16 +13,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import basix.ufl
 import numpy as np
+from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact import Solution, build_problem, parse_case, solve
-from contact.mesh.domain import Domain
+from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.typing import Array
 from scripts.reporting import Report, append, parser
 
-SEED, COUNT, COARSE_COUNT = 11, 200, 12
+SEED, COUNT, COARSE_COUNT = 11, 400, 16
 
 #: Notes of fallbacks, the last one tried first.
 WAYS = ("proximal point", "interior point", "working set")
@@ -113,7 +116,116 @@ def strip(rng: Rng) -> tuple[Tables, None]:
     }, None
 
 
-FAMILIES = (belt, belt, leaf, strip)
+def stack(rng: Rng) -> tuple[Tables, Domain]:
+    """Draw two arched leaves on each other, between two plates, the upper of which is pressed."""
+    long, rise = 100.0, float(rng.uniform(3, 8))
+    thick = rng.uniform(0.5, 1.5, 2)
+    cells, mu = int(rng.integers(16, 40)), float(rng.choice([0.1, 0.3, 0.6]))
+    radius = (long**2 / 4 + rise**2) / (2 * rise)
+    half = np.arcsin(long / 2 / radius)
+    apart = 10.0  # of the leaves before they are bent, so that markers tell them apart
+    rows = [np.array([0.0, 0.5, 1.0]) * t + k * apart for k, t in enumerate(thick)]
+    across = np.linspace(-half, half, cells + 1)
+    points = np.array([[a, r] for row in rows for r in row for a in across])
+    corner = np.array([i + j * (cells + 1) for j in (0, 1, 3, 4) for i in range(cells)])
+    corners = np.array([0, 1, cells + 1, cells + 2])
+    plane = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
+    mesh = dmesh.create_mesh(MPI.COMM_SELF, corner[:, None] + corners, points, plane)
+    places = {"bottom": 0.0, "inner": thick[0], "outer": apart, "top": apart + thick[1]}
+    domain = from_mesh(
+        mesh,
+        {name: lambda x, r=r: np.isclose(x[1], r) for name, r in places.items()},
+        regions={"lower": lambda x: x[1] < apart / 2, "upper": lambda x: x[1] > apart / 2},
+    )
+    x = mesh.geometry.x
+    r = x[:, 1] - np.where(x[:, 1] > apart / 2, apart - thick[0], 0.0)
+    angle = x[:, 0].copy()
+    x[:, 0] = (radius + r) * np.sin(angle)
+    x[:, 1] = rise - radius + (radius + r) * np.cos(angle)
+    stiffness = 48 * 200e3 * np.sum(thick**3) / 12 / long**3
+    force = stiffness * rise * float(rng.choice([0.1, 0.3, 0.6]))
+    below = {"shape": "plane", "point": [0.0, float(x[:, 1].min())], "normal": [0.0, 1.0]}
+    above = {"shape": "plane", "point": [0.0, rise + float(thick.sum())], "normal": [0.0, -1.0]}
+    lid = {"displacement": [0.0, "free"], "force": [0.0, -force]}
+    return {
+        "space": {"degree": 2, "kinematics": "plane_stress"},
+        "material": {"young": 200e3, "poisson": 0.3},
+        "friction": {"law": "coulomb", "mu": mu},
+        "contact": [
+            {"on": "bottom", "foundation": below},
+            {"on": "outer", "against": "inner"},
+            {"on": "top", "foundation": above, "rigid": lid},
+        ],
+    }, domain
+
+
+def clip(rng: Rng) -> tuple[Tables, Domain]:
+    """Draw a C-shaped clip on a round bar that is too thick for it, pulled around at one end."""
+    angle, thick = np.deg2rad(rng.uniform(200, 330)), float(rng.uniform(0.05, 0.3))
+    mu, spread = float(rng.uniform(0.1, 0.6)), float(10 ** rng.uniform(-5, -3))
+    cells, degree = int(rng.integers(20, 60)), int(rng.choice([1, 2]))
+    domain = bent(
+        np.array([angle, thick]),
+        (cells, int(rng.integers(1, 4))),
+        lambda a, r: ((1 + r) * np.cos(a), (1 + r) * np.sin(a)),
+    )
+    # The clip bends open: forces of the bar are of the order 3 E I spread.
+    pull = float(rng.choice([0.0, 0.1, 0.3])) * mu * thick**3 / 4 * spread
+    along = pull * np.array([-np.sin(angle), np.cos(angle)])
+    bar = {"shape": "sphere", "centre": [0.0, 0.0], "radius": 1.0 + spread}
+    pulled = {"on": "right", "force": [float(c) for c in along]}
+    return {
+        "space": {"degree": degree},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "load": [pulled] if pull else [],
+        "contact": {"on": "bottom", "overlap": "press", "foundation": bar},
+        "friction": {"law": "coulomb", "mu": mu},
+    }, domain
+
+
+def ring(rng: Rng) -> tuple[Tables, None]:
+    """Draw a ring on a shaft that is too thick for it, pulled along, as a body of revolution."""
+    inner, wide = 1.0, float(rng.uniform(0.2, 1.5))
+    tall, fit = float(rng.uniform(0.3, 3.0)), float(10 ** rng.uniform(-5, -3))
+    mu, share = float(rng.uniform(0.05, 0.5)), float(rng.choice([0.5, 0.8, 0.9, 0.95]))
+    cells = [int(rng.integers(4, 12)), int(rng.integers(4, 20))]
+    outer = inner + wide
+    pressure = fit / inner * (outer**2 - inner**2) / (outer**2 + inner**2)  # Lame, nu = 0
+    pull = share * mu * pressure * 2 * inner * tall / (outer**2 - inner**2)
+    shaft = {"shape": "plane", "point": [inner + fit, 0.0], "normal": [1.0, 0.0]}
+    grid = {"generator": "rectangle", "origin": [inner, 0.0], "size": [wide, tall]}
+    return {
+        "mesh": {**grid, "cells": cells},
+        "space": {"degree": int(rng.choice([1, 2])), "kinematics": "axisymmetric"},
+        "material": {"young": 1.0, "poisson": 0.0},
+        "load": [{"on": str(rng.choice(["top", "bottom"])), "traction": [0.0, pull]}],
+        "contact": {"on": "left", "overlap": "press", "foundation": shaft},
+        "friction": {"law": "coulomb", "mu": mu},
+    }, None
+
+
+def jaws(rng: Rng) -> tuple[Tables, None]:
+    """Draw a block that hangs between two jaws, the right one of which is pressed."""
+    mu, share = float(rng.uniform(0.1, 0.6)), float(rng.choice([0.3, 0.6, 0.8, 0.9]))
+    size = rng.uniform(0.5, 1.5, 3)
+    cells, force = [int(n) for n in rng.integers(2, 6, 3)], float(10 ** rng.uniform(-5, -3))
+    weight = share * 2 * mu * force / float(np.prod(size))
+    left = {"shape": "plane", "point": [0.0, 0.0, 0.0], "normal": [1.0, 0.0, 0.0]}
+    right = {"shape": "plane", "point": [float(size[0]), 0.0, 0.0], "normal": [-1.0, 0.0, 0.0]}
+    jaw = {"displacement": ["free", 0.0, 0.0], "force": [-force, 0.0, 0.0]}
+    return {
+        "mesh": {"generator": "box", "size": [float(s) for s in size], "cells": cells},
+        "material": {"young": 1.0, "poisson": float(rng.choice([0.0, 0.3]))},
+        "load": [{"everywhere": True, "body_force": [0.0, 0.0, -weight]}],
+        "contact": [
+            {"on": "left", "foundation": left},
+            {"on": "right", "foundation": right, "rigid": jaw},
+        ],
+        "friction": {"law": "coulomb", "mu": mu},
+    }, None
+
+
+FAMILIES = (belt, belt, leaf, strip, stack, clip, ring, jaws)
 
 
 def solved(number: int) -> tuple[str, Solution]:
@@ -121,7 +233,9 @@ def solved(number: int) -> tuple[str, Solution]:
     family = FAMILIES[number % len(FAMILIES)]
     tables, domain = family(np.random.default_rng([SEED, number]))
     if domain is not None:
-        given = {"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1]}
+        # The case is checked with the names of the parts; the mesh is another one.
+        parts = {name: {"side": "top"} for name in ("inner", "outer") if name in domain.parts}
+        given = {"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1], "parts": parts}
         case = parse_case({"mesh": given, **tables})
         return family.__name__, solve(build_problem(case, MPI.COMM_SELF, domain=domain))
     return family.__name__, solve(build_problem(parse_case(tables), MPI.COMM_SELF))
