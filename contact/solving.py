@@ -19,7 +19,6 @@ import numpy as np
 from mpi4py import MPI
 
 from contact._compat import destroy_unused
-from contact.adapting import adapted
 from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, Replacements, build_problem, named, replaced_by
 from contact.case.file import Case, load_case, to_toml
@@ -30,11 +29,11 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, Outcome, Record, tell
 from contact.methods.signals import SIGNALLED, stop_on_signal
-from contact.nesting import default_start
 from contact.problem.checks import check_potential, check_problem, check_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.problem.state import State
+from contact.refining import adapted, default_start
 from contact.results.fields import check_variables
 from contact.results.remarks import announce
 from contact.results.solution import Solution, StepRecord, StepRecorder

@@ -9,7 +9,7 @@ from argparse import ArgumentParser
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from contact.io.reference import described
+from contact.io.tables import described
 from contact.results import quantity as q
 
 #: Formulas in Markdown for the symbols of the command line's help.

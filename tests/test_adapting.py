@@ -9,11 +9,11 @@ from dolfinx.mesh import compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 
 from contact import InputError, build_problem, load_case, parse_case, solve, write_outputs
-from contact.adapting import GROWTH, grown, marked
 from contact.mesh.domain import from_mesh
 from contact.mesh.geometry import area, volume
 from contact.mesh.grid import box, rectangle
 from contact.mesh.transfer import refined
+from contact.refining import GROWTH, grown, marked
 from tests.problems.bar import changed
 
 PLANE = {

@@ -32,7 +32,7 @@ LAYERS = (
     {"case"},
     {"io"},
     {"plot"},
-    {"adapting", "nesting", "solving", "sweeping", "writing", "derivatives"},
+    {"refining", "solving", "sweeping", "writing", "derivatives"},
     {"cli"},
 )
 

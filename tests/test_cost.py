@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Bolt, build_problem, nesting
+from contact import Bolt, build_problem, refining
 from contact.case.file import Case, parse_case
 from contact.errors import InputError
 from contact.history import BodyState
@@ -394,7 +394,7 @@ def test_a_large_body_that_yields_is_factorised_once(monkeypatch: pytest.MonkeyP
     """The tangent is that of a coarser mesh's solution, without being asked for."""
     cold = solve(bar(32, *CASE))
     assert cold.start == "the zero initial guess"
-    monkeypatch.setitem(nesting.MANY, "condensed", 8000)
+    monkeypatch.setitem(refining.MANY, "condensed", 8000)
     found = solve(bar(32, *CASE))
     assert found.start == "the solution on a coarser mesh"
     assert found.converged
@@ -408,13 +408,13 @@ def test_a_large_body_that_yields_is_factorised_once(monkeypatch: pytest.MonkeyP
 )
 def test_else_it_starts_from_rest(monkeypatch: pytest.MonkeyPatch, change: str) -> None:
     """A linear body is factorised once in any case; a part may not end on the coarser grid."""
-    monkeypatch.setitem(nesting.MANY, "condensed", 100)
+    monkeypatch.setitem(refining.MANY, "condensed", 100)
     assert solve(bar(8, *CASE, change)).start == "the zero initial guess"
 
 
 def test_a_slender_body_starts_from_a_coarser_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without it a linear beam that lies down takes more than twice as many factorisations."""
-    monkeypatch.setitem(nesting.MANY, "whole", 1000)
+    monkeypatch.setitem(refining.MANY, "whole", 1000)
     beam = cantilever(PUSHED, [640, 8], 2, 0.3, 0.5)
     found, cold = solve(parse_case(beam)), solve(parse_case({**beam, "solver": {"nested": False}}))
     assert (found.start, cold.start) == ("the solution on a coarser mesh", "the zero initial guess")
@@ -427,7 +427,7 @@ def test_a_coarser_mesh_that_does_not_fit_the_case_is_left_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With an odd number of cells it has other nodes, at one of which this mu is negative."""
-    monkeypatch.setitem(nesting.MANY, "whole", 1000)
+    monkeypatch.setitem(refining.MANY, "whole", 1000)
     beam = cantilever(PUSHED, [803, 9], 1, 0.0, 0.5)
     beam["mesh"]["size"] = [402.0, 1.0]
     beam["friction"] = {"law": "coulomb", "mu": "0.05 * sqrt(abs(x - 200)) - 0.0005"}
@@ -440,7 +440,7 @@ def test_a_coarser_mesh_that_does_not_fit_the_case_is_left_out(
 @pytest.fixture
 def small_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a mesh of some thousand unknowns be solved like one of a million."""
-    monkeypatch.setitem(nesting.MANY, "whole", 1000)
+    monkeypatch.setitem(refining.MANY, "whole", 1000)
     monkeypatch.setitem(multigrid.LARGE, (3, False), 1000)
     monkeypatch.setitem(multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit", "200")
 

@@ -72,7 +72,7 @@ class Parser(argparse.ArgumentParser):
         """Return the help, with the keys and columns of the files that the command writes."""
         if not self.files:
             return super().format_help()
-        from contact.io.reference import files_help  # loads dolfinx, which options precede
+        from contact.io.tables import files_help  # loads dolfinx, which options precede
 
         return f"{super().format_help()}\n{files_help(*self.files)}\n"
 

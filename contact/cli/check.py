@@ -1,32 +1,45 @@
-"""``contact check CASE``: the resolved case, its mesh and unknowns, and the expected sizes."""
+"""``contact check CASE``: the resolved case, its mesh and unknowns, and all that acts."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.body.elements import CHUNK, unlocked
+from contact.body.global_unknowns import Member
 from contact.case.build import build_problem
 from contact.case.checks import growing
 from contact.case.file import Case, load_case, to_toml
-from contact.cli.acting import acting
-from contact.cli.geometry import parts, regions
 from contact.cli.main import CONVERGED
 from contact.errors import counted
-from contact.mesh.cells import Shape, shape_of
-from contact.mesh.geometry import determinant, geometry_nodes, jacobians
+from contact.mesh.cells import Shape, rule, shape_of
+from contact.mesh.domain import Domain, Indices
+from contact.mesh.entities import cells_at
+from contact.mesh.geometry import (
+    determinant,
+    geometry_nodes,
+    integration_weights,
+    jacobians,
+    outward,
+    volumes,
+)
 from contact.methods.options import NewtonOptions
-from contact.nesting import coarser_cases
-from contact.problem.checks import meeting_supports
+from contact.model.body import Electrode
+from contact.model.rigid import Rigid
+from contact.problem.checks import expected_displacements, meeting_supports
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
+from contact.refining import coarser_cases
 from contact.results import environment
 from contact.results.bodies import apart
 from contact.results.discretisation import own_shape, without_heights
+from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 
@@ -38,6 +51,16 @@ INCOMPRESSIBLE = 0.475
 STIFFER = 100.0
 #: Most steps of an evolution whose loads are looked at.
 LOOKS = 20
+#: Length of the mean of a part's normals from which on the part counts as flat, and below which
+#: they cancel.
+FLAT, CLOSED = 1 - 1e-6, 1e-6
+#: Displacements above this share of the body are not small.
+LARGE = 0.05
+#: Loads over the contact part and Young's modulus from which on units are asked for: sharp
+#: indenters come to a tenth.
+SOFT = 0.25
+#: Words for components that have no displacement given, or no force.
+WORDS = {True: "free", False: "held"}
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -171,3 +194,221 @@ def _quality(problem: ContactProblem) -> list[str]:
             "iterative solvers slow"
         )
     return lines
+
+
+def parts(domain: Domain) -> list[str]:
+    """Return a line for each part: its facets, area, centroid and mean normal. Collective."""
+    rows, inside = [], []
+    for name in sorted(domain.parts):
+        count, area, centroid, mean = _sizes(domain, domain.parts[name])
+        if not area > 0:  # facets on the axis of revolution
+            rows.append([name, counted(count, "facet"), "on the axis", "", ""])
+            continue
+        length = float(np.linalg.norm(mean))
+        across = f"normal {vector(mean)}"
+        if length < CLOSED:
+            across = "not plane, normals that cancel"
+        elif length < FLAT:
+            across = f"not plane, mean normal {vector(mean / length)}"
+        rows.append([*_row(domain, name, count, area, centroid), across])
+    for name in sorted(domain.inside):
+        count, area, centroid, _ = _sizes(domain, domain.inside[name])
+        inside.append(_row(domain, name, count, area, centroid))
+    return [
+        "# parts of its boundary:",
+        *table(rows),
+        *(["# parts inside of it:"] if inside else []),
+        *table(inside),
+    ]
+
+
+def _row(domain: Domain, name: str, count: int, area: float, centroid: Array) -> list[str]:
+    extent = "area" if domain.dim == 3 or domain.revolved else "length"
+    place = f"centroid {vector(domain.resultant(centroid))}"
+    return [name, counted(count, "facet"), f"{extent} {area:.6g}", place]
+
+
+def _sizes(domain: Domain, facets: Indices) -> tuple[int, float, Array, Array]:
+    """Return number, area, centroid and mean normal of facets, of the whole body. Collective."""
+    cells, place = cells_at(domain.mesh, facets)
+    shape, order, behind = shape_of(domain.mesh), domain.order, geometry_nodes(domain, cells)
+    nodes = np.take_along_axis(behind, shape.facet_nodes(order)[place][:, :, None], axis=1)
+    at, weights = rule(shape.facet, 4 * order)
+    areas = integration_weights(domain.revolved, shape.facet, nodes, at, weights)
+    points = np.einsum("qk,fkd->fqd", shape.facet.lagrange(order, at), nodes)
+    normal = outward(shape.facet, nodes, behind.mean(axis=1), at)
+    normal = normal / np.linalg.norm(normal, axis=2, keepdims=True)
+    both = np.concatenate([points, np.broadcast_to(normal, points.shape)], axis=2)
+    local = np.array([facets.size, areas.sum(), *np.einsum("fq,fqd->d", areas, both)])
+    count, area, *sums = domain.comm.allreduce(local, op=MPI.SUM)
+    centroid, mean = np.reshape(sums, (2, domain.dim)) / (area if area > 0 else 1.0)
+    return round(count), float(area), centroid, mean
+
+
+def regions(domain: Domain) -> list[str]:
+    """Return a line for each region: its cells and volume. Collective."""
+    rows, size = [], volumes(domain)
+    word = "volume" if domain.dim == 3 or domain.revolved else "area"
+    for name in sorted(domain.regions):
+        cells = domain.regions[name]
+        local = np.array([cells.size, size[cells].sum()])
+        count, volume = domain.comm.allreduce(local, op=MPI.SUM)
+        rows.append([name, counted(round(count), "cell"), f"{word} {volume:.6g}"])
+    return ["# regions:", *table(rows)]
+
+
+def vector(values: NDArray[np.floating]) -> str:
+    """Return a vector, without the rounding of its zeros."""
+    values = np.where(np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0), 0.0, values)
+    return f"({', '.join(f'{value:.6g}' for value in values)})"
+
+
+def table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Give the rows with aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        yield "#   " + "  ".join(cells).rstrip()
+
+
+class Row(NamedTuple):
+    """One thing that acts, or would if its size were not 0.
+
+    Attributes
+    ----------
+    where, text
+        The thing, and its values in words.
+    size
+        Of its values, by which those of several times are compared.
+    moves
+        Whether it prescribes a displacement.
+    """
+
+    where: str
+    text: str
+    size: float
+    moves: bool = False
+
+
+def acting(problem: ContactProblem, times: Sequence[float]) -> list[str]:
+    """Return lines on all that acts at some times, and warnings of these. Collective.
+
+    Each thing is told at the time at which it is largest, and not at all if it is 0 at all times.
+    """
+    comm, size = problem.comm, problem.domain.size
+    gap = problem.interface.gap
+    gap = np.where(np.abs(gap) < NEGLIGIBLE * size, 0.0, gap)  # rounding is no gap
+    least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
+    largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
+    problems = [problem.at(time) for time in times]
+    lines, forces = [], False
+    for seen in zip(*map(_rows, problems), strict=True):
+        time, row = max(zip(times, seen, strict=True), key=lambda pair: pair[1].size)
+        if row.size > 0:
+            forces |= not row.moves
+            lines.append([row.where, row.text, f"at t = {time:g}" if len(times) > 1 else ""])
+    if not lines and least >= 0:
+        return ["# warning: nothing is loaded or moved: all results will be 0"]
+    loads = [now.equilibrium.external(now.time) for now in problems]
+    given = [now.equilibrium.prescribe(now.equilibrium.rest(), now.time) for now in problems]
+    pairs = [expected_displacements(problem, *both) for both in zip(loads, given, strict=True)]
+    pressed, moved = (max(values) / size for values in zip(*pairs, strict=True))
+    over = " (below 0: an overlap, which is pressed apart)" if least < 0 else ""
+    return [
+        "# acting:",
+        *table([*lines, ["gap", f"{least:.4g} to {largest:.4g}{over}", ""]]),
+        *_warnings(pressed, moved, beyond=least > 10 * moved * size and not forces),
+    ]
+
+
+def _warnings(pressed: float, moved: float, beyond: bool) -> Iterator[str]:
+    """Give warnings of loads and displacements that are large, and of a gap that is."""
+    if moved > LARGE:
+        yield (
+            f"# warning: displacements of {moved:.0%} of the body are prescribed, and "
+            "strains are taken as small"
+        )
+    if pressed > SOFT:
+        yield (
+            f"# warning: the loads over the area of the contact part are {pressed:.0%} of Young's "
+            "modulus, and strains are taken as small; are both in the same units?"
+        )
+    if beyond:
+        yield "# warning: the gap is far larger: the body may not touch at all"
+
+
+def _rows(problem: ContactProblem) -> list[Row]:
+    """Return all that may act at the time of a problem, the same things at all. Collective."""
+    body, comm, d = problem.equilibrium, problem.comm, problem.dim
+    unknowns, time = body.global_unknowns, problem.time
+
+    def largest(values: Array) -> float:
+        return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
+
+    loads = body.nodal(body.external(time))
+    given = body.nodal(body.prescribe(body.rest(), time))[: len(unknowns.tied)]
+    given = np.where(unknowns.tied, 0.0, given)
+    charge = np.abs(loads[:, d:] / body.phi_scale).sum()
+    charge = float(comm.allreduce(float(charge), op=MPI.SUM))
+    moved, raised = largest(given[:, :d]), largest(given[:, d:] * body.phi_scale)
+    return [
+        _forces("loads", loads[:, :d], problem),
+        Row("charges", f"{charge:.4g} in all", charge),
+        Row("supports", f"displacements of up to {moved:.4g}", moved, moves=True),
+        Row("supports", f"potentials of up to {raised:.4g}", raised),
+        *(row for member in unknowns.members for row in _member(member, time)),
+        *_foundations(problem),
+    ]
+
+
+def _forces(where: str, nodal: Array, problem: ContactProblem) -> Row:
+    """Return the resultant of nodal forces, (nodes, d). Collective."""
+    total = np.asarray(problem.comm.allreduce(nodal.sum(axis=0), op=MPI.SUM))
+    size = float(problem.comm.allreduce(float(np.abs(nodal).sum()), op=MPI.SUM))
+    total = problem.domain.resultant(total)
+    balanced = np.abs(total).max() <= NEGLIGIBLE * size
+    text = (
+        f"forces of {size:.4g} in all, which balance" if balanced else f"resultant {vector(total)}"
+    )
+    return Row(where, text, size)
+
+
+def _member(member: Member, time: float) -> list[Row]:
+    """Return the given motions and forces of a rigid body, the charge of an electrode, a bolt's."""
+    given, where = member.description, f"{member.description.name} {member.description.on!r}"
+    names: tuple[tuple[str, ...], ...] = (("shortening",), ("force",))
+    if isinstance(given, Electrode):
+        names = (("potential",), ("charge",))
+    if isinstance(given, Rigid):
+        where = f"foundation of {given.on!r}" if given.foundation else f"rigid part {given.on!r}"
+        names = (("displacement", "rotation"), ("force", "moment"))
+    d = len(given.displacement or ()) if isinstance(given, Rigid) else 1
+    values = [member.given(time) * member.units, member.forces(time) / member.units]
+    values[0][d:] = np.rad2deg(values[0][d:])
+    rows = []
+    for moves, kinds, every in zip((True, False), names, values, strict=True):
+        told = [f"{value:.4g}" for value in every]
+        told = [t if f != moves else WORDS[moves] for t, f in zip(told, member.free, strict=True)]
+        for name, own, texts in zip(
+            kinds, np.split(every, [d]), (told[:d], told[d:]), strict=False
+        ):
+            one = texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
+            text = f"{name} {one}{' degrees' if name == 'rotation' else ''}"
+            rows.append(Row(where, text, np.abs(own).max(), moves))
+    return rows
+
+
+def _foundations(problem: ContactProblem) -> list[Row]:
+    """Return the potentials of foundations, and the forces of layers before any motion."""
+    body, start = problem.equilibrium, problem.start()
+    forces = np.zeros(body.owned + body.global_unknowns.size)
+    problem.interface.add_forces(forces, body.rest(), start.forces)
+    found = [
+        (contact.on, float(np.abs(contact.conductor.at(problem.time).phi_f).max(initial=0.0)))
+        for contact in problem.contacts
+        if contact.conductor is not None
+    ]
+    return [
+        _forces("layers", -body.nodal(forces)[:, : problem.dim], problem),
+        *(Row(f"foundation of {on!r}", f"potential {phi:.4g}", phi) for on, phi in found),
+    ]

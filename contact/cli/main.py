@@ -46,9 +46,9 @@ COMMANDS = {
     "plot": "contact.cli.plot",
     "view": "contact.cli.plot",
     "identify": "contact.cli.identify",
-    "materials": "contact.cli.materials",
+    "materials": "contact.cli.reference",
     "demo": "contact.cli.solve",
-    "schema": "contact.cli.schema",
+    "schema": "contact.cli.reference",
 }
 
 

@@ -15,8 +15,8 @@ from contact.errors import InputError
 from contact.methods.signals import signals_held
 from contact.plot.figures import FORMATS, animate, export, plot, window
 from contact.plot.run import read_run
+from contact.plot.series import plot_sweep
 from contact.plot.style import Look
-from contact.plot.sweep import plot_sweep
 from contact.ranks import on_root
 from contact.sweeping import TABLE
 

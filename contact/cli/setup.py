@@ -24,8 +24,8 @@ from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
 from contact.mesh.geometry import facet_normals
 from contact.model.fields import Field, Moving, at_time
-from contact.plot.camera import Camera, rendered
 from contact.plot.foundation import add_foundation, facing
+from contact.plot.space import Camera, rendered
 from contact.plot.style import BLUE, SKY, STYLE, heading
 from contact.problem.problem import ContactProblem
 from contact.results.options import Units

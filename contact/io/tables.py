@@ -1,13 +1,16 @@
-"""Tables as CSV files. On one rank."""
+"""Tables as CSV files, and the keys and columns of the output files in words. On one rank."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from contact.results.grid import Table
+from contact.results.quantities import quantities
+from contact.results.quantity import Quantity
 
 
 def write_csv(
@@ -33,3 +36,35 @@ def write_mappings(
     """Write rows of named values, under the names in the header and all others."""
     names = list(dict.fromkeys([*header, *(name for row in rows for name in row)]))
     write_csv(path, names, ([row.get(name) for name in names] for row in rows))
+
+
+def described(file: str) -> Iterator[tuple[str, Quantity, str]]:
+    """Yield the name of a key, column or field, its quantity, and the description there."""
+    for quantity in quantities(file):
+        name, text = quantity.name, quantity.text
+        if file.endswith(".csv") and quantity.component:
+            name = quantity.component.format(name=name, axis="x")
+        if file != quantity.files[0]:
+            text = f"As in `{quantity.files[0]}`."
+        if name != quantity.name:
+            text += " Likewise the other components."
+        yield name, quantity, text
+
+
+def files_help(*names: str) -> str:
+    """Return the keys or columns of some files, for the command line's help."""
+    lines = []
+    for file in names:
+        lines += ["", f"{'columns' if file.endswith('.csv') else 'keys'} of {file}:"]
+        for name, quantity, text in described(file):
+            unit = f" ({quantity.unit})" if quantity.unit else ""
+            text = f"{_first(text)}{unit}"
+            lines += textwrap.wrap(f"  {name:<19} {text}", 98, subsequent_indent=22 * " ")
+    return "\n".join([*lines, "", "signs, units, all files: docs/output.md"]).lstrip("\n")
+
+
+def _first(text: str) -> str:
+    """Return the first statement of a text, without Markdown."""
+    for end in (". ", ": ", "; "):
+        text = text.partition(end)[0]
+    return text.rstrip(".").replace("`", "")

@@ -23,9 +23,9 @@ from contact.plot.body import body_figure, picture
 from contact.plot.contact import draw_line
 from contact.plot.foundation import magnification
 from contact.plot.run import Run, read_run, read_step, read_steps
+from contact.plot.series import steps_figures
 from contact.plot.space import Scene, contact_figure
-from contact.plot.steps import steps_figures
-from contact.plot.style import DEFORMED, PAGE, STYLE, Look, fitted, named
+from contact.plot.style import DEFORMED, PAGE, STYLE, Look, fitted, image, named
 from contact.ranks import refused
 
 #: Endings of files that figures may have.
@@ -50,13 +50,6 @@ class Gallery(dict[str, Figure]):
         return "".join(
             f'<img alt="{name}" src="data:image/png;base64,{text}">' for name, text in texts.items()
         )
-
-
-def image(figure: Figure, ending: str, dpi: int | None = None) -> bytes:
-    """Return a figure as the contents of a file."""
-    data = io.BytesIO()
-    figure.savefig(data, format=ending, dpi=dpi or "figure")
-    return data.getvalue()
 
 
 def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Gallery:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import textwrap
 from dataclasses import dataclass
 from typing import Any
@@ -126,6 +127,13 @@ def page_width() -> float:
 def sheet(aspect: float) -> Figure:
     """Return an empty figure of the present width, and of a height in shares of it."""
     return Figure(figsize=(page_width(), aspect * page_width()))
+
+
+def image(figure: Figure, ending: str, dpi: int | None = None) -> bytes:
+    """Return a figure as the contents of a file."""
+    data = io.BytesIO()
+    figure.savefig(data, format=ending, dpi=dpi or "figure")
+    return data.getvalue()
 
 
 def heading(title: str) -> str:

@@ -24,8 +24,8 @@ from contact import Case, build_problem, load_case, solve
 from contact.case.file import parse_case
 from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
-from contact.nesting import default_start
 from contact.problem.problem import ContactProblem
+from contact.refining import default_start
 from contact.results.solution import Solution
 from scripts.cases import CASES, bar
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from contact import Case, build_problem, load_case, solve
 from contact.methods.options import NewtonOptions
-from contact.nesting import nested_start
+from contact.refining import nested_start
 from scripts.cases import CASES, TABLE_8_4
 from scripts.reporting import Report, parser
 

@@ -37,7 +37,7 @@ PHASES = {
     "residual forces": ("body/loads.py", "assembled"),
     "contact laws": ("interface/complementarity.py", "linearise"),
     "iterations on the condensed problem": ("methods/fallbacks.py", "solve_contact"),
-    "transfer from mesh to mesh": ("nesting.py", "prolong"),
+    "transfer from mesh to mesh": ("refining.py", "prolong"),
 }
 
 Result = TypeVar("Result")

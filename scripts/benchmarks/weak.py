@@ -35,9 +35,9 @@ from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
 from contact.model.contact import Contact
 from contact.model.friction import Friction
-from contact.nesting import prolong
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
+from contact.refining import prolong
 from contact.results.recovery import nodal_means
 from forms.hencky import Linear
 from scripts.benchmarks.bench_one import rank_memory

@@ -13,10 +13,10 @@ from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome, Record
-from contact.nesting import has_coarser, nested_start
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
+from contact.refining import has_coarser, nested_start
 from contact.results.remarks import review
 from contact.typing import Array
 from scripts.studies.product_norm import ProductNorm

@@ -9,8 +9,7 @@ from mpi4py import MPI
 
 from contact.case.build import build_problem
 from contact.case.file import load_case, parse_case
-from contact.cli import geometry
-from contact.cli.check import describe, expectations
+from contact.cli.check import describe, expectations, parts
 from contact.mesh.grid import rectangle
 from scripts.cases import CASES
 from tests.problems.bar import changed
@@ -183,7 +182,7 @@ def test_parts_that_are_not_plane(slope, words):
         x[:, 1] += x[:, 1] * slope * (1 - np.abs(x[:, 0] - 1))
     two = [domain.facets(side) for side in ("top", "right")[: 1 + np.isinf(slope)]]
     made = replace(domain, parts={"roof": np.unique(np.concatenate(two))})
-    (text,) = geometry.parts(made)[1:]
+    (text,) = parts(made)[1:]
     assert text.endswith(words)
 
 

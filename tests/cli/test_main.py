@@ -81,11 +81,11 @@ def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, sta
 def test_a_signal_before_the_solve_ends_the_run_in_words(
     bar, capsys, monkeypatch, stage, number, status
 ):
-    import contact.nesting
+    import contact.refining
     import contact.solving
 
     before = [signal.getsignal(ending) for ending in (signal.SIGINT, signal.SIGTERM)]
-    where = contact.solving if stage == "setup" else contact.nesting
+    where = contact.solving if stage == "setup" else contact.refining
     monkeypatch.setattr(where, "build_problem", lambda *_, **__: signal.raise_signal(number))
     out = bar.parent / "out"
     nested = ["--set", "solver.nested=true", "--set", "mesh.cells=[32, 8]"]

@@ -12,10 +12,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from contact.cli.main import main
 from contact.errors import InputError
 from contact.methods.signals import Interrupted
+from contact.plot.series import DRAWN
+from contact.plot.series import _figure as sweep_figure
+from contact.plot.series import _read as read_sweep
 from contact.plot.style import Look
-from contact.plot.sweep import DRAWN
-from contact.plot.sweep import _figure as sweep_figure
-from contact.plot.sweep import _read as read_sweep
 from contact.sweeping import Axis
 from tests.cli.running import MESH
 from tests.problems.bar import BAR

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import contact
-from contact import nesting
+from contact import refining
 from contact.linear import multigrid
 from contact.methods import (
     fallbacks,
@@ -249,9 +249,9 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"by more than [{LARGEST_VIOLATION}] of the largest displacement": True,
         "Below a residual of [10⁻²]": outer_loop.NEAR == 1e-2,
         "the residual is below [10⁻²], friction": outer_loop.NEAR == 1e-2,
-        "to [10⁻³], and each": nesting.COARSE_TOLERANCE == 1e-3,
-        f"from [{nesting.MANY['whole']:,}] unknowns on": True,
-        f"[{nesting.MANY['condensed']:,}] on": True,
+        "to [10⁻³], and each": refining.COARSE_TOLERANCE == 1e-3,
+        f"from [{refining.MANY['whole']:,}] unknowns on": True,
+        f"[{refining.MANY['condensed']:,}] on": True,
     }
     assert [words for words, holds in said.items() if words not in page or not holds] == []
     rows = [found.span() for words in said for found in re.finditer(re.escape(words), page)]

@@ -9,7 +9,7 @@ import pytest
 
 from contact import sensitivity
 from contact.case.file import number_at, with_number
-from contact.io.reference import files_help
+from contact.io.tables import files_help
 from contact.plot.run import read_grid
 from contact.results import quantities as registry
 from contact.results.functionals import Integral

@@ -14,9 +14,9 @@ from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.friction import Friction
-from contact.nesting import coarser_cases
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.refining import coarser_cases
 from contact.solving import solve
 from contact.thesis.fixed_point import FixedPoint
 from forms.hencky import Linear, Log

@@ -20,9 +20,8 @@ from contact.plot.body import draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.plot.figures import draw
 from contact.plot.run import Run
-from contact.plot.steps import draw_loop
+from contact.plot.series import Swept, draw_loop
 from contact.plot.style import Look, smooth
-from contact.plot.sweep import Swept
 from contact.results.options import OutputOptions, Units
 from contact.results.solution import Solution
 from contact.solving import solve

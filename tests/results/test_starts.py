@@ -15,7 +15,7 @@ from contact import (
     solve,
 )
 from contact.interface.multipliers import Multipliers
-from contact.nesting import prolong
+from contact.refining import prolong
 from scripts.cases import CASES
 
 SMALL = ["mesh.cells=[16, 4]", "solver.method=newton"]

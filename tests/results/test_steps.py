@@ -12,7 +12,7 @@ from contact.case.build import build_problem
 from contact.io.tables import write_mappings
 from contact.plot.figures import plot
 from contact.plot.run import read_grid, read_run
-from contact.plot.steps import draw_loop
+from contact.plot.series import draw_loop
 from contact.results.resultants import rigid_columns
 from contact.solving import evolve
 from tests.problems.bar import changed

@@ -23,7 +23,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from contact import Solution, load_case, nesting, solve
+from contact import Solution, load_case, refining, solve
 from contact.case.file import Case, parse_case
 from contact.interface import complementarity
 from contact.linear import multigrid, schur
@@ -327,7 +327,10 @@ DEVICES = (
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
 LINEAR = (
-    Device("nested iteration", (nesting,), "Bornemann and Deuflhard 1996", (),
+    Device("nested iteration",
+           (refining.pays, refining.default_start, refining.nested_start, refining.prolong,
+            refining._interpolate, refining.coarser_cases, refining._coarser),
+           "Bornemann and Deuflhard 1996", (),
            (("nested", False),), _own("pulled-strip")),
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
            _block),

@@ -1,23 +1,27 @@
-"""``contact materials``: the materials that have a name, and the constants of one."""
+"""``contact materials``, ``contact schema``: materials by name, the JSON schema of a case file."""
 
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.case.schema import schema
 from contact.cli.main import CONVERGED
 from contact.library.materials import PACKAGED, Entry, find, library
 from contact.ranks import on_root
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
-    """Print the list, or the material."""
+    """Print the list of materials, one of them, or the schema."""
 
     def text() -> str:
+        if options.command == "schema":
+            return json.dumps(schema(), indent=1, ensure_ascii=False)
         path = PACKAGED if options.file is None else Path(options.file)
         return listing(path) if options.name is None else description(find(options.name, path))
 
