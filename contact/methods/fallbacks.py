@@ -74,7 +74,7 @@ PROXIMAL_STIFFNESS, SOFTER, STIFFER = 1e-2, 0.2, 4.0
 
 #: Ratio of the residual without the bed to the least so far that counts as progress, and most
 #: problems in succession without it: friction cannot hold the body then.
-NEARER, IN_VAIN = 0.9, 8
+NEARER, IN_VAIN = 0.9, 16
 
 #: Residual without the bed below which Newton's last steps are tried.
 NEARLY_BALANCED = 0.03
