@@ -23,8 +23,7 @@ from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, Replacements, build_problem, named, replaced_by
 from contact.case.file import Case, load_case, to_toml
 from contact.errors import InputError
-from contact.methods.load_stepping import LoadStepping, solve_step
-from contact.methods.method import METHODS, Method
+from contact.methods.load_stepping import METHODS, LoadStepping, Method, solve_step
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, Outcome, Record, tell

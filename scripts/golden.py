@@ -218,7 +218,7 @@ def _of_fields(solution: Solution) -> dict[str, Value]:
     """Return energy, norms of displacement and stress, a displacement at a point. Collective."""
     import numpy as np
 
-    from contact.problem.energy import stored
+    from contact.problem.residuals import stored
 
     comm, u, stress = solution.problem.comm, solution.displacement, solution.stress
     space = u.function_space

@@ -7,22 +7,19 @@ Where to find
 complementarity functions, their residuals and generalised derivative
     `complementarity`, with the parameters c and gamma (`ComplementarityParameters`).
 active set (open, stick, slip)
-    `active_set`: `ActiveSet` and `constraint_active`, its only definition.
+    `multipliers`: `ActiveSet` and `constraint_active`, its only definition.
 all laws together
     `interface.Interface`: normal gap, slip, pressure, friction bound, forces on the body.
 friction
-    `friction`, with the coefficients of `forms.laws`; `smoothing` has the non-local operator R.
+    `friction`, with the coefficients of `forms.laws`, and the non-local operator R.
 layer and current
-    `law.InterfaceLaw`; `layer` describes normal compliance.
-penalised laws
-    `penalised`.
+    `law.InterfaceLaw`; `law.NormalLaw` is normal compliance with the rigid part behind it.
 jump, lumped surface mass
     `nodes.ContactNodes`, of both kinds of contact; `nodes.Geometry` of one contact.
 contact forces, slip history
     `multipliers`.
 contact nodes and their geometry at a place
-    in front of a rigid foundation `placing`, of another body `pairing`; of several contacts
-    `joined`.
+    in front of a rigid foundation `placing`, of another body `pairing`.
 mortar coupling
     `mortar`: `search` of the facets opposite on all ranks, `coupling` (D and M, by integrals over
     `segments`), `operator` (their application), `lumping` (areas of nodes); the deviation of curved

@@ -5,7 +5,7 @@ With projections onto the admissible forces, a half line and a disc, the laws ar
     p - max(0, p - c (gap - u_nu)) = 0,     lambda_f - proj_s(lambda_f + c u_tau) = 0,
 
 with the initial gap (rho in the pages) and the normal gap g_N = gap - u_nu.
-Their pieces are those of the active set (`contact.interface.active_set`). `interface_residuals`
+Their pieces are those of the active set (`ActiveSet`). `interface_residuals`
 evaluates them; `linearise` takes a step of the semismooth Newton method on them, node by node.
 There a node in contact pushes with p - gamma (gap - u_nu), a sticking one with
 lambda_f + gamma u_tau, a slipping one with its friction bound along the slip: with gamma far above
@@ -24,9 +24,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact.interface.active_set import ActiveSet
 from contact.interface.interface import Interface
-from contact.interface.multipliers import Multipliers
+from contact.interface.multipliers import ActiveSet, Multipliers
 from contact.interface.nodes import unit_vectors
 from contact.ranks import summed
 from contact.tolerances import EPS

@@ -9,10 +9,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.interface.active_set import ActiveSet, constraint_active
 from contact.interface.friction import NodalFriction
 from contact.interface.law import InterfaceLaw
-from contact.interface.multipliers import Multipliers, SlipHistory
+from contact.interface.multipliers import ActiveSet, Multipliers, SlipHistory, constraint_active
 from contact.interface.nodes import ContactNodes
 from contact.mesh.entities import component_sums
 from contact.ranks import summed

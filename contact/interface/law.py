@@ -8,20 +8,101 @@ The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer 
 unilateral constraint, as the one monotone graph `NormalLaw` of Figure 1.6, and the current
 through `charge_block` in the operator. A linearised layer would not do there: a column that
 is stiff enough cycles for ever between the slopes of an open and of a saturated layer.
+
+Laws of several contacts are `Grouped` into one law, each acting on its own nodes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.interface.active_set import constraint_active
-from contact.interface.layer import NormalLaw
-from contact.interface.nodes import ContactNodes
+from contact.arguments import naming, real
+from contact.errors import InputError
+from contact.interface.multipliers import constraint_active
+from contact.interface.nodes import ContactNodes, Geometry, side_by_side
 from contact.model.foundation import Conductor, Layer
+from contact.tolerances import EPS
 from contact.typing import Array
+from forms.laws import (
+    Compliance,
+    PenetrationLaw,
+    PerfectConductivity,
+    PotentialFactor,
+    Truncation,
+)
+
+
+@dataclass(frozen=True)
+class NormalLaw:
+    """-sigma_nu as a graph of u_nu (Figure 1.6): free, compliant layer, rigid part.
+
+    Attributes
+    ----------
+    p_nu
+        Penetration law.
+    stiffness
+        h_nu, frozen, shape (n,).
+    touch, gap
+        rho_0 and rho, gaps of the layer and of the rigid part, shape (n,).
+    """
+
+    p_nu: PenetrationLaw
+    stiffness: Array
+    touch: Array
+    gap: Array
+
+    def layer(self, u_n: Array) -> Array:
+        """Return the pressure of the layer at normal displacements."""
+        return self.stiffness * self.p_nu(u_n - self.touch)
+
+    def layer_slope(self, u_n: Array) -> Array:
+        """Return the derivative of `layer`."""
+        return self.stiffness * self.p_nu.derivative(u_n - self.touch)
+
+    def pressure(self, z: Array, r: float) -> Array:
+        """Return P with (phi, P) on the graph and P + r phi = z: (3.43) with a layer.
+
+        It is unique for any r > 0 above the slope of a falling p_nu.
+        """
+        low, high = self.touch, np.minimum(self.gap, z / r)
+        phi, layer, steep = high, self.layer(high), self.layer_slope(high)
+        free, rigid = z <= r * low, z - r * self.gap >= layer
+        done = free | rigid
+        # Newton's method in a bracket; every third sweep halves it, should Newton not.
+        for sweep in range(90):
+            excess, slope = r * phi + layer - z, r + steep
+            # Below this the excess is rounding in phi.
+            rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(phi) + np.abs(self.touch)))
+            done |= np.abs(excess) <= rounding
+            if np.all(done):
+                break
+            low, high = np.where(excess < 0, phi, low), np.where(excess > 0, phi, high)
+            newton = phi - excess / np.where(slope > 0, slope, r)
+            inside = (newton > low) & (newton < high) & (sweep % 3 < 2)
+            phi = np.where(done, phi, np.where(inside, newton, 0.5 * (low + high)))
+            layer, steep = self.layer(phi), self.layer_slope(phi)
+        # The layer's pressure is exact where it is small, the remainder where it is stiff.
+        pressed = np.where(steep < r, layer, z - r * phi)
+        return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
+
+    def displacement(self, z: Array, r: float) -> Array:
+        """Return u_nu = (z - `pressure`)/r."""
+        return np.asarray((z - self.pressure(z, r)) / r, dtype=float)
+
+    def pressure_slope(self, z: Array, r: float) -> Array:
+        """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
+        high = np.minimum(self.gap, z / r)
+        free, rigid = z <= r * self.touch, z - r * self.gap >= self.layer(high)
+        slope = self.layer_slope(self.displacement(z, r))
+        return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))
+
 
 #: A pressure above zero.
 TINY = np.finfo(float).tiny
@@ -207,3 +288,180 @@ class InterfaceLaw:
         if self.compliance is not None and (full or not self.compliance.lagged):
             total += self.pressure_block(x, full)
         return total
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """Laws of groups of nodes in place of one, of whatever kind (`forms.laws`).
+
+    Values are those of each law at its own nodes, constants the largest ones. The operator R is
+    one too: the pressure on one obstacle does not bound friction on another.
+
+    Attributes
+    ----------
+    laws
+        The law of each group.
+    bounds
+        Where the groups begin on this rank, and the number of all nodes.
+    label
+        Name in messages of a law that may be the user's own, and fail or return no numbers.
+    """
+
+    laws: tuple[Any, ...]
+    bounds: tuple[int, ...]
+    label: str = ""
+
+    @staticmethod
+    def of(laws: Iterable[Any], nodes: Sequence[ContactNodes], label: str = "") -> Any:
+        """Return one law of the kind of given ones, those of the nodes of each contact."""
+        ends = np.cumsum([0, *(piece.nodes.size for piece in nodes)])
+        return Grouped(tuple(laws), tuple(int(end) for end in ends), label)
+
+    def _at_nodes(self, value: Callable[..., Any], *given: Array, method: str = "") -> Array:
+        """Return the values of each law at its own nodes: `value` of the law and its arguments."""
+        parts, label = [], f"{self.label}: {method}" if self.label and method else self.label
+        for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
+            with naming(label) if label else nullcontext():
+                values = value(law, *(argument[begin:end] for argument in given))
+                parts.append(real(values, (end - begin,), "one number for each node"))
+        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+    def __call__(self, *given: Any) -> Any:
+        """Return s(|u_tau|, p), p_nu, h_nu, phi_L, or the smoothed pressure R p."""
+        return self._at_nodes(lambda law, *own: law(*own), *given)
+
+    def derivative(self, s: Any) -> Any:
+        """Return the derivative of a law of one argument."""
+        return self._at_nodes(lambda law, s: law.derivative(s), s, method="derivative")
+
+    def by_slip(self, slip: Any, pressure: Any) -> Any:
+        """Return the derivative of a friction law by the slip."""
+        return self._at_nodes(
+            lambda law, slip, p: law.by_slip(slip, p), slip, pressure, method="by_slip"
+        )
+
+    def by_pressure(self, slip: Any, pressure: Any) -> Any:
+        """Return the derivative of a friction law by the pressure."""
+        return self._at_nodes(
+            lambda law, slip, p: law.by_pressure(slip, p), slip, pressure, method="by_pressure"
+        )
+
+    def transposed(self, values: Array) -> Array:
+        """Return the transpose of R on nodal values."""
+        return self._at_nodes(lambda smoothing, own: smoothing.transposed(own), values)
+
+    def at(self, s: Any, pressed: Any, loaded: Any) -> Any:
+        """Return the conductivity psi."""
+        return self._at_nodes(lambda psi, *own: psi.at(*own), s, pressed, loaded, method="at")
+
+    def gap_slope(self, s: Any, pressed: Any) -> Any:
+        """Return the derivative of psi by the gap."""
+        return self._at_nodes(lambda psi, *own: psi.gap_slope(*own), s, pressed, method="gap_slope")
+
+    @property
+    def maximum(self) -> float:
+        """The largest mu, or phi_L."""
+        return max(law.maximum for law in self.laws)
+
+    @property
+    def lipschitz(self) -> float:
+        """The largest Lipschitz constant of mu by the slip."""
+        return max(law.lipschitz for law in self.laws)
+
+    @property
+    def radius(self) -> float:
+        """The largest radius of R."""
+        return max(law.radius for law in self.laws)
+
+    @property
+    def k_e(self) -> float:
+        """The largest conductivity."""
+        return max(law.k_e for law in self.laws)
+
+    @property
+    def delta(self) -> float:
+        """The steepest ramp of a conductivity."""
+        return max(law.delta for law in self.laws)
+
+    @property
+    def follows_gap(self) -> bool:
+        """Whether a conductivity depends on the gap."""
+        return any(law.follows_gap for law in self.laws)
+
+
+#: Laws of an obstacle without layer or current.
+NO_LAYER = Layer(0.0, Compliance(np.inf), PotentialFactor(0.0))
+NO_CONDUCTOR = Conductor(PerfectConductivity(0.0), 0.0, Truncation(np.inf))
+
+
+def joined_layers(given: Sequence[Layer | None], geometries: Sequence[Geometry]) -> Layer | None:
+    """Return the layers of all contacts as one; None where there is none."""
+    if not any(given):
+        return None
+    pieces, layers = [geometry.nodes for geometry in geometries], [own or NO_LAYER for own in given]
+    return Layer(
+        np.repeat([own.thickness for own in layers], [piece.nodes.size for piece in pieces]),
+        Grouped.of((own.p_nu for own in layers), pieces, "layer: p_nu"),
+        Grouped.of((own.h_nu for own in layers), pieces, "layer: h_nu"),
+        _alike([own.lagged for own in given if own is not None]),
+    )
+
+
+def joined_conductors(
+    given: Sequence[Conductor | None], pieces: Sequence[ContactNodes]
+) -> Conductor | None:
+    """Return the conductors of all contacts as one, given their nodes; None where there is none."""
+    if len(given) == 1 or not any(given):
+        return given[0]
+    conductors = [own or NO_CONDUCTOR for own in given]
+    sizes = [piece.nodes.size for piece in pieces]
+
+    def phi_f(time: float) -> Array:
+        """Return the potentials of the foundations at a time."""
+        return np.repeat([float(own.at(time).phi_f) for own in conductors], sizes)
+
+    moving = any(own.phi_f_at is not None for own in conductors)
+    return Conductor(
+        Grouped.of((own.psi for own in conductors), pieces, "Conductor: psi"),
+        np.repeat([own.phi_f for own in conductors], sizes),
+        Grouped.of((own.phi_l for own in conductors), pieces, "Conductor: phi_l"),
+        _alike([own.lagged for own in given if own is not None]),
+        phi_f if moving else None,
+    )
+
+
+def joined_constrained(
+    given: Sequence[Conductor | None], geometries: Sequence[Geometry], law: InterfaceLaw, begin: int
+) -> InterfaceLaw | None:
+    """Return the law at the constrained nodes of all contacts; None without conductors.
+
+    Parameters
+    ----------
+    given, geometries, law
+        The conductors, the geometries, and the law at contact nodes.
+    begin
+        Global number of the first node of this rank.
+    """
+    there = [
+        (geometry.constrained, own)
+        for geometry, own in zip(geometries, given, strict=True)
+        if geometry.constrained is not None
+    ]
+    if not there:
+        return None
+    pieces = [own for own, _ in there]
+    nodes = side_by_side(pieces)
+    if law.nodes.coupling is not None:
+        coupling = law.nodes.coupling.at(nodes.nodes.astype(np.int64) + begin)
+        nodes = replace(nodes, coupling=coupling)
+    conductor = joined_conductors([own for _, own in there], pieces)
+    return replace(law, nodes=nodes, compliance=None, conductor=conductor)
+
+
+def _alike(lagged: Sequence[bool]) -> bool:
+    """Return the value of all; refuse different ones."""
+    if len(set(lagged)) > 1:
+        raise InputError(
+            "contact: lagged is true for some and false for others; accepted: one way", "lagged"
+        )
+    return lagged[0]

@@ -1,21 +1,27 @@
-"""The contact nodes and their geometry.
+"""The contact nodes and their geometry, of one contact and of all.
 
 Multipliers and auxiliary variables live at these nodes; products of L2(Gamma_3) are lumped there.
-Each rank has the contact nodes that it owns; sums and norms are global.
+Each rank has the contact nodes that it owns; sums and norms are global. The nodes of one contact
+follow each other in the arrays of all: the interface knows no number of contacts.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy import sparse
 
+from contact.body.equilibrium import BodyEquilibrium
+from contact.errors import InputError
 from contact.interface.mortar.lumping import Mixing
-from contact.interface.mortar.operator import CouplingOperator
+from contact.interface.mortar.operator import CouplingOperator, coupling_operator
+from contact.linear.layout import Inclined, projectors
 from contact.ranks import largest, summed
 from contact.typing import Array
 
@@ -211,3 +217,104 @@ class Geometry:
     jumps: Mixing | None
     covered: Array | None = None
     constrained: ContactNodes | None = None
+
+
+def joined_nodes(
+    geometries: Sequence[Geometry], parts: Sequence[str], body: BodyEquilibrium
+) -> ContactNodes:
+    """Return the nodes of all contacts, one contact after the other. Collective.
+
+    Parameters
+    ----------
+    geometries, parts
+        Of each contact, and the names of the parts that the nodes are of.
+    body
+        The bodies.
+
+    Raises
+    ------
+    InputError
+        If two contacts share nodes, a node is on both sides of pairs of bodies, or one whose jump
+        is a sum is on a roller.
+    """
+    _refuse_shared(geometries, parts)
+    nodes = side_by_side([geometry.nodes for geometry in geometries])
+    inclined = body.layout.inclined
+    jumps = [geometry.jumps for geometry in geometries if geometry.jumps is not None]
+    there = None if inclined is None else inclined.at(nodes.nodes)
+    # The unknowns by their jumps: free components, the normal one of which is that of the unknowns,
+    # of which the `admissible_normal` stands for that of the components that supports hold.
+    unknowns, d = projectors(body.free[nodes.nodes], there), nodes.dim
+    fixed = nodes.normal - np.einsum("nij,nj->ni", unknowns[:, :d, :d], nodes.normal)
+    unknowns[:, :d, :d] += nodes.admissible_normal[:, :, None] * fixed[:, None, :]
+    at_nodes = nodes.nodes, unknowns
+    coupling = coupling_operator(nodes.comm, body.layout.index_map, jumps, at_nodes, body.free)
+    if coupling is not None and inclined is not None:
+        _refuse_rollers(nodes, coupling, inclined)
+    carried = _carried(nodes, coupling, body.global_unknowns.ties, unknowns)
+    return replace(nodes, coupling=coupling, carried=carried)
+
+
+def _refuse_shared(geometries: Sequence[Geometry], parts: Sequence[str]) -> None:
+    """Refuse contacts that share nodes. Collective."""
+    every = np.concatenate([geometry.nodes.nodes for geometry in geometries])
+    shared = every.size - np.unique(every).size
+    if geometries[0].nodes.comm.allreduce(shared, op=MPI.SUM) > 0:
+        raise InputError(
+            f"contact: the parts {', '.join(parts)} share nodes, which one obstacle alone can "
+            "hold; accepted: parts without common nodes, such as pieces of a side with a gap "
+            "between",
+            "contacts-meet",
+        )
+
+
+def _refuse_rollers(nodes: ContactNodes, coupling: CouplingOperator, inclined: Inclined) -> None:
+    """Refuse jumps of several nodes, which have no common direction, on rollers. Collective."""
+    shared = bool(np.isin(coupling.local, inclined.nodes).any())
+    if not nodes.comm.allreduce(shared, op=MPI.LOR):
+        return
+    contact = "contact of degree 2 in 3-D"
+    if coupling.between:
+        contact = "contact of two bodies"
+    elif nodes.revolved:
+        contact = "contact of a body of revolution that reaches its axis"
+    raise InputError(
+        f"fixed.normal: its part shares nodes with a {contact}, where jumps are sums over nodes; "
+        "accepted: there a displacement across an axis instead, or parts apart",
+        "roller-contact",
+    )
+
+
+def _carried(
+    nodes: ContactNodes, coupling: CouplingOperator | None, ties: sparse.csr_array, unknowns: Array
+) -> Array | None:
+    """Return how nodes move with the global unknowns where no jump changes. Collective."""
+    if nodes.motion is None:
+        return None
+    moved = nodes.motion.copy()
+    if coupling is not None:
+        for k, column in enumerate(ties.toarray().T):
+            moved[coupling.places, :, k] -= coupling.apply(column.reshape(-1, nodes.block_size))
+    return np.asarray(unknowns @ moved)
+
+
+def side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
+    """Return the nodes of several contacts as one array."""
+
+    def every(values: Callable[[ContactNodes], Any]) -> Any:
+        return np.concatenate([values(nodes) for nodes in pieces])
+
+    first = pieces[0]
+    return replace(
+        first,
+        nodes=every(lambda nodes: nodes.nodes),
+        points=every(lambda nodes: nodes.points),
+        weight=every(lambda nodes: nodes.weight),
+        normal=every(lambda nodes: nodes.normal),
+        admissible_normal=every(lambda nodes: nodes.admissible_normal),
+        tangent=every(lambda nodes: nodes.tangent),
+        gap=every(lambda nodes: nodes.gap),
+        deviation=every(lambda nodes: nodes.deviation),
+        motion=None if first.motion is None else every(lambda nodes: nodes.motion),
+        cut=max(nodes.cut for nodes in pieces),
+    )

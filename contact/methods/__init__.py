@@ -3,16 +3,15 @@
 `newton` is the default: it condenses the body where that pays, and iterates over its material.
 `semismooth` is the semismooth Newton method (primal-dual active set) on the whole body or on the
 condensed one, `newton_step` one step of it. `fallbacks` has the methods after it, in order.
-`load_stepping` is the quasi-static load stepping around any method. The fixed points, Uzawa block
-relaxation and penalty are in `contact.thesis`; none is a fallback.
+`load_stepping` has the protocol `Method`, and the load steps around any method. The fixed points,
+Uzawa block relaxation and penalty are in `contact.thesis`; none is a fallback.
 
-Parts of methods: `interior_point` and its `cones`, `unconstrained_modes` (rigid-body modes),
-`step_control` (stagnation, chord steps, Newton or Picard in the conductivity). For all methods:
-`method` is their protocol, `options` has tolerances and limits, `report` records and outcome;
-`signals` ends a solve by Ctrl-C.
+Parts of methods: `interior_point` with its cones, `unconstrained_modes` (rigid-body modes). For all
+methods: `options` has tolerances and limits, `report` records, stagnation and outcome; `signals`
+ends a solve by Ctrl-C.
 
 The methods share, and do not define: complementarity functions and active set
-(`contact.interface.complementarity`, `active_set`), static condensation
+(`contact.interface.complementarity`, `multipliers`), static condensation
 (`contact.problem.condensed`, `contact.linear.schur`), the constraint x = C y + d
 (`contact.linear.constraint`), the residuals (`contact.problem.residuals`).
 

@@ -42,9 +42,8 @@ from numpy.typing import NDArray
 from contact.errors import SingularError
 from contact.interface.interface import Interface, Proximal
 from contact.methods.interior_point import interior_point
-from contact.methods.report import Outcome
+from contact.methods.report import PROGRESS, Outcome
 from contact.methods.semismooth import SemismoothNewton
-from contact.methods.step_control import PROGRESS
 from contact.methods.unconstrained_modes import RIGID_MOTION
 from contact.problem.condensed import CondensedProblem
 from contact.problem.residuals import evaluate, residual_forces

@@ -1,4 +1,4 @@
-"""Quasi-static load stepping with incremental friction.
+"""The methods by name, and quasi-static load stepping by any of them, with incremental friction.
 
 A step is a static problem with the loads at its end and the history at its beginning. It starts
 from a prediction, and a linear body is factorised once for all steps. A step that fails is halved;
@@ -8,20 +8,80 @@ the steps before it stay. Where the loads grow from zero this is continuation in
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from contact.methods.method import Method
-from contact.methods.report import Outcome
+from contact.linear.operator import Counters
+from contact.methods.newton import Newton
+from contact.methods.report import Monitor, Outcome, Record
 from contact.methods.signals import Interrupted
 from contact.methods.unconstrained_modes import UnconstrainedModes, with_least_displacements
-from contact.problem.limit_analysis import released, unilateral_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate
+from contact.problem.rigid_modes import released, unilateral_supports
 from contact.problem.state import State
+from contact.thesis.fixed_point import FixedPoint
+from contact.thesis.penalty import Penalty
 from contact.typing import Array
+
+
+class Method(Protocol):
+    """A solver of one problem, from an initial guess to a state and its `Outcome`.
+
+    A new one is a class made of a problem, its options and a monitor, with an entry in `METHODS`;
+    and its options, with an entry in `contact.methods.options.OPTIONS`. One that uses others makes
+    their options by `with_method`, and has their records in its history.
+    """
+
+    @property
+    def options(self) -> Any:
+        """Its options; `allowed` is the tolerance of each residual."""
+
+    @property
+    def history(self) -> list[Record]:
+        """Records of the outer iterations."""
+
+    @property
+    def counters(self) -> Counters:
+        """Factorisations and solves."""
+
+    @property
+    def state(self) -> State:
+        """The last iterate: the end of a solve after a signal."""
+
+    def set_load_step(self, problem: ContactProblem) -> None:
+        """Take another load step of the same problem; factorisations remain, records start anew."""
+
+    def solve(
+        self, start: State | None = None, linearised_at: Array | None = None
+    ) -> tuple[State, Outcome]:
+        """Iterate until convergence or a limit. Collective.
+
+        Parameters
+        ----------
+        start
+            Initial guess; zero by default.
+        linearised_at
+            Unknowns of the first secant of the material; those of the start by default. Prescribed
+            values that have changed strain the elements beside them alone.
+
+        Raises
+        ------
+        InputError
+            If the linear system is singular.
+        """
+
+
+#: Name of a method -> its class.
+METHODS: Mapping[str, Callable[[ContactProblem, Any, Monitor | None], Method]] = {
+    "uzawa": FixedPoint,
+    "penalty": Penalty,
+    "newton": Newton,
+}
+
 
 logger = logging.getLogger("contact.solve")
 

@@ -2,7 +2,7 @@
 
 1. Complementarity functions p - max(0, p + c (u_nu - rho)) and lambda - proj(lambda + c u_tau)
    state contact and friction at each node. Their arguments define the active set: which nodes are
-   open, stick or slip (`contact.interface.active_set`). On it each has a generalised derivative
+   open, stick or slip (`contact.interface.multipliers`). On it each has a generalised derivative
    (`contact.interface.complementarity`).
 2. A step linearises material, contact, friction, layer and current together (`newton_step`). The
    multipliers are eliminated node by node with the augmentation parameter gamma, so that one
@@ -27,6 +27,7 @@ Alart and Curnier, A mixed formulation for frictional contact problems prone to 
 methods, Comput. Methods Appl. Mech. Engrg. 92 (1991).
 Hintermueller, Ito and Kunisch, The primal-dual active set strategy as a semismooth Newton method,
 SIAM J. Optim. 13 (2002).
+Kelley, Iterative Methods for Linear and Nonlinear Equations, SIAM (1995), section 5.4: chord steps.
 Hueeber, Stadler and Wohlmuth, A primal-dual active set algorithm for three-dimensional contact
 problems with Coulomb friction, SIAM J. Sci. Comput. 30 (2008).
 """
@@ -37,6 +38,8 @@ import logging
 import sys
 import time
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from contact.linear.operator import Counters
 from contact.methods.fallbacks import (
@@ -52,12 +55,10 @@ from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Monitor, Outcome, Record, Recorder
 from contact.methods.semismooth import Iteration, SemismoothNewton
-from contact.methods.step_control import MOST_STEPS, Chord
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, condensation_pays
 from contact.problem.problem import ContactProblem
-from contact.problem.protocols import Problem
-from contact.problem.state import State
+from contact.problem.state import Problem, State
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
@@ -74,6 +75,69 @@ FALLBACKS = WORKING_SET, CONTINUATION, RIGID_MOTION, INTERIOR_POINT, PROXIMAL_PO
 
 #: Reason of an end without solution of a condensed problem.
 NOT_CONDENSED = "the condensed contact problem is not solved"
+
+#: Cost of a factorisation, in chord steps.
+MOST_STEPS = 10.0
+
+#: Residual above which there are no chord steps.
+RADIUS = 0.05
+
+
+class Chord:
+    """Choice between a Newton step and a chord step, by the rate of convergence.
+
+    Parameters
+    ----------
+    goal
+        Tolerance on the residual.
+    most_steps
+        Most chord steps to the goal; 0 for none at all.
+    """
+
+    def __init__(self, goal: float, most_steps: float) -> None:
+        self._goal, self._most_steps = goal, most_steps
+        self.drop()
+        self.begin()
+
+    def drop(self) -> None:
+        """Take a Newton step next."""
+        self._factorised = self._keeps = False
+
+    def begin(self) -> None:
+        """Begin an iteration with other loads or another initial guess."""
+        self._before: State | None = None
+        self._reached = np.inf
+
+    def choose(
+        self, state: State, reached: float, linearised_at: Array | None = None
+    ) -> tuple[State, bool]:
+        """Return the iterate to step from, and whether the step is a chord step.
+
+        Parameters
+        ----------
+        state, reached
+            Last iterate and its residual. Where a chord step has raised it, the one before is
+            taken.
+        linearised_at
+            Unknowns of the secant; None for those of the state.
+        """
+        before, last = self._before, self._reached
+        if not self._factorised or self._most_steps <= 0:
+            keep = False
+        elif before is None:
+            keep = state.active_set is not None and linearised_at is None
+        elif reached >= last and self._keeps:
+            state, reached, keep = before, last, False
+        else:
+            rate = reached / last
+            left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
+            keep = bool(left <= self._most_steps and reached <= RADIUS)
+        self._before, self._reached, self._keeps = state, reached, keep
+        return state, keep
+
+    def note_factorisation(self) -> None:
+        """Note that there is a factorisation."""
+        self._factorised = True
 
 
 @dataclass

@@ -2,7 +2,8 @@
 
 Multipliers are eliminated node by node (`contact.interface.complementarity.linearise`): the linear
 systems keep the size and pattern of the elastic ones. Iterative solvers stop at a forcing term
-(inexact Newton).
+(inexact Newton). `ConductivityDerivative` chooses between Newton's method and Picard's in the
+conductivity.
 
 References
 ----------
@@ -12,7 +13,7 @@ Nocedal and Wright, Numerical Optimization, Springer (2006): Levenberg-Marquardt
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,10 +27,8 @@ from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.options import NewtonOptions
-from contact.methods.step_control import ConductivityDerivative
-from contact.problem.protocols import Problem
 from contact.problem.residuals import Residuals, residual_forces
-from contact.problem.state import State
+from contact.problem.state import Problem, State
 from contact.typing import Array
 
 #: Forcing term of inexact Newton. One by the residuals (Eisenstat and Walker) would ask for more
@@ -244,3 +243,45 @@ def linearised_layer(
     block = law.pressure_block(linearised_at, full)
     back = nodes.normal_component(np.einsum("nij,nj->ni", block, nodal - linearised_at))
     return block, law.pressure(linearised_at) + back - layer
+
+
+@dataclass
+class ConductivityDerivative:
+    """Choice between psi'(u_nu - rho) in the tangent (Newton) and psi frozen (Picard).
+
+    With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and steep
+    ramps psi converge fast. But a node that opens draws less charge, and may open further: the
+    linearised charge leads back to contact, the node is then under tension, and the active set
+    cycles. With psi frozen it opens to the other end of the ramp.
+
+    Attributes
+    ----------
+    near
+        Largest residual with the derivative.
+    included
+        Whether the last step had it.
+    """
+
+    near: float = np.inf
+    included: bool = False
+    _limit: float = np.inf
+
+    def worsened(self, residual: float) -> bool:
+        """Tell whether a step with the derivative has raised the residual: it is to be rejected.
+
+        The derivative is taken again below a tenth of the residual before that step.
+        """
+        if not self.included or residual <= self._limit:
+            return False
+        # A step with psi frozen may only undo this one.
+        self._limit *= 0.1
+        self.included = False
+        return True
+
+    def __call__(self, residual: float, allowed: bool = True) -> bool:
+        """Tell whether the next step is to have the derivative, by the residual before it."""
+        self.worsened(residual)
+        self.included = allowed and residual <= min(self.near, self._limit)
+        if self.included:
+            self._limit = residual
+        return self.included

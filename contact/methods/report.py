@@ -1,4 +1,8 @@
-"""Report of a solve: a `Record` of each outer iteration, and its `Outcome`."""
+"""Report of a solve: a `Record` of each outer iteration, and its `Outcome`.
+
+And its end by the residuals, alike on all ranks: `Stagnation`, the stagnation limit, and `Best`,
+the iterate of least residual.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Generic, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -166,3 +170,56 @@ class Outcome:
         words = self.criterion or f"all residuals <= {self.allowed.largest:g}"
         granted = self.residuals.granted(self.allowed)
         return f"{words}, to rounding: {granted}" if granted else words
+
+
+#: Ratio to the least residual so far that is progress.
+PROGRESS = 0.5
+
+T = TypeVar("T")
+
+
+@dataclass
+class Best(Generic[T]):
+    """Iterate of least residual, `found`: the end of a method that fails."""
+
+    found: T | None = None
+    _least: float = np.inf
+
+    def see(self, iterate: T, residual: float) -> None:
+        """Keep an iterate if its residual is the least, and not NaN."""
+        if residual < self._least:
+            self.found, self._least = iterate, residual
+
+
+@dataclass
+class Stagnation:
+    """Stagnation limit: number of steps without progress.
+
+    Attributes
+    ----------
+    limit
+        Steps without progress at which the iteration is given up.
+    progress
+        Ratio to the reference residual that is progress.
+    cumulative
+        Whether the reference is the least residual at the last progress, so that a slow decrease
+        over several steps counts; else the least residual of all steps before.
+    best
+        Least residual so far.
+    """
+
+    limit: int
+    progress: float
+    cumulative: bool = False
+    best: float = np.inf
+    _since: int = 0
+    _reference: float = np.inf
+
+    def __call__(self, residual: float, limit: int | None = None) -> bool:
+        """Count a step by its residual; True at the limit, that of this step if given."""
+        gained = residual < self.progress * self._reference
+        self._since = 0 if gained else self._since + 1
+        self.best = min(self.best, residual)
+        if gained or not self.cumulative:
+            self._reference = self.best
+        return self._since >= (self.limit if limit is None else limit)

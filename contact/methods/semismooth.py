@@ -10,16 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from contact.interface.active_set import constraint_active
-from contact.interface.multipliers import Multipliers
+from contact.interface.multipliers import Multipliers, constraint_active
 from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
-from contact.methods.report import Outcome, Record, Recorder
-from contact.methods.step_control import PROGRESS, Best, Stagnation, undeformed_equilibrium
+from contact.methods.report import PROGRESS, Best, Outcome, Record, Recorder, Stagnation
 from contact.methods.unconstrained_modes import UnconstrainedModes
-from contact.problem.protocols import Problem
-from contact.problem.residuals import Residuals, evaluate_forces, residual_forces
-from contact.problem.state import State
+from contact.problem.residuals import (
+    Residuals,
+    evaluate_forces,
+    residual_forces,
+    undeformed_equilibrium,
+)
+from contact.problem.state import Problem, State
 from contact.ranks import summed
 from contact.typing import Array
 

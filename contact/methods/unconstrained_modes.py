@@ -31,12 +31,10 @@ from contact.mesh.entities import component_sums
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.methods.report import Outcome
 from contact.problem.condensed import CondensedProblem
-from contact.problem.limit_analysis import Overload
 from contact.problem.problem import ContactProblem
-from contact.problem.protocols import Problem
 from contact.problem.residuals import evaluate, residual_forces
-from contact.problem.rigid_modes import Group, constrained_by_supports, groups, null_space
-from contact.problem.state import State
+from contact.problem.rigid_modes import Group, Overload, constrained_by_supports, groups, null_space
+from contact.problem.state import Problem, State
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 

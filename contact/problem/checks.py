@@ -16,10 +16,10 @@ from contact.body.loads import to_blame
 from contact.errors import InputError
 from contact.interface.law import InterfaceLaw
 from contact.model.fields import values_at
-from contact.problem.limit_analysis import UnilateralSupport
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
     Group,
+    UnilateralSupport,
     described,
     groups,
     middle,

@@ -26,8 +26,7 @@ from contact.linear.operator import Counters
 from contact.linear.petsc import check_overflow, petsc_options
 from contact.linear.schur import DenseOperator, DenseStiffness, SchurComplement
 from contact.problem.problem import ContactProblem
-from contact.problem.protocols import Scales
-from contact.problem.state import State
+from contact.problem.state import Scales, State
 from contact.ranks import summed
 from contact.tolerances import ROUNDING
 from contact.typing import Array

@@ -28,9 +28,8 @@ import numpy as np
 from contact.body.internal_variables import VARIABLES
 from contact.errors import InputError
 from contact.history import History, InternalVariables, Part
-from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.multipliers import Multipliers, SlipHistory
+from contact.interface.multipliers import ActiveSet, Multipliers, SlipHistory
 from contact.interface.nodes import unit_vectors
 from contact.linear import multigrid
 from contact.linear.operator import Counters

@@ -20,17 +20,16 @@ from contact.body.internal_variables import VARIABLES
 from contact.body.materials import young_behind
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
+from contact.interface.friction import joined_friction
 from contact.interface.interface import Interface
-from contact.interface.joined import (
+from contact.interface.law import (
+    InterfaceLaw,
     joined_conductors,
     joined_constrained,
-    joined_friction,
     joined_layers,
-    joined_nodes,
 )
-from contact.interface.law import InterfaceLaw
 from contact.interface.multipliers import Multipliers, SlipHistory
-from contact.interface.nodes import ContactNodes, Geometry
+from contact.interface.nodes import ContactNodes, Geometry, joined_nodes
 from contact.interface.pairing import PairPlacement, find_pair
 from contact.interface.placing import FoundationPlacement, find_nodes
 from contact.linear.constraint import ConstrainedOperator, Constraint
@@ -42,8 +41,7 @@ from contact.model.contact import Contact, check_laws
 from contact.model.foundation import Conductor, Electric
 from contact.model.friction import Friction
 from contact.model.rigid import Rigid
-from contact.problem.protocols import Scales
-from contact.problem.state import State
+from contact.problem.state import Scales, State
 from contact.ranks import on_all_ranks
 from contact.typing import Array
 

@@ -15,11 +15,12 @@ from scipy import linalg
 from contact.errors import counted
 from contact.mesh.entities import cells_at, owned_among
 from contact.mesh.owners import Owners
-from contact.problem.limit_analysis import Overload, UnilateralSupport
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
     Group,
+    Overload,
+    UnilateralSupport,
     constrained_by_supports,
     described,
     groups,

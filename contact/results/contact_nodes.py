@@ -15,8 +15,8 @@ from contact.errors import InputError, counted
 from contact.interface.mortar.surface import surface_of
 from contact.interface.multipliers import Multipliers
 from contact.mesh.entities import paths
-from contact.problem.energy import dissipated
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import dissipated
 from contact.problem.state import State
 from contact.results.resultants import resultant
 from contact.typing import Array

@@ -23,9 +23,8 @@ from contact.body.loads import assembled
 from contact.mesh.domain import compiled
 from contact.model.body import Bolt, Electrode
 from contact.model.rigid import Rigid
-from contact.problem.energy import dissipated
 from contact.problem.problem import ContactProblem
-from contact.problem.residuals import residual_forces
+from contact.problem.residuals import dissipated, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
 from contact.results.quantity import Functional

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from contact.problem.energy import stored
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import stored
 from contact.results import functionals as f
 from contact.results.environment import versions
 from contact.results.field_quantities import (

@@ -18,8 +18,8 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.linear.operator import Counters
 from contact.methods.report import Outcome, Record
-from contact.problem.energy import Balance, balance, dissipated
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import Balance, balance, dissipated
 from contact.problem.state import State
 from contact.results.contact_nodes import (
     ContactResult,

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
-from contact.interface.active_set import constraint_active
+from contact.interface.multipliers import constraint_active
 from contact.linear.operator import Counters
 from contact.problem.condensed import Condensation, condensation_pays
 from contact.problem.problem import ContactProblem

@@ -1,7 +1,7 @@
 """Algorithms 1 to 9 of the thesis: fixed points, Uzawa block relaxation, penalty.
 
-`fixed_point` over `uzawa` with its `acceleration`, and `penalty`; `outer_loop` is their common
-frame. Newton's method does not fall back on them. Numbers such as (3.45) are those of equations of
+`fixed_point` over `uzawa`, and `penalty`; both are an `OuterLoop` (`fixed_point`). Newton's method
+does not fall back on them. Numbers such as (3.45) are those of equations of
 the thesis.
 
 References

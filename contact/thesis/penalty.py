@@ -1,7 +1,8 @@
 """Algorithm 3: the penalty method, through PETSc's SNES.
 
-The laws of `contact.interface.penalised` replace those of Signorini and Coulomb: the penalised
-problem (PV_eps) is one nonlinear equation in the displacement. An outer iteration freezes the
+The penalised laws replace those of Signorini and Coulomb, node by node: [u_nu - rho]^+/eps_contact
+and s u_tau/(|u_tau| + eps_slip), (4.1)-(4.3), functions of the displacement. The penalised problem
+(PV_eps) is one nonlinear equation in the displacement. An outer iteration freezes the
 secant modulus of the material and the friction modulus of (4.33); (4.32), with [u_nu - rho]^+ of
 the *new* iterate and a compliant layer, is solved by SNES as a semismooth equation. Outer
 iterations are those of Algorithm 3, inner ones those of SNES. SNES takes full steps while friction
@@ -23,7 +24,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from contact.errors import InputError, SingularError
-from contact.interface.penalised import PenalisedLaw, Regularisation, outer
+from contact.interface.interface import Interface
+from contact.interface.multipliers import Multipliers
+from contact.interface.nodes import unit_vectors
 from contact.linear.operator import Counters
 from contact.linear.petsc import petsc_options
 from contact.methods.options import PenaltyOptions
@@ -34,9 +37,98 @@ from contact.problem.checks import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, residual_forces
 from contact.problem.state import State
-from contact.thesis.outer_loop import LOST, NEAR, OuterLoop
+from contact.thesis.fixed_point import LOST, NEAR, OuterLoop
 from contact.tolerances import LARGEST_VIOLATION
 from contact.typing import Array
+from forms.foundation import penalty_friction_modulus, penalty_pressure
+
+
+@dataclass(frozen=True)
+class Regularisation:
+    """Parameters of the penalised laws.
+
+    Attributes
+    ----------
+    contact
+        eps of [u_nu - rho]^+/eps (length^3/force).
+    slip
+        eps of u_tau/(|u_tau| + eps) (length).
+    """
+
+    contact: float
+    slip: float
+
+
+def outer(a: Array, b: Array) -> Array:
+    """Return a b^T node by node, shape (n, d, d)."""
+    return a[:, :, None] * b[:, None, :]
+
+
+class PenalisedLaw:
+    """Contact forces as a function of the nodal unknowns, with their derivative.
+
+    Parameters
+    ----------
+    interface, eps
+        The contact nodes with their laws, and the parameters of these.
+    iterate
+        Nodal unknowns of the lagged friction modulus s/(|u_tau| + eps), (4.32)-(4.33), shape
+        (n, block size). None: the modulus is implicit, (4.3), but for a smoothed pressure in its
+        derivative.
+    """
+
+    def __init__(
+        self, interface: Interface, eps: Regularisation, iterate: Array | None = None
+    ) -> None:
+        self._interface, self._eps = interface, eps
+        self._modulus = None if iterate is None else self._modulus_at(iterate)
+
+    def acts(self) -> bool:
+        """Return whether friction acts: a lagged modulus above 0 anywhere. Collective."""
+        return self._modulus is None or self._interface.nodes.maximum(self._modulus) > 0
+
+    def stick(self) -> None:
+        """Set the friction modulus to 1/eps_contact at all nodes."""
+        self._modulus = np.full(self._interface.gap.shape, 1 / self._eps.contact)
+
+    def _pressed(self, nodal: Array) -> tuple[Multipliers, Array]:
+        """Return the pressures, and their derivative in u_nu: 1/eps also at first touch."""
+        interface, nodes = self._interface, self._interface.nodes
+        normal = nodes.normal_component(nodal)
+        pressure = np.asarray(penalty_pressure(normal, interface.gap, self._eps.contact))
+        multipliers = Multipliers(pressure, np.zeros(nodes.normal.shape))
+        return multipliers, (normal >= interface.gap) / self._eps.contact
+
+    def _modulus_at(self, nodal: Array) -> Array:
+        """Return the friction modulus, shape (n,). Collective."""
+        interface = self._interface
+        bound = interface.bound(nodal, self._pressed(nodal)[0])
+        return np.asarray(
+            penalty_friction_modulus(bound, interface.slip_length(nodal), self._eps.slip)
+        )
+
+    def forces(self, nodal: Array) -> Multipliers:
+        """Return the forces. Collective."""
+        modulus = self._modulus_at(nodal) if self._modulus is None else self._modulus
+        tangential = self._interface.slip(nodal)
+        return Multipliers(self._pressed(nodal)[0].pressure, modulus[:, None] * tangential)
+
+    def block(self, nodal: Array) -> Array:
+        """Return their derivative, shape (n, d, d). Collective."""
+        interface, nodes = self._interface, self._interface.nodes
+        multipliers, slope = self._pressed(nodal)
+        modulus = self._modulus_at(nodal) if self._modulus is None else self._modulus
+        block = slope[:, None, None] * outer(nodes.normal, nodes.normal)
+        block = block + modulus[:, None, None] * nodes.tangent
+        if self._modulus is not None:
+            return block
+        slip, unit = interface.slip_length(nodal), unit_vectors(interface.slip(nodal))
+        total, share = interface.pressure(nodal, multipliers), slip / (slip + self._eps.slip)
+        along = (interface.friction.by_slip(total, slip) - modulus) * share
+        across = interface.friction.by_pressure(total, slip) * slope * share
+        block = block + along[:, None, None] * outer(unit, unit)
+        return block + across[:, None, None] * outer(unit, nodes.normal)
+
 
 logger = logging.getLogger("contact.inner")
 

@@ -168,7 +168,7 @@ MUTANTS = (
     Mutant(
         "friction-of-open-nodes",
         "the active set: nodes that are open, and bound by Tresca's law",
-        "contact/interface/active_set.py",
+        "contact/interface/multipliers.py",
         "acts = (bound > 0) | closed",
         "acts = closed",
         ("tests/methods/test_newton.py", "tests/methods/test_uzawa.py"),

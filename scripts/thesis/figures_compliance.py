@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from contact import Solution, build_problem, load_case
 from contact.interface.complementarity import project_disc
-from contact.interface.layer import NormalLaw
+from contact.interface.law import NormalLaw
 from contact.plot.body import Picture, draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.plot.style import Look

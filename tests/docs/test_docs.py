@@ -20,12 +20,11 @@ from contact.methods import (
     newton,
     newton_step,
     semismooth,
-    step_control,
     unconstrained_modes,
 )
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.problem import condensed
-from contact.thesis import fixed_point, outer_loop, penalty, uzawa
+from contact.thesis import fixed_point, penalty, uzawa
 from contact.tolerances import LARGEST_VIOLATION
 from scripts import command_page
 from scripts.pictures import RUNS
@@ -208,8 +207,8 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         "[10^{-2}]\\,\\kappa$ is added": newton_step.REGULARISATION == 1e-2,
         "tolerance is [10⁻³] of the": newton.CONTACT_PART == 1e-3,
         "has not fallen to [1/20]": newton.UNSOLVED == 0.05,
-        "below a residual of [0.05]": step_control.RADIUS == 0.05,
-        f"within [{step_control.MOST_STEPS:g}] steps": True,
+        "below a residual of [0.05]": newton.RADIUS == 0.05,
+        f"within [{newton.MOST_STEPS:g}] steps": True,
         f"at most [{interior_point.LIMIT}] times": True,
         f"at most [{interior_point.UPDATES}] times": True,
         "below [10⁻¹⁰] of the work": interior_point.CLOSED == 1e-10,
@@ -247,8 +246,8 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"more than [{LARGEST_VIOLATION}] the run": penalty.Penalty.stagnation[1] == 0.99,
         "by [10 %]": fixed_point.FixedPoint.stagnation[1] == 0.9,
         f"by more than [{LARGEST_VIOLATION}] of the largest displacement": True,
-        "Below a residual of [10⁻²]": outer_loop.NEAR == 1e-2,
-        "the residual is below [10⁻²], friction": outer_loop.NEAR == 1e-2,
+        "Below a residual of [10⁻²]": fixed_point.NEAR == 1e-2,
+        "the residual is below [10⁻²], friction": fixed_point.NEAR == 1e-2,
         "to [10⁻³], and each": refining.COARSE_TOLERANCE == 1e-3,
         f"from [{refining.MANY['whole']:,}] unknowns on": True,
         f"[{refining.MANY['condensed']:,}] on": True,

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import ComplementarityParameters, at_bound, linearise
-from contact.interface.multipliers import Multipliers
+from contact.interface.multipliers import ActiveSet, Multipliers
 from contact.model.friction import Friction
 from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
 from tests.problems import mechanics

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.interface.smoothing import Smoothing
+from contact.interface.friction import Smoothing
 from contact.mesh.grid import rectangle
 from contact.model.body import Fixed
 from contact.model.contact import Contact

@@ -8,9 +8,8 @@ from mpi4py import MPI
 
 from contact import build_problem, solve
 from contact.linear.operator import Counters
-from contact.methods.newton import Newton
+from contact.methods.newton import Chord, Newton
 from contact.methods.options import NewtonOptions
-from contact.methods.step_control import Chord
 from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

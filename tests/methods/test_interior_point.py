@@ -11,8 +11,7 @@ from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
 from contact.errors import InputError, SingularError
-from contact.methods.cones import Cones
-from contact.methods.interior_point import interior_point
+from contact.methods.interior_point import Cones, interior_point
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome, Record

@@ -7,8 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, parse_case, solve
-from contact.problem.limit_analysis import Overload
-from contact.problem.rigid_modes import groups
+from contact.problem.rigid_modes import Overload, groups
 from contact.results.remarks import untouched
 
 MU, PRESS = 0.3, 1e-3

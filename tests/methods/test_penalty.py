@@ -10,7 +10,6 @@ from contact import solve
 from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.interface.penalised import PenalisedLaw, Regularisation
 from contact.mesh import grid as domain
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.model.body import Fixed, Load
@@ -20,7 +19,7 @@ from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Plane
 from contact.problem.problem import ContactProblem
 from contact.thesis.fixed_point import FixedPoint
-from contact.thesis.penalty import Penalty
+from contact.thesis.penalty import PenalisedLaw, Penalty, Regularisation
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems import mechanics

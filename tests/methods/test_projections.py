@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from contact.interface.complementarity import disc_derivative, project_disc, project_half_line
-from contact.interface.layer import NormalLaw
-from contact.thesis.acceleration import ResidualMinimiser
-from contact.thesis.uzawa import _Projection
+from contact.interface.law import NormalLaw
+from contact.thesis.uzawa import ResidualMinimiser, _Projection
 from forms.laws import Compliance
 
 

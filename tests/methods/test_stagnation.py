@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.methods.options import FixedPointOptions, PenaltyOptions
-from contact.methods.step_control import Best, Stagnation
+from contact.methods.report import Best, Stagnation
 from contact.model.friction import Friction
 from contact.problem.residuals import evaluate
 from contact.thesis.fixed_point import FixedPoint

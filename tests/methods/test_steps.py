@@ -10,9 +10,8 @@ from contact.errors import InputError
 from contact.methods.load_stepping import LoadStepping
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
-from contact.problem.energy import Balance, balance
 from contact.problem.problem import SLIP
-from contact.problem.residuals import evaluate
+from contact.problem.residuals import Balance, balance, evaluate
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from contact._compat import geometry_dofmap
 from contact.body.description import Body
-from contact.interface.smoothing import Smoothing
+from contact.interface.friction import Smoothing
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle
 from contact.model.body import Fixed, Load

@@ -14,7 +14,7 @@ from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.history import BodyState
-from contact.interface.smoothing import Smoothing
+from contact.interface.friction import Smoothing
 from contact.mesh.domain import revolved
 from contact.mesh.geometry import area, volume
 from contact.mesh.grid import box, rectangle

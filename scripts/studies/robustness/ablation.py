@@ -33,13 +33,12 @@ from contact.methods import (
     interior_point,
     newton_step,
     semismooth,
-    step_control,
 )
-from contact.methods.newton import Newton
+from contact.methods.newton import Chord, Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.methods.unconstrained_modes import UnconstrainedModes
-from contact.problem.residuals import evaluate
+from contact.problem.residuals import evaluate, undeformed_equilibrium
 from scripts.benchmarks import bench_one
 from scripts.cases import CASES
 from scripts.reporting import Report, append, parser
@@ -313,11 +312,11 @@ DEVICES = (
     Device("sliding nodes at their bound", (complementarity.at_bound,), "-",
            ((complementarity, "at_bound", lambda _, friction, *__: friction),), (),
            _finer("bar-67", (640, 160))),
-    Device("derivative of the conductivity by the gap", (step_control.ConductivityDerivative,), "-",
-           ((step_control.ConductivityDerivative, "__call__", lambda *_: False),)),
+    Device("derivative of the conductivity by the gap", (newton_step.ConductivityDerivative,), "-",
+           ((newton_step.ConductivityDerivative, "__call__", lambda *_: False),)),
     Device("stagnation limit of the continuation", (), "-",
            ((fallbacks, "CONTINUATION_LIMIT", None),), (), _conducting),
-    Device("zero displacement where nothing acts", (step_control.undeformed_equilibrium,), "-",
+    Device("zero displacement where nothing acts", (undeformed_equilibrium,), "-",
            ((semismooth.Iteration, "_loss_of_contact", _nothing),), (),
            _own("two-blocks-unloaded")),
     Device("working set of contact nodes, from all open",
@@ -334,7 +333,7 @@ LINEAR = (
            (("nested", False),), _own("pulled-strip")),
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
            _block),
-    Device("chord steps", (step_control.Chord,), "Kelley 1995", (), (("keep", "never"),), _plane),
+    Device("chord steps", (Chord,), "Kelley 1995", (), (("keep", "never"),), _plane),
     Device("static condensation", (Newton._condensed_steps,), "Guyan 1965", (),
            (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
