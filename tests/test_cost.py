@@ -1,6 +1,8 @@
 """Cost of the methods: factorisations, solves and iterations, not seconds.
 
-Other tests count where that is what they test: a body that is condensed, or kept, or solved once.
+Bounds on counts stand here alone, twice what is seen. What other tests say of counts is exact: none
+or some of a kind, a limit that the user gives, the same in two runs. Those of the thesis's
+algorithms are its results, and compared where these are.
 """
 
 from __future__ import annotations
@@ -20,7 +22,10 @@ from contact.case.file import Case, parse_case
 from contact.errors import InputError
 from contact.history import BodyState
 from contact.linear import multigrid
+from contact.linear.multigrid import PRICE
 from contact.linear.operator import Counters, SparseOperator
+from contact.methods.load_stepping import LoadStepping
+from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
@@ -35,7 +40,9 @@ from scripts.studies.cantilevers import cantilever
 from scripts.studies.indentation_in_space import punch
 from scripts.studies.robustness.problems import problems
 from tests.interface.test_compliance import COLUMNS
+from tests.linear.test_linear_contact import operator_of, sliding, sticking
 from tests.linear.test_two_bodies import balls
+from tests.linear.test_two_bodies import blocks as two_blocks
 from tests.methods.test_belt import STRAPS, around_a_drum
 from tests.methods.test_chord import followed, yielding
 from tests.methods.test_curved import flattened
@@ -52,15 +59,21 @@ from tests.methods.test_nothing_touches import (
     unloaded,
 )
 from tests.methods.test_overload import wall
+from tests.methods.test_penalty import stiff
 from tests.methods.test_slender import LIGHT, TIP, UNIFORM, beam, bent, on_the_ground
+from tests.methods.test_stuck import on_a_bent_one, pushed, relaxed, stack
 from tests.problem.test_bolts import tightened
 from tests.problem.test_moved_nodes import halved
+from tests.problem.test_rigid import FREE
 from tests.problem.test_rigid_pairs import stacked
 from tests.problems import pairs
+from tests.problems.mechanics import attempt, leaning_block, newton, pressed_block
 from tests.problems.mechanics import bar as short_bar
-from tests.problems.mechanics import leaning_block, newton
+from tests.problems.mechanics import solve as relax
 from tests.problems.rigid import indented
 from tests.problems.rings import between_plates, squeezed
+from tests.problems.shaken import shaken, times
+from tests.verification.test_piezo_examples import example, first_solve
 from tests.verification.test_punch import SUNK, TILTED, punched
 from tests.verification.test_quadratic_space import quadratic
 
@@ -178,6 +191,12 @@ def tilted_punch(linear: str) -> Counted:
     return counted
 
 
+def penalised(_: Path) -> Counters:
+    method = stiff()
+    method.solve()
+    return method.counters
+
+
 EXACT = {"tolerance": 1e-10}
 LONG = {"space": {"degree": 2}}
 ITERATIVE = {"solver": {"linear": "iterative"}}
@@ -243,6 +262,10 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
     "bimorph on a good conductor": (drawn("bimorph-8"), (1, 1, 33)),
     "columns on a layer": (columns, (1, 1, 6)),
     # Materials
+    "short linear bar, few iterations allowed": (
+        by_newton(linear_bar, max_iterations=2),
+        (1, 1, 76),
+    ),
     "linear bar": (of_case(bar(16, *CASE, "material.law=linear")), (1, 1, 6)),
     "short linear bar": (by_newton(linear_bar), (1, 1, 5)),
     "short linear bar, whole": (by_newton(linear_bar, condense=False), (5, 4, 0)),
@@ -324,12 +347,38 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
         (1, 1, 5),
     ),
     "indenter that is moved, degree 2": (indenter(3, 2, degree=2, displacement=-0.02), (1, 1, 4)),
+    "indenter that is free, whole": (
+        of_case(indented(n=8, **FREE), **EXACT, condense=False, linear="lu"),
+        (4, 3, 0),
+    ),
+    "indenter that is free, iterative": (
+        of_case(indented(n=8, **FREE), **EXACT, condense=False, linear="iterative"),
+        (7, 1, 0),
+    ),
     "tilted punch": (lambda _: punched(7, 20.0, False, TILTED).counters, (1, 1, 3)),
     "circular punch": (lambda _: punched(6, 20.0, True, SUNK).counters, (1, 1, 3)),
     "tilted punch, 3-D": (tilted_punch("auto"), (1, 1, 2)),
     "tilted punch, 3-D, direct": (tilted_punch("lu"), (1, 1, 2)),
     "plate on two blocks": (by_newton(stacked), (1, 1, 2)),
     "bolt and flanges": (bolted, (1, 1, 3)),
+    # Algorithms of the thesis
+    **{
+        f"block relaxation, {name}": (lambda _, case=case: relaxed(case)[0].counters, (seen, 1, 0))
+        for name, case, seen in [
+            ("loose block", pushed(0.97), 164),
+            ("loose stack", stack(), 193),
+            ("block on a bent one", on_a_bent_one(), 87),
+        ]
+    },
+    "block relaxation, wide gap": (
+        lambda _: relax(pressed_block(COMM, 2, gap=1e3), 1e-9).counters,
+        (51, 1, 0),
+    ),
+    "block relaxation, single loop": (
+        lambda _: relax(short_bar(COMM, 32, law=Linear(1.0, 0.3)), 1e-8, single_loop=True).counters,
+        (34, 1, 0),
+    ),
+    "penalty, small compliance": (penalised, (40, 40, 0)),
 }
 
 #: Problems that ranks solve too.
@@ -526,3 +575,94 @@ def test_the_iterations_a_digit_are_those_that_were_gained(monkeypatch, rtol):
         monkeypatch.setattr(multigrid, "refine", correct)
     assert operator.counters.factorizations == 2
     assert operator._hierarchy._rate < 4
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("mu", [0.0, 0.4])
+def test_counts_do_not_grow_with_the_number_of_sliding_nodes(mu: float) -> None:
+    """They are those of the body without a contact, on whatever mesh."""
+    for n in (4, 12):
+        problem = leaning_block(COMM, n)
+        x = problem.start().x
+        weight = problem.nodes.weight[:, None, None] / problem.nodes.weight.max()
+        counts = []
+        for blocks in (0 * sticking(problem), sticking(problem), sliding(problem, mu)[0]):
+            operator = operator_of(problem, "iterative", symmetric=mu == 0)
+            operator.update("secant", BodyState(x), weight * blocks)
+            operator.solve(problem.equilibrium.external(), 1e-6)
+            counts.append(operator.counters.linear_iterations)
+        assert max(counts) <= counts[0] + 3, counts
+
+
+@pytest.mark.parallel
+def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
+    """Where little changes they stay; where much does the solve goes on with new ones."""
+    problem = leaning_block(COMM, 12)
+    body, weight = problem.equilibrium, problem.nodes.weight[:, None, None]
+    x, load, sticks = problem.start().x, body.external(), weight * sticking(problem)
+    operator = operator_of(problem, "iterative")
+    operator.update("secant", BodyState(x), sticks)
+    operator.solve(load, 1e-6)
+    fresh = operator.counters.linear_iterations
+    for step in range(1, 5):
+        operator.update("secant", BodyState(x), (1 + 0.1 * step) * sticks, constant=True)
+        operator.solve(load, 1e-6)
+    counters = operator.counters
+    assert (counters.factorizations, counters.linear_solves) == (1, 5)
+    assert counters.linear_iterations <= 5 * fresh + PRICE
+    before = counters.linear_iterations
+    # Nothing holds the nodes, and the coarse levels take them for held.
+    operator.update("secant", BodyState(x), 0 * sticks, constant=True)
+    found = operator.solve(load, 1e-6)
+    assert counters.factorizations == 2
+    assert counters.linear_iterations - before <= 3 * fresh + PRICE
+    direct = operator_of(problem, "lu")
+    direct.update("secant", BodyState(x), 0 * sticks)
+    assert body.norm(found - direct.solve(load)) <= 1e-5 * body.norm(found)
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_multigrid_converges_for_two_bodies_as_for_one(held, monkeypatch):
+    # Small systems have no coarse levels otherwise.
+    options = {**multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit": "200"}
+    monkeypatch.setattr(multigrid, "DEFAULTS", options)
+    problem, counters = two_blocks(held), Counters()
+    method = Newton(
+        problem,
+        NewtonOptions(tolerance=1e-8, condense=False, linear="iterative"),
+        counters=counters,
+    )
+    state, outcome = method.solve()
+    assert outcome.converged
+    assert method.whole.step.operator._inner.ksp.getPC().getMGLevels() > 1
+    assert counters.linear_iterations <= 6.5 * counters.linear_solves
+    direct, exact = Newton(problem, NewtonOptions(tolerance=1e-8)).solve()
+    assert exact.converged
+    scale = np.abs(direct.x).max()
+    assert np.allclose(state.x, direct.x, rtol=0, atol=1e-6 * scale)
+
+
+@pytest.mark.parametrize("f2", [-0.005, -0.05])
+@pytest.mark.parametrize("n", [32, 64])
+def test_block_relaxation_takes_few_iterations_on_fine_meshes(n, f2):
+    """To 1e-8, for the frictionless start and each Tresca step."""
+    options = {"inner_tolerance": 1e-8, "max_outer": 2}
+    loop, _ = attempt(short_bar(MPI.COMM_SELF, n, f2), **options)
+    counts = [record.inner for record in loop.history]
+    assert len(counts) == 3
+    assert max(counts) <= 34
+    assert all(record.residuals.contact <= 1e-8 for record in loop.history)
+
+
+def test_a_linear_body_is_factorised_once_in_all_steps():
+    steps = LoadStepping(problem := shaken(), Newton(problem)).steps(times(4))
+    assert [outcome.counters.factorizations for _, outcome in steps] == [1] + 15 * [0]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("cells", "symmetric", "most"), [((32, 16), True, 84), ((8, 2, 4), False, 64)]
+)
+def test_multigrid_iterations_of_a_piezoelectric_body(cells, symmetric, most):
+    iterations, _ = first_solve(example(COMM, cells), symmetric, compare=False)
+    assert iterations <= most, iterations

@@ -62,7 +62,7 @@ def test_two_keys_and_rows_that_are_there(sweep):
     assert [row["friction.mu"] for row in rows] == ["0.2", "0.4", "0.2", "0.4"]
     force = [float(row["contact_force_y"]) for row in rows]
     assert force[2] < force[0] < 0
-    assert [row["factorizations"] for row in rows] == ["1", "0", "0", "0"]
+    assert [row["factorizations"] for row in rows] == ["1", "0", "0", "0"]  # the body is kept
     longer = (*over[:3], "friction.mu=0.2,0.4,0.6")
     _, more = sweep(*longer, *linear)
     assert len(more) == 6

@@ -16,7 +16,6 @@ from contact.errors import InputError
 from contact.history import BodyState
 from contact.linear import multigrid
 from contact.linear.layout import Layout
-from contact.linear.multigrid import PRICE
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -46,50 +45,6 @@ def sliding(problem: ContactProblem, mu: float) -> tuple[Array, Array]:
     along[:, 0] = 1.0
     force = GAMMA * (normal + mu * along)
     return force[:, :, None] * normal[:, None, :], force
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("mu", [0.0, MU])
-def test_counts_do_not_grow_with_the_number_of_sliding_nodes(mu: float) -> None:
-    """They are those of the body without a contact, on whatever mesh."""
-    for n in (4, 12):
-        problem = mechanics.leaning_block(WORLD, n)
-        x = problem.start().x
-        weight = problem.nodes.weight[:, None, None] / problem.nodes.weight.max()
-        counts = []
-        for blocks in (0 * sticking(problem), sticking(problem), sliding(problem, mu)[0]):
-            operator = operator_of(problem, "iterative", symmetric=mu == 0)
-            operator.update("secant", BodyState(x), weight * blocks)
-            operator.solve(problem.equilibrium.external(), 1e-6)
-            counts.append(operator.counters.linear_iterations)
-        assert max(counts) <= counts[0] + 3, counts
-
-
-@pytest.mark.parallel
-def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
-    """Where little changes they stay; where much does the solve goes on with new ones."""
-    problem = mechanics.leaning_block(WORLD, 12)
-    body, weight = problem.equilibrium, problem.nodes.weight[:, None, None]
-    x, load, sticks = problem.start().x, body.external(), weight * sticking(problem)
-    operator = operator_of(problem, "iterative")
-    operator.update("secant", BodyState(x), sticks)
-    operator.solve(load, 1e-6)
-    fresh = operator.counters.linear_iterations
-    for step in range(1, 5):
-        operator.update("secant", BodyState(x), (1 + 0.1 * step) * sticks, constant=True)
-        operator.solve(load, 1e-6)
-    counters = operator.counters
-    assert (counters.factorizations, counters.linear_solves) == (1, 5)
-    assert counters.linear_iterations <= 5 * fresh + PRICE
-    before = counters.linear_iterations
-    # Nothing holds the nodes, and the coarse levels take them for held.
-    operator.update("secant", BodyState(x), 0 * sticks, constant=True)
-    found = operator.solve(load, 1e-6)
-    assert counters.factorizations == 2
-    assert counters.linear_iterations - before <= 3 * fresh + PRICE
-    direct = operator_of(problem, "lu")
-    direct.update("secant", BodyState(x), 0 * sticks)
-    assert body.norm(found - direct.solve(load)) <= 1e-5 * body.norm(found)
 
 
 @pytest.mark.parallel

@@ -7,9 +7,7 @@ from mpi4py import MPI
 from contact import build_problem, parse_case, solve
 from contact.body.description import Body
 from contact.linear import multigrid
-from contact.linear.operator import Counters, SparseOperator
-from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
+from contact.linear.operator import SparseOperator
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
@@ -39,27 +37,6 @@ def blocks(held: bool, n: int = 6) -> ContactProblem:
     contact = Contact("under", flat(), friction=friction, against="over")
     domain = Blocks(3, n, n + 1, jitter=0.1).domain(SELF)
     return ContactProblem(domain, Body(Linear(1.0, 0.3), fixed, tuple(loads)), contact)
-
-
-@pytest.mark.parametrize("held", [True, False])
-def test_it_converges_as_fast_as_for_one_body(held, monkeypatch):
-    # Small systems have no coarse levels otherwise.
-    options = {**multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit": "200"}
-    monkeypatch.setattr(multigrid, "DEFAULTS", options)
-    problem, counters = blocks(held), Counters()
-    method = Newton(
-        problem,
-        NewtonOptions(tolerance=1e-8, condense=False, linear="iterative"),
-        counters=counters,
-    )
-    state, outcome = method.solve()
-    assert outcome.converged
-    assert method.whole.step.operator._inner.ksp.getPC().getMGLevels() > 1
-    assert counters.linear_iterations <= 6.5 * counters.linear_solves
-    direct, exact = Newton(problem, NewtonOptions(tolerance=1e-8)).solve()
-    assert exact.converged
-    scale = np.abs(direct.x).max()
-    assert np.allclose(state.x, direct.x, rtol=0, atol=1e-6 * scale)
 
 
 def balls(linear, mu, push):

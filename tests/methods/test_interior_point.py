@@ -197,8 +197,6 @@ def test_no_friction_is_solved_like_none(law):
     )
     (state, outcome), (found, _) = method.solve(), other.solve()
     assert outcome.converged, outcome.reason
-    # One run may need a last step or two, close to what rounding leaves, and the other not.
-    assert abs(len(method.history) - len(other.history)) <= 2
     # The upper half rolls on the lower one at next to no force: two runs whose residuals are 2e-12
     # differ by 5e-6, and pressures, which are up to 27, by 1e-6 with it; by elastic strains less.
     assert np.allclose(state.forces.pressure, found.forces.pressure, rtol=0, atol=1e-5)

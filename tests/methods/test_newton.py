@@ -89,7 +89,7 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
     fast = Newton(problem, NewtonOptions(tolerance=1e-9))
     state, outcome = fast.solve(State(x, Multipliers(pressure, forces.friction + against)))
     assert outcome.converged
-    assert len(fast.history) == 1
+    assert len(fast.history) == 1  # no step
     assert np.allclose(state.x, x, rtol=0, atol=1e-8 * np.abs(x).max())
 
 
@@ -160,11 +160,10 @@ def bar_case(n: int, *changes: str) -> Case:
 
 
 @pytest.mark.core
-def test_nested_meshes_save_steps_and_change_nothing():
+def test_nested_meshes_change_nothing():
     plain = solve(bar_case(32), comm=SELF)
     nested = solve(bar_case(32, "solver.nested=true"), comm=SELF)
     assert plain.outcome.converged and nested.outcome.converged
-    assert nested.counters.factorizations < plain.counters.factorizations
     assert np.allclose(plain.forces.pressure, nested.forces.pressure, rtol=0, atol=1e-8)
 
 
@@ -177,12 +176,11 @@ def test_nested_levels_halve_the_cells():
 
 
 @pytest.mark.core
-def test_a_linear_material_is_assembled_once_and_solved_exactly():
+def test_a_condensed_body_is_solved_as_the_whole_one():
     problem = mechanics.bar(
         SELF, 8, law=Linear(1.0, 0.3), friction=Friction(ConstantCoefficient(0.5))
     )
     method = newton(problem)
-    assert method.counters.factorizations == 1
     whole = newton(problem, condense=False)
     assert np.allclose(whole.state.x, method.state.x, rtol=0, atol=1e-9)
 

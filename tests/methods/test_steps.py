@@ -7,8 +7,6 @@ import pytest
 
 from contact import build_problem, evolve, load_case
 from contact.errors import InputError
-from contact.methods.load_stepping import LoadStepping
-from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.problem.problem import SLIP
 from contact.problem.residuals import Balance, balance, evaluate
@@ -175,11 +173,6 @@ def test_a_state_can_be_gone_on_from():
     assert not whole[3].near(rest[1], atol=1e-10)
     for state in whole:
         assert evaluate(problem.at(state.time, state.history), state).largest < 1e-12
-
-
-def test_a_linear_body_is_factorised_once():
-    steps = LoadStepping(problem := shaken(), Newton(problem)).steps(times(4))
-    assert [outcome.counters.factorizations for _, outcome in steps] == [1] + 15 * [0]
 
 
 @pytest.mark.parametrize("ends", [[1.0, 1.0], [0.0, 1.0], [1.0, np.nan], [2.0, 1.0]])

@@ -162,7 +162,6 @@ def test_slower_methods_work_at_the_contact_nodes_too():
     assert reference.solve()[1].converged
     method = Newton(problem, NewtonOptions(tolerance=1e-10, max_iterations=2))
     assert method.solve()[1].converged
-    assert method.counters.factorizations == 1
     assert "interior point" in method.history[0].note
     assert np.allclose(
         method.state.forces.friction, reference.state.forces.friction, rtol=0, atol=1e-9

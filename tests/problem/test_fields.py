@@ -91,6 +91,7 @@ def test_counts_and_residuals_in_any_units(method, linear):
     assert all(one.converged for one in found)
     assert len(set(counts)) == 1, counts
     iterations = [one.counters.linear_iterations for one in found]
-    assert max(iterations) <= 1.02 * min(iterations)
+    # equal but for rounding
+    assert iterations == pytest.approx(3 * iterations[:1], rel=0.02)
     forces = [np.array(one.contact_force) / unit for one, unit in zip(found, units, strict=True)]
     assert np.allclose(forces, forces[0], rtol=1e-9, atol=0)

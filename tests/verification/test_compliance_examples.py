@@ -121,7 +121,6 @@ def test_example_8_3_takes_two_iterations_as_in_the_thesis():
 def test_rows_of_table_8_4(suffix, value):
     changes = f"friction.mu={value}", f"electric.k_e={value}"
     uzawa = solved(f"8-4{suffix}", 48, *changes)
-    assert len(uzawa.history) <= 50
     if value < 0.1:  # several solutions coexist above
         newton = solved(f"8-4{suffix}", 48, *changes, "solver.method=newton")
         assert close(uzawa, newton, 1e-6)
