@@ -7,9 +7,9 @@ from contact.case.file import load_case as load_case
 from contact.case.file import parse_case as parse_case
 from contact.derivatives.by_fields import field_gradient as field_gradient
 from contact.derivatives.by_fields import gap_gradient as gap_gradient
+from contact.derivatives.by_parameters import Parameter as Parameter
 from contact.derivatives.by_parameters import Sensitivities as Sensitivities
 from contact.derivatives.by_parameters import sensitivity as sensitivity
-from contact.derivatives.differences import Parameter as Parameter
 from contact.derivatives.identification import Identified as Identified
 from contact.derivatives.identification import identify as identify
 from contact.errors import InputError as InputError

@@ -32,10 +32,8 @@ from contact.problem.condensed import condensation_pays
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import neighbours
-from contact.results.error_estimate import estimated
-from contact.results.intervals import intervals
-from contact.results.quantities import values_of
-from contact.results.quantity import ADAPT
+from contact.results.error_estimate import estimated, intervals
+from contact.results.quantities import ADAPT, values_of
 from contact.results.solution import Remark, Solution
 from contact.tolerances import ROUNDING
 from contact.typing import Array

@@ -17,8 +17,13 @@ from contact.io.fields import gathered, write_fields, write_grid, write_vtu
 from contact.io.folder import ResultFolder, result_folder
 from contact.io.tables import write_columns, write_mappings
 from contact.ranks import on_all_ranks, on_root
-from contact.results.quantities import quantities, values_of
-from contact.results.quantity import (
+from contact.results.contact_nodes import (
+    contact_surface,
+    contact_table,
+    opposite_surface,
+    opposite_table,
+)
+from contact.results.quantities import (
     ADAPT,
     AGAINST,
     HISTORY,
@@ -27,14 +32,10 @@ from contact.results.quantity import (
     STEPS,
     SUMMARY,
     SURFACE,
+    quantities,
+    values_of,
 )
 from contact.results.solution import Solution
-from contact.results.surface import (
-    contact_surface,
-    contact_table,
-    opposite_surface,
-    opposite_table,
-)
 
 
 def write_outputs(

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact import _compat
 from contact.body.elements import CHUNK, unlocked
 from contact.body.global_unknowns import Member
 from contact.case.build import build_problem
@@ -36,7 +37,6 @@ from contact.problem.checks import expected_displacements, meeting_supports
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.refining import coarser_cases
-from contact.results import environment
 from contact.results.bodies import apart
 from contact.results.discretisation import own_shape, without_heights
 from contact.tolerances import NEGLIGIBLE
@@ -85,7 +85,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
     domain, comm = problem.domain, problem.comm
     cells = domain.mesh.topology.index_map(domain.dim).size_global
     layout = problem.equilibrium.layout
-    library, path = environment.blas()
+    library, path = _compat.blas()
     lines = [
         to_toml(case, domain.dim),
         f"# mesh: {counted(cells, 'cell')} in {domain.dim}-D on {counted(comm.size, 'rank')}, "
@@ -97,10 +97,10 @@ def describe(case: Case, problem: ContactProblem) -> str:
         f"{problem.nodes.size}",
         *expectations(problem, _times(case)),
         f"# blas: {library} {path}".rstrip(),
-        "# versions: " + ", ".join(f"{k} {v}" for k, v in environment.versions().items()),
+        "# versions: " + ", ".join(f"{k} {v}" for k, v in _compat.versions().items()),
     ]
-    if library == environment.REFERENCE:
-        lines.append(f"# {environment.ADVICE}")
+    if library == _compat.REFERENCE:
+        lines.append(f"# {_compat.ADVICE}")
     return "\n".join(lines)
 
 

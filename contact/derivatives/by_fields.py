@@ -17,11 +17,17 @@ from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.internal_variables import VARIABLES
 from contact.body.loads import assembled
-from contact.derivatives.by_parameters import LoadPath, backwards, parameters_of, quantities_of
-from contact.derivatives.differences import Parameter, family_of
+from contact.derivatives.by_parameters import (
+    LoadPath,
+    Parameter,
+    backwards,
+    family_of,
+    parameters_of,
+    quantities_of,
+)
 from contact.errors import InputError
 from contact.history import InternalVariables, LinearisationPoint
-from contact.results.quantity import Differentiable, Functional
+from contact.results.functionals import Differentiable, Functional
 from contact.results.solution import Solution
 from contact.typing import Array
 

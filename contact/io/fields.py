@@ -26,10 +26,9 @@ from contact.mesh.cells import shape_of
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root
+from contact.results.contact_nodes import Grid, Values, contact_surface
 from contact.results.fields import DerivedFields, linear, unknowns
-from contact.results.grid import Grid, Values
 from contact.results.solution import Solution
-from contact.results.surface import contact_surface
 
 #: A time, and the state then.
 Frame: TypeAlias = tuple[float, State]

@@ -8,9 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from contact.results.grid import Table
-from contact.results.quantities import quantities
-from contact.results.quantity import Quantity
+from contact.results.contact_nodes import Table
+from contact.results.quantities import Quantity, quantities
 
 
 def write_csv(

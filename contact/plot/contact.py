@@ -26,7 +26,7 @@ from contact.plot.style import (
     page_width,
     sheet,
 )
-from contact.results.grid import Table
+from contact.results.contact_nodes import Table
 from contact.typing import Array
 
 #: Names of the zones without friction.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from contact.plot.contact import ends
 from contact.plot.run import Run, linear, polygons
 from contact.plot.style import BLUE, SKY
-from contact.results.grid import Table
+from contact.results.contact_nodes import Table
 from contact.typing import Array
 
 #: Overlap of bodies, over the diameter, that is not seen.

@@ -20,9 +20,9 @@ from scipy.spatial import KDTree
 from contact.errors import InputError
 from contact.plot.style import heading
 from contact.ranks import refused
-from contact.results.grid import Table
+from contact.results.contact_nodes import Table
 from contact.results.options import Units
-from contact.results.quantity import OPPOSITE
+from contact.results.quantities import OPPOSITE
 from contact.typing import Array
 
 #: Most frames of an animation.

@@ -9,18 +9,25 @@ modulus. In a piezoelectric body sigma is the pair (sigma, D), and S that of [F,
 whose energy is eps : F eps + E . beta E. At the contact pressures times gaps between the nodes are
 added, and friction times slip that is not dissipated (Krause, Veeser and Walloth, Numer. Math.
 130, 2015).
+
+`nodal_means` are means of the cells around a vertex. Across facets inside of the body at which
+something acts, stresses jump: there the cells fall into groups that these facets separate, as the
+materials do. `intervals` are those of the quoted quantities on three nested uniform meshes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import ufl
 from dolfinx import fem, la
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from contact import _compat
 from contact.body.elements import MEAN_DILATATION, in_chunks
@@ -28,16 +35,17 @@ from contact.body.loads import expression
 from contact.body.materials import factor_of
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain, Indices, members, part_name
-from contact.mesh.entities import cells_at
+from contact.mesh.entities import cell_facets, cells_at
 from contact.mesh.geometry import geometry_nodes, integration_weights
+from contact.mesh.owners import Owners
 from contact.model.body import Bolt
 from contact.model.fields import constant
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.ranks import exchanged
 from contact.results.fields import DerivedFields
 from contact.results.local_problems import LocalProblems
-from contact.results.recovery import nodal_means
 from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 from forms.crystal import VOIGT
@@ -410,3 +418,162 @@ def _seen(
     # On the axis of revolution there is no area.
     means = found[..., :-1] / np.where(found[..., -1:] > 0, found[..., -1:], 1.0)
     return np.asarray(hats @ means)
+
+
+def nodal_means(
+    domain: Domain, cells: Indices, values: Array, apart: Sequence[str] = ()
+) -> tuple[Array, NDArray[np.integer]]:
+    """Return means around vertices, (n, components), and which are those of corners. Collective.
+
+    Parameters
+    ----------
+    domain
+        The mesh.
+    cells
+        Owned cells; those around them that are not among them do not count.
+    values
+        At the corners of each of the cells, shape (cells, corners, components); or constant there,
+        shape (cells, components).
+    apart
+        Names of parts inside of the body across which there are no means.
+
+    Returns
+    -------
+    The means, and their places at the corners of the cells, shape (cells, corners).
+    """
+    corners = shape_of(domain.mesh).corners
+    dofmap, index_map = _compat.geometry_dofmap(domain.mesh), domain.mesh.geometry.index_map()
+    sums = np.zeros((index_map.size_local + index_map.num_ghosts, values.shape[-1] + 1))
+    for some in in_chunks(np.arange(cells.size)):
+        vertices = dofmap[cells[some], :corners]
+        here = values[some].reshape(-1, values.shape[-1])
+        # The constants of a cell go to all of its corners.
+        column = np.repeat(np.arange(len(here)), vertices.size // max(len(here), 1))
+        rows = np.ones(vertices.size), (vertices.ravel(), column)
+        around = sparse.csr_array(rows, shape=(len(sums), len(here)))
+        sums[:, :-1] += around @ here
+        sums[:, -1] += around.sum(axis=1)
+    if domain.comm.size > 1:
+        total = la.vector(index_map, sums.shape[1])
+        total.array[:] = sums.ravel()
+        total.scatter_reverse(la.InsertMode.add)
+        total.scatter_forward()
+        sums = total.array.reshape(sums.shape)
+    with np.errstate(invalid="ignore"):
+        means = np.asarray(sums[:, :-1] / sums[:, -1:])
+    places = dofmap[cells, :corners]
+    return _separated(domain, cells, values, apart, means, places) if apart else (means, places)
+
+
+def _separated(
+    domain: Domain,
+    cells: Indices,
+    values: Array,
+    apart: Sequence[str],
+    means: Array,
+    places: NDArray[np.integer],
+) -> tuple[Array, NDArray[np.integer]]:
+    """Return means and places with those of groups at the vertices of parts. Collective."""
+    # Corners of two cells at a vertex are of one group where a facet joins the cells that has the
+    # vertex and is in no part. The rank that owns a vertex is sent all corners there, and returns
+    # the mean of its group to each.
+    mesh, comm, d = domain.mesh, domain.comm, domain.dim
+    shape = shape_of(mesh)
+    mesh.topology.create_connectivity(d, d - 1)
+    of_facets, of_nodes = mesh.topology.index_map(d - 1), mesh.geometry.index_map()
+    facet_owners, owners = Owners.of(of_facets, comm), Owners.of(of_nodes, comm)
+    own = np.unique(np.concatenate([domain.facets_anywhere(name) for name in apart]))
+    local = cell_facets(mesh)[cells]
+    facets = of_facets.local_to_global(local.ravel()).reshape(local.shape)
+    nodes = of_nodes.local_to_global(places.ravel()).reshape(places.shape)
+    within = facet_owners.requested(of_facets.local_to_global(own.astype(np.int32)))
+    cut = np.isin(facets, facet_owners.among(within, facets.ravel()))
+    named = owners.requested(nodes[:, shape.facet_corners][cut].ravel())
+    chosen = np.isin(nodes, owners.among(named, nodes.ravel()))
+    joins = np.zeros((len(shape.facet_corners), shape.corners), dtype=bool)
+    np.put_along_axis(joins, shape.facet_corners, True, axis=1)
+    cell, facet, corner = np.nonzero(chosen[:, None] & joins & ~cut[:, :, None])
+    before = comm.exscan(int(chosen.sum())) or 0
+    number = before + np.cumsum(chosen).reshape(chosen.shape) - 1
+    ranks = owners.ranks(nodes[chosen])
+    around = values[chosen] if values.ndim == 3 else values[np.nonzero(chosen)[0]]
+    by, numbers, around = exchanged(comm, ranks, number[chosen], around)
+    # A cell at a vertex is joined to those of its facets that are in no part.
+    at = np.column_stack([number[cell, corner], facets[cell, facet], nodes[cell, corner]])
+    joined = exchanged(comm, owners.ranks(at[:, 2]), at)[1]
+    _, meets = np.unique(joined[:, 1:], axis=0, return_inverse=True)
+    size = len(numbers) + len(joined)
+    links = np.ones(len(joined)), (np.searchsorted(numbers, joined[:, 0]), len(numbers) + meets)
+    groups = connected_components(sparse.csr_array(links, shape=(size, size)), directed=False)[1]
+    _, group = np.unique(groups[: len(numbers)], return_inverse=True)
+    entries = np.ones(group.size), (group, np.arange(group.size))
+    onto = sparse.csr_array(entries, shape=(group.max(initial=-1) + 1, group.size))
+    sums = onto @ np.column_stack([around, np.ones(group.size)])
+    found = exchanged(comm, by, (sums[:, :-1] / sums[:, -1:])[group])[1]
+    # They come back in the order in which the corners went.
+    order = np.empty(ranks.size, dtype=np.intp)
+    order[np.argsort(ranks, kind="stable")] = np.arange(ranks.size)
+    places = places.copy()
+    places[chosen] = len(means) + order
+    return np.concatenate([means, found]), places
+
+
+#: Quantity -> its interval; None where it does not converge like the error.
+Intervals: TypeAlias = dict[str, list[float] | None]
+
+#: Columns of ``adapt.csv`` that are no quantities of the body.
+OF_MESHES = ("unknowns", "error", "kkt")
+
+#: Factor of safety of the width, and the largest one by which C may grow from mesh to mesh.
+SAFETY = 1.25
+
+#: Ends of the names of a vector's components, whose rounding is that of the vector.
+AXES = ("_x", "_y", "_z")
+
+
+def intervals(rows: Sequence[Mapping[str, float]]) -> Intervals | None:
+    """Return the interval of each quantity; None unless the error falls on the last three meshes.
+
+    The grid convergence index (Roache, J. Fluids Eng. 116, 1994) with |Q - Q_h| <= C e, e being the
+    estimated error in the energy norm: C is the larger |Q_j - Q_k|/(e_j - e_k) of the last two
+    refinements. Where C grows it goes on to grow, and the changes to come are a geometric series.
+    Most quantities converge faster, and lie well inside. Residuals of the solutions are added. One
+    whose changes are of both signs has not begun to converge, and has none.
+
+    Parameters
+    ----------
+    rows
+        Those of ``adapt.csv``, the finest mesh last, all edges being cut alike from one to the
+        next: where some cells are refined, most of the error of a quantity may be elsewhere.
+    """
+    if len(rows) < 3 or not rows[-3]["error"] > rows[-2]["error"] > rows[-1]["error"]:
+        return None
+    last, error = rows[-3:], [float(row["error"]) for row in rows[-3:]]
+    quantities = [name for name in rows[-1] if name not in OF_MESHES]
+    sizes: dict[str, float] = {}
+    for name in quantities:
+        size = max(abs(row[name]) for row in last)
+        sizes[_whole(name)] = max(size, sizes.get(_whole(name), 0.0))
+    found: Intervals = {}
+    for name in quantities:
+        unknown = max(ROUNDING, *(row["kkt"] for row in last)) * sizes[_whole(name)]
+        values = [float(row[name]) for row in last]
+        changes = [values[k + 1] - values[k] for k in (0, 1)]
+        first, second = (
+            max(abs(changes[k]) - 2 * unknown, 0.0) / (error[k] - error[k + 1]) for k in (0, 1)
+        )
+        turns = min(first, second) > 0 and changes[0] * changes[1] < 0
+        growth = max(second / first, 1.0) if first > 0 else 1.0 if second == 0 else np.inf
+        ratio = growth * error[2] / error[1]
+        if turns or growth > SAFETY or ratio >= 1:
+            found[name] = None
+            continue
+        change = max(first, second) * (error[1] - error[2])
+        width = SAFETY * change * ratio / (1 - ratio) + unknown
+        found[name] = [values[2] - width, values[2] + width]
+    return found
+
+
+def _whole(name: str) -> str:
+    """Return the name of the vector of a component, or the name itself."""
+    return name[:-2] if name.endswith(AXES) else name

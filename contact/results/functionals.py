@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import ufl
@@ -27,7 +28,6 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import dissipated, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
-from contact.results.quantity import Functional
 from contact.results.resultants import (
     NAMES,
     DrivenPart,
@@ -37,6 +37,25 @@ from contact.results.resultants import (
     nodes_of,
 )
 from contact.typing import Array
+
+
+class Functional(Protocol):
+    """A number as a function of problem and state; any callable is one."""
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return the value. Collective."""
+
+
+@runtime_checkable
+class Differentiable(Functional, Protocol):
+    """A functional that knows its derivatives, which the adjoint asks for."""
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return them by the owned unknowns, and by the forces at the nodes, shape (n, d).
+
+        Collective.
+        """
+
 
 #: Functionals by the names of their columns.
 Functionals = Mapping[str, Functional]

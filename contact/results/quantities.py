@@ -11,34 +11,292 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from operator import attrgetter, itemgetter
 from typing import Any
 
 import numpy as np
 
+from contact._compat import versions
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import stored
 from contact.results import functionals as f
-from contact.results.environment import versions
-from contact.results.field_quantities import (
-    AT_NODES,
-    AT_OPPOSITE_NODES,
-    FIELDS,
-    OF_ITERATIONS,
-)
-from contact.results.quantity import (
-    ADAPT,
-    BODY,
-    CONTACTS,
-    ENDS,
-    STEPS,
-    SUMMARY,
-    SWEEP,
-    VECTOR,
-    Functional,
-    Quantity,
-    elsewhere,
-)
+from contact.results.functionals import Functional
 from contact.results.resultants import rigid_columns
+
+SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
+ADAPT = "adapt.csv"
+#: Results of each contact: entries of `contacts` in the summary, columns with its name at the end.
+CONTACTS = "contacts.csv"
+NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
+BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
+#: Tables with a row per solution; the others have columns of arrays.
+ROWS = (STEPS, SWEEP, ADAPT, CONTACTS)
+#: Names of the entries of a vector, and of an interval.
+AXES, ENDS = ("x", "y", "z"), ("least", "largest")
+#: Column of an entry of a vector.
+VECTOR = "{name}_{axis}"
+#: Status of a node -> its number in ``contact.vtu``.
+STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
+
+
+def elsewhere(given: Any) -> None:
+    """Return None, a placeholder: the writer fills this column."""
+
+
+def of_law(given: Any) -> None:
+    """Return None, a placeholder: laws may have an internal variable of this name."""
+
+
+def is_of(column: str, key: str) -> bool:
+    """Tell whether a column of a table is that of a key: itself, or an entry of it.
+
+    ``reactions`` has ``reactions.left_x``, as have ``reactions.left`` and the column's own name.
+    """
+    return (
+        re.fullmatch(rf"{re.escape(key)}(\..*)?(_({'|'.join(AXES + ENDS)}))?", column) is not None
+    )
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A key of ``summary.json``, a column of a table or a field.
+
+    Attributes
+    ----------
+    name
+        PART, KEY and AXIS in it stand for names of the case, and x, y, z.
+    text
+        The description, with the sign; `unit` is "length", "stress", ..., empty for none.
+    value
+        A function of `solution.Solution`, called on all ranks; in ``history.csv`` of
+        `methods.report.Record`, in ``contact.csv`` and ``contact.vtu`` of
+        `contact_nodes.ContactResult`, in ``fields.vtu`` of `fields.Point`, on master sides of a
+        mapping, of each contact of `contact_nodes.ContactShare`. By default the functional, or the
+        attribute or entry of the quantity's name. A mapping has several columns, a vector one per
+        component; None is for a quantity that a problem does not have, which has no key, column or
+        field then.
+    files
+        Where it stands; the first has the description.
+    component
+        Of a list of fixed length, or of those in a table: name of the column of an entry.
+    entries
+        Names of the entries.
+    functional
+        The number as a function of problem and state, as which it has derivatives too.
+    functionals
+        Of a problem, those of the quantity's columns, by their names; of each contact also of its
+        number.
+    """
+
+    name: str
+    unit: str
+    text: str
+    value: Callable[[Any], Any] | None = None
+    files: tuple[str, ...] = (SUMMARY,)
+    component: str = ""
+    entries: tuple[str, ...] = AXES
+    functional: Functional | None = None
+    functionals: Callable[..., Mapping[str, Functional]] | None = None
+
+    def of(self, given: Any) -> Any:
+        """Return the value."""
+        if self.value is not None:
+            return self.value(given)
+        if self.functional is not None:
+            return self.functional(given.problem, given.state)
+        return (itemgetter if isinstance(given, Mapping) else attrgetter)(self.name)(given)
+
+    def in_file(self, file: str, given: Any) -> dict[str, Any]:
+        """Return the keys, columns or field in a file; none where the quantity is absent."""
+        value = self.of(given)
+        if value is None:
+            return {}
+        table = file.endswith(".csv")
+        if table and isinstance(value, Mapping):
+            return dict(value)
+        if table and self.component and np.ndim(value) > (file not in ROWS):
+            parts = np.asarray(value).T
+            if file not in ROWS or len(parts) > 1:  # a moment in the plane is a number
+                names = [self.component.format(name=self.name, axis=end) for end in self.entries]
+                columns = parts.tolist() if file in ROWS else parts
+                return dict(zip(names, columns, strict=False))
+            value = parts.item()
+        return {self.name: value}
+
+
+def _node_counts(record: Any) -> str:
+    """Return the numbers of open, stick and slip nodes after an iteration; empty if unknown."""
+    return "/".join(map(str, record.sizes or ()))
+
+
+#: Of the contact nodes; fields of the contact part are NaN, or -1, at nodes that are held.
+AT_NODES = (
+    Quantity(
+        "on", "", "Part of the node; where there are several contacts.", lambda n: n.part, (NODES,),
+    ),
+    Quantity("x", "length", "Reference place of the node.", lambda n: n.points, (NODES,), "{axis}"),
+    Quantity(
+        "weight", "area", "Tributary area of the node; sums with it are integrals over Γ₃.",
+        files=(NODES, SURFACE),
+    ),
+    Quantity(
+        "gap", "length", "Initial distance to the foundation, along the contact direction ν.",
+        files=(NODES, SURFACE),
+    ),
+    Quantity(
+        "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. If "
+        "the foundation moves, all displacements here are relative to it. At degree 2 on "
+        "triangular facets it is (u - (u₁ + u₂)/5)/(3/5) at mid-edge nodes, with u₁ and u₂ at the "
+        "ends of the edge, and gaps likewise: the pressure there acts on it, not on u.",
+        lambda n: n.normal_displacement, (NODES,),
+    ),
+    Quantity(
+        "u_t", "length", "Tangential displacement u_τ: its components in 3-D, `u_t` in 2-D.",
+        lambda n: n.tangential(n.slip), (NODES,), "{name}{axis}",
+    ),
+    Quantity(
+        "pressure", "stress", "Contact pressure -σ_ν, of the foundation and its layer.",
+        files=(NODES, SURFACE),
+    ),
+    Quantity(
+        "tau", "stress",
+        "Friction stress -σ_τ of the body on the foundation: its components, `tau` in 2-D.",
+        lambda n: n.tangential(n.friction), (NODES,), VECTOR,
+    ),
+    Quantity(
+        "bound", "stress", "Friction bound: `tau` is no larger.",
+        lambda n: n.friction_bound, (NODES,),
+    ),
+    Quantity("status", "", "`open`, `stick` or `slip`.", files=(NODES,)),
+    Quantity(
+        "phi", "potential", "Potential; of piezoelectric bodies.", lambda n: n.potential, (NODES,),
+    ),
+    Quantity(
+        "d_n", "charge/area", "Charge D·ν that leaves through the foundation; of piezoelectric "
+        "bodies. Nodes that supports hold conduct too, but have no row: `charges` of the summary "
+        "includes them.",
+        lambda n: n.charge, (NODES,),
+    ),
+    Quantity(
+        "traction", "stress", "Stress of the body on the foundation, a vector: p ν - σ_τ.",
+        files=(SURFACE,),
+    ),
+    Quantity("opening", "length", "gap - u_n: the open gap.", files=(SURFACE,)),
+    Quantity("slip", "length", "Tangential displacement, a vector.", files=(SURFACE,)),
+    Quantity("friction_bound", "stress", "As `bound`.", files=(SURFACE,)),
+    Quantity("normal", "", "Contact direction ν, out of the body.", files=(SURFACE,)),
+    Quantity("charge", "charge/area", "As `d_n`; of piezoelectric bodies.", files=(SURFACE,)),
+    Quantity(
+        "status", "", "0 open, 1 stick, 2 slip; -1 for a node that is held.",
+        lambda n: np.array([STATUS[name] for name in n.status], np.int32), (SURFACE,),
+    ),
+    Quantity(
+        "row", "", "Row of the node in `contact.csv`, from 0; -1 for none.",
+        lambda n: np.arange(n.status.size, dtype=np.int32), (SURFACE,),
+    ),
+    Quantity("entry", "", "Number of its `[[contact]]`, from 0.", elsewhere, (SURFACE,)),
+    Quantity(
+        "rigid", "", "1 in front of a rigid foundation, 0 in front of another body.",
+        elsewhere, (SURFACE,),
+    ),
+)  # fmt: skip
+
+#: Of the nodes of the opposite side.
+AT_OPPOSITE_NODES = (
+    Quantity("on", "", "Part of the node: one that is `against` in a contact.", files=(AGAINST,)),
+    Quantity("x", "length", "Reference place of the node.", None, (AGAINST,), "{axis}"),
+    Quantity("weight", "area", "Tributary area of the node.", files=(AGAINST, OPPOSITE)),
+    Quantity(
+        "pressure", "stress", "Normal contact force on the node over its area.",
+        files=(AGAINST, OPPOSITE),
+    ),
+    Quantity(
+        "traction", "stress", "Whole contact force on the node over its area, a vector.",
+        None, (AGAINST, OPPOSITE), VECTOR,
+    ),
+    Quantity(
+        "u", "length", "Displacement of the node.",
+        lambda f: f["displacement"], (AGAINST,), VECTOR,
+    ),
+    Quantity("displacement", "length", "Displacement.", files=(OPPOSITE,)),
+    Quantity("normal", "", "Out of the body.", files=(OPPOSITE,)),
+    Quantity("entry", "", "Number of its contact, from 0.", files=(OPPOSITE,)),
+)  # fmt: skip
+
+#: Fields of the body; the derived ones have a companion NAME_cell, cell by cell.
+FIELDS = (
+    Quantity("displacement", "length", "Displacement.", elsewhere, (BODY, SURFACE)),
+    Quantity(
+        "potential", "potential", "Potential; of piezoelectric bodies.",
+        elsewhere, (BODY, SURFACE),
+    ),
+    Quantity(
+        "stress", "stress", "σ, nine components, row by row; tension is positive.", files=(BODY,),
+    ),
+    Quantity(
+        "principal_stress", "stress", "σ1 ≥ σ2 ≥ σ3, eigenvalues of `stress`: at nodes those of "
+        "the averaged tensor.", files=(BODY,),
+    ),
+    Quantity(
+        "von_mises", "stress", "Von Mises stress; at nodes the average of those of the cells, "
+        "which is not less than that of the averaged tensor.", files=(BODY,),
+    ),
+    Quantity("strain", "", "ε, nine components as of the stress.", files=(BODY,)),
+    Quantity("dev_strain", "", "|dev ε|, the norm of the strain deviator.", files=(BODY,)),
+    Quantity(
+        "plastic_strain", "", "Of `j2`, nine components; `back_stress_1`, ... likewise.",
+        of_law, (BODY,),
+    ),
+    Quantity(
+        "equivalent_plastic_strain", "", "Of `j2`; other internal variables have fields too.",
+        of_law, (BODY,),
+    ),
+    Quantity("electric_displacement", "charge/area", "D; of piezoelectric bodies.", files=(BODY,)),
+    Quantity("electric_field", "potential/length", "E = -grad φ; likewise.", files=(BODY,)),
+    Quantity(
+        "error", "",
+        "Estimated discretisation error of the cell over the energy norm of the solution: the "
+        "squares add up to that of `error` in the summary. In `fields.vtu` alone, cell by cell.",
+        elsewhere, (BODY,),
+    ),
+)  # fmt: skip
+
+#: Of the outer iterations.
+OF_ITERATIONS = (
+    Quantity(
+        "iteration", "", "Number of the outer iteration; 0 is a frictionless start.",
+        files=(HISTORY,),
+    ),
+    Quantity("inner", "", "Linear solves of the iteration.", files=(HISTORY,)),
+    Quantity(
+        "equilibrium", "", "Residual after the iteration, as in `kkt`.",
+        lambda r: r.residuals.equilibrium, (HISTORY,),
+    ),
+    Quantity("contact", "", "Likewise.", lambda r: r.residuals.contact, (HISTORY,)),
+    Quantity("friction", "", "Likewise.", lambda r: r.residuals.friction, (HISTORY,)),
+    Quantity(
+        "change", "", "Relative change of the friction bound; `nan` where there is none.",
+        files=(HISTORY,),
+    ),
+    Quantity("seconds", "s", "Since the solve began.", files=(HISTORY,)),
+    Quantity("note", "", "Kind of the iteration, for instance `tangent`.", files=(HISTORY,)),
+    Quantity(
+        "contact_solves", "", "Linear solves of the condensed problem in the iteration.",
+        lambda r: r.contact_solves, (HISTORY,),
+    ),
+    Quantity(
+        "active_set", "", "Numbers of open, stick and slip nodes at its end, for instance `3/5/1`; "
+        "empty where the active set is not known.", _node_counts, (HISTORY,),
+    ),
+    Quantity(
+        "steps", "", "The active sets after each Newton iteration on the condensed problem, "
+        "separated by blanks; `-` where one is not known.",
+        lambda r: " ".join(_node_counts(step) or "-" for step in r.steps), (HISTORY,),
+    ),
+)  # fmt: skip
 
 
 def quantities(file: str) -> list[Quantity]:

@@ -22,19 +22,15 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Balance, balance, dissipated
 from contact.problem.state import State
 from contact.results.contact_nodes import (
-    ContactResult,
     ContactShare,
     Solved,
-    contact_result,
     contact_shares,
 )
-from contact.results.error_estimate import Estimate
+from contact.results.error_estimate import Estimate, Intervals
 from contact.results.fields import Deformation, DerivedFields, unknowns
 from contact.results.functionals import MaxDisplacement
-from contact.results.intervals import Intervals
 from contact.results.options import OutputOptions, Units
-from contact.results.quantities import values_of
-from contact.results.quantity import STEPS
+from contact.results.quantities import STEPS, values_of
 from contact.results.resultants import (
     ChargeBalance,
     DrivenPart,
@@ -235,11 +231,6 @@ class Solution(Solved):
         balance, contact, friction = self.outcome.residuals.floors
         balance = max(balance, self.rounding)
         return {"equilibrium": balance, "contact": contact, "friction": friction}
-
-    @cached_property
-    def contact(self) -> ContactResult:
-        """The contact nodes of all ranks as arrays, and as functions. Collective."""
-        return contact_result(self)
 
     @cached_property
     def _derived(self) -> dict[str, fem.Function]:

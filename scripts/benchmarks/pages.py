@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from contact.results.environment import versions
+from contact._compat import versions
 
 #: The table of the ranks' memory, likewise.
 MEMORY_TABLE = re.compile(r"^\| \| unknowns \| ranks \|.*\n(?:\|.*\n)+", re.MULTILINE)

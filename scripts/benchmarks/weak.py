@@ -38,7 +38,7 @@ from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.refining import prolong
-from contact.results.recovery import nodal_means
+from contact.results.error_estimate import nodal_means
 from forms.hencky import Linear
 from scripts.benchmarks.bench_one import rank_memory
 

@@ -17,11 +17,11 @@ from contact.case.file import Case, number_at, parse_case, to_toml, with_number
 from contact.derivatives.by_parameters import (
     ADJOINT,
     TANGENT,
+    Parameter,
     Sensitivities,
     parameters_of,
     sensitivity,
 )
-from contact.derivatives.differences import Parameter
 from contact.errors import InputError
 from contact.problem.linearised import active_set
 from contact.results.quantities import named_functionals

@@ -15,8 +15,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import build_problem, evolve
+from contact.results.contact_nodes import contact_table
 from contact.results.resultants import charge_balance
-from contact.results.surface import contact_table
 from contact.typing import Array
 from scripts.reporting import Report, options, solved, subplots
 from scripts.studies.indentation import (

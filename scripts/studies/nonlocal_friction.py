@@ -11,8 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Solution
-from contact.results.grid import Table
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import Table, contact_table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
 from scripts.studies.error_norms import errors

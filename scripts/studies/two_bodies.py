@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from contact import load_case, parse_case
-from contact.results.grid import Table
+from contact.results.contact_nodes import Table, contact_table
 from contact.results.solution import Solution
-from contact.results.surface import contact_table
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, append, options, solved, subplots

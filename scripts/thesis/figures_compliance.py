@@ -18,9 +18,7 @@ from contact.interface.law import NormalLaw
 from contact.plot.body import Picture, draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.plot.style import Look
-from contact.results.contact_nodes import tangent_of
-from contact.results.grid import Table
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import Table, contact_table, tangent_of
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity

@@ -15,8 +15,7 @@ from contact import Case, Solution
 from contact.plot.body import draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.plot.style import Look
-from contact.results.grid import Table
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import Table, contact_table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
 

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.transfer import carry
 from contact.plot.body import picture
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import contact_table
 from contact.typing import Array
 from forms.kinematics import strain
 from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, run_of, subplots

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from contact import Case, Solution, build_problem
 from contact.mesh.geometry import area
 from contact.plot.body import draw_plane, picture
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import contact_table
 from scripts.reporting import TWO_COLUMNS, Report, append, options, run_of, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from contact.results.environment import versions
+from contact._compat import versions
 from scripts.thesis.chapters import PAGES, PARTS, Part, add_only, run, wanted
 from scripts.thesis.summary import table
 

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from contact import parse_case, solve
 from contact.case.build import build_problem
 from contact.errors import InputError
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import contact_table
 from tests.problems.everywhere import displacements
 
 COMM = MPI.COMM_WORLD

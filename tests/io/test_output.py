@@ -12,9 +12,8 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.methods.options import OPTIONS, with_method
-from contact.results.contact_nodes import tangent_of
+from contact.results.contact_nodes import contact_table, tangent_of
 from contact.results.options import OutputOptions
-from contact.results.surface import contact_table
 from contact.solving import solve
 from contact.writing import write_outputs
 from tests.problems.written import block, electric, written

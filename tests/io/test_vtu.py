@@ -12,7 +12,7 @@ from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.io.fields import gathered, write_grid
 from contact.mesh.cells import TRIANGLE, VTK
 from contact.plot.run import read_grid
-from contact.results.grid import Grid
+from contact.results.contact_nodes import Grid
 from contact.solving import solve
 from contact.writing import write_outputs
 from tests.problems.written import block, electric

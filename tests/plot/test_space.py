@@ -27,7 +27,7 @@ from contact.plot.space import (
     contact_figure,
 )
 from contact.plot.style import Look
-from contact.results.quantity import STATUS
+from contact.results.quantities import STATUS
 from contact.solving import solve
 from contact.writing import write_outputs
 from tests.problems.written import block

@@ -17,8 +17,8 @@ from contact.model.material import Material
 from contact.model.obstacle import GapFunction
 from contact.problem.checks import check_rigid_modes
 from contact.problem.problem import ContactProblem
+from contact.results.contact_nodes import contact_table
 from contact.results.resultants import charge_balance
-from contact.results.surface import contact_table
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks

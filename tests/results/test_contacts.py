@@ -12,7 +12,7 @@ from mpi4py import MPI
 from contact import InputError, parse_case, sensitivity, solve, write_outputs
 from contact.case.file import Case
 from contact.results import quantities as registry
-from contact.results.quantity import CONTACTS, Quantity
+from contact.results.quantities import CONTACTS, Quantity
 
 COMM = MPI.COMM_WORLD
 

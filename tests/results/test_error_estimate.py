@@ -23,10 +23,9 @@ from contact.model.contact import Contact
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.results.error_estimate import estimated, oscillation, sampled
+from contact.results.error_estimate import estimated, nodal_means, oscillation, sampled
 from contact.results.fields import DerivedFields, Point
 from contact.results.local_problems import LocalProblems
-from contact.results.recovery import nodal_means
 from forms.elasticity import isotropic, mandel
 from forms.hencky import Linear, Log
 from scripts.studies.effectivity import known

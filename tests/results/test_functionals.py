@@ -9,9 +9,8 @@ from mpi4py import MPI
 
 from contact import load_case, parse_case, sensitivity, solve
 from contact.case.file import number_at, with_number
-from contact.results.functionals import Integral
+from contact.results.functionals import Differentiable, Integral
 from contact.results.quantities import named_functionals
-from contact.results.quantity import Differentiable
 from scripts.studies.derivatives import FAMILIES, problem
 
 SELF = MPI.COMM_SELF

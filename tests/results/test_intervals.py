@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contact.results.intervals import intervals
+from contact.results.error_estimate import intervals
 
 
 def rows(quantity, rate, kkt=1e-10, meshes=4, name="max_displacement", **more):

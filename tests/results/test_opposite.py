@@ -18,9 +18,8 @@ from contact.model.obstacle import GapFunction
 from contact.plot.figures import figures_of
 from contact.plot.run import read_grid, read_run
 from contact.problem.problem import ContactProblem
-from contact.results.quantities import quantities
-from contact.results.quantity import AGAINST, OPPOSITE
-from contact.results.surface import opposite_surface
+from contact.results.contact_nodes import opposite_surface
+from contact.results.quantities import AGAINST, OPPOSITE, quantities
 from contact.solving import solve_problem
 from contact.writing import write_outputs
 from forms.hencky import Linear

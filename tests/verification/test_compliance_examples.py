@@ -12,7 +12,7 @@ from contact.model.formula import Expression
 from contact.model.foundation import Layer
 from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import contact_table
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient
 from scripts.cases import CASES, TABLE_8_4
 from scripts.studies import limit_theorem

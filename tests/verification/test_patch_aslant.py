@@ -29,7 +29,7 @@ from contact import (
     sensitivity,
     solve,
 )
-from contact.derivatives.differences import Parameter
+from contact.derivatives.by_parameters import Parameter
 from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
 from contact.model.obstacle import GapFunction

@@ -14,7 +14,7 @@ from contact.model.body import Fixed
 from contact.model.contact import Contact
 from contact.model.obstacle import Sphere
 from contact.problem.problem import ContactProblem
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import contact_table
 from forms.hencky import Linear
 from tests.problems.mechanics import constant, leaning_block
 from tests.problems.piezo import Column, potential

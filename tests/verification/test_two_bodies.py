@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contact import build_problem, load_case, parse_case, solve
-from contact.results.surface import contact_table
+from contact.results.contact_nodes import contact_table
 from scripts.cases import CASES
 from scripts.studies.cylinder_block import finite, half_planes
 from scripts.studies.mindlin import turn, turn_of_cylinders
