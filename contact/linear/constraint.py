@@ -14,7 +14,6 @@ Q^T K Q is computed by PtAP. R would fill the rows of all tied nodes: q borders 
 [[K, K R], [R^T K, R^T K R]]. A factorisation solves for the columns of K R together with the
 right-hand side; for an iterative solver q is eliminated, a low-rank update of K that keeps its
 preconditioner. After an inexact solve q is corrected: its rows are met to rounding.
-`contact.problem.condensed` condenses the same system.
 
 Right-hand sides and solutions have the values of q, the same on all ranks, behind the owned ones.
 """
@@ -256,6 +255,37 @@ class ConstrainedBulk:
         """Return None: `columns` and `corner` are the border."""
 
 
+class BorderedSolve:
+    """Block elimination of the q of [[A, B], [B^T, C]] (y, q) = (f, g), given A^-1 B. Collective.
+
+    The Schur complement S = C - B^T A^-1 B is inverted where anything resists q; the rest of q is
+    0, and `regular` false.
+
+    Parameters
+    ----------
+    comm
+        Communicator.
+    columns, corner
+        B, shape (owned, m), and C, shape (m, m).
+    responses
+        A^-1 B, shape (owned, m).
+    """
+
+    def __init__(
+        self, comm: MPI.Intracomm, columns: Array, corner: Array, responses: Array
+    ) -> None:
+        self._comm, self.columns, self.responses = comm, columns, responses
+        left, size, right = np.linalg.svd(corner - summed(comm, columns.T @ responses))
+        resists = size > ROUNDING * np.abs(corner).max(initial=0.0)
+        self.regular = bool(resists.all())
+        self.inverse = np.asarray((right[resists].T / size[resists]) @ left[:, resists].T)
+
+    def solve(self, first: Array, forces: Array) -> tuple[Array, Array]:
+        """Return y and q from A^-1 f and g. Collective."""
+        q = self.inverse @ (forces - summed(self._comm, self.columns.T @ first))
+        return first - self.responses @ q, q
+
+
 class ConstrainedOperator:
     """C^T K C plus blocks at nodes of y; as `operator.SparseOperator`, in x.
 
@@ -279,12 +309,10 @@ class ConstrainedOperator:
         self._bulk, self._constraint, self._nodes = bulk, bulk.constraint, nodes
         self._inner = SparseOperator(bulk, nodes, symmetric=symmetric, counters=counters, kind=kind)
         self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.constraint.free)
-        #: Whether the responses K^-1 K R are those of an earlier matrix.
-        self._outdated = False
-        self._responses = np.zeros((self._owned, self._free.size))
-        self._inverse: Array = np.zeros((self._free.size, self._free.size))
-        #: Inverse of the stiffness of the blocks against q.
-        self._compliance_of_q = np.zeros_like(self._inverse)
+        #: Elimination of q by a direct solver; None for an earlier matrix.
+        self._bordered: BorderedSolve | None = None
+        #: Inverses of the stiffness of body and blocks against q, for an iterative solver.
+        self._inverse = self._compliance_of_q = np.zeros((self._free.size, self._free.size))
 
     @property
     def symmetric(self) -> bool:
@@ -297,8 +325,8 @@ class ConstrainedOperator:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
         if not self._inner.update(kind, state, blocks, constant=constant):
             return False
-        self._outdated = self._free.size > 0
-        if self._inner.iterative and self._outdated:
+        self._bordered = None
+        if self._inner.iterative and self._free.size > 0:
             self._eliminate(blocks)
         return True
 
@@ -313,18 +341,16 @@ class ConstrainedOperator:
                 guess = constraint.relative(guess)[: self._owned]
             relative = self._inner.solve(own - columns @ (self._inverse @ forces), rtol, guess)
             moved = self._inverse @ (forces - self._on_q(columns, relative))
+        elif free.size == 0:
+            relative, moved = self._inner.solve(own), forces
         else:
-            if self._outdated:
+            if self._bordered is None:
                 first, *responses = self._inner.solve_all(np.column_stack([own, columns])).T
-                self._responses, self._outdated = np.column_stack(responses), False
-                self._inverse = self._condensed(columns, self._responses)
+                self._bordered = self._eliminated(columns, np.column_stack(responses))
             else:
                 first = self._inner.solve(own)
-            moved = self._inverse @ (forces - self._on_q(columns, first))
-            relative = first - self._responses @ moved
-        q = np.zeros(constraint.free.size)
-        q[free] = moved
-        solution = constraint.expand(np.concatenate([relative, q]))
+            relative, moved = self._bordered.solve(first, forces)
+        solution = self._expanded(relative, moved)
         if self._inner.iterative and rtol is not None and free.size:
             left = rhs[self._owned :] - self.multiply(solution)[self._owned :]
             solution[self._owned :][free] += self._compliance_of_q @ left[free]
@@ -353,17 +379,18 @@ class ConstrainedOperator:
         first = self._inner.solve_transposed(own)
         solved = [self._inner.solve_transposed(columns[:, k]) for k in range(free.size)]
         responses = np.stack([*solved], axis=1) if solved else np.zeros_like(columns)
-        moved = self._condensed(columns, responses) @ (forces - self._on_q(columns, first))
-        q = np.zeros(constraint.free.size)
-        q[free] = moved
-        return constraint.expand(np.concatenate([first - responses @ moved, q]))
+        return self._expanded(*self._eliminated(columns, responses).solve(first, forces))
 
-    def _condensed(self, columns: Array, responses: Array) -> Array:
-        """Return the pseudoinverse of the condensed stiffness against q. Collective."""
+    def _eliminated(self, columns: Array, responses: Array) -> BorderedSolve:
+        """Return the elimination of the free q. Collective."""
         corner = self._bulk.corner[np.ix_(self._free, self._free)]
-        left, size, right = np.linalg.svd(corner - self._on_q(columns, responses))
-        resists = size > ROUNDING * np.abs(corner).max(initial=0.0)
-        return np.asarray((right[resists].T / size[resists]) @ left[:, resists].T)
+        return BorderedSolve(self._bulk.layout.comm, columns, corner, responses)
+
+    def _expanded(self, relative: Array, moved: Array) -> Array:
+        """Return x = C y of the free q. Collective."""
+        q = np.zeros(self._constraint.free.size)
+        q[self._free] = moved
+        return self._constraint.expand(np.concatenate([relative, q]))
 
     def _on_q(self, columns: Array, values: Array) -> Array:
         """Return columns^T times values. Collective."""

@@ -12,7 +12,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.linalg import lu_factor, lu_solve
 
 from contact.body.equilibrium import ComponentNorms
 from contact.history import BodyState, LinearisationPoint
@@ -20,7 +19,7 @@ from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
-from contact.linear.constraint import ConstrainedBulk, Constraint
+from contact.linear.constraint import BorderedSolve, ConstrainedBulk, Constraint
 from contact.linear.layout import Inclined, balance, masked
 from contact.linear.operator import Counters
 from contact.linear.petsc import check_overflow, petsc_options
@@ -268,6 +267,8 @@ class Condensation:
             internal = body.internal_forces(state, linearised_at)
         residual = internal - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
+        if not self._regular:
+            return None
         reactions = body.norms(body.reactions(residual))
         acting = body.load_norms(state.time) + reactions + body.exchanged(state)
         restricted = self._constraint.restrict(-residual)
@@ -278,10 +279,10 @@ class Condensation:
             kept = self._schur.reduce(self._rhs)
         else:
             kept = self._schur.condense(self._rhs, np.zeros(body.owned))
-        inside = summed(body.comm, self._responses.T @ self._rhs)
+        inside = summed(body.comm, self._bordered.responses.T @ self._rhs)
         self._on_q = restricted[body.owned :][self._free] - inside
-        forces = self._border.T @ self._solve_q(self._on_q) - kept
-        if not (self._regular and np.isfinite(forces).all()):
+        forces = self._border.T @ (self._bordered.inverse @ self._on_q) - kept
+        if not np.isfinite(forces).all():
             return None
         free, inclined = body.layout.at(self.nodes)
         nodes = self.full.interface.nodes
@@ -323,27 +324,25 @@ class Condensation:
         balance(self._matrix, body.layout)
         with petsc_options(PREFIX):
             stiffness = schur.factorise(self._matrix)
+        self._kind, self._size = kind, self._matrix.norm()
+        self.counters.factorizations += 1
+        self._regular = body.comm.bcast(bool(np.isfinite(stiffness).all()))
+        if not self._regular:
+            return
+        # q with the kept unknowns at 0.
         columns = self._bulk.columns[:, self._free].T
         responses = [schur.interior(np.asarray(column)) for column in columns]
         border = [schur.condense(*pair) for pair in zip([*columns], responses, strict=True)]
-        self._responses = np.reshape(responses, columns.shape).T
+        corner = self._bulk.corner[np.ix_(self._free, self._free)]
+        self._bordered = BorderedSolve(
+            body.comm, columns.T, corner, np.reshape(responses, columns.shape).T
+        )
+        self._regular = self._bordered.regular
         #: Derivative of the forces on q by kept unknowns, shape (free, kept).
         self._border = np.reshape(border, (self._free.size, schur.size))
-        inside = summed(body.comm, columns @ self._responses)
-        corner = self._bulk.corner[np.ix_(self._free, self._free)] - inside
-        self._corner = lu_factor(corner, check_finite=False) if self._free.size else None
         if body.comm.rank == 0 and self._free.size:
-            stiffness -= self._border.T @ self._solve_q(self._border)
-        self._regular = body.comm.bcast(bool(np.isfinite(stiffness).all()))
+            stiffness -= self._border.T @ (self._bordered.inverse @ self._border)
         self._rows, self._stiffness = self._scattered(stiffness), DenseStiffness(stiffness)
-        self._kind, self._size = kind, self._matrix.norm()
-        self.counters.factorizations += 1
-
-    def _solve_q(self, forces: Array) -> Array:
-        """Solve for q with the kept unknowns at 0."""
-        if self._corner is None:
-            return forces
-        return np.asarray(lu_solve(self._corner, forces, check_finite=False))
 
     def _scattered(self, stiffness: Array) -> Array:
         """Scatter the rows of a matrix on the first rank. Collective."""
@@ -366,7 +365,7 @@ class Condensation:
         self.counters.linear_iterations += 1
         kept = np.concatenate(self.full.comm.allgather(x - condensed.equilibrium.at))
         q = np.zeros(self._constraint.free.size)
-        q[self._free] = self._solve_q(self._on_q - self._border @ kept)
+        q[self._free] = self._bordered.inverse @ (self._on_q - self._border @ kept)
         rhs = self._rhs - self._bulk.columns @ q
         return self._constraint.expand(np.concatenate([self._schur.expand(rhs, kept), q]))
 
