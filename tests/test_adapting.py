@@ -194,15 +194,6 @@ def test_revolution_and_two_bodies(name):
     assert solution.contact_force == pytest.approx(first.contact_force, rel=0.05, abs=1e-4)
 
 
-def test_what_does_not_go_with_it_is_refused():
-    data = changed(mesh__adapt={"error": 2.0})
-    with pytest.raises(InputError, match=r"mesh.adapt.error: given 2.0; accepted: a number betw"):
-        parse_case(data)
-    data = changed(mesh__adapt={}, solver__nested=True)
-    with pytest.raises(InputError, match=r"nested: given together with \[mesh.adapt\]"):
-        solve(parse_case(data))
-
-
 @pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("generator", "off"), [("quarter_disc", 1e-12), ("sphere", 3e-5)])

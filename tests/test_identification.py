@@ -101,30 +101,6 @@ def test_the_command(tmp_path, capsys):
     assert not picture.exists()
 
 
-@pytest.mark.parametrize(
-    ("text", "more", "message"),
-    [
-        ("t,contact_force_x\n1.0,much\n", [], "accepted: a row of names, then rows of numbers"),
-        (None, [], "accepted: a CSV file"),
-        ("t,contact_force_x\n1.0,0.1\n2.0,0.1\n", ["--for", ""], "--for: missing; accepted: keys"),
-        ("t,contact_force_x\n1.0,0.1\n2.0,0.1\n", ["--for", "friction.nu"], "friction.nu: nothing"),
-        ("t,contact_force_x\n1.0,0.1\n9.0,0.1\n", [], "data: t: given"),
-        ("t\n1.0\n2.0\n", [], "data: columns t; accepted: t and columns of steps.csv"),
-        ("t,contact_force_x\n1.0,0.1\n", [], "data: given '1 values'; accepted: more than 2"),
-        ("t,contact_force_x\n1.0,0.1\n", ["--bound", "friction.mu=1:0"], "--bound friction.mu=1:0"),
-    ],
-)
-def test_bad_input_ends_the_command_with_one_line(tmp_path, capsys, text, more, message):
-    file, path = tmp_path / "loop.csv", tmp_path / "block.toml"
-    path.write_text(to_toml(case()))
-    if text is not None:
-        file.write_text(text)
-    keys = ["--for", "friction.mu,material.young"]
-    assert main(["identify", str(path), str(file), *keys, *more, "--quiet"]) == 2
-    said = capsys.readouterr().err.strip()
-    assert message in said and len(said.splitlines()) == 1
-
-
 def test_intervals_contain_the_parameters_as_often_as_they_say():
     # of a linear model, in ten thousand repetitions
     shares = coverage(solved(), COLUMNS)
@@ -203,28 +179,3 @@ def test_columns_of_supports_and_energies_can_be_fitted():
     found = identify(wrong, data, ["friction.mu", "material.young"], comm=SELF)
     for key, value in found.parameters.items():
         assert value == pytest.approx(number_at(case(), key), rel=1e-5)
-
-
-BAD_FILES = {
-    "empty": ("", "it is empty"),
-    "short": ("t,contact_force_x\n1,2\n\n3\n", "row 4 has 1 values for 2 names"),
-    "words": ("t,contact_force_x\n1,2\n2,two\n", "row 3, column contact_force_x: 'two' is no numb"),
-    "blank": ("t,contact_force_x\n1,\n", "row 2, column contact_force_x: '' is no number"),
-}
-
-
-@pytest.mark.parametrize("name", BAD_FILES)
-def test_files_say_where_they_are_wrong(tmp_path, name):
-    text, words = BAD_FILES[name]
-    (tmp_path / "bad.csv").write_text(text)
-    with pytest.raises(InputError) as error:
-        read_data(tmp_path / "bad.csv")
-    assert words in str(error.value)
-
-
-def test_keys_stand_once_and_bounds_have_one():
-    data = measured()
-    with pytest.raises(InputError, match=r"parameters: .*a list of keys, each once"):
-        identify(case(), data, ["friction.mu", "friction.mu"], comm=SELF)
-    with pytest.raises(InputError, match=r"bounds: given 'friction\.nu'; accepted: one of"):
-        identify(case(), data, ["friction.mu"], bounds={"friction.nu": (0, 1)}, comm=SELF)

@@ -8,7 +8,6 @@ from contact import (
     Body,
     Contact,
     Elastic,
-    Fixed,
     Linear,
     Load,
     Problem,
@@ -236,24 +235,3 @@ def test_what_is_refused(name):
     with pytest.raises(InputError, match=words) as caught:
         build_problem(column(elastic))
     assert "\n" not in str(caught.value)
-
-
-def test_nothing_in_python_is_refused():
-    with pytest.raises(
-        InputError, match="stiffness: missing; accepted: stiffness, normal, or both"
-    ):
-        Elastic("bottom")
-    with pytest.raises(InputError, match="the stiffness has 3 components"):
-        domain = rectangle(MPI.COMM_SELF, (0.0, 0.0), (1.0, 1.0), (2, 2))
-        body = Body(Linear(1.0, 0.0), Fixed("top", [0, 0]), elastic=Elastic("bottom", [1, 1, 1]))
-        Problem(domain, body, Contact("right", 1.0))
-
-
-def test_a_stiffness_that_pulls_or_is_no_number_is_refused():
-    """A support that pulls with the load was taken, one without a value ended in a traceback."""
-    domain = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [2, 2])
-    with pytest.raises(InputError, match=r"Elastic on 'top': normal: -50.0 is negative"):
-        Elastic("top", normal=-50.0)
-    body = Body(Linear(1.0, 0.3), [], elastic=[Elastic("top", normal=lambda x: x[0] - 0.5)])
-    with pytest.raises(InputError, match=r"elastic.0.normal: given -0."):
-        Problem(domain, body, Contact("bottom", gap=10.0))

@@ -55,10 +55,6 @@ def test_a_force_is_the_resultant_and_a_traction_is_per_area(dim):
     assert np.allclose(*loads, rtol=0, atol=1e-15)
 
 
-def test_the_second_argument_is_per_area_as_before():
-    assert Load("top", [0.0, DOWN]) == Load("top", traction=[0.0, DOWN])
-
-
 def case(**keys):
     return changed(load=[{"on": "loaded", **keys}])
 
@@ -158,12 +154,6 @@ def test_formulas_in_t_are_taken_as_they_are():
     data = case(force=[0.0, "-0.01*t**2"]) | {"evolution": steps}
     problem = build_problem(parse_case(data))
     assert external(problem, 2.0)[1] == pytest.approx(-0.04)
-
-
-def test_what_grows_is_named():
-    steps = {"times": [0.0, 1.0], "steps": [2]}
-    assert growing(parse_case(changed(evolution=steps))) == ["load.0"]  # the support is at 0
-    assert growing(parse_case(changed())) == []
 
 
 def test_supports_at_zero_drive_nothing():

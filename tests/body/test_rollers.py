@@ -268,13 +268,6 @@ def test_a_roller_alone_leaves_a_motion_along_it():
         build_problem(block(30.0, contact=far | {"on": "right"}, friction={"law": "none"}))
 
 
-def test_in_python_both_are_refused():
-    with pytest.raises(
-        InputError, match="accepted: one of normal and displacement, and for more another entry"
-    ):
-        Fixed("left", [0.0, None], normal=0.0)
-
-
 def wedge(order, values=(0.0, 0.0), more=()):
     """Return a block whose left side is inclined by 20 degrees, on rollers there and below."""
     domain = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [5, 4])

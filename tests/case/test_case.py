@@ -109,21 +109,6 @@ def test_broken_files_name_the_file(tmp_path, content, fragment):
     assert fragment in str(error.value) or not content
 
 
-def test_a_byte_order_mark_is_skipped(tmp_path):
-    path = tmp_path / "windows.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + BAR.replace("\n", "\r\n").encode())
-    plain = tmp_path / "plain.toml"
-    plain.write_text(BAR)
-    assert load_case(path).model_dump() == load_case(plain).model_dump()
-
-
-def test_missing_files_name_the_file(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere\.toml: No such file"):
-        load_case(tmp_path / "nowhere.toml")
-    with pytest.raises(InputError, match="directory"):
-        load_case(tmp_path)
-
-
 @pytest.mark.core
 def test_overrides(bar):
     case = load_case(

@@ -5,7 +5,6 @@ import pytest
 from mpi4py import MPI
 
 from contact import InputError, load_case, parse_case, solve
-from contact.case.build import build_problem
 from contact.case.digest import digest
 from contact.case.file import to_toml
 from tests.problems.bar import changed
@@ -85,16 +84,6 @@ def test_other_files_are_refused(tmp_path, text, words):
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_and_values_are_one_too_many(tmp_path):
-    (tmp_path / "press.csv").write_text("0,0\n3,1\n")
-    data = with_file()
-    data["evolution"]["amplitudes"]["press"]["time"] = [0.0, 3.0]
-    with pytest.raises(InputError, match=r"press\.time: given with file"):
-        parse_case(data, tmp_path)
-    with pytest.raises(InputError, match=r"press\.time: missing; accepted: time, or file"):
-        parse_case(changed(evolution=STEPS | {"amplitudes": {"press": {}}}))
-
-
 HALF = {
     "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
     "material": {"young": 10.0, "poisson": 0.3},
@@ -113,22 +102,3 @@ def test_symmetry_is_a_displacement_of_zero_across_a_plane():
     assert np.array_equal(one.pressure, two.pressure)
     assert np.array_equal(one.displacement.x.array, two.displacement.x.array)
     assert np.abs(one.displacement.x.array).max() > 1e-3
-
-
-@pytest.mark.parametrize(
-    ("on", "axis", "words"),
-    [
-        ("left", "y", r"fixed\.0\.symmetry: left reaches from y = 0 to 1; accepted: a part in a"),
-        ("left", "z", r'fixed\.0\.symmetry: given "z"; accepted: x or y'),
-        (["left", "right"], "x", "reaches from x = 0 to 1"),
-    ],
-)
-def test_parts_in_no_such_plane_are_refused(on, axis, words):
-    with pytest.raises(InputError, match=words):
-        build_problem(parse_case(HALF | {"fixed": [{"on": on, "symmetry": axis}]}))
-
-
-def test_symmetry_and_a_displacement_are_one_too_many():
-    fixed = [{"on": "left", "symmetry": "x", "displacement": [0.0, 0.0]}]
-    with pytest.raises(InputError, match="one of symmetry and displacement"):
-        parse_case(HALF | {"fixed": fixed})

@@ -1,7 +1,5 @@
 """Lists of parts where a part is asked for: as one name for all of them."""
 
-import copy
-import pickle
 import tomllib
 
 import pytest
@@ -10,8 +8,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, InputError, Linear, Load, Problem, parse_case, solve
-from contact.case.file import to_toml
-from contact.mesh.domain import Together, members, part_name
+from contact.mesh.domain import part_name
 from contact.mesh.grid import rectangle
 
 BLOCK = """
@@ -85,32 +82,6 @@ def test_lists_in_python():
     assert solution.contact_force == pytest.approx([0.0, -0.02])
     with pytest.raises(InputError, match="a part, or a list of names"):
         Fixed([3], [0.0, 0.0])
-
-
-def test_the_case_says_the_list_again():
-    case = block(contact='["near", "far"]')
-    assert 'on = ["near", "far"]' in to_toml(case)
-    again = parse_case(tomllib.loads(to_toml(case)))
-    assert members(again.contacts[0][1].on) == ("near", "far")
-
-
-@pytest.mark.parametrize("same", [copy.deepcopy, lambda name: pickle.loads(pickle.dumps(name))])
-def test_a_name_of_several_can_be_copied(same):
-    assert members(same(Together(["a, b", "c"]))) == ("a, b", "c")
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"load": "[]"}, r"load.0.on: given \[\]; accepted: the name of a part, or a list"),
-        ({"load": '["top", 3]'}, "load.0.on: given .*; accepted: the name of a part, or a list"),
-        ({"contact": '["near", "fra"]'}, r'contact.on: given "fra"; .*did you mean far\?'),
-        ({"load": '["top", "far"]'}, "shares facets with the contact part bottom"),
-    ],
-)
-def test_messages(change, message):
-    with pytest.raises(InputError, match=message):
-        solve(block(**change))
 
 
 def test_several_parts_are_one_electrode_and_one_rigid_body():

@@ -39,19 +39,3 @@ def test_an_object_that_is_not_there(key: str, name: str) -> None:
     others = {k: v for k, v in objects().items() if k != name}
     with pytest.raises(InputError, match=rf"{key}: missing; accepted: it in the case, or {name}"):
         solve(parse_case(BARE, without=WITHOUT), **others)
-
-
-def test_what_cannot_be_left_out() -> None:
-    with pytest.raises(InputError, match=r"accepted: mesh, material, friction\.mu"):
-        parse_case(BARE, without=["contact"])
-    with pytest.raises(InputError, match="mesh: missing"):
-        parse_case(BARE, without=["material", "friction.mu"])
-
-
-def test_a_file_and_its_objects(tmp_path) -> None:
-    """`solve` with a file name knows what its objects replace."""
-    path = tmp_path / "bare.toml"
-    fixed = '[[fixed]]\non = "top"\ndisplacement = [0.02, -0.02]\n'
-    path.write_text(fixed + '[contact]\non = "bottom"\n')
-    given = {k: v for k, v in objects().items() if k != "coefficient"}
-    assert solve(path, **given).converged

@@ -7,7 +7,7 @@ import pytest
 from contact.case.file import Case, parse_case, to_toml
 from contact.methods.options import OPTIONS, NewtonOptions, with_method
 from contact.model.messages import keys_of, sections_of
-from scripts import case_page, output_page
+from scripts import case_page
 from tests.problems.bar import changed
 
 
@@ -39,18 +39,3 @@ def test_the_resolved_case_holds_what_the_method_reads():
 
 def test_the_reference_page_is_up_to_date():
     assert case_page.PAGE.read_text() == case_page.page(), "run python3 -m scripts.case_page"
-
-
-@pytest.mark.parametrize("pages", [case_page, output_page], ids=["case", "output"])
-def test_help_for_a_page_writes_nothing(pages, tmp_path, monkeypatch, capsys):
-    """A file called `--help` was written."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(pages, "PAGE", tmp_path / "page.md")
-    for given, status in (["--help"], 0), (["other.md"], 2):
-        with pytest.raises(SystemExit) as ended:
-            pages.main(given)
-        assert ended.value.code == status
-        assert not list(tmp_path.iterdir())
-    assert "usage: python3 -m scripts." in capsys.readouterr().out
-    pages.main([])
-    assert (tmp_path / "page.md").read_text(encoding="utf-8") == pages.page()

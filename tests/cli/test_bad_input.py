@@ -1,16 +1,11 @@
 """Input that is absurd rather than wrong: one line, exit status 2, at once."""
 
-import logging
 import time
 
 import pytest
-from mpi4py import MPI
 
-from contact.case import mesh
-from contact.case.file import parse_case
 from contact.cli.main import main
-from contact.errors import clipped
-from contact.model.messages import LIST, listed, path_of, shown
+from contact.model.messages import LIST
 from tests.cli.running import check_identifier
 
 TABLES = {
@@ -144,31 +139,3 @@ def test_messages_of_absurd_input(snapshot, tmp_path, capsys):
     for name, override in OVERRIDES.items():
         said[f"override: {name}"] = refused(path, capsys, "--set", override)
     snapshot("absurd-input", said)
-
-
-def test_a_large_mesh_is_announced(monkeypatch, caplog):
-    monkeypatch.setattr(mesh, "MANY", 100)
-    section = parse_case(
-        {
-            "mesh": {"generator": "rectangle", "size": [1, 1], "cells": [4, 4], "refine": 1},
-            "material": {"young": 1, "poisson": 0.3},
-            "fixed": [{"on": "left", "displacement": [0, 0]}],
-            "contact": {"on": "bottom"},
-        }
-    ).mesh
-    with caplog.at_level(logging.WARNING, "contact"):
-        section.build(MPI.COMM_SELF)
-    assert "mesh.refine: 1 refinements of 32 cells, 128 cells: their mesh alone" in caplog.text
-
-
-def test_what_is_quoted_is_short_and_of_one_line():
-    assert shown(10**5000) == "a whole number of thousands of digits"
-    nested = []
-    for _ in range(100_000):
-        nested = [nested]
-    assert shown(nested) == "a deeply nested list"
-    assert clipped("ä\n\x1b\u2028") == r"ä\n\x1b\u2028"
-    assert path_of(["load", "0", "on"]) == "load.0.on"
-    assert len(path_of(["k"] * 500)) <= 100
-    assert listed(["a", "b"]) == "a, b"
-    assert listed(map(str, range(1000))).endswith(" 76, 77 and 922 more")

@@ -1,16 +1,13 @@
 """`contact check` says of loads, gaps and the mesh what is so."""
 
-from dataclasses import replace
 from itertools import takewhile
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from contact.case.build import build_problem
 from contact.case.file import load_case, parse_case
-from contact.cli.check import describe, expectations, parts
-from contact.mesh.grid import rectangle
+from contact.cli.check import describe, expectations
 from scripts.cases import CASES
 from tests.problems.bar import changed
 
@@ -71,57 +68,6 @@ def test_what_acts_is_seen(name):
     assert NOTHING not in said(ACTING[name])
 
 
-@pytest.mark.parametrize("data", [PIEZO, bar(), bar(contact__gap=0.1)], ids=range(3))
-def test_where_nothing_acts_that_is_said(data):
-    assert NOTHING in said(data)
-
-
-def test_a_load_between_times_at_which_it_is_zero_is_seen():
-    data = changed(
-        load__0__amplitude="pulse",
-        evolution={
-            "times": [0.0, 2.0],
-            "steps": [4],
-            "amplitudes": {"pulse": {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}},
-        },
-    )
-    case = parse_case(data)
-    text = describe(case, build_problem(case))
-    assert NOTHING not in text
-    assert rows(text)["loads"] == "resultant (0, -0.01) at t = 1"
-    assert "supports" not in rows(text)
-
-
-def test_ends_of_stages_are_looked_at():
-    """Of the many steps only some are."""
-    times = [0.0, 1.0, 2.0, 3.0]
-    data = bar(
-        fixed__0__displacement=[0.12, 0.0],
-        fixed__0__amplitude="shear",
-        evolution={
-            "times": times,
-            "steps": [20, 30, 20],
-            "amplitudes": {"shear": {"time": times, "value": [0.0, 0.0, 1.0, 1.0]}},
-        },
-    )
-    case = parse_case(data)
-    text = describe(case, build_problem(case))
-    assert rows(text)["supports"] == "displacements of up to 0.12 at t = 2"
-
-
-def test_displacements_are_not_guessed():
-    """A cantilever bends by 1e-3 or more, and a block of its size is compressed by 3e-6."""
-    text = said(changed(mesh__size=[40.0, 1.0], mesh__parts=None, load__0__on="top"))
-    assert "expected" not in text and "some" not in text
-    assert rows(text) == {"loads": "resultant (0, -0.2)", "gap": "0 to 0"}
-
-
-def test_charges_of_electrodes_are_no_forces():
-    data = {**PIEZO, "electrode": [{"on": "right", "charge": 1e3}]}
-    data["fixed"] = [PIEZO["fixed"][0]]
-    assert "same units" not in said(data)
-
-
 def line(data, name):
     case = parse_case(data)
     text = describe(case, build_problem(case))
@@ -163,27 +109,6 @@ def test_a_curved_part_has_a_mean_normal():
     case = load_case(CASES / "two-spheres.toml")
     text = describe(case, build_problem(case))
     assert "not plane, mean normal (0.57" in text
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize(
-    ("slope", "words"),
-    [
-        (np.inf, "not plane, mean normal (0.447214, 0.894427)"),
-        (0.3, "not plane, mean normal (0, 1)"),
-        (0.0, "  normal (0, 1)"),
-    ],
-)
-def test_parts_that_are_not_plane(slope, words):
-    """Two sides of a rectangle; a roof; and a flat one."""
-    domain = rectangle(MPI.COMM_WORLD, [0.0, 0.0], [2.0, 1.0], [8, 4])
-    x = domain.mesh.geometry.x
-    if np.isfinite(slope):
-        x[:, 1] += x[:, 1] * slope * (1 - np.abs(x[:, 0] - 1))
-    two = [domain.facets(side) for side in ("top", "right")[: 1 + np.isinf(slope)]]
-    made = replace(domain, parts={"roof": np.unique(np.concatenate(two))})
-    (text,) = parts(made)[1:]
-    assert text.endswith(words)
 
 
 LID = {"on": "top", "displacement": [0.0, "free"], "force": [0.0, -2.0]}
@@ -250,13 +175,3 @@ def test_all_that_acts_is_told_and_nothing_else(data, found):
     assert set(told) == {*found, "gap"}
     for name, words in found.items():
         assert told[name].startswith(words)
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("given", [{"force": 500.0}, {"shortening": 0.25}])
-def test_bolts_are_told(given):
-    mesh = {**MESH, "inside": {"section": "abs(x - 1) < 1e-6"}}
-    (key, value), *_ = given.items()
-    fixed = [{"on": ["left", "right"], "displacement": [0.0, "free"]}]
-    told = rows(said(block(mesh=mesh, fixed=fixed, bolt=[{"on": "section", **given}])))
-    assert told == {"bolt 'section'": f"{key} {value:g}", "gap": "0 to 0"}

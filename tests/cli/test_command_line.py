@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from petsc4py import PETSc
 
-from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.cli.main import BAD_INPUT, CONVERGED
 from tests.cli.running import BAR, check_identifier, refuse, run, write
 
 ROOT = Path(__file__).parents[2]
@@ -36,44 +36,6 @@ def test_wrong_command_line(
     assert len(lines) == 1
     assert all(word in lines[0] for word in words), lines
     check_identifier(lines[0])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "identifier"),
-    [
-        (["solve", "case.toml"], "missing"),
-        (["solve", "none.toml", "--out", "out"], "toml"),
-        (["solve", "case.toml", "again.toml", "--out", "out"], "command-line"),
-        (["sleep"], "command-line"),
-        (["check", "case.toml", "--set", "material.young=-1"], "value"),
-        (["check", "case.toml", "--set", "material.yuong=1"], "unknown-key"),
-        (["check", "case.toml", "--set", "load.0.on=tpo"], "part-name"),
-        (["check", "case.toml", "--set", "friction.mu='sin('"], "formula"),
-        (["check", "case.toml", "--set", "friction.mu=-1"], "negative"),
-        (["check", "case.toml", "--set", "load.0.traction=[0, 'log(x-9)']"], "not-finite"),
-        (
-            [
-                *("check", "case.toml", "--set", "friction.mu=0"),
-                *("--set", "fixed.0.displacement=['free', 0]"),
-            ],
-            "unsupported",
-        ),
-        (["materials", "cheese"], "library"),
-        (["new", "none.msh"], "file-name"),
-        (["plot", "out"], "no-results"),
-        (["sweep", "case.toml", "--over", "friction.mu", "--out", "out"], "over"),
-        (["identify", "case.toml", "none.csv", "--for", "friction.mu"], "data-file"),
-    ],
-)
-def test_errors_end_in_the_identifier_of_their_entry(
-    arguments, identifier, tmp_path, monkeypatch, capfd
-):
-    monkeypatch.chdir(tmp_path)
-    write(tmp_path, BAR)
-    assert main(arguments) == BAD_INPUT
-    (line,) = capfd.readouterr().err.splitlines()
-    check_identifier(line)
-    assert line.endswith(f" [{identifier}]")
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,12 @@
 """How the command line begins and ends: PETSc's options, exit statuses, processes."""
 
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from mpi4py import MPI
 
-from contact.methods.signals import Interrupted, ending_on_signal, stop_on_signal
 from tests.problems.processes import BAR, RANKS, SMALL, command, environment
 
 BOX = """
@@ -87,51 +84,3 @@ def test_a_crash_has_a_status_of_its_own(ranks: int, tmp_path: Path) -> None:
     assert status == 70, text
     assert "ZeroDivisionError" in text and "contact: " in text
     assert not (out / "summary.json").exists()
-
-
-def test_a_figure_that_fails_costs_nothing_else(tmp_path: Path) -> None:
-    before = "import matplotlib.figure; matplotlib.figure.Figure.savefig = lambda *_: 1 / 0"
-    out = tmp_path / "out"
-    status, text = run("solve", str(BAR), "--out", str(out), *SMALL, "--plot", before=before)
-    assert status == 70, text
-    assert (out / "summary.json").exists() and (out / "fields.vtu").is_file()
-
-
-MESHING = """
-[mesh]
-generator = "quarter_disc"
-size = 0.003
-contact_size = 0.003
-[material]
-young = 1.0
-poisson = 0.3
-[[fixed]]
-on = "top"
-displacement = [0.0, 0.0]
-[contact]
-on = "contact"
-"""
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_a_long_meshing_at_once(number: int, tmp_path: Path) -> None:
-    """Gmsh hears none."""
-    file = tmp_path / "disc.toml"
-    file.write_text(MESHING)
-    process = start("check", str(file))
-    assert process.stdout is not None
-    assert "take Gmsh" in process.stdout.readline()
-    process.send_signal(number)
-    process.communicate(timeout=10)
-    assert process.returncode == -number
-
-
-def test_an_echo_of_a_signal_does_not_keep_results_from_being_written() -> None:
-    """A launcher and its process group both deliver it, the one after the solve has stopped."""
-    with ending_on_signal():
-        with pytest.raises(Interrupted), stop_on_signal(MPI.COMM_SELF, None) as stop:
-            signal.raise_signal(signal.SIGTERM)
-            stop.poll()
-        signal.raise_signal(signal.SIGTERM)
-    with ending_on_signal(), pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGTERM)

@@ -5,16 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from contact.case.file import load_case
 from contact.cli.check import quality
 from contact.cli.main import BAD_INPUT, CONVERGED, main
-from contact.cli.new import case_text
 from contact.mesh.cells import HEXAHEDRON, QUADRILATERAL, TETRAHEDRON, TRIANGLE
 from meshes import write
-from scripts.cases import CASES
-from tests.problems.overlapping import layers
 
 FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"
 
@@ -93,37 +89,6 @@ def test_the_space_is_that_of_the_elements(
         assert main(["check", str((tmp_path / name).with_suffix(".toml"))]) == CONVERGED
 
 
-def test_the_axis_of_revolution_is_not_pressed_down(tmp_path: Path) -> None:
-    """Though it is the part that lies lowest."""
-    cone = "*NODE\n1,0,0\n2,1,1.2\n3,0,1\n*ELEMENT, TYPE=CAX3\n1,1,2,3\n*NSET, NSET=axis\n1,3\n"
-    (tmp_path / "cone.inp").write_text(cone + "*NSET, NSET=side\n1,2\n*NSET, NSET=lid\n2,3\n")
-    assert main(["new", str(tmp_path / "cone.inp")]) == CONVERGED
-    case = load_case(tmp_path / "cone.toml")
-    assert (case.fixed[0].on, case.contact.on) == ("lid", "side")
-
-
-def test_a_mesh_of_second_order_of_gmsh_is_one_of_degree_2(tmp_path: Path) -> None:
-    write("quarter_disc", tmp_path / "disc.msh", "triangle", 2)
-    assert main(["new", str(tmp_path / "disc.msh")]) == CONVERGED
-    assert load_case(tmp_path / "disc.toml").space.degree == 2
-
-
-def test_parts_inside_of_a_body_are_listed(tmp_path: Path) -> None:
-    """They may be held, electrodes, or cut by a bolt."""
-    names = '1 1 "low"\n1 2 "high"\n1 3 "cut"\n2 4 "bar"\n'
-    nodes = "1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 1 2 0\n6 0 2 0\n"
-    cells = "1 1 2 1 1 1 2\n2 1 2 2 2 5 6\n3 1 2 3 3 3 4\n4 3 2 4 4 1 2 3 4\n5 3 2 4 4 4 3 5 6\n"
-    blocks = {"MeshFormat": "2.2 0 8\n", "PhysicalNames": f"4\n{names}", "Nodes": f"6\n{nodes}"}
-    blocks["Elements"] = f"5\n{cells}"
-    text = "".join(f"${name}\n{block}$End{name}\n" for name, block in blocks.items())
-    (tmp_path / "bar.msh").write_text(text)
-    assert main(["new", str(tmp_path / "bar.msh")]) == CONVERGED
-    made = (tmp_path / "bar.toml").read_text()
-    assert "#   low\n# Parts inside of it, for supports, electrodes and bolts:\n#   cut\n" in made
-    more = ["--set", 'bolt=[{on = "cut", shortening = 0.001}]']
-    assert main(["check", str(tmp_path / "bar.toml"), *more]) == CONVERGED
-
-
 @pytest.mark.core
 def test_two_bodies(tmp_path: Path) -> None:
     """The case presses them onto each other; it passes check as it is, and solves."""
@@ -152,14 +117,6 @@ def test_several_bodies(tmp_path: Path) -> None:
     expected = [("ball_bottom", "lower_top"), ("ball_top", "upper_bottom")]
     assert sides == {frozenset(pair) for pair in expected}
     assert main(["check", str(mesh.with_suffix(".toml"))]) == CONVERGED
-
-
-@pytest.mark.parametrize("name", ["nothing.msh", "bad/no-groups.msh"])
-def test_no_mesh(name: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    case = tmp_path / "case.toml"
-    assert main(["new", str(FIXTURES / name), "--case", str(case)]) == BAD_INPUT
-    assert len(capsys.readouterr().err.splitlines()) == 1
-    assert not case.exists()
 
 
 def test_shapes_of_cells() -> None:
@@ -192,55 +149,6 @@ def test_shapes_of_quadrilaterals_and_hexahedra() -> None:
         assert quality(shape, corners[None]) == pytest.approx([ratio], rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ([], "gap    0 to 0"),
-        (["mesh.size=[400, 1]", "mesh.parts={}", "load.0.on=right"], "thinner than 0.1"),
-        (["load.0.traction=[0, -5]"], "of Young's modulus, and strains are taken"),
-        (["fixed.0.displacement=[0, -0.5]"], "of the body are prescribed"),
-        (["load=[]", "fixed.0.displacement=[0, -0.01]", "contact.gap=0.9"], "may not touch at all"),
-    ],
-)
-def test_what_is_said(
-    changes: list[str], words: str, bar: Path, capsys: pytest.CaptureFixture
-) -> None:
-    options = [option for change in changes for option in ("--set", change)]
-    assert main(["check", str(bar), *options]) == CONVERGED
-    printed = capsys.readouterr().out
-    assert words in printed
-    assert ("# warning" in printed) == bool(changes)
-
-
-def test_what_is_said_of_a_small_contact_part(capsys: pytest.CaptureFixture) -> None:
-    """Local strains of a quarter of a/R are no sign of other units."""
-    assert main(["check", str(CASES / "indent-ball-force.toml")]) == CONVERGED
-    printed = capsys.readouterr().out
-    assert "force (held, -366.3)  at t = 1" in printed and "displacements" not in printed
-    assert "# warning" not in printed
-
-
-def test_a_part_that_faces_two_bodies_is_one_contact(tmp_path: Path) -> None:
-    """Two blocks on a base with smaller facets, whose side would be that of two contacts."""
-    corners = [(x / 2, y) for y in (0.0, 1.0) for x in range(5)]
-    corners += [(x, y) for left in (0.0, 1.1) for y in (1.0, 2.0) for x in (left, left + 0.9)]
-    cells = [(i, i + 1, i + 6, i + 5) for i in range(1, 5)] + [(11, 12, 14, 13), (15, 16, 18, 17)]
-    sets = {"low": range(1, 6), "face": range(6, 11), "one": (11, 12), "two": (15, 16)}
-    sets["lids"] = (13, 14, 17, 18)
-    lines = [f"{i},{x},{y}" for i, (x, y) in enumerate(corners, 1)]
-    lines = ["*NODE", *lines, "*ELEMENT, TYPE=CPE4"]
-    lines += [f"{i},{','.join(map(str, cell))}" for i, cell in enumerate(cells, 1)]
-    for name, nodes in sets.items():
-        lines += [f"*NSET, NSET={name}", ",".join(map(str, nodes))]
-    (tmp_path / "base.inp").write_text("\n".join(lines) + "\n")
-    assert main(["new", str(tmp_path / "base.inp")]) == CONVERGED
-    path = tmp_path / "base.toml"
-    (contact,) = load_case(path).contact
-    assert (contact.on, contact.against) == ("face", "one+two")
-    assert main(["check", str(path)]) == CONVERGED
-    assert main(["solve", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == CONVERGED
-
-
 def two_squares(path: Path, gap: float, *, skins: bool = False) -> Path:
     """Write two unit squares above each other: sides with names, or one name a square."""
     corners = [(x, y + k * (1 + gap)) for k in (0, 1) for y in (0, 1) for x in (0, 1)]
@@ -262,23 +170,3 @@ def test_the_displacement_closes_the_gap(gap: float, tmp_path: Path) -> None:
     assert json.loads((out / "summary.json").read_text())["contact_nodes"] > 0
     (_, down) = (component.value for component in load_case(case).fixed[0].displacement)
     assert -gap - 0.005 < down < -gap
-
-
-def test_bodies_of_one_part_each(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    """They cannot be held and in contact by the same nodes: there is no case that works."""
-    mesh = two_squares(tmp_path / "skins.inp", 0.05, skins=True)
-    assert main(["new", str(mesh)]) == BAD_INPUT
-    assert "a, b as parts: none to hold beside those in contact; accepted: a" in (
-        capsys.readouterr().err
-    )
-    assert not mesh.with_suffix(".toml").exists()
-
-
-def test_meshes_that_overlap() -> None:
-    """It is told, with the key by which that is an interference."""
-    for depth in (0.0, 0.01):
-        domain = layers(MPI.COMM_SELF, "quadrilateral", 1, "flat", depth)
-        text = case_text(domain, Path("layers.msh"), Path("layers.toml"))
-        assert 'against = "outer0"' in text or 'against = "inner1"' in text
-        told = "The meshes overlap, by up to 0.01," in text and 'overlap = "press"' in text
-        assert told == (depth > 0)

@@ -70,21 +70,6 @@ def test_another_problem_asks(
     assert summary.read_bytes() != before
 
 
-def test_results_that_do_not_say_of_what(case: Path, capsys: pytest.CaptureFixture) -> None:
-    """A summary of somebody else's, or of a problem made in Python, is no less worth."""
-    assert run(case) == CONVERGED
-    summary = case.parent / "out" / "summary.json"
-    about = json.loads(summary.read_text())
-    for text in ("{}", "[", json.dumps(about | {"case": "["}), json.dumps(about | {"case": None})):
-        MPI.COMM_WORLD.barrier()
-        if MPI.COMM_WORLD.rank == 0:
-            summary.write_text(text)
-        MPI.COMM_WORLD.barrier()
-        assert run(case) == BAD_INPUT
-    if MPI.COMM_WORLD.rank == 0:
-        assert "do not say of which case they are" in capsys.readouterr().err
-
-
 def test_the_case_of_results_can_be_run_again(case: Path) -> None:
     """summary.json holds the case with all defaults."""
     assert run(case) == CONVERGED
@@ -110,18 +95,3 @@ def test_log(method: str, case: Path) -> None:
         assert text.count("contact.solver: iteration 1: ") == runs
         assert text.count("inner iteration 1: residual ") >= runs
         assert text.splitlines()[-1].endswith("<= 1e-08") or "penalised" in text.splitlines()[-1]
-
-
-def test_a_log_that_cannot_be_written(case: Path, capsys: pytest.CaptureFixture) -> None:
-    assert run(case, "--log", str(case.parent / "no" / "run.log")) == BAD_INPUT
-    if MPI.COMM_WORLD.rank == 0:
-        assert "run.log: No such file or directory; accepted: a file" in capsys.readouterr().err
-
-
-def test_a_log_goes_to_no_file_that_is_none(case: Path, capsys: pytest.CaptureFixture) -> None:
-    """Not behind the case file, which could not be read any more."""
-    before = case.read_bytes()
-    assert run(case, "--log", str(case)) == BAD_INPUT
-    if MPI.COMM_WORLD.rank == 0:
-        assert "given no log; accepted: a new file, or a log" in capsys.readouterr().err
-        assert case.read_bytes() == before

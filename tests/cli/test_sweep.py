@@ -2,20 +2,12 @@
 
 import csv
 import shutil
-import signal
 from pathlib import Path
 
 import pytest
-from matplotlib import rc_context
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from contact.cli.main import main
 from contact.errors import InputError
-from contact.methods.signals import Interrupted
-from contact.plot.series import DRAWN
-from contact.plot.series import _figure as sweep_figure
-from contact.plot.series import _read as read_sweep
-from contact.plot.style import Look
 from contact.sweeping import Axis
 from tests.cli.running import MESH
 from tests.problems.bar import BAR
@@ -69,31 +61,6 @@ def test_two_keys_and_rows_that_are_there(sweep):
     assert [row for row in more if row["friction.mu"] != "0.6"] == rows  # seconds too
 
 
-def test_rows_of_other_values_remain(sweep):
-    _, rows = sweep("--over", "friction.mu=0.2,0.4")
-    status, more = sweep("--over", "friction.mu=0.3")
-    assert status == 0
-    assert [row["friction.mu"] for row in more] == ["0.3", "0.2", "0.4"]
-    assert more[1:] == rows
-
-
-def test_numbers_are_those_of_their_values():
-    assert Axis.of("friction.mu=0.20,4e-1").values == ("0.2", "0.4")
-    assert Axis.of("mesh.cells=[8, 4],[8,2]").values == ("[8, 4]", "[8, 2]")
-
-
-def test_rows_that_come_later_remain_where_the_sweep_is_ended(sweep, monkeypatch):
-    _, rows = sweep("--over", "friction.mu=0.2,0.4")
-
-    def stopped(*_):
-        raise Interrupted(signal.SIGTERM)
-
-    monkeypatch.setattr("contact.sweeping._Runner.solve", stopped)
-    status, more = sweep("--over", "friction.mu=0.2,0.3,0.4")
-    assert status == 128 + signal.SIGTERM
-    assert more == rows
-
-
 @pytest.mark.core
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_warm_and_cold_agree(sweep, tmp_path, law):
@@ -132,24 +99,6 @@ def test_bad_input(sweep, capfd, arguments, message):
     assert status == 2
     assert rows == []
     assert message in capfd.readouterr().err
-
-
-def test_another_sweep_is_not_overwritten(sweep, capfd):
-    sweep("--over", "friction.mu=0.2")
-    assert sweep("--over", "friction.mu=0.3", "--set", "material.young=2.0")[0] == 2
-    assert "a sweep of another case: there material.young is 1.0, here 2.0" in (
-        capfd.readouterr().err
-    )
-    assert sweep("--over", "load.0.traction.1=-0.1")[0] == 2
-    words = "given a sweep over other keys; accepted: one over friction.mu, or another folder"
-    assert words in capfd.readouterr().err
-
-
-def test_commas_within_lists_and_texts():
-    axis = Axis.of('a.b=[0, 1],[2, 3],"x,y",{ a = 1, b = 2 }')
-    assert axis.values == ("[0, 1]", "[2, 3]", '"x,y"', "{ a = 1, b = 2 }")
-    with pytest.raises(InputError):
-        Axis.of("a=1,,2")
 
 
 @pytest.fixture
@@ -203,18 +152,6 @@ def test_damaged_files_are_refused_and_kept(sweep, tmp_path, capfd, kind):
     assert {path: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
 
 
-def test_rows_with_other_columns_are_kept(sweep, tmp_path, capfd):
-    """Rows that are there would lack a column that is asked for, and a new one have more."""
-    sweep("--over", "friction.mu=0.2,0.4")
-    table = tmp_path / "out" / "sweep.csv"
-    before = table.read_bytes()
-    more = ("--columns", "error.energy")
-    for values in ("0.2,0.4,0.6", "0.2,0.4"):
-        assert sweep("--over", f"friction.mu={values}", *more)[0] == 2
-        assert "--columns error.energy: the rows of" in capfd.readouterr().err
-        assert table.read_bytes() == before
-
-
 def test_ranges():
     assert Axis.of("friction.mu=0.1:0.3:3").values == ("0.1", "0.2", "0.3")
     assert Axis.of("mesh.refine=0:2:3").values == ("0", "1", "2")
@@ -244,14 +181,6 @@ def test_columns_of_the_summary(sweep):
     assert again == rows
 
 
-def test_columns_that_are_there_stay_as_they_are(sweep):
-    over = ("--over", "friction.mu=0.2,0.4", "--columns", "stick_nodes,converged")
-    status, rows = sweep(*over)
-    assert status == 0
-    assert all(row["stick_nodes"].isdigit() and row["converged"] == "True" for row in rows)
-    assert sweep(*over) == (0, rows)
-
-
 def test_a_row_that_is_refused_is_named(sweep, capsys):
     """The rows before it are kept."""
     held = ("--set", "fixed.0.displacement=[0.0, 'free']", "--set", "friction.mu=0.0")
@@ -261,40 +190,6 @@ def test_a_row_that_is_refused_is_named(sweep, capsys):
     said = capsys.readouterr().err
     assert said.startswith("contact: load.0.traction=[0.0, 0.01]: ")
     assert "[pulled-off]" in said
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("max_presure", "did you mean max_pressure"),
-        ("inner_iterations", "inner_iterations: no number, vector or table of these"),
-        ("reason", "reason: no number, vector or table of these in this case's summary.json"),
-        ("error.nothing", "(did you mean error.energy?); accepted: error.energy"),
-        ("rigid.force", "rigid.force: no number, vector or table of these"),
-        ("reactions.lft", "(did you mean reactions.left?)"),
-    ],
-)
-def test_other_columns_are_refused(sweep, tmp_path, capsys, name, words):
-    """Nothing is left behind."""
-    before = sorted(tmp_path.iterdir())
-    assert sweep("--over", "friction.mu=0.2", "--columns", name)[0] == 2
-    assert words in capsys.readouterr().err
-    assert sorted(tmp_path.iterdir()) == before
-
-
-def test_tables_in_tables_are_columns(tmp_path, capsys):
-    """Of a rigid part its motion and force, a column a component."""
-    case = tmp_path / "bar.toml"
-    held = '[[fixed]]\non = "left"\ndisplacement = [0.0, 0.0]'
-    pushed = '[[rigid]]\non = "left"\ndisplacement = [0.0, 0.0]\nrotation = 0.0'
-    assert held in BAR
-    case.write_text(BAR.replace(held, pushed))
-    over = ["--over", "friction.mu=0.2,0.4", "--columns", "rigid_parts,rigid_parts.left.force"]
-    assert main(["sweep", str(case), "--out", str(tmp_path / "out"), *over, "--quiet"]) == 0
-    (row, _) = csv.DictReader((tmp_path / "out" / "sweep.csv").open())
-    balance = float(row["rigid_parts.left.force_y"]) - float(row["contact_force_y"])
-    assert balance == pytest.approx(0.01, rel=1e-6)
-    assert "rigid_parts.left.displacement_x" in row and "rigid_parts.left.moment" in row
 
 
 def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
@@ -316,79 +211,3 @@ def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
     (tmp_path / "out" / "sweep.csv").write_text("nothing")
     assert main(["plot", out]) == 2
     assert "damaged" in capsys.readouterr().err
-
-
-def test_columns_that_were_asked_for_are_drawn(sweep, tmp_path, capsys):
-    """With a dot too; a vector or a table stands for all in it that varies."""
-    over = ("--over", "load.0.traction.1=-0.002:-0.006:3", "--set", "material.law=linear")
-    assert sweep(*over, "--columns", "reactions.left,error.energy,max_dev_strain")[0] == 0
-    swept = read_sweep(tmp_path / "out")
-    own = ["reactions.left_x", "reactions.left_y", "max_dev_strain"]
-    assert {*own} <= {*swept.default} and not {"kkt", "stick_nodes", "seconds"} & {*swept.default}
-    assert [name for name in DRAWN if swept.varies(name)] == swept.default[: -len(own) - 1]
-    assert swept.chosen("reactions.left") == swept.chosen("reactions") == own[:2]
-    assert swept.chosen("reactions.left_y") == ["reactions.left_y"]
-    labels = [ax.get_ylabel() for ax in sweep_figure(swept, own[:2]).axes]
-    assert labels == ["reactions: left, $x$", "reactions: left, $y$"]
-    fields = [text for name in ("reactions.left", "error.energy") for text in ("--field", name)]
-    assert main(["plot", str(tmp_path / "out"), *fields]) == 0
-    assert "figure-sweep-reactions.left.png" in capsys.readouterr().out
-    assert (tmp_path / "out" / "figure-sweep-error.energy.png").stat().st_size > 10_000
-    assert main(["plot", str(tmp_path / "out"), "--field", "reactions.lft"]) == 2
-    assert "(did you mean reactions.left_" in capsys.readouterr().err
-
-
-def test_the_forces_of_several_parts_together_are_a_column(sweep):
-    """An elastic support on a list of parts has one name, without the comma between columns."""
-    elastic = ("--set", "elastic=[{ on = ['left', 'right'], stiffness = [0.0, 0.01] }]")
-    given = ("--over", "load.0.traction=[0.0, -0.005]", *elastic, "--set", "contact.gap=1.0")
-    columns = ("--columns", "reactions.left+right,contact_area")
-    status, rows = sweep(*given, "--set", "fixed.0.displacement=[0.0, 'free']", *columns)
-    assert status == 0
-    assert float(rows[0]["reactions.left+right_y"]) == pytest.approx(0.01, rel=1e-6)
-
-
-def test_labels_of_a_sweep_have_words_and_units(tmp_path):
-    """A vector of which a component varies is drawn over it; rounding is no panel."""
-    keys, columns = "friction.mu,load.0.traction", "contact_force_x,contact_force_y,max_pressure"
-    rows = '0.1,"[0.0, -1.0]",True,{},-2.0,3.0\n0.1,"[0.0, -4.0]",True,{},-8.0,9.0\n'
-    case = '[case.units]\nlength = "mm"\nstress = "MPa"\n[space]\nkinematics = "{}"\n'
-    (tmp_path / "sweep.csv").write_text(
-        f"{keys},converged,{columns}\n" + rows.format("1e-15", "-3e-15")
-    )
-    for kinematics, unit in (("plane_strain", "N/mm"), ("axisymmetric", "N")):
-        (tmp_path / "sweep.toml").write_text('title = "Bars"\n' + case.format(kinematics))
-        swept = read_sweep(tmp_path)
-        assert [name for name in DRAWN if swept.varies(name)] == ["contact_force_y", "max_pressure"]
-        figure = sweep_figure(swept, ["contact_force_y", "max_pressure"])
-        force, pressure = figure.axes
-        assert force.get_ylabel() == f"contact force, $y$ ({unit})"
-        assert pressure.get_ylabel() == "largest pressure (MPa)"
-        assert force.get_xlabel() == "load 0: traction, $y$ (MPa)"
-        assert list(force.lines[0].get_xdata()) == [-4.0, -1.0]
-        assert force.lines[0].get_label() == r"friction: $\mu$ = 0.1"
-        assert figure.get_suptitle() == "Bars"
-    with pytest.raises(InputError, match=r"--field input: no such column of sweep\.csv; accepted"):
-        swept.chosen("input")
-    (tmp_path / "sweep.toml").unlink()
-    with pytest.raises(InputError, match=r"sweep\.toml: missing or damaged"):
-        read_sweep(tmp_path)
-
-
-@pytest.mark.parametrize("inches", [85 / 25.4, 6.3])
-def test_the_legend_of_a_sweep_is_within_its_figure(tmp_path, inches):
-    """A line for each of the other keys, in words with units."""
-    rows = [f"[0.0, {-k}.0],0.{m},True,{k * m}.0,3.0" for k in (1, 2, 3) for m in (1, 2)]
-    lines = ["load.0.traction,friction.mu,converged,max_pressure,contact_area", *rows]
-    table = "\n".join(line.replace("[", '"[').replace("]", ']"') for line in lines)
-    (tmp_path / "sweep.csv").write_text(f"{table}\n")
-    (tmp_path / "sweep.toml").write_text(
-        '[case.units]\nlength = "mm"\nstress = "daN/mm²"\n[space]\nkinematics = "plane_strain"\n'
-    )
-    with rc_context(Look(inches).style):
-        figure = sweep_figure(read_sweep(tmp_path), ["max_pressure", "contact_area"])
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        box = figure.get_tightbbox(canvas.get_renderer())
-    width, height = figure.get_size_inches()
-    assert min(box.x0, box.y0) > -0.02 and box.x1 < width + 0.02 and box.y1 < height + 0.02

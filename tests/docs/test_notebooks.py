@@ -39,19 +39,3 @@ def test_notebook(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             pytest.importorskip(module)
     runpy.run_path(str(path))
     pyplot.close("all")
-
-
-@pytest.mark.slow
-def test_one_as_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures of a solution are shown by the cell that ends with them."""
-    monkeypatch.delenv("MPLBACKEND", raising=False)
-    jupytext, nbclient = pytest.importorskip("jupytext"), pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
-    (path,) = (path for path in NOTEBOOKS if path.stem == "first_contact")
-    notebook = jupytext.read(path)
-    place = {"metadata": {"path": str(path.parents[2])}}
-    nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources=place).execute()
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    html = "".join(output.get("data", {}).get("text/html", "") for output in outputs)
-    assert html.count("data:image/png") == 2
-    assert sum("image/png" in output.get("data", {}) for output in outputs) == 2

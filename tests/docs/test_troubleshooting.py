@@ -9,7 +9,6 @@ differs.
 import ast
 import re
 from collections import Counter
-from collections.abc import Iterator
 from functools import cache
 
 from tests.docs.pages import ROOT
@@ -51,22 +50,6 @@ def is_text(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value != ""
 
 
-def warnings() -> Iterator[str]:
-    """Yield what is logged as a warning, or printed as one without an identifier."""
-    for tree in TREES:
-        inner = {id(p) for n in ast.walk(tree) if isinstance(n, ast.JoinedStr) for p in n.values}
-        for node in ast.walk(tree):
-            match node:
-                case ast.Call(func=ast.Attribute(attr="warning"), args=[text, *_]):
-                    said = text_of(text).replace("%s", DIFFERS)
-                    if re.search(r"\w{3}", said):  # not what hands another message on
-                        yield said
-                case ast.expr() if id(node) not in inner and re.match(
-                    r"(# )?warning: \w", text_of(node)
-                ):
-                    yield text_of(node)
-
-
 def heads() -> list[str]:
     """Return the heads of entries: their identifiers, and the phrases before their colon."""
     code = r"(?:\*\*)?`[^`]+`(?:\*\*)?,?\s+"
@@ -95,19 +78,3 @@ def fits(phrase: str, text: str) -> bool:
 def test_each_identifier_has_one_entry() -> None:
     assert len(identifiers()) > 100
     assert Counter(of_page()[0]) == Counter(identifiers())
-
-
-def test_identifiers_stand_in_heads_alone() -> None:
-    bold = re.findall(r"\*\*`\[([a-z-]+)\]`\*\*", PAGE)
-    assert bold == of_page()[0]
-
-
-def test_warnings_of_the_log_have_a_place() -> None:
-    phrases = of_page()[1]
-    assert {text for text in warnings() if not any(fits(one, text) for one in phrases)} == set()
-
-
-def test_phrases_are_those_of_messages() -> None:
-    phrases = of_page()[1]
-    assert len(phrases) > 200
-    assert [phrase for phrase in phrases if not fits(phrase, sources())] == []

@@ -11,14 +11,11 @@ from contact import (
     Friction,
     InputError,
     Linear,
-    NewtonOptions,
     Problem,
     SlipCoefficient,
-    solve,
 )
 from contact.mesh.grid import rectangle
-from contact.problem.residuals import evaluate
-from forms.laws import ConstantCoefficient, Coulomb
+from forms.laws import ConstantCoefficient
 
 
 def problem(contact, friction=None):
@@ -67,45 +64,7 @@ def test_a_radius_is_a_length(radius):
         Friction(mu=0.3, radius=radius)
 
 
-@pytest.mark.parametrize("tolerance", [0, -1.0, np.nan, 1.0, "1e-8"])
-def test_a_tolerance_can_be_met_and_missed(tolerance):
-    with pytest.raises(InputError, match=r"tolerance: given .*; accepted: between 0 and 1"):
-        NewtonOptions(tolerance=tolerance)
-
-
-def test_a_number_is_no_friction():
-    with pytest.raises(InputError, match=r"friction: given 0.3; accepted: Friction\(mu="):
-        problem(Contact("bottom"), 0.3)
-
-
 @pytest.mark.parallel
 def test_a_gap_is_a_number():
     with pytest.raises(InputError, match="contact: the gap is no number at a node"):
         problem(Contact("bottom", lambda x: np.where(x[0] > 1.5, np.nan, 0.0)))
-
-
-class Lost:
-    """A coefficient that is no number."""
-
-    maximum, lipschitz = 0.3, 0.0
-
-    def __call__(self, slip):
-        """Return mu."""
-        return np.full_like(slip, np.nan)
-
-    def derivative(self, slip):
-        """Return d mu / ds."""
-        return np.zeros_like(slip)
-
-
-def test_a_bound_without_numbers_is_not_met():
-    solution = solve(problem(Contact("bottom"), Friction(mu=1e6)))
-    assert solution.converged  # all of it sticks
-    lost = evaluate(problem(Contact("bottom"), Friction(law=Coulomb(Lost()))), solution.state)
-    assert lost.excess(solution.outcome.allowed)
-
-
-def test_the_degree_is_one_or_two():
-    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
-    with pytest.raises(InputError, match="degree: given 3; accepted: 1 or 2"):
-        Problem(domain, Body(Linear(10.0, 0.3), []), Contact("bottom"), degree=3)

@@ -1,6 +1,5 @@
 """A folder of results: old or new ones at any moment, one run at a time, nothing of a user's."""
 
-import json
 import os
 import shutil
 import subprocess
@@ -11,13 +10,10 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact import solve
 from contact.case.file import to_toml
 from contact.cli.main import main
 from contact.errors import InputError
 from contact.io.folder import LOCK, STAGE, ResultFolder, result_folder, settle
-from contact.plot.figures import plot
-from contact.writing import write_outputs
 from tests.problems.processes import CLONE
 from tests.problems.written import block
 from tests.results.test_steps import case_of as steps_case
@@ -215,43 +211,3 @@ def test_a_file_under_the_name_of_a_result_is_replaced_when_that_is_asked_for(
         assert contents(out) == before
     comm.barrier()
     assert on_the_line("solve", cases["static"], "--out", out, "--overwrite") == 0
-
-
-def test_a_summary_of_a_users_own_names_no_files_of_ours(
-    tmp_path: Path, cases: dict[str, Path]
-) -> None:
-    """Its word "files" is not ours: it has no versions of the libraries."""
-    out = tmp_path / "out"
-    kept = mine(out, "data.csv", "mine.json")
-    (out / "summary.json").write_text('{"files": ["data.csv", "mine.json", "summary.json"]}')
-    assert on_the_line("solve", cases["static"], "--out", out, "--overwrite") == 0
-    assert kept.items() <= contents(out).items()
-
-
-def test_outputs_from_python_replace_nothing_of_a_users(tmp_path: Path) -> None:
-    solution = solve(block(2), comm=SELF)
-    for name in ("steps.csv", "fields-0003.vtu"):
-        before = mine(tmp_path / name, name)
-        with pytest.raises(InputError, match=rf"{name}: given a file that no run's summary"):
-            write_outputs(solution, tmp_path / name)
-        assert contents(tmp_path / name) == before
-
-
-def test_a_figure_of_a_users_stays(tmp_path: Path) -> None:
-    write_outputs(solve(block(2), comm=SELF), tmp_path)
-    before = mine(tmp_path, "figure-displacement.png")
-    with pytest.raises(InputError, match=r"figure-displacement\.png: given a file that no run's"):
-        plot(tmp_path, ["displacement"])
-    assert contents(tmp_path) == before
-    (tmp_path / "figure-displacement.png").unlink()
-    for _ in range(2):
-        drawn = plot(tmp_path, ["displacement"])
-        assert [path.name for path in drawn] == ["figure-displacement.png"]
-        assert drawn[0].name in json.loads((tmp_path / "summary.json").read_text())["files"]
-
-
-def test_a_table_of_a_users_is_no_sweep(tmp_path: Path, cases: dict[str, Path]) -> None:
-    before = mine(tmp_path / "out", "sweep.csv")
-    sweep = ("sweep", cases["static"], "--over", "friction.mu=0.2", "--out", tmp_path / "out")
-    assert on_the_line(*sweep) == 2
-    assert contents(tmp_path / "out") == before

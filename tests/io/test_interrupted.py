@@ -1,15 +1,12 @@
 """What a solve that is interrupted leaves."""
 
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mpi4py import MPI
 
-import contact.solving
 from contact.linear.operator import SparseOperator
 from contact.methods.report import Record
 from contact.solving import SolveInterrupted, solve
@@ -37,38 +34,6 @@ def test_interrupted_solve_keeps_its_results(shared_tmp_path: Path) -> None:
     assert summary["reason"] == "interrupted (SIGINT)"
     assert len(rows) == 9
     assert signal.getsignal(signal.SIGINT) is handler
-
-
-@pytest.mark.parallel
-def test_a_signal_after_the_last_iteration_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It has its usual effect then, on all ranks: the solve has ended by itself."""
-    step = contact.solving.solve_step
-
-    def press(*args: Any) -> Any:
-        reached = step(*args)
-        if MPI.COMM_WORLD.rank == 0:
-            signal.raise_signal(signal.SIGINT)
-        return reached
-
-    monkeypatch.setattr(contact.solving, "solve_step", press)
-    with pytest.raises(KeyboardInterrupt) as interrupt:
-        solve(block(2))
-    assert not isinstance(interrupt.value, SolveInterrupted)
-
-
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_script_that_catches_nothing_ends_with_the_status_of_the_signal(
-    number: signal.Signals, status: int
-) -> None:
-    """Python from 3.14 on ends itself by Ctrl-C's signal, of which shells make the same status."""
-    script = (
-        "import signal\n"
-        "from contact import solve\n"
-        "from tests.problems.written import block\n"
-        f"solve(block(2), monitor=lambda record: signal.raise_signal({int(number)}))\n"
-    )
-    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=False)
-    assert ended.returncode in (status, -number)
 
 
 @pytest.mark.parallel

@@ -4,13 +4,11 @@ import csv
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.errors import InputError
 from contact.methods.options import OPTIONS, with_method
 from contact.results.contact_nodes import contact_table, tangent_of
 from contact.results.options import OutputOptions
@@ -162,16 +160,6 @@ def test_contact_force_balances_the_supports(shared_tmp_path: Path) -> None:
     assert summary["contact_force"][1] == pytest.approx(-0.4, rel=1e-8)
     weighted = sum(float(row["weight"]) * float(row["pressure"]) for row in rows)
     assert weighted == pytest.approx(0.4, rel=1e-8)
-
-
-def test_what_is_written_and_where_is_checked(tmp_path: Path) -> None:
-    """Other things in place of a solution or a folder are named."""
-    solution: Any = solve(block(2))
-    folder: Any = 3
-    with pytest.raises(InputError, match=r"write_outputs: given .*; accepted: a Solution"):
-        write_outputs(solution.problem, tmp_path)
-    with pytest.raises(InputError, match="folder: given 3; accepted: the name of a folder"):
-        write_outputs(solution, folder)
 
 
 def test_outputs_are_replaced(shared_tmp_path: Path) -> None:

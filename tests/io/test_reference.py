@@ -155,12 +155,3 @@ def test_one_entry_is_a_key_a_column_and_a_derivative(
 
 def test_the_page_is_made_from_this() -> None:
     assert PAGE.read_text() == page(), "python3 -m scripts.output_page"
-
-
-def test_help_names_every_key() -> None:
-    for name in (SUMMARY, NODES, HISTORY, STEPS, SWEEP):
-        lines = files_help(name).splitlines()
-        assert all(len(line) <= 100 for line in lines)
-        shown = [line.split()[0] for line in lines if re.match(r"  \S", line)]
-        assert len(shown) == len(quantities(name))
-        assert all(fits(q, key) for q, key in zip(quantities(name), shown, strict=True))

@@ -9,14 +9,11 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, solve
+from contact import solve
 from contact.case.file import to_toml
 from contact.cli.main import main
 from contact.cli.solve import solve_and_keep
-from contact.errors import InputError
-from contact.io.checkpoint import Checkpoints, check_restart, discard, kept_case, read_steps
-from contact.methods.newton import Newton
-from contact.methods.report import Recorder
+from contact.io.checkpoint import Checkpoints, read_steps
 from tests.problem.test_plasticity import block
 from tests.results.test_steps import case_of as steps_case
 
@@ -138,24 +135,6 @@ def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
     assert [step.state.time for step in again] == [step.state.time for step in whole.steps]
 
 
-def test_a_new_run_leaves_the_earlier_checkpoints_until_its_first_step(tmp_path, monkeypatch):
-    solve_and_keep(steps_case(), None, SELF, tmp_path)
-    written = [path.name for path in sorted((tmp_path / "checkpoints").iterdir())]
-
-    def fail(self, record):
-        raise Killed
-
-    with monkeypatch.context() as context:
-        context.setattr(Checkpoints, "keep", fail)
-        with pytest.raises(Killed):
-            solve_and_keep(steps_case(), None, SELF, tmp_path)
-    assert [path.name for path in sorted((tmp_path / "checkpoints").iterdir())] == written
-    assert kept_case(tmp_path) == to_toml(steps_case())
-    (tmp_path / "checkpoints" / ".00006.npz.part").touch()  # a run was killed while it wrote
-    discard(tmp_path)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_all_steps_were_there(tmp_path):
     """A run that is ended while it writes its results has nothing left to solve."""
     whole = solve_and_keep(steps_case(), None, SELF, tmp_path)
@@ -163,33 +142,6 @@ def test_all_steps_were_there(tmp_path):
     assert again.converged
     assert again.state.near(whole.state)
     assert again.history == []
-
-
-def test_steps_of_an_earlier_run_are_not_gone_on_from(tmp_path, ended):
-    """The first step of a run replaces the first of the earlier one; a kill may leave the rest."""
-    solve_and_keep(steps_case(), None, SELF, tmp_path)
-    place, earlier = tmp_path / "checkpoints", tmp_path / "earlier"
-    place.rename(earlier)
-    heal = ended(2)
-    with pytest.raises(Killed):
-        solve_and_keep(steps_case(), None, SELF, tmp_path)
-    heal()
-    for name in ("00003.npz", "00004.npz", "00005.npz"):
-        shutil.move(earlier / name, place)
-    assert len(read_steps(tmp_path, solve(steps_case(), comm=SELF).problem)) == 2
-    solution = solve_and_keep(steps_case(), None, SELF, tmp_path, tmp_path)
-    assert solution.converged and len(solution.history) > 0
-    assert len(read_steps(tmp_path, solution.problem)) == len(list(place.iterdir())) == 5
-
-
-def test_another_mesh(tmp_path):
-    solve_and_keep(steps_case(), None, SELF, tmp_path)
-    for cells in ([8, 4], [16, 2]):
-        domain = steps_case(mesh__cells=cells).mesh.build(SELF)
-        with pytest.raises(InputError, match=r"checkpoint does not fit the problem .nodes"):
-            read_steps(tmp_path, build_problem(steps_case(), SELF, domain=domain))
-        with pytest.raises(InputError, match=r"of another case: there mesh\.cells\.\d is"):
-            check_restart(tmp_path, steps_case(mesh__cells=cells))
 
 
 def test_another_mesh_file_is_not_continued(tmp_path, ended, capfd):
@@ -250,15 +202,6 @@ def test_the_command_line(tmp_path, ended, capfd):
     assert len((out / "steps.csv").read_text().splitlines()) == 6
 
 
-def test_missing_arguments(capfd, tmp_path):
-    case = tmp_path / "case.toml"
-    case.write_text(to_toml(steps_case()))
-    assert on_the_line("solve", case) == 2
-    assert "--out: missing; accepted: a folder to write to" in capfd.readouterr().err
-    assert on_the_line("solve", "--out", tmp_path) == 2
-    assert "CASE.toml: missing; accepted: a case file, or --restart DIR" in capfd.readouterr().err
-
-
 def rows_of(out):
     with (out / "steps.csv").open() as file:
         return list(csv.DictReader(file))
@@ -289,30 +232,6 @@ def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number,
     for one, two in zip(rows_of(tmp_path / "whole"), rows_of(out), strict=True):
         for name in one.keys() - {"linear_solves", "factorizations", "kkt"}:
             assert float(two[name]) == pytest.approx(float(one[name]), rel=1e-9, abs=1e-12)
-
-
-def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monkeypatch):
-    out, case = tmp_path / "out", tmp_path / "case.toml"
-    case.write_text(to_toml(steps_case()))
-    assert on_the_line("solve", case, "--out", out) == 0
-    before = {path.name: path.read_bytes() for path in out.iterdir()}
-    turn = Newton.set_load_step
-
-    def signalled(self, problem):
-        signal.raise_signal(signal.SIGINT)
-        turn(self, problem)
-
-    record = Recorder.record
-
-    def nothing(self, *arguments, **named):
-        self.poll()
-        record(self, *arguments, **named)
-
-    monkeypatch.setattr(Newton, "set_load_step", signalled)
-    monkeypatch.setattr(Recorder, "record", nothing)
-    assert on_the_line("solve", case, "--out", out) == 130
-    after = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
-    assert after == before
 
 
 def test_read_steps_gives_the_states(tmp_path):

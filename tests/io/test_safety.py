@@ -4,22 +4,19 @@ import ctypes
 import json
 import os
 import shutil
-import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from contact.io.folder import LOCK, STAGE, settle
+from contact.io.folder import LOCK
 from tests.problems.processes import (
     BAR,
     RANKS,
     SMALL,
     command,
     environment,
-    processes,
     served,
 )
 
@@ -105,25 +102,6 @@ def test_a_full_disk_keeps_the_earlier_results(ranks: int, good: Path, small_dis
 
 
 @RANKS
-def test_what_the_system_refuses_is_said_in_words(ranks: int, tmp_path: Path) -> None:
-    """A path that is too long, a folder of the system's, and a home that is none."""
-    with served(ranks) as run:
-        outs = tmp_path / ("long" * 75), Path("/proc/self/out")
-        ends = [run("solve", str(BAR), "--out", str(out), *SMALL) for out in outs]
-    # HOME is that of a process: caches are there.
-    environ = environment() | {"HOME": "/proc/self/nobody"}
-    environ.pop("XDG_CACHE_HOME", None)
-    started = solving(tmp_path / "out", ranks=ranks)
-    done = subprocess.run(started, env=environ, capture_output=True, text=True, timeout=120)
-    for status, text in (*ends, (done.returncode, done.stderr)):
-        assert status == 2
-        (message,) = messages(text)
-        assert "accepted: " in message
-        assert ranks > 1 or text.count("\n") == 1
-    assert not list(tmp_path.iterdir())
-
-
-@RANKS
 def test_a_mesh_from_elsewhere_executes_nothing(ranks: int, tmp_path: Path) -> None:
     """Gmsh would take it for a script, where a case is but looked at."""
     mark, mesh = tmp_path / "executed", tmp_path / "body.msh"
@@ -138,38 +116,3 @@ def test_a_mesh_from_elsewhere_executes_nothing(ranks: int, tmp_path: Path) -> N
     (message,) = messages(done.stderr)
     assert "no Gmsh .msh file" in message
     assert not mark.exists()
-
-
-@RANKS
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_signals_while_writing_leave_one_of_the_runs_whole(
-    ranks: int, kind: signal.Signals, good: Path, tmp_path: Path
-) -> None:
-    """They are sent from when the first new file is there; every process ends."""
-    out = tmp_path / "out"
-    for delay in (0.0, 0.05)[ranks - 1 :]:
-        shutil.rmtree(out, ignore_errors=True)
-        shutil.copytree(good, out)
-        process = subprocess.Popen(
-            solving(out, "--plot", ranks=ranks), env=environment(), start_new_session=True,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        end = time.monotonic() + 60
-        while not (out / STAGE).exists() and process.poll() is None and time.monotonic() < end:
-            time.sleep(0.002)
-        assert process.poll() is None  # else no signal meets it
-        time.sleep(delay)
-        process.send_signal(kind)
-        process.wait(timeout=60)
-        end = time.monotonic() + 60
-        while left_of(process.pid) and time.monotonic() < end:
-            time.sleep(0.05)
-        assert not left_of(process.pid)
-        settle(out)
-        assert same(out, good) or whole(out)
-
-
-def left_of(session: int) -> list[str]:
-    """Return the names of the processes of a session."""
-    return [process.name for process in processes() if process.session == session]

@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from pyvista import UnstructuredGrid
 
-from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.cli.main import CONVERGED, main
 from contact.io.fields import gathered, write_grid
 from contact.mesh.cells import TRIANGLE, VTK
 from contact.plot.run import read_grid
@@ -99,14 +99,6 @@ def test_ranks_with_nothing(shared_tmp_path: Path) -> None:
         np.testing.assert_array_equal(read.cell_data["v"][:, :2], whole.in_cells["v"])
 
 
-def test_a_file_of_another_program_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "fields.vtu"
-    for text in ("", "<VTKFile/>", "<PointData></PointData>"):
-        path.write_text(text)
-        with pytest.raises(ValueError, match="it has no grid"):
-            read_grid(path)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("dim", [2, 3])
 def test_figures_are_drawn_again(dim: int, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
@@ -128,30 +120,3 @@ def test_figures_are_drawn_again(dim: int, tmp_path: Path, capsys: pytest.Captur
     assert after.pop("files") == sorted([*before.pop("files"), *names])
     assert after == before
     assert all((tmp_path / name).stat().st_size > 5000 for name in names)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--field", "presure"], "accepted: dev_strain, displacement"),
-        (["--field", "stress_x"], "--field stress_x: no such field"),
-        (["--format", "gif"], "accepted: png, pdf, svg"),
-        (["--width", "85"], "accepted: a length such as 85mm"),
-    ],
-)
-def test_what_cannot_be_drawn(
-    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
-    write_outputs(solve(block(2)), tmp_path)
-    files = sorted(tmp_path.iterdir())
-    assert main(["plot", str(tmp_path), *arguments]) == BAD_INPUT
-    message = capsys.readouterr().err
-    assert words in message
-    assert len(message.splitlines()) == 1
-    assert sorted(tmp_path.iterdir()) == files
-
-
-def test_no_results_to_draw(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    assert main(["plot", str(tmp_path)]) == BAD_INPUT
-    assert "accepted: a folder that a run has left" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []

@@ -6,8 +6,7 @@ import pytest
 import contact
 from contact.case.file import load_case, parse_case, to_toml
 from contact.cli.main import main
-from contact.errors import InputError
-from contact.library.materials import PACKAGED, find, library
+from contact.library.materials import find, library
 from forms.crystal import isotropic_about_x3, stiffness_tensor, turned
 from tests.problems.messages import message_of
 
@@ -108,29 +107,6 @@ def test_published_charge_constants_of_quartz_and_lithium_niobate():
     assert find("PZT-5A").bar_coupling(2, 0) == pytest.approx(0.344, abs=0.005)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("c33 = 115.0", "c33 = 15.0", "positive definite"),
-        ('"33" = 5.622', '"33" = -5.6', "positive definite"),
-        ("d33 = 289.0", "d33 = 189.0", "d33 = 189 pC/N is published"),
-        ('source = "measured"', "", "'source' is missing"),
-        ("c44 = 25.6", "c45 = 25.6", "c45"),
-        ('class = "6mm"', 'class = "6mm"\nyoung = 1.0', "one of young"),
-        ("[mine]", "mine = 3\n[theirs]", "no table"),
-        ("condition", "conditions", "conditions: unknown key"),
-    ],
-)
-def test_a_wrong_entry_is_refused_with_its_name(tmp_path, old, new, words):
-    path = tmp_path / "library.toml"
-    assert old in MINE
-    path.write_text(MINE.replace(old, new))
-    with pytest.raises(InputError, match=words) as caught:
-        library(path)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.core
 def test_a_material_by_name_is_the_one_by_its_constants():
     entry = find("PZT-4")
@@ -156,16 +132,6 @@ def test_a_library_of_ones_own(tmp_path, capsys):
     assert main(["materials", "mine", "--file", str(tmp_path / "mine.toml")]) == 0
     text = capsys.readouterr().out
     assert "d = e s (pC/N)" in text and "291.3" in text and "k33 = 0.69" in text
-
-
-def test_the_command_lists_and_shows(capsys):
-    assert main(["materials"]) == 0
-    listed = capsys.readouterr().out.splitlines()
-    assert len(listed) == len(library())
-    assert main(["materials", "quarz"]) == 2
-    assert "did you mean quartz?" in capsys.readouterr().err
-    assert main(["materials", "sapphire"]) == 0
-    assert "coupling" not in capsys.readouterr().out
 
 
 BAD = {
@@ -195,16 +161,3 @@ BAD = {
 def test_messages_of_bad_materials(snapshot):
     said = {name: message_of(case, **given) for name, given in BAD.items()}
     snapshot("refused-materials", said)
-
-
-def test_quartz_is_no_body_of_revolution():
-    data = {**CASE, "material": {"name": "quartz"}, "space": {"kinematics": "axisymmetric"}}
-    data["fixed"] = [CASE["fixed"][0]]
-    with pytest.raises(InputError, match="all around its axis X3"):
-        contact.build_problem(parse_case(data))
-
-
-def test_the_library_is_part_of_the_package():
-    assert PACKAGED.is_file()
-    text = (PACKAGED.parents[2] / "pyproject.toml").read_text()
-    assert '"library/*.toml"' in text

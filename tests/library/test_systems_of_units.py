@@ -10,8 +10,6 @@ from contact.case.file import parse_case, to_toml
 from contact.errors import InputError
 from contact.model.units import SYSTEMS, System, system_named
 
-STEEL = {"name": "steel"}
-
 
 def pressed(units, size, shift, volts=None, labels=None, name="steel", **more):
     """Return the case of a square pressed by a plate: its size, the shift and volts in units."""
@@ -99,55 +97,6 @@ def test_the_system_of_the_case_is_that_of_its_materials():
     assert pressed("uN-um-MPa", 1.0, 1e-3, labels="uN-um-MPa").case.units.charge == "pC"
 
 
-MM = {"length": "mm", "stress": "MPa"}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"units": None, "labels": MM}, '"SI" has m for length, and case.units.length = "mm"'),
-        ({"units": None, "labels": {"stress": "psi"}}, 'has Pa for stress, and .*"psi"'),
-        ({"units": None, "labels": {"length": "R"}}, 'has m for length, and .*"R"'),
-        ({"units": "GPa", "labels": MM}, '"GPa" has GPa for stress'),
-        ({"units": "SI", "labels": MM}, r'accepted: "N-mm-MPa" \[units]$'),
-        ({"units": "kN-mm-GPa", "labels": {"stress": "N/mm²"}}, "for stress"),
-        ({"units": "SI", "labels": "N-mm-MPa"}, "for length"),
-        ({"units": "N-mm", "labels": None}, "accepted: .*N-mm-MPa.*or a table"),
-        ({"units": {"length": "inch"}, "labels": None}, r"units\.length: given .inch."),
-        ({"units": {"lenght": "mm"}, "labels": None}, "did you mean length"),
-        ({"units": None, "labels": "mm-MPa"}, r"case\.units: given .mm-MPa.; accepted: .SI."),
-        (
-            {"units": "N-mm-MPa", "labels": MM | {"charge": "C"}, "name": "PZT-4"},
-            "has mC for charge",
-        ),
-        (
-            {"units": "GPa", "labels": {"length": "mm", "stress": "GPa", "potential": "GV"}}
-            | {"name": "PZT-4"},
-            r"accepted: labels of one system",
-        ),
-        (
-            {"units": "GPa", "labels": {"length": "mm", "stress": "GPa", "charge": "nC"}}
-            | {"name": "PZT-4"},
-            "accepted: labels of one system",
-        ),
-    ],
-)
-def test_contradictions_are_refused(arguments, words):
-    with pytest.raises(InputError, match=words) as caught:
-        pressed(size=1.0, shift=1e-3, **arguments)
-    assert "\n" not in str(caught.value)
-
-
-def test_labels_that_fit_are_accepted():
-    for units, labels in (
-        ("N-mm-MPa", MM),
-        ("N-mm-MPa", {"length": "mm", "stress": "N/mm2", "charge": "C"}),  # steel has no charge
-        ("GPa", {"length": "mm", "stress": "GPa", "potential": "MV"}),
-        ({"length": "cm", "force": "daN"}, {"length": "cm", "stress": "daN/cm^2"}),
-    ):
-        assert pressed(units, 1.0, 1e-3, labels=labels).case.units.given == labels
-
-
 def test_materials_of_two_systems_are_refused():
     data = pressed("SI", 1.0, 1e-3).model_dump(by_alias=True, exclude_none=True)
     data["material"] = [
@@ -156,12 +105,3 @@ def test_materials_of_two_systems_are_refused():
     ]
     with pytest.raises(InputError, match=r'material\.1\.units: "GPa", and material\.0 has "SI"'):
         parse_case(data)
-
-
-def test_labels_are_printed_with_the_letter_of_si() -> None:
-    """The names of systems keep letters of a keyboard."""
-    assert system_named("uN-um-MPa", {}).labels["length"] == "µm"
-    assert {"µm"} == {system_named(k, {}).labels["length"] for k in SYSTEMS if "um" in k}
-    assert system_named("N-mm-MPa", {}).labels == {
-        "length": "mm", "stress": "MPa", "potential": "V", "charge": "mC"
-    }  # fmt: skip

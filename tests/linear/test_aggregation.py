@@ -8,7 +8,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact.body.description import Body
-from contact.linear.layout import hidden, options
+from contact.linear.layout import options
 from contact.linear.multigrid import AGGREGATES, DEFAULTS, Aggregation, masked_motions, tentative
 from contact.linear.operator import SparseOperator
 from contact.mesh.grid import box
@@ -211,15 +211,3 @@ def test_how_petsc_multiplies_on_several_ranks_is_no_matter_of_one() -> None:
         assert known.getString("matptap_via") == "nonscalable"
     finally:
         known.delValue("matptap_via")
-
-
-def test_options_are_hidden_for_a_while_only() -> None:
-    known = PETSc.Options()
-    known["hidden_one"] = "1"
-    try:
-        with hidden("hidden_", ["one", "two"]):
-            assert not known.hasName("hidden_one")
-        assert known.getString("hidden_one") == "1"
-        assert not known.hasName("hidden_two")
-    finally:
-        known.delValue("hidden_one")

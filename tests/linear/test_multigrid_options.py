@@ -54,21 +54,3 @@ def test_cycles() -> None:
     _additive, pc, additive = solved({"pc_mg_type": "additive"})
     assert pc.getMGType() == PETSc.PC.MGType.ADDITIVE
     assert additive > usual
-
-
-@pytest.mark.parallel
-def test_how_often_aggregates_are_smoothed() -> None:
-    """Aggregates as they are couple to fewer others: the coarse matrix has fewer entries."""
-    entries = []
-    for steps in ("0", "1"):
-        _operator, pc, _ = solved({"pc_gamg_agg_nsmooths": steps})
-        coarse = pc.getMGCoarseSolve().getOperators()[0]
-        entries.append(coarse.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])
-    assert entries[0] < 0.8 * entries[1]
-
-
-@pytest.mark.parallel
-def test_the_type_of_the_preconditioner_may_be_named() -> None:
-    """The levels that ranks make are of PETSc's type "mg", with the options of "gamg"."""
-    _operator, pc, _ = solved({"pc_type": "gamg"})
-    assert pc.getType() == "mg"

@@ -9,7 +9,6 @@ import pytest
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.cli.main import BAD_INPUT, main
 from contact.mesh.domain import Domain
 from contact.mesh.reader import from_file
 from contact.methods.newton import Newton
@@ -130,19 +129,6 @@ def test_motions(lines, moved, tmp_path):
     agree(read(tmp_path / "parts.inp", text), expected)
 
 
-def test_a_plane_part_is_turned_over(tmp_path):
-    """About an axis of its plane: 180 degrees leave it there but for rounding."""
-    own = "*NODE\n1,0,0\n2,2,0\n3,2,1\n4,0,1\n*ELEMENT, TYPE=CPS4, ELSET=all\n1,1,2,3,4\n"
-    plate = f"*PART, NAME=Plate\n{own}*SURFACE, NAME=end\nall, S2\n*END PART\n"
-    lines = "0., 2.\n1., 0., 0., 1., 1., 0., 180.\n"
-    instances = instance("One", "Plate") + instance("Two", "Plate", lines)
-    domain = read(tmp_path / "parts.inp", assembly(plate, instances))
-    for name, place in {"One": (2, 0.5), "Two": (0, 2.5)}.items():
-        found = [integral(domain, lambda x, _, k=k: x[k], f"{name}.end") for k in (0, 1)]
-        assert found == pytest.approx(place, abs=1e-12)
-        assert integral(domain, region=f"{name}.all") == pytest.approx(2.0)
-
-
 def test_two_parts_numbered_from_one(tmp_path):
     """One has its nodes in its instance, as an independent one has; unique names stand alone."""
     own = block(3).replace(", ELSET=Eall", "") + sets(3)
@@ -181,22 +167,6 @@ def test_sets_of_the_assembly(tmp_path):
     assert found.notes[1] == "sets of nodes that hold no facet of the boundary: point"
 
 
-def test_parts_and_instances_that_have_no_end(tmp_path):
-    """They end where the next one begins."""
-    instances = instance("One", "Cube") + instance("Two", "Cube", LINES)
-    whole = assembly(part("Cube", 1), instances)
-    cut = whole.replace("*END PART\n", "").replace("*END INSTANCE\n", "")
-    agree(read(tmp_path / "cut.inp", cut), read(tmp_path / "whole.inp", whole))
-
-
-def test_numbers_of_an_instance_end_with_it(tmp_path):
-    """A set of a part that names more nodes than it has takes none of the next instance."""
-    more = part("Cube", 1).replace("*END", "*NSET, NSET=far, GENERATE\n5, 5000\n*END")
-    instances = instance("One", "Cube") + instance("Two", "Cube", "0., 0., 4.\n")
-    got = moments(read(tmp_path / "parts.inp", assembly(more, instances)))
-    assert got["part one.far"] == pytest.approx([1.0, 0.5, 0.5, 1.0])
-
-
 def solve(domain: Domain) -> tuple[np.ndarray, np.ndarray]:
     """Press the block Two on the block One; return displacements and pressures."""
     low, high = ([constant(value, 3) for value in (0.0, 0.0, w)] for w in (0.0, -0.02))
@@ -221,39 +191,3 @@ def test_contact_of_two_instances(tmp_path):
     assert np.max(expected[1]) > 0.01
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
-
-
-CUBE, ONE = part("Cube", 1), instance("One", "Cube")
-ACCEPTED = "accepted: a line of its translation"
-
-
-@pytest.mark.parametrize(
-    ("parts", "instances", "words"),
-    [
-        (CUBE, instance("One", "Ball"), "NAME=One: there is no part 'Ball'; accepted: those"),
-        (CUBE + CUBE, ONE, "*PART, NAME=Cube: it is there twice"),
-        (CUBE, ONE + ONE, "*INSTANCE, NAME=One: it is there twice"),
-        (CUBE.replace(", NAME=Cube", ""), ONE, "not found: 'NAME'; accepted: mesh files of Gmsh"),
-        (CUBE, ONE + "*NSET, NSET=a, INSTANCE=Two\n1\n", "there is no instance Two"),
-        (CUBE, ONE + "*NSET, NSET=a\nhigh\n", "there is no set HIGH"),
-        (CUBE, ONE + "*NSET, NSET=a\nOne.up\n", "there is no set ONE.UP"),
-        (CUBE, ONE + "*SURFACE, NAME=a\nOne.1, S7\n", "elements 1 have no face 'S7'"),
-        (CUBE.replace("\n8, ", "\n7, 0., 0., 3.\n8, "), ONE, "node 7 is at two places"),
-        (CUBE.replace("\n1, 1, 2", "\n1, 1, two"), ONE, "'two' where a number belongs"),
-        (CUBE.replace("*END", "*SYSTEM\n0,0,1\n*END"), ONE, "*SYSTEM makes or moves nodes"),
-        (CUBE, instance("One", "Cube", "0., 0., 1., 2.\n"), f"0., 0., 1., 2.; {ACCEPTED}"),
-        (CUBE, instance("One", "Cube", "0., 0., nan\n"), ACCEPTED),
-        (CUBE, instance("One", "Cube", "0., 0., zero\n"), "float: 'zero'"),
-        (CUBE, instance("One", "Cube", "0.\n0, 0, 0, 0, 0, 1\n"), ACCEPTED),
-        (CUBE, instance("One", "Cube", "0.\n1, 2, 3, 1, 2, 3, 90.\n"), ACCEPTED),
-        (CUBE, instance("One", "Cube", "0.\n0, 0, 0, 0, 0, 1, 90.\n0.\n"), ACCEPTED),
-        (CUBE.replace("\n8, 1.0", "\n8, inf"), ONE, "coordinates are no numbers"),
-        (CUBE, "", "it has no triangles"),
-    ],
-)
-def test_damaged_assemblies_end_in_one_line(parts, instances, words, tmp_path, capfd):
-    (tmp_path / "parts.inp").write_text(assembly(parts, instances))
-    assert main(["new", str(tmp_path / "parts.inp")]) == BAD_INPUT
-    printed = capfd.readouterr()
-    assert words in printed.err and len(printed.err.splitlines()) == 1
-    assert printed.out == "" and [path.name for path in tmp_path.iterdir()] == ["parts.inp"]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-from pathlib import Path
-
 import numpy as np
 import pytest
 import ufl
@@ -12,7 +9,6 @@ from dolfinx import fem
 from mpi4py import MPI
 from vtkmodules import vtkCommonDataModel
 
-import contact
 from contact.errors import InputError
 from contact.mesh.cells import SHAPES, Shape, rule, shape_of
 from contact.mesh.domain import compiled, revolved
@@ -34,32 +30,6 @@ from tests.problems.sizes import measures as part_sizes
 
 COMM = MPI.COMM_WORLD
 NAMES = [shape.name for shape in SHAPES]
-
-
-#: Where names of shapes stand: with their definition, in formats of files and input, and for the
-#: pieces into which facets are cut.
-FORMATS = ("cells", "grid", "abaqus", "formats", "xdmf", "contents")
-NAMING = [
-    *(f"mesh/{name}" for name in FORMATS),
-    "case/mesh",
-    "interface/mortar/segments",
-    "model/formula",
-]
-
-
-def test_nothing_else_asks_for_a_shape_by_its_name() -> None:
-    """Neither by a text nor by a constant; properties such as `Shape.simplex` tell what differs."""
-    root = Path(contact.__file__).parent
-    asked = set()
-    for path in root.rglob("*.py"):
-        if str(path.relative_to(root).with_suffix("")) in NAMING:
-            continue
-        for node in ast.walk(ast.parse(path.read_text())):
-            text = isinstance(node, ast.Constant) and node.value in ("interval", *NAMES)
-            constant = isinstance(node, ast.Name) and node.id in [name.upper() for name in NAMES]
-            if text or constant:
-                asked.add(str(path.relative_to(root)))
-    assert asked == set()
 
 
 @pytest.mark.core
@@ -174,12 +144,6 @@ def test_serendipity_cells_are_cells_of_degree_2(shape):
             np.testing.assert_allclose(weights @ values, values[own], atol=1e-14)
         found += len(own)
     assert found == {"quadrilateral": 1, "hexahedron": 7}.get(shape.name, 0)
-
-
-def test_some_quadrilaterals_alone_are_not_refined():
-    domain = rectangle(MPI.COMM_SELF, (0, 0), (1, 1), (2, 2), cell="quadrilateral")
-    with pytest.raises(InputError, match="quadrilaterals, of which some cannot be refined alone"):
-        refined(domain, np.array([0], dtype=np.int32))
 
 
 def test_cells_of_the_other_dimension_are_refused():

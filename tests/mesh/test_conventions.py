@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,10 +11,8 @@ from dolfinx import io
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.errors import InputError, SingularError
-from contact.mesh.grid import GridError
+from contact.errors import InputError
 from contact.mesh.reader import from_file
-from contact.mesh.xdmf import WINDOW, _mixed
 from tests.problems.quadrilaterals import unit_block
 from tests.problems.sizes import integral, measures
 
@@ -284,52 +281,3 @@ def test_mixed_topologies_of_second_order(tmp_path):
         (tmp_path / "other.xdmf").write_text(f"<Xdmf><Domain>{grids}</Domain></Xdmf>")
         with pytest.raises(InputError, match=f"the XDMF reader says of it: .*{accepted}"):
             from_file(MPI.COMM_SELF, tmp_path / "other.xdmf")
-
-
-def test_prisms_of_second_order_in_xdmf(tmp_path):
-    points = np.concatenate([CUBE[[0, 1, 2, 4, 5, 6]], np.zeros((9, 3))])
-    text = "<Xdmf><Domain><Grid><Geometry><DataItem Dimensions='15 3'>{}</DataItem></Geometry>"
-    text += "<Topology TopologyType='Wedge_15'><DataItem NumberType='Int' Dimensions='1 15'>{}"
-    text += "</DataItem></Topology><Attribute Name='low' Center='Node'><DataItem NumberType='Int' "
-    text += "Dimensions='15'>{}</DataItem></Attribute></Grid></Domain></Xdmf>"
-    mark = [1, 1, 1, *[0] * 12]
-    numbers = (" ".join(map(str, v)) for v in (points.ravel().tolist(), range(15), mark))
-    (tmp_path / "prism.xdmf").write_text(text.format(*numbers))
-    domain = from_file(MPI.COMM_SELF, tmp_path / "prism.xdmf")
-    assert integral(domain) == pytest.approx(0.5)
-    assert measures(domain) == pytest.approx({"low 1": 0.5})
-
-
-def test_long_runs_of_mixed_cells():
-    """More cells than are looked at together, and kinds that alternate."""
-    triangles = np.column_stack(
-        [np.full(2 * WINDOW + 5, 4), np.arange(6 * WINDOW + 15).reshape(-1, 3)]
-    )
-    line = [2, 2, 8, 9]
-    found = _mixed(np.concatenate([line, triangles.ravel(), line, line]))
-    assert [(name, len(rows)) for name, rows in found] == [
-        *(("interval", 1), ("triangle", 2 * WINDOW + 5), ("interval", 2)),
-    ]
-    assert np.array_equal(found[1][1], triangles[:, 1:])
-    assert found[2][1].tolist() == [[8, 9]] * 2
-
-
-def test_no_message_shows_how_numpy_writes_numbers():
-    given = [np.float64(2.0), np.int64(3), np.True_, "np.pi"]
-    error = InputError(f"given {given}", "value")
-    assert error.words == "given [2.0, 3, True, 'np.pi']"
-    assert str(error) == f"{error.words} [value]"
-
-
-@pytest.mark.parametrize(
-    "error",
-    [
-        InputError("no file", "file-name").within("part.msh: "),
-        SingularError("singular", "unsupported"),
-        GridError("size", 0, "more"),
-    ],
-)
-def test_an_error_has_one_identifier_on_all_ranks(error):
-    copied = pickle.loads(pickle.dumps(error))
-    assert type(copied) is type(error) and str(copied) == str(error)
-    assert str(error) == f"{error.words} [{error.identifier}]"

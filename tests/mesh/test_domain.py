@@ -7,7 +7,6 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.case.mesh import Mesh as MeshSection
-from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, box, rectangle
 from tests.problems.messages import message_of
@@ -96,17 +95,6 @@ def test_overlapping_parts_share_their_facets():
 
 
 @pytest.mark.parallel
-def test_there_may_be_any_number_of_parts():
-    names = [f"p{i}" for i in range(40)]
-    domain = rectangle(
-        COMM, (0, 0), (40, 1), (40, 1), {n: Piece("top", i, i + 1) for i, n in enumerate(names)}
-    )
-    assert measures(domain) == pytest.approx(
-        {"left": 1.0, "right": 1.0, "bottom": 40.0, "top": 40.0} | dict.fromkeys(names, 1.0)
-    )
-
-
-@pytest.mark.parallel
 def test_a_mesh_without_regions_is_one():
     domain = rectangle(COMM, (0, 0), (4, 1), (8, 4))
     assert list(domain.regions) == ["body"]
@@ -123,14 +111,6 @@ def test_rotation_turns_the_normals_and_keeps_the_size():
     assert mean_normal(space, "top") == pytest.approx([0.5, 0.0, np.sqrt(0.75)])
     about_x = box(COMM, (0, 0, 0), (4, 1, 2), (2, 1, 1), rotation=90.0, axis=(2, 0, 0))
     assert mean_normal(about_x, "top") == pytest.approx([0.0, -1.0, 0.0])
-
-
-def test_unknown_part_names_the_nearest_and_all():
-    domain = rectangle(COMM, (0, 0), (4, 1), (4, 1))
-    with pytest.raises(InputError, match=r"no part 'botom'; did you mean 'bottom'.*left, right"):
-        domain.ds("botom")
-    with pytest.raises(InputError, match="no part 'x'"):
-        domain.facets("x")
 
 
 CORRECT_RECTANGLE = {"origin": (0, 0), "size": (4, 1), "cells": (8, 4)}
@@ -172,11 +152,6 @@ def test_messages_of_wrong_grids(snapshot):
     snapshot("wrong-grids", said)
 
 
-def test_grid_positions_pass_with_rounding():
-    domain = rectangle(COMM, (0.1, 0), (0.6, 1), (6, 1), {"a": Piece("top", 0.1 + 0.2, 0.7)})
-    assert measures(domain)["a"] == pytest.approx(0.4)
-
-
 @pytest.mark.parallel
 @pytest.mark.parametrize("ghosts", [dmesh.GhostMode.none, dmesh.GhostMode.shared_facet])
 def test_parts_of_a_dolfinx_mesh(ghosts):
@@ -185,22 +160,6 @@ def test_parts_of_a_dolfinx_mesh(ghosts):
     domain = from_mesh(mesh, {"low": low, "half": lambda x: x[0] < 0.34})
     assert measures(domain) == pytest.approx({"low": 1.0, "half": 1.0 + 4.0 / 3.0})
     assert domain.size == 1.0
-
-
-@pytest.mark.parallel
-def test_wrong_parts_of_a_dolfinx_mesh_are_refused():
-    mesh = dmesh.create_unit_square(COMM, 4, 4)
-    with pytest.raises(InputError, match="'none' contains no facet"):
-        from_mesh(mesh, {"none": lambda x: x[0] > 2.0})
-    mesh.topology.create_entities(1)
-    inside = np.arange(mesh.topology.index_map(1).size_local, dtype=np.int32)
-    with pytest.raises(InputError, match="'all' contains interior facets"):
-        from_mesh(mesh, {"all": inside})
-    prisms = dmesh.create_box(
-        COMM, [(0.0,) * 3, (1.0,) * 3], (2, 2, 2), cell_type=dmesh.CellType.prism
-    )
-    with pytest.raises(InputError, match="quadrilaterals in the plane, or of tetrahedra or hexah"):
-        from_mesh(prisms, {})
 
 
 @pytest.mark.core

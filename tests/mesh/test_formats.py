@@ -362,30 +362,6 @@ def test_damaged_files_end_in_one_line(name, share, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("type=CPE4", "type=CPX4", "TYPE=CPX4: elements that are not known"),
-        (" 7, 1, 2, 5, 4", " 7, 1, 2, 5, 9", "elements whose nodes it does not have"),
-        (" 7, 1, 2, 5, 4", " 7, 1, 2, 5", "9 numbers, 5 an element"),
-        ("right, 7", "left, 7", "there is no set LEFT"),
-        ("Eall, S3", "Eall, S9", "elements Eall have no face 'S9'"),
-        ("right, 7", "both", "a set holds itself"),
-        ("*STATIC", "*INCLUDE, INPUT=away.inp", "there is no file 'away.inp' beside plate.inp"),
-        ("*STATIC", "*INCLUDE, INPUT=plate.inp", "plate.inp includes itself"),
-        ("NSET=Nall", "INPUT=away.inp", "NODE: there is no file 'away.inp' beside plate.inp"),
-        ("1, 0., 0., 0.", "1, zero, 0.", "could not convert string to float: 'zero'"),
-    ],
-)
-def test_what_is_wrong_with_a_deck_is_said(old, new, words, tmp_path):
-    assert old in PLATE
-    (tmp_path / "plate.inp").write_text(PLATE.replace(old, new))
-    with pytest.raises(
-        InputError, match="mesh file .*plate.inp: the Abaqus reader says of it: .*" + words
-    ):
-        from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
-
-
-@pytest.mark.parametrize(
     ("added", "words"),
     [
         ("*NODE\n4, 0., 2.\n", "NODE: node 4 is at two places"),
@@ -401,15 +377,6 @@ def test_keywords_that_change_the_mesh_are_refused(added, words, tmp_path, capsy
     assert main(["new", str(tmp_path / "plate.inp")]) == BAD_INPUT
     said = capsys.readouterr().err
     assert words in said and "; accepted: " in said
-
-
-def test_a_node_that_is_repeated(tmp_path):
-    """In its place; directions of *TRANSFORM are left out."""
-    added = "*NODE\n4, 0., 1.\n*TRANSFORM, NSET=ground\n1, 0, 0\n"
-    (tmp_path / "plate.inp").write_text(PLATE.replace("*BOUNDARY", f"{added}*BOUNDARY"))
-    domain = from_file(MPI.COMM_SELF, tmp_path / "plate.inp")
-    assert regions(domain)["Eall"] == pytest.approx(2.0)
-    assert domain.notes[0].startswith("left out: *TRANSFORM, *BOUNDARY")
 
 
 def test_data_lines_from_another_file(tmp_path):

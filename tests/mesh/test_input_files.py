@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.cli.main import CONVERGED, main
 from contact.errors import InputError
 from contact.mesh.reader import from_file
 from tests.problems.sizes import integral, measures
@@ -74,12 +73,6 @@ def test_surfaces_made_of_others_are_refused_by_name(tmp_path):
         read(tmp_path, block() + text)
 
 
-def test_free_sides_of_plane_elements(tmp_path):
-    text = "*NODE\n1,0,0\n2,1,0\n3,2,0\n4,0,1\n5,1,1\n6,2,1\n*ELEMENT, TYPE=CPS4, ELSET=plate\n"
-    text += "1,1,2,5,4\n2,2,3,6,5\n*SURFACE, NAME=rim\nplate,\n"
-    assert measures(read(tmp_path, text)) == pytest.approx({"rim": 6.0})
-
-
 def test_nodes_of_a_set_of_elements(tmp_path):
     """Before or behind its elements, and with other nodes."""
     sets = "*NSET, NSET=layer, ELSET=lowest\n*ELSET, ELSET=lowest, GENERATE\n1, 4\n"
@@ -97,17 +90,6 @@ def test_sets_and_surfaces_of_one_name(tmp_path):
     assert measures(domain) == pytest.approx({"low": 1.0, "End": 0.25, "nodal": 1.0})
     said = "sets left out, as a surface of other facets has their name: "
     assert domain.notes == (said + "nodal", said + "End")
-
-
-def test_what_is_left_out_is_shown(tmp_path, capsys):
-    text = block() + "*NSET, NSET=End, GENERATE\n19, 27\n*SURFACE, NAME=end\n5, S2\n"
-    text += "*SURFACE, NAME=low\nEall, S1\n*ELEMENT, TYPE=C3D8\n11, 1,2,5,4,10,11,14,13\n"
-    (tmp_path / "block.inp").write_text(text.replace("Eall, S1", "1, S1\n2, S1\n3, S1\n4, S1"))
-    assert main(["new", str(tmp_path / "block.inp")]) == CONVERGED
-    assert main(["check", str(tmp_path / "block.toml")]) == CONVERGED
-    shown = capsys.readouterr().out
-    assert "# note: 1 cell(s) that stand twice in it count once" in shown
-    assert "# note: sets left out, as a surface of other facets has their name: End" in shown
 
 
 PARTS = """*PART, NAME=Part-1
@@ -136,44 +118,3 @@ def test_a_part_and_its_assembly_have_names_of_their_own(tmp_path):
     assert measures(domain) == pytest.approx({"Set-1": 1.0, "Part-1-1.Set-1": 6.0})
     found = {name: len(cells) for name, cells in domain.regions.items()}
     assert found == {"Part-1-1.Set-1": 8, "Set-1": 2}
-
-
-def test_names_behind_their_instance(tmp_path):
-    sets = "*NSET, NSET=low, INSTANCE=Part-1-1, GENERATE\n1, 9\n*NSET, NSET=all\nPart-1-1.Set-1\n"
-    sets += "*NSET, NSET=more, INSTANCE=Part-1-1\nSet-1\n*NSET, NSET=step\nlow"
-    sets += ", part-1-1.10, Part-1-1.11, part-1-1.12\n*SURFACE, NAME=top\n"
-    sets += "".join(f"Part-1-1.{k}, S2\n" for k in range(5, 9))
-    domain = read(tmp_path, in_parts(sets))
-    expected = {"low": 1.0, "all": 6.0, "more": 6.0, "Set-1": 6.0, "top": 1.0}
-    expected |= {"step": 1.5}
-    assert measures(domain) == pytest.approx(expected)
-
-
-def test_continuum_shells_are_solids(tmp_path):
-    text = block() + "*NODE\n28, 0, 0, 2\n29, 1, 0, 2\n30, 1, 1, 2\n31, 0, 1, 2\n"
-    text += "*ELEMENT, TYPE=SC8R\n9, 19, 21, 27, 25, 28, 29, 30, 31\n"
-    domain = read(tmp_path, text + "*NSET, NSET=low, GENERATE\n1, 9\n")
-    assert integral(domain) == pytest.approx(2.0)
-
-
-def test_elements_between_nodes_are_left_out(tmp_path):
-    text = block() + "*ELEMENT, TYPE=MASS, ELSET=point\n9, 27\n*ELEMENT, TYPE=SPRINGA\n10, 1, 27\n"
-    domain = read(tmp_path, text + "*NSET, NSET=low, GENERATE\n1, 9\n*NSET, NSET=a, ELSET=point\n")
-    assert measures(domain) == pytest.approx({"low": 1.0})
-    assert domain.notes[0] == "left out: *ELEMENT, TYPE=MASS, *ELEMENT, TYPE=SPRINGA"
-
-
-def test_a_surface_that_goes_on(tmp_path):
-    text = "*SURFACE, NAME=low\n1, S1\n2, S1\n*SURFACE, NAME=Low\n3, S1\n4, S1\n"
-    assert measures(read(tmp_path, block() + text)) == pytest.approx({"low": 1.0})
-
-
-def test_letters_and_numbers_of_other_programs(tmp_path):
-    """A byte order mark, Fortran's exponents, letters in Latin-1, commas in quotation marks."""
-    text = block().replace("0.5", "5.0D-1")
-    text += '*NSET, NSET="under, façade", GENERATE\n1, 9\n*NSET, NSET=faèade, GENERATE\n19, 27\n'
-    expected = {"under, façade": 1.0, "faèade": 1.0}
-    for written in (text.encode("latin-1"), text.encode("utf-8-sig")):
-        (tmp_path / "block.inp").write_bytes(written)
-        domain = from_file(MPI.COMM_SELF, tmp_path / "block.inp")
-        assert measures(domain) == pytest.approx(expected)

@@ -12,7 +12,6 @@ from mpi4py import MPI
 import meshes
 from contact.case.build import build_problem
 from contact.case.file import parse_case
-from contact.cli.check import describe
 from contact.errors import InputError
 from contact.mesh.reader import from_msh
 from tests.problems.sizes import integral, measures
@@ -141,21 +140,6 @@ def test_groups_of_cells_are_regions():
     assert x == pytest.approx(np.array([[2 / 3, 1 / 3, 0.0]]))
 
 
-def test_check_lists_regions_and_notes():
-    case = parse_case(
-        {
-            "mesh": {"file": str(FIXTURES / "ungrouped.msh")},
-            "material": {"young": 1.0, "poisson": 0.3},
-            "fixed": [{"on": "bottom", "displacement": [0.0, "free"]}],
-            "contact": {"on": "bottom"},
-        }
-    )
-    lines = describe(case, build_problem(case, COMM)).splitlines()
-    regions = lines.index("# regions:")
-    assert lines[regions + 1] == "#   body  1 cell  area 0.5"
-    assert any(line.startswith("# note: 1 cell(s) in no physical group") for line in lines)
-
-
 @pytest.mark.parallel
 def test_cells_in_no_group_are_no_part_of_the_body():
     domain = from_msh(COMM, FIXTURES / "ungrouped.msh")
@@ -183,24 +167,3 @@ def test_a_mesh_file_is_never_executed(start, name, tmp_path):
     with pytest.raises(InputError, match=r"no Gmsh .msh file"):
         from_msh(MPI.COMM_SELF, tmp_path / name)
     assert not mark.exists()
-
-
-def test_options_beside_a_mesh_file_are_not_obeyed(tmp_path):
-    """Gmsh reads those of ``gmsh.open`` from a file with the ending .opt, a script too."""
-    mark = tmp_path / "executed"
-    (tmp_path / "bar.msh").write_bytes((FIXTURES / "bar.msh").read_bytes())
-    (tmp_path / "bar.msh.opt").write_text(f'Printf("x") > "{mark}";\nMesh.SwitchElementTags = 1;\n')
-    assert measures(from_msh(MPI.COMM_SELF, tmp_path / "bar.msh")) == pytest.approx(BAR)
-    assert not mark.exists()
-
-
-@pytest.mark.parametrize("fixture", ["bar.msh", "bar-2.2.msh"])
-@pytest.mark.parametrize("name", ["body.msh", "body.msh.gz", "a b; touch x.geo", "mesh"])
-def test_a_mesh_file_is_read_whatever_its_name(fixture, name, tmp_path):
-    (tmp_path / name).write_bytes((FIXTURES / fixture).read_bytes())
-    assert measures(from_msh(MPI.COMM_SELF, tmp_path / name)) == pytest.approx(BAR)
-
-
-def test_every_bad_fixture_is_in_the_table_and_all_are_small():
-    assert {p.name for p in (FIXTURES / "bad").iterdir()} == set(BAD) - {"absent.msh"}
-    assert all(p.stat().st_size < 30_000 for p in FIXTURES.rglob("*.msh"))

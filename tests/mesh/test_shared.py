@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.cli.main import CONVERGED, main
 from contact.errors import InputError
-from contact.mesh import xdmf
 from contact.mesh.reader import from_file
 from tests.mesh.test_formats import PLATE, bricks, regions
 from tests.problems.sizes import integral, measures
@@ -102,14 +100,6 @@ def moments(domain):
     return [integral(domain, of, **place) for place in places for of in axes]
 
 
-def test_names_with_blanks_and_many_groups(tmp_path, capsys):
-    nodes = "".join(f"*NSET, NSET=set{k}{'x' * 60}\n1, 2\n" for k in range(1200))
-    (tmp_path / "many.inp").write_text(PLATE.replace("*STEP\n", nodes + "*STEP\n", 1))
-    made = tmp_path / "a part & more.xdmf"
-    assert main(["mesh", str(tmp_path / "many.inp"), str(made)]) == CONVERGED
-    assert len(from_file(MPI.COMM_SELF, made).parts) > 1200
-
-
 @pytest.mark.parallel
 def test_dolfinx_reads_it_too(shared_tmp_path, capsys):
     from dolfinx.io import XDMFFile
@@ -146,18 +136,6 @@ def test_a_case_is_solved_on_it_as_on_its_source(tmp_path, capsys):
     assert abs(found[0][1]) > 1e-3
 
 
-def test_other_names_and_files_that_are_there_are_refused(tmp_path, capsys):
-    source, made = written(tmp_path, "plate.inp")
-    before = made.read_bytes()
-    for to, words in ((made, "it is there already"), (tmp_path / "part.msh", "given another end")):
-        assert main(["mesh", str(source), str(to)]) == BAD_INPUT
-        assert words in capsys.readouterr().err
-    assert main(["mesh", str(tmp_path / "none.msh"), str(tmp_path / "b.xdmf")]) == BAD_INPUT
-    assert "no such file" in capsys.readouterr().err
-    assert made.read_bytes() == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["part.h5", "part.xdmf", "plate.inp"]
-
-
 @pytest.mark.parallel
 @pytest.mark.parametrize("harm", ["missing", "cut"])
 def test_damaged_shares_are_refused(harm, shared_tmp_path, capsys):
@@ -171,24 +149,3 @@ def test_damaged_shares_are_refused(harm, shared_tmp_path, capsys):
     COMM.barrier()
     with pytest.raises(InputError, match=r"part\.h5: it is missing or damaged"):
         from_file(COMM, made)
-
-
-def test_no_rank_takes_more_than_its_share(tmp_path, monkeypatch, capsys):
-    """Of three ranks each gets a third of points, cells and facets."""
-    _, made = written(tmp_path, "bricks.inp")
-    heavy = xdmf.distributed_arrays(made)
-
-    class Rank:
-        size = 3
-
-        def __init__(self, rank):
-            self.rank = rank
-
-    monkeypatch.setattr(xdmf, "on_root", lambda comm, action: action())
-    shares = [xdmf.read_distributed(Rank(rank), heavy) for rank in range(3)]
-    for rows in ([s.points for s in shares], [s.parts.rows for s in shares]):
-        sizes = [len(own) for own in rows]
-        assert max(sizes) - min(sizes) <= 1
-    every = np.concatenate([s.points for s in shares])
-    assert len(every) == 12
-    assert np.unique(every, axis=0).shape == every.shape

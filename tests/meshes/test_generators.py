@@ -1,8 +1,5 @@
 """Generators of meshes: what they make and what they refuse."""
 
-import re
-
-import gmsh
 import numpy as np
 import pytest
 from dolfinx import mesh as dmesh
@@ -12,7 +9,6 @@ import meshes
 from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.mesh.reader import from_generator, from_msh
-from meshes import grading
 from meshes.__main__ import main
 from tests.problems.messages import message_of
 from tests.problems.sizes import integral, measures
@@ -32,18 +28,6 @@ def nodes(domain):
 
 BAR = {"left": 1.0, "right": 1.0, "bottom": 4.0, "top": 4.0, "loaded": 2.0}
 SIDES = ("left", "right", "front", "back", "bottom", "top")
-
-
-@pytest.mark.parallel(2)
-def test_a_running_gmsh_is_left_as_it_was():
-    if COMM.rank == 0:
-        gmsh.initialize(interruptible=False)
-        gmsh.model.add("mine")
-    from_generator(COMM, "bar")
-    if COMM.rank == 0:
-        assert gmsh.isInitialized()
-        assert gmsh.model.getCurrent() == "mine"
-        gmsh.finalize()
 
 
 ARC = np.pi * 8.0
@@ -325,23 +309,6 @@ def test_messages_of_wrong_generators(snapshot):
     snapshot("wrong-generators", said)
 
 
-def test_a_long_meshing_says_so_first(monkeypatch, caplog):
-    monkeypatch.setattr(grading, "LONG", 1e-3)
-    from_generator(COMM, "bar")
-    assert "take Gmsh" in caplog.text
-
-
-@pytest.mark.parametrize("name", GENERATORS)
-def test_the_cells_that_are_foreseen_are_too_few_but_not_by_far(name, monkeypatch, caplog):
-    """Sizes are refused by that number, and no mesh that fits may be."""
-    monkeypatch.setattr(grading, "LONG", 0.0)
-    domain = from_generator(COMM, name)
-    foreseen = max(float(count) for count in re.findall(r"ask for some (\S+) cells", caplog.text))
-    cells = domain.mesh.topology.index_map(domain.dim).size_global
-    assert foreseen < 1.1 * cells  # what is turned loses some at the axis
-    assert cells < 10 * foreseen
-
-
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
 def test_command_line_writes_a_mesh(tmp_path, version):
     path = tmp_path / "bar.msh"
@@ -354,11 +321,6 @@ def test_command_line_writes_a_mesh(tmp_path, version):
     assert main(disc) == 0
     domain = from_msh(COMM, path)
     assert (shape_of(domain.mesh).name, domain.order) == ("quadrilateral", 2)
-
-
-def test_command_line_refuses_wrong_sizes(tmp_path, capsys):
-    assert main(["bar", "--size", "-1", "--out", str(tmp_path / "bar.msh")]) == 2
-    assert "positive number" in capsys.readouterr().err
 
 
 def test_spheres_of_two_quarters():

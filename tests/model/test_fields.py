@@ -1,7 +1,5 @@
 """Whatever a field is given as, it is the same field: numbers, functions, UFL, Functions."""
 
-from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,10 +19,8 @@ from contact import (
     InputError,
     Linear,
     Load,
-    Material,
     Problem,
     SlipCoefficient,
-    Sphere,
     solve,
 )
 from contact.model.fields import field
@@ -69,17 +65,6 @@ def test_values_and_forms(way: str) -> None:
     form = fem.form(given.ufl(ufl.SpatialCoordinate(mesh)) * ufl.ds(domain=mesh))
     integral = mesh.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
     assert integral == pytest.approx(2 * (0.3 * 2 - 0.1 * 2) + 0.3 + 0.1, rel=1e-12)
-
-
-def test_numbers_by_other_names() -> None:
-    """Arrays without a dimension, and what UFL makes a number of."""
-    x = ufl.SpatialCoordinate(square()[0])
-    inside = np.zeros((3, 2))
-    for given in (np.array(0.3), ufl.as_ufl(0.3), 0.3 + 0 * x[0], np.float32(0.25) + 0.05):
-        np.testing.assert_allclose(field(given).numpy(inside), 0.3, rtol=1e-7)
-    moved = Fixed("top", ufl.as_vector([0.1 * x[0], -0.3])).displacement
-    assert moved is not None
-    assert np.all(moved[1].numpy(inside) == -0.3)
 
 
 @pytest.mark.parallel
@@ -133,16 +118,6 @@ def test_a_problem_without_a_case_file(way: str) -> None:
     np.testing.assert_allclose(other.state.x, first.state.x, atol=1e-9)
 
 
-def test_numbers_alone() -> None:
-    mesh, tags = square()
-    solution = solve(problem(mesh, tags, 0.0))
-    assert solution.converged
-    np.testing.assert_allclose(solution.displacement.x.array, 0.0, atol=1e-12)
-    pressed = Body(Linear(10.0, 0.3), [Fixed("top", [0.0, -0.01])])
-    domain = Domain.from_mesh(mesh, tags, {"bottom": [3], "top": 7})
-    assert solve(Problem(domain, pressed, Contact("bottom"))).contact_force[1] < -0.1
-
-
 def test_vectors() -> None:
     mesh, _ = square()
     u = fem.Function(fem.functionspace(mesh, ("Lagrange", 1, (2,))))
@@ -159,57 +134,6 @@ def test_vectors() -> None:
 
 
 TOP = Fixed("top", [0.0, -0.01])
-LAYERS = Body([Material(Linear(2.0, 0.3), on="a"), Material(Linear(1.0, 0.3), on="b")], TOP)
-
-
-def test_a_body_of_several_materials_can_be_changed() -> None:
-    """It is what its materials say, whatever else of it is replaced."""
-    free = replace(LAYERS, fixed=())
-    assert free.materials == LAYERS.materials and free.law == Linear(1.0, 0.3)
-
-
-def made(law: Linear, contact: Any = None) -> Problem:
-    """Return a problem whose one support is no list."""
-    mesh, tags = square()
-    domain = Domain.from_mesh(mesh, tags, {"bottom": 3, "top": 7})
-    assert repr(domain) == "<Domain: 64 cells; parts bottom, top; regions body>"
-    return Problem(domain, Body(law, TOP), contact or Contact("bottom"))
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (
-            lambda: Fixed("top", "free"),
-            "displacement: given .free.; accepted: a list of 2 components",
-        ),
-        (lambda: Fixed("top", 0.0), "displacement: given 0.0; accepted: a list of 2 components"),
-        (
-            lambda: Fixed("top", ["w", 0.0]),
-            r"^Fixed on 'top': displacement\.0: .w.: unknown name w; accepted",
-        ),
-        (lambda: Load("top", pressure=True), "pressure: True is neither a number nor a formula"),
-        (lambda: Friction(0.3), r"accepted: Friction\(mu=0.3\)"),
-        (lambda: Friction(mu=0.3, tresca=1.0), "accepted: one of coefficient, tresca, mu and law"),
-        (lambda: field(ufl.Identity(2)), "UFL of shape"),
-        (
-            lambda: made(Linear(10.0, 0.3), Contact("bottom", lambda x: x[:2])),
-            "a number for each x",
-        ),
-        (lambda: Sphere((0.0, -1.0), -1.0), "Sphere: radius: given -1.0; accepted: a length > 0"),
-        (lambda: made(Linear(10.0, 0.6)), "Poisson's ratio 0.6; accepted"),
-        (lambda: made(Linear(10.0, 0.3), "bottom"), r"accepted: Contact\(part"),
-        (lambda: solve(made(Linear(10.0, 0.3)), "newton"), r"accepted: NewtonOptions\(\)"),
-        (
-            lambda: Body(Linear(1.0, 0.3), TOP, regions=(Material(Linear(2.0, 0.3)),)),
-            "regions beside a law: .*; accepted: all materials as the law",
-        ),
-        (lambda: replace(LAYERS, law=Linear(7.0, 0.3)), "regions beside a law"),
-    ],
-)
-def test_what_is_none(make: Callable[[], object], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        make()
 
 
 def test_a_function_of_another_mesh() -> None:

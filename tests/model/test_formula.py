@@ -1,7 +1,6 @@
 """Formulas: NumPy and UFL agree with each other, and nothing else than formulas is let in."""
 
 import math
-import pickle
 from functools import reduce
 
 import basix.ufl
@@ -109,24 +108,6 @@ def test_values(formula, value):
     expression = Expression(formula)
     assert expression.numpy([[2.0, 3.0]]) == pytest.approx([value])
     assert float(expression.ufl(x2)((2.0, 3.0))) == pytest.approx(value)
-
-
-def test_constants_have_the_shape_of_the_points():
-    expression = Expression("2*pi")
-    assert expression.is_constant and expression.value == pytest.approx(2 * np.pi)
-    assert expression.numpy(np.zeros((4, 3))).shape == (4,)
-    assert expression.numpy(np.zeros((0, 2))).shape == (0,)
-    assert expression.ufl(x2).ufl_shape == ()
-    with pytest.raises(ValueError, match="depends on the coordinates"):
-        _ = Expression("x").value
-
-
-def test_names_equality_and_pickle():
-    expression = Expression("x*sin(z)")
-    assert expression.names == {"x", "z"}
-    assert pickle.loads(pickle.dumps(expression)) == expression
-    assert Expression(1) == Expression(1.0) != Expression("1")
-    assert len({Expression("x"), Expression("x")}) == 1
 
 
 def test_z_is_refused_in_the_plane():

@@ -12,7 +12,6 @@ from contact import (
     Electric,
     Fixed,
     Friction,
-    InputError,
     Layer,
     Linear,
     Material,
@@ -110,28 +109,6 @@ def test_foundations_move_by_the_contact() -> None:
     assert forces[0][1] < -0.01
     for force in forces[1:]:
         assert force == pytest.approx(forces[0], rel=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("make", "key"),
-    [
-        (lambda: Contact("bottom", overlap="push"), "overlap"),
-        (lambda: Contact("bottom", layer=-0.1), "layer"),
-        (lambda: Contact("bottom", layer=0.1, stiffness=-1.0), "stiffness"),
-        (lambda: Contact("bottom", stiffness=1.0), "stiffness"),  # without a layer
-        (lambda: Contact("bottom", gap="0.1*w"), "gap"),
-        (lambda: Contact("bottom", name=" a"), "name"),
-        (lambda: Electric(-1.0), "k_e"),
-        (lambda: Electric(1.0, "x"), "phi_f"),
-        (lambda: Material(young=-1.0, poisson=0.3), "young"),
-        (lambda: Material(Linear(1.0, 0.3), young=1.0), "young"),
-        (lambda: Material("j2", young=1.0, poisson=0.3), "yield_stress"),
-        (lambda: Amplitude(time=[1.0, 0.0], value=[0.0, 1.0]), "time"),
-    ],
-)
-def test_wrong_values_are_named(make, key) -> None:
-    with pytest.raises(InputError, match=rf"\b{key}: .*; accepted: "):
-        make()
 
 
 def test_the_potential_of_a_foundation_in_time() -> None:

@@ -218,23 +218,6 @@ def test_normals_are_the_slope_of_the_distance(name):
     SHAPES[name][0].check_normals(1e-3 * POINTS + np.array(TIP))
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
-def test_normals_of_other_shapes_are_believed(scale):
-    """A function whose slope is not 1, a rough profile, and one of few triangles."""
-    random = np.random.default_rng(3)
-    x = np.linspace(-3, 3, 400)
-    rough = np.cumsum(random.normal(size=x.size)) * 2e-3
-    points = scale * POINTS[:, :2]
-    Level(lambda x: 7 * (x[:, 1] / scale + (x[:, 0] / scale) ** 2)).check_normals(points)
-    Heights((scale * x,), scale * rough).check_normals(points)
-    grid = (x[::40], x[::40])
-    Heights(tuple(scale * a for a in grid), scale * random.normal(size=(10, 10))).check_normals(
-        scale * POINTS
-    )
-    corners = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0.3], [0, 1, 0]]])
-    Triangles(scale * corners.astype(float)).check_normals(scale * POINTS)
-
-
 @pytest.mark.parallel
 def test_a_problem_names_the_shape():
     domain = rectangle(MPI.COMM_WORLD, (-0.2, 0.6), (0.4, 0.2), (8, 4))

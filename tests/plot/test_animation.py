@@ -35,27 +35,6 @@ def test_one_frame_a_step(run: Path) -> None:
     assert abs(frames[0] - frames[-1]).max() > 100
 
 
-def test_paper_is_white(tmp_path: Path) -> None:
-    """A picture has more colours than its file, which has had a grey in place of white."""
-    small = ["mesh.cells=[10, 8]", "space.degree=1", "evolution.steps=[2, 1]", "output.fields=vtu"]
-    given = [text for each in small for text in ("--set", each)]
-    case = str(CASES / "ring-on-mandrel.toml")
-    assert main(["solve", case, "--out", str(tmp_path), *given, "--quiet"]) == 0
-    assert main(["plot", str(tmp_path), "--animate"]) == 0
-    image = Image.open(tmp_path / "animation-deformed.gif")
-    for k in range(image.n_frames):
-        image.seek(k)
-        assert image.convert("RGB").getpixel((1, 1)) == (255, 255, 255)
-
-
-def test_a_later_run_takes_it_away(run: Path) -> None:
-    assert main(["plot", str(run), "--animate", "--field", "displacement_x"]) == 0
-    assert (run / "animation-displacement_x.gif").is_file()
-    arguments = ["solve", str(CASES / "fretting.toml"), "--out", str(run), *SMALL]
-    assert main(arguments) == 0
-    assert not (run / "animation-displacement_x.gif").exists()
-
-
 def test_frames_are_the_steps(run: Path) -> None:
     frames = read_steps(run)
     assert [time for time, _ in frames] == pytest.approx([1.0, 1.5, 2.0, 4.0, 6.0])
@@ -81,12 +60,3 @@ def test_a_step_is_drawn(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "--step 6: no fields of such a step; accepted: 1, 2, 3, 4, 5" in capsys.readouterr().err
     assert main(["plot", str(run), "--step", "2", "--animate"]) == 2
     assert "an animation shows all steps" in capsys.readouterr().err
-
-
-def test_static_results_have_no_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    case = str(CASES / "bar.toml")
-    arguments = ["solve", case, "--out", str(tmp_path), "--set", "mesh.cells=[8,2]", "--quiet"]
-    assert main(arguments) == 0
-    for option in (["--animate"], ["--step", "1"]):
-        assert main(["plot", str(tmp_path), *option]) == 2
-        assert "no steps there; accepted: the results of an evolution" in capsys.readouterr().err

@@ -1,6 +1,5 @@
 """Rigid foundations beside magnified bodies: true shapes, or shallow profiles that touch."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ from contact.plot.foundation import (
     BEYOND,
     SHALLOW,
     UNSEEN,
-    magnification,
     profiles,
 )
 from contact.plot.run import Run
@@ -79,25 +77,6 @@ def test_foundations_are_no_spikes_and_bodies_touch_them(name: str, tmp_path: Pa
     assert low < drawn[seen][touching[seen], 1].min()
 
 
-def test_a_plane_in_front_of_a_round_body_stays_plane() -> None:
-    """Magnified gaps would bend it; the round body that is magnified would overlap it."""
-    mesh = {
-        "generator": "quarter_disc", "radius": 8.0, "size": 0.8, "contact_size": 0.2,
-        "contact_width": 2.0, "growth": 0.2,
-    }  # fmt: skip
-    run = pressed(
-        {"on": "contact", "foundation": SHAPES["plane"], "direction": "foundation"},
-        mesh=mesh,
-        fixed=[{"on": "symmetry", "displacement": [0.0, "free"]}],
-        load=[{"on": "top", "traction": [0.0, -2e-3]}],
-    )
-    for scale in (magnification(run), 50.0):
-        (profile,) = profiles(run, scale, run.body.points[:, :2], 1, None)
-        assert np.ptp(profile.points[:, 1]) < 1e-9
-    (profile,) = profiles(run, magnification(run), run.body.points[:, :2], 1, None)
-    assert profile.gap.min() >= -1.001 * UNSEEN * run.diameter
-
-
 def test_a_moving_foundation_is_drawn_where_the_body_meets_it() -> None:
     """A ball comes from afar, by 30 times the deformation of the body."""
     run = pressed(
@@ -116,34 +95,3 @@ def test_a_moving_foundation_is_drawn_where_the_body_meets_it() -> None:
     radii = np.linalg.norm(profile.points - [1.0, -0.999], axis=1)
     assert made.scale > 1
     np.testing.assert_allclose(radii, 1.0 + (made.scale - 1) * 1e-3, atol=0.5 * 0.031**2)
-
-
-def test_the_foundation_of_a_small_zone_is_in_the_picture() -> None:
-    """The picture ends at the body without it."""
-    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [200, 10]}
-    ball = {"shape": "sphere", "centre": [1.0, -3.01], "radius": 3.0}
-    run = pressed({"foundation": ball}, by=0.0105, mesh=mesh)
-    made = picture(run, "von_mises")
-    assert made.near is not None
-    ax = draw_plane(made).axes[0]
-    assert ax.get_xlim() == pytest.approx(tuple(made.box[:, 0]))
-    (profile,) = profiles(run, made.scale, made.skin.points[:, :2], 1, made.near)
-    inside = abs(profile.points[:, 0] - 1.0) < np.ptp(made.box[:, 0]) / 2
-    assert ax.get_ylim()[0] < profile.points[inside, 1].min()
-
-
-def test_magnified_bodies_do_not_overlap() -> None:
-    """A gap that small displacements close: bodies would overlap by 49 times of it."""
-    run = pressed({"foundation": SHAPES["plane"]})
-    large = run.displacement * 1e-3 * run.diameter / np.abs(run.displacement).max()
-    run.body.point_data["displacement"] = large
-    count = len(run.table["x"])
-    table = run.table | {"u_n": np.full(count, 1e-3), "gap": np.full(count, 1e-3)}
-    rigid, bodies = (
-        replace(run, table=table | {"rigid": np.full(count, flag)}) for flag in (True, False)
-    )
-    assert magnification(rigid) == 50.0
-    scale = magnification(bodies)
-    assert scale == 5.0 and scale * 1e-3 - 1e-3 <= 0.002 * run.diameter
-    table["gap"][:] = 1.0
-    assert magnification(bodies) == 50.0

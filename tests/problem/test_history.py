@@ -7,20 +7,19 @@ onto a frictionless foundation is in a homogeneous state, known in closed form.
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import InputError, Material, evolve, parse_case, solve, solve_steps
+from contact import InputError, evolve, parse_case, solve, solve_steps
 from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
 from contact.io.checkpoint import Checkpoints, read_steps
 from contact.io.fields import body_share
 from contact.results.fields import DerivedFields, check_variables
 from forms.hencky import Isotropic
-from forms.history import HistoryLaw, Response, isotropic_stiffness
+from forms.history import Response, isotropic_stiffness
 from scripts.examples.own_return_mapping import DruckerPrager
 
 YOUNG, POISSON, LIMIT, MOST, HEIGHT, WIDTH = 10.0, 0.3, 2e-3, 0.5, 1.0, 2.0
@@ -134,23 +133,6 @@ def test_a_restart_goes_on_with_the_same_history(tmp_path):
     assert total == pytest.approx(here, rel=1e-6)
 
 
-def test_the_protocol_has_all_that_is_asked_of_a_law():
-    """As one finds who writes a class by `HistoryLaw` alone; its `respond` has no defaults."""
-    given, names = Damage(YOUNG, POISSON), [key for key in dir(HistoryLaw) if key[0] != "_"]
-    bare = SimpleNamespace(**{name: getattr(given, name) for name in names})
-    bare.respond = lambda strain, variables, kind: given.respond(strain, variables, kind)
-    forces = [solve(case(), law=law).steps[-1].row["contact_force_y"] for law in (given, bare)]
-    assert forces[0] == pytest.approx(forces[1], rel=1e-12)
-
-
-@pytest.mark.parametrize("name", ["young", "poisson", "bulk", "shear"])
-def test_a_law_without_a_constant_is_refused_by_a_message_with_its_name(name):
-    given = {"young": YOUNG, "poisson": POISSON, "bulk": 1.0, "shear": 1.0, "variables": dict}
-    del given[name]
-    with pytest.raises(InputError, match=f"^law: given .* accepted: .*{name}.*HistoryLaw"):
-        Material(SimpleNamespace(**given))
-
-
 def test_a_state_without_its_history_is_of_another_step():
     problem = build_problem(case(), MPI.COMM_SELF, law=Damage(YOUNG, POISSON))
     first, second = evolve(problem, [1.0, 2.0])
@@ -213,13 +195,6 @@ class Other(Damage):
         return self.changed(found) if self.acts else found
 
 
-@pytest.mark.parametrize("name", ["", "\N{LATIN SMALL LETTER E WITH ACUTE}", "a b", "2a", 3, None])
-def test_a_variable_has_the_name_of_a_field(name):
-    words = rf"^case: Other: variables: the name: given {name!r}; accepted: an identifier of ASCII"
-    with pytest.raises(InputError, match=words):
-        build_problem(case(cells=2), MPI.COMM_SELF, law=Other(YOUNG, POISSON, name))
-
-
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
 def test_a_variable_has_a_name_that_no_field_has(kinematics):
     """The fields are those that a solution writes."""
@@ -262,42 +237,6 @@ def test_a_wrong_response_is_refused_by_all_ranks_before_the_solve(kind, everywh
     law = Other(YOUNG, POISSON, changed=changed, everywhere=everywhere)
     with pytest.raises(InputError, match=f"^case: Other: respond{words}"):
         build_problem(case(cells=2), MPI.COMM_WORLD, law=law)
-
-
-def test_a_law_that_fails_at_larger_strains_is_named():
-    law = Other(YOUNG, POISSON, changed=lambda r: r if np.abs(r.stress).max() < 1e-3 else 1 / 0)
-    problem = build_problem(case(cells=2, stages=1), MPI.COMM_SELF, law=law)
-    with pytest.raises(InputError, match=r"^Other: respond: the function raises ZeroDivisionError"):
-        next(evolve(problem, [1.0]))
-
-
-@pytest.mark.parallel(2)
-def test_the_error_of_a_law_on_one_rank_ends_the_others():
-    """They waited for it for ever."""
-    law = Other(
-        YOUNG,
-        POISSON,
-        changed=lambda r: r if np.abs(r.stress).max() < 1e-3 else 1 / 0,
-        everywhere=False,
-    )
-    problem = build_problem(case(cells=2, stages=1), MPI.COMM_WORLD, law=law)
-    with pytest.raises(InputError, match=r"^Other: respond: the function raises ZeroDivisionError"):
-        next(evolve(problem, [1.0]))
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        (["kappa"], r": the function returns \['kappa'\]; accepted: a mapping"),
-        (None, ": the function returns None; accepted: a mapping"),
-        ({"kappa": "a"}, ": 'kappa': the function returns 'a'; accepted: a real number"),
-        ({"kappa": 1j}, ": 'kappa': the function returns 1j; accepted: a real number"),
-    ],
-)
-def test_wrong_variables_are_refused(monkeypatch, given, words):
-    monkeypatch.setattr(Damage, "variables", lambda self, size: given)
-    with pytest.raises(InputError, match=f"^case: Damage: variables{words}"):
-        build_problem(case(cells=2), MPI.COMM_SELF, law=Damage(YOUNG, POISSON))
 
 
 @pytest.mark.parallel(2)

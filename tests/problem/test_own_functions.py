@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
-import ufl
 from mpi4py import MPI
 
 from contact import (
@@ -15,7 +14,6 @@ from contact import (
     Fixed,
     Friction,
     InputError,
-    Layer,
     Level,
     Linear,
     Load,
@@ -23,14 +21,12 @@ from contact import (
     Problem,
     Response,
     Rigid,
-    Shape,
     UserLaw,
     solve,
 )
 from contact.mesh.grid import rectangle
 from contact.typing import Array
 from forms.hencky import Isotropic
-from forms.laws import Coulomb, PotentialFactor
 
 pytestmark = pytest.mark.parallel(2)
 
@@ -167,91 +163,6 @@ def test_what_one_rank_alone_meets_is_refused_by_all(place: str) -> None:
                 fails() if last else 0.01 * np.ones(np.shape(x)[0 if place == "shape" else -1])
             )
         )
-
-
-@dataclass(frozen=True)
-class Holed(Shape):
-    """A plane whose distance is no number at one corner of the body."""
-
-    def distance(self, points: Array) -> tuple[Array, Array]:
-        distance = np.where(points[:, 0] < 0.1, np.nan, points[:, 1])
-        return distance, np.broadcast_to([0.0, 1.0], points.shape)
-
-
-@pytest.mark.parametrize("direction", ["foundation", "body"])
-def test_a_shape_without_a_distance_at_a_node_is_named(
-    direction: Literal["foundation", "body"],
-) -> None:
-    """Left out, the contact of that node would be missing without a word."""
-    with pytest.raises(InputError, match=r"^contact\.foundation: Holed: the gap is no number"):
-        solved(contact=Contact("bottom", Holed(direction=direction)))
-
-
-class Springs:
-    """p_nu = s for s > 0, from a table that ends."""
-
-    def __init__(self, end: float) -> None:
-        self._end = end
-
-    def __call__(self, s: Any) -> Any:
-        if np.max(s, initial=0.0) > self._end:
-            raise LookupError("beyond the table")
-        return np.maximum(s, 0.0)
-
-    def derivative(self, s: Any) -> Any:
-        return np.where(s > 0, 1.0, 0.0)
-
-
-def fails_in_slip(slip: Any) -> Any:
-    return 0.01 + 0 * slip if np.all(slip == 0) else fails()
-
-
-@pytest.mark.parametrize(
-    ("friction", "name"),
-    [
-        (Friction(mu=Coefficient(fails_in_slip)), "Friction: mu"),
-        (Friction(law=Coulomb(Coefficient(fails_in_slip))), "Friction: law"),
-    ],
-)
-def test_what_fails_where_it_slips_is_named_too(friction: Friction, name: str) -> None:
-    domain = rectangle(MPI.COMM_SELF, (0.0, 0.0), (2.0, 1.0), (8, 4))
-    body = Body(LAW, Fixed("top", [0.01, -0.005]))
-    with pytest.raises(InputError, match=f"^{name}.* raises KeyError: 'no such table'"):
-        solve(Problem(domain, body, Contact("bottom"), friction))
-
-
-def test_a_layer_is_named() -> None:
-    """Where it is looked at before the solve, and where an iterate presses deeper than that."""
-    stiffness = PotentialFactor(100.0)
-    for end, thickness in ((0.01, 0.1), (-0.1, 0.1)):
-        layer = Layer(thickness, Springs(end), stiffness)
-        with pytest.raises(InputError, match=r"^layer: p_nu: .* LookupError: beyond"):
-            solved(contact=Contact("bottom", layer=layer))
-    domain = rectangle(MPI.COMM_SELF, (0.0, 0.0), (2.0, 1.0), (8, 4))
-    problem = Problem(
-        domain, Body(LAW, TOP), Contact("bottom", layer=Layer(0.1, Springs(0.2), stiffness))
-    )
-    deep = np.zeros((problem.nodes.nodes.size, 2))
-    deep[:, 1] = -1.0
-    law = problem.interface.layer
-    assert np.isfinite(law.pressure(0 * deep)).all()
-    graph = law.normal_law(0 * deep)
-    assert graph is not None
-    with pytest.raises(InputError, match=r"^layer: p_nu: .* LookupError: beyond"):
-        graph.layer(np.full(len(deep), 1.0))
-
-
-def test_a_modulus() -> None:
-    for modulus, words in (
-        (fails, "raises KeyError"),
-        (text, "returns 'much'"),
-        (nothing, "returns None"),
-        (lambda t: np.nan * t, "nan without strain|returns nan"),
-        (lambda t: [t, t], r"returns \["),
-        (lambda t: ufl.as_ufl(0.4), r"for a number; .* Material\(law, factor=...\)"),
-    ):
-        with pytest.raises(ValueError, match=f"^UserLaw: modulus: .*{words}"):
-            UserLaw(10.0, 0.3, modulus=modulus)
 
 
 def test_a_modulus_may_return_one_number_for_all_strains() -> None:

@@ -6,9 +6,8 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact import Body, Contact, InputError, Linear, Load, Problem, load_case, solve
+from contact import Body, Contact, InputError, Linear, Load, Problem, solve
 from contact.mesh.grid import rectangle
-from scripts.cases import CASES
 from tests.problems.written import block, electric
 
 
@@ -73,11 +72,3 @@ def test_a_body_that_nothing_holds_is_refused() -> None:
     body = Body(Linear(1.0, 0.3), [], [Load("top", traction=[0.1, 0.0])])
     with pytest.raises(InputError, match="held"):
         solve(Problem(domain, body, Contact("bottom")))
-
-
-def test_a_look_at_a_solution_is_a_line():
-    solution = solve(load_case(CASES / "bar.toml", ["mesh.cells=[16, 4]"]))
-    text = repr(solution)
-    assert text.startswith("<Solution 'Bar on a rigid foundation': converged, all residuals <=")
-    assert "method uzawa" in text and len(text) < 200
-    assert repr(solution.contact).startswith("<ContactResult: 16 nodes, ")

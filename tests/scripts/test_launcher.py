@@ -5,12 +5,9 @@ tests are the same inside and outside a private root.
 """
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import time
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -25,29 +22,12 @@ def launcher(tmp_path: Path) -> Launcher:
     return Launcher(tmp_path)
 
 
-def _wait_for(condition, seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)
-
-
 def test_runs_directly_where_fenicsx_is(launcher):
     launcher.fake("python3")
     status, out, _ = launcher.run("sh", "-c", 'echo "$PYTHONPATH:$1:$PWD"; exit 7', "sh", "a  b")
     assert status == 7
     assert out == f"{launcher.clone}:a  b:{launcher.elsewhere}\n"
     assert launcher.roots() == []
-
-
-def test_a_package_of_a_virtual_environment_is_not_hidden(launcher):
-    launcher.fake("python3")
-    folder = launcher.elsewhere / "venv"
-    folder.mkdir()
-    for name, text in (("python3", "echo 0.1.0"), ("tool", 'echo "<$PYTHONPATH>"')):
-        (folder / name).write_text(f"#!{shutil.which('bash')}\n{text}\n")
-        (folder / name).chmod(0o755)
-    assert launcher.run(str(folder / "tool"))[1] == "<>\n"
 
 
 def test_threads_under_mpi_only_where_the_user_set_none(launcher):
@@ -125,53 +105,12 @@ def test_the_suite_has_a_root_of_its_own(launcher):
     assert "'buster'" in err and "sid" in err
 
 
-def test_a_second_start_waits_for_the_first(launcher):
-    launcher.bootstrap_tools()
-    first = launcher.start("sh", "-c", "echo first", FAKE_SECONDS="1")
-    _wait_for(lambda: launcher.calls() == 1)
-    status, out, err = launcher.run("sh", "-c", "echo second")
-    assert (status, out) == (0, "second\n")
-    assert "waiting" in err
-    assert first.communicate(timeout=30)[0] == "first\n"
-    assert launcher.calls() == 1
-
-
-@pytest.mark.parametrize("kill", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
-def test_an_interrupted_start_leaves_nothing_half_made(launcher, kill):
-    launcher.bootstrap_tools()
-    # without namespaces what SIGKILL leaves goes on, and the next start has to wait for it
-    process = launcher.start("true", FAKE_SECONDS="2" if kill == signal.SIGKILL else "60")
-    _wait_for(lambda: launcher.calls() == 1)
-    process.send_signal(kill)
-    process.communicate(timeout=30)
-    assert process.returncode == (-kill if kill == signal.SIGKILL else 128 + kill)
-    assert not [name for name in launcher.roots() if not name.endswith(".part")]
-    if kill != signal.SIGKILL:
-        assert launcher.roots() == []
-    assert launcher.run("true")[0] == 0
-    assert len(launcher.roots()) == 1 and not launcher.roots()[0].endswith(".part")
-
-
 def test_a_failed_bootstrap_is_said_and_removed(launcher):
     launcher.bootstrap_tools()
     status, _, err = launcher.run("true", FAKE_FAILURE="1")
     assert status == UNAVAILABLE
     assert "the mirror is gone" in err and ".log" in err
     assert launcher.roots() == []
-
-
-@pytest.mark.parametrize("kind", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-def test_signals_reach_the_command(launcher, kind):
-    launcher.bootstrap_tools()
-    assert launcher.run("true")[0] == 0
-    trap = f'trap "echo caught; exit 9" {kind.name[3:]}'
-    program = f"{trap}; echo ready; while :; do sleep 0.05; done"
-    process = launcher.start("bash", "-c", program)
-    assert process.stdout is not None
-    assert process.stdout.readline() == "ready\n"
-    process.send_signal(kind)
-    out, _ = process.communicate(timeout=30)
-    assert (process.returncode, out) == (9, "caught\n")
 
 
 @pytest.mark.parametrize("kind", [signal.SIGTERM, signal.SIGINT])
@@ -195,16 +134,6 @@ def test_signals_reach_the_ranks_and_not_their_launcher(launcher, kind, status, 
         process.send_signal(kind)
     out, _ = process.communicate(timeout=30)
     assert (process.returncode, out) == (128 + kind, "written\n")
-
-
-def test_one_floor_and_one_package_list():
-    project = tomllib.loads((CLONE / "pyproject.toml").read_text())["project"]
-    (dolfinx,) = [d for d in project["dependencies"] if d.startswith("fenics-dolfinx")]
-    bounds = dolfinx.removeprefix("fenics-dolfinx")
-    assert f"- fenics-dolfinx {bounds}\n" in (CLONE / "environment.yml").read_text()
-    packages = (CLONE / "scripts/debian-packages.txt").read_text().split("\n")
-    assert "libopenblas0-pthread" in packages
-    assert "scripts/debian-packages.txt" in (CLONE / "Dockerfile").read_text()
 
 
 def test_usage():

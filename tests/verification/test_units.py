@@ -1,12 +1,13 @@
 """The same problem in other units: the same iterations, and the same numbers but for the units."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact.case.file import parse_case
 from contact.solving import solve
-from scripts.studies.units import scaled
 
 #: Lengths and stresses, from atoms to mountains, in the units of the first. They are powers of two,
 #: which no number is rounded by: counts of one machine's rounding would not be those of another's.
@@ -21,6 +22,26 @@ UNITS = [
     (2.0**-30, 2.0**-30),
     (2.0**20, 2.0**44),
 ]
+
+
+def scaled(length: float, stress: float, dim: int, **solver: Any) -> dict[str, Any]:
+    """Return a block on a foundation, clamped at the left, pressed and pushed on top."""
+    size = [4.0, 1.0] if dim == 2 else [2.0, 1.0, 1.0]
+    cells = [32, 8] if dim == 2 else [8, 4, 4]
+    force = [0.002, -0.01] if dim == 2 else [0.002, 0.001, -0.01]
+    return {
+        "mesh": {
+            "generator": "rectangle" if dim == 2 else "box",
+            "size": [side * length for side in size],
+            "cells": cells,
+        },
+        "material": {"law": "log", "young": stress, "poisson": 0.3, "yield_strain": 0.01},
+        "fixed": [{"on": "left", "displacement": [0.0] * dim}],
+        "load": [{"on": "top", "traction": [component * stress for component in force]}],
+        "contact": {"on": "bottom", "gap": 1e-3 * length},
+        "friction": {"law": "coulomb", "mu": 0.4},
+        "solver": solver,
+    }
 
 
 @pytest.mark.parametrize(
