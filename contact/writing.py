@@ -128,7 +128,7 @@ def _write_contact_steps(solution: Solution, path: Path) -> None:
 
 def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:
     """Draw the figures from the files. Collective."""
-    from contact.plot.figures import Look, draw, read_run  # which take a while to load
+    from contact.plot.figures import draw, read_run  # which take a while to load
 
     run = None
     if solution.output.fields != "vtu":
@@ -136,7 +136,7 @@ def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:
     elif solution.problem.comm.rank == 0:
         run = read_run(folder, summary)
     if run is not None:
-        draw(run, folder, look=Look(mirror=solution.output.mirror))
+        draw(run, folder)
 
 
 def _plain(value: Any) -> Any:

@@ -41,7 +41,6 @@ INTRODUCTION = """\
 | `checkpoint.npz` | with `output.checkpoint = true` |
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `figure-*-step-N.png` | of a step of an evolution, by `contact plot DIR --step N` |
-| `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
 Once all files are complete, they replace those of an earlier run; other files in DIR are not
 touched. Results of another problem are replaced with `--overwrite` only. The same problem may be

@@ -81,10 +81,9 @@ RUNS = {
         {
             "evolution-loop.png": "figure-loop.png",
             "evolution-zones.png": "figure-zones.png",
-            "evolution-body.gif": "animation-deformed.gif",
+            "evolution-body.png": "figure-deformed.png",
         },
         ("evolution.steps=[16, 8, 16, 16]",),
-        ("--animate", "--width=100mm"),
     ),
     "tutorial": Drawn(
         "tutorial.md",

@@ -267,12 +267,6 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
             ),
             "--format": _value("pdf,png", "formats of the files: png, pdf, svg", default="png"),
             "--width": _value("85mm", "width of the figures, in mm, cm or in"),
-            "--xlim": _value(
-                "A,B",
-                "show places with x (r) between these alone, coordinates of the mesh",
-            ),
-            "--ylim": _value("A,B", "likewise y (z); in 3-D of the contact alone"),
-            "--mirror": _flag("show both halves of a body of revolution"),
             "--view": _value(
                 "X,Y,Z",
                 "direction from a body in 3-D to the eye; without it one that sees the contact",
@@ -285,9 +279,6 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
             ),
             "--html": _flag(
                 "write figure-view.html instead, a body in 3-D to turn in a browser (needs trame)"
-            ),
-            "--animate": _flag(
-                "draw animation-FIELD.gif instead, the deformed body over the steps of an evolution"
             ),
         },
     )

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.methods.signals import signals_held
-from contact.plot.figures import FORMATS, animate, export, plot, window
+from contact.plot.figures import FORMATS, export, plot, window
 from contact.plot.run import read_run
 from contact.plot.series import plot_sweep
 from contact.plot.style import Look
@@ -38,13 +38,12 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 "figure-option",
             )
     width = None if options.width is None else inches(options.width)
-    xlim, ylim = (limits_of(option, getattr(options, option)) for option in ("xlim", "ylim"))
     view = None if options.view is None else direction(options.view)
-    look, folder = Look(width, options.mirror, xlim, ylim, view), Path(options.folder)
+    look, folder = Look(width, view), Path(options.folder)
 
     def draw() -> list[Path]:
         if (folder / TABLE).is_file() and not (folder / "summary.json").exists():
-            for option in ("xlim", "ylim", "mirror", "view", "html", "animate", "step"):
+            for option in ("view", "html", "step"):
                 if getattr(options, option) not in (None, False):
                     raise InputError(
                         f"--{option}: the figure of a sweep shows no places; accepted: --field, "
@@ -52,15 +51,8 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                         "figure-option",
                     )
             return plot_sweep(folder, options.field, formats, look)
-        if options.animate and options.step is not None:
-            raise InputError(
-                "--step: an animation shows all steps; accepted: --step or --animate",
-                "figure-of-steps",
-            )
         if options.html:
             return export(folder, options.field)
-        if options.animate:
-            return animate(folder, options.field, look)
         return plot(folder, options.field, formats, look, options.step)
 
     with signals_held():  # no figure is left half written
@@ -106,24 +98,3 @@ def direction(text: str) -> tuple[float, float, float]:
             "figure-option",
         )
     return x, y, z
-
-
-def limits_of(option: str, text: str | None) -> tuple[float, float] | None:
-    """Return the ends of an axis that are given as "0.5,1.5".
-
-    Raises
-    ------
-    InputError
-        If they are not two numbers, the smaller one first.
-    """
-    if text is None:
-        return None
-    try:
-        low, high = map(float, text.split(","))
-    except ValueError:
-        low = high = 0.0
-    if not low < high < math.inf:
-        raise InputError(
-            f"--{option} {text}; accepted: the ends of the axis, such as 0.5,1.5", "figure-option"
-        )
-    return low, high

@@ -148,16 +148,12 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
     body = run.body.warp_by_vector("displacement", factor=scale)
     (body.cell_data if in_cells else body.point_data)["values"] = values
     skin = body.extract_surface(nonlinear_subdivision=1)  # triangles; at degree 2 four of each
-    whole = np.array([skin.points.min(axis=0), skin.points.max(axis=0)])[:, : len(run.axes)]
-    box = whole.copy() if near is None else np.clip(near, *whole)
-    sides = look.sides(run.axes)
-    if run.plane:
-        if len(sides) > 1:
-            whole[0, 0], box[0, 0] = -whole[1, 0], -box[1, 0]
-        for k, (low, high) in enumerate(whole.T):
-            box[:, k] = look.ends(k, low, high, "the body") or box[:, k]
-    if run.plane and (np.any(box[0] > whole[0]) or np.any(box[1] < whole[1])):
-        values = _inside(skin, box, sides, values)
+    box = np.array([skin.points.min(axis=0), skin.points.max(axis=0)])[:, : len(run.axes)]
+    if near is not None:
+        box = np.clip(near, *box)
+        places = (skin.cell_centers() if in_cells else skin).points[:, :2]
+        seen = np.asarray(skin["values"])[np.all((places >= box[0]) & (places <= box[1]), axis=1)]
+        values = seen if seen.size else values
     label = named(field, run.units)[1]
     if field != REGION:
         return Picture(run, body, skin, *colour_range(values, label), scale, box, look, near)
@@ -169,21 +165,6 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
     return Picture(run, body, skin, classes, label, scale, box, look, near, names)
 
 
-def _inside(skin: Any, box: Array, sides: Sequence[int], values: Array) -> Array:
-    """Return the values of a surface, or of its mirror image, in a box; else those given."""
-    found = []
-    for side in sides:
-        part, ends = skin, box.copy()
-        ends[:, 0] = np.sort(side * box[:, 0])
-        for above, k in np.ndindex(ends.shape):
-            if part.n_cells:
-                place = np.eye(3)[k] * ends[above, k]
-                part = part.clip("xyz"[k], origin=place, invert=above == 1)
-        found.append(np.asarray(part["values"]) if part.n_cells else np.empty(0))
-    every = np.concatenate(found)
-    return every if every.size else values
-
-
 def body_figure(picture: Picture) -> Figure | None:
     """Draw a deformed body; None in 3-D without a display."""
     return draw_plane(picture) if picture.run.plane else draw_space(picture)
@@ -191,12 +172,7 @@ def body_figure(picture: Picture) -> Figure | None:
 
 def draw_plane(picture: Picture) -> Figure:
     """Draw a plane body over its outline in the reference configuration, and the foundation."""
-    run, box, head, look = picture.run, picture.box, picture.title, picture.look
-    places = np.asarray(picture.skin.points)[:, :2]
-    sides = look.sides(run.axes)
-    free = [look.xlim is None, look.ylim is None]
-    whole = np.ptp(places, axis=0) * [len(sides), 1]
-    cut = bool(np.any(np.ptp(box, axis=0)[free] < 0.99 * whole[free]))
+    run, box, head = picture.run, np.array(picture.box), picture.title
     width, height = box[1] - box[0]
     tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
     more = 0.02 * float(matplotlib.rcParams["font.size"]) * head.count("\n")
@@ -208,23 +184,22 @@ def draw_plane(picture: Picture) -> Figure:
         feature_edges=False, manifold_edges=False, non_manifold_edges=False
     )
     outline = edges.points[edges.lines.reshape(-1, 3)[:, 1:], :2]
-    scale, near = picture.scale, picture.near
-    found = [each for side in sides for each in profiles(run, scale, places, side, near)]
-    for side in sides:
-        _colour(ax, picture, side)
-        # Dashes would be those of an edge each: none where edges are short.
-        ax.add_collection(LineCollection(list(outline * [side, 1]), colors="black", lw=0.5))
+    places = np.asarray(picture.skin.points)[:, :2]
+    _colour(ax, picture)
+    # Dashes would be those of an edge each: none where edges are short.
+    ax.add_collection(LineCollection(list(outline), colors="black", lw=0.5))
+    found = profiles(run, picture.scale, places, picture.near)
     for profile in found:
         profile.draw(ax, HATCHED * float(np.ptp(box, axis=0).max()))
     _bar(figure, picture)
     ax.set_aspect("equal")
-    shown = np.array(box)
-    if not cut:
-        every = np.concatenate([outline.reshape(-1, 2) * [side, 1] for side in sides])
-        shown = np.array([np.minimum(box[0], every.min(0)), np.maximum(box[1], every.max(0))])
-    shown = reduce(lambda part, profile: profile.reach(part), found, shown)
-    shown += 0.0 if cut else 0.02 * np.ptp(shown, axis=0) * [[-1], [1]]
-    ax.set(xlim=look.xlim or tuple(shown[:, 0]), ylim=look.ylim or tuple(shown[:, 1]))
+    if picture.near is None:
+        every = np.concatenate([box, outline.reshape(-1, 2)])
+        box = np.array([every.min(axis=0), every.max(axis=0)])
+    box = reduce(lambda part, profile: profile.reach(part), found, box)
+    if picture.near is None:
+        box += 0.02 * np.ptp(box, axis=0) * [[-1], [1]]
+    ax.set(xlim=tuple(box[:, 0]), ylim=tuple(box[:, 1]))
     ax.set_xlabel(run.units.label(f"${run.axes[0]}$", "length"))
     ax.set_ylabel(run.units.label(f"${run.axes[1]}$", "length"))
     ax.set_title(head, fontsize="medium")
@@ -250,10 +225,10 @@ def _bar(figure: Figure, picture: Picture) -> None:
     text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the bar
 
 
-def _colour(ax: Axes, picture: Picture, side: int) -> None:
-    """Draw the coloured body, or its mirror image where the side is -1."""
+def _colour(ax: Axes, picture: Picture) -> None:
+    """Draw the coloured body."""
     skin = picture.skin.triangulate()
-    mesh = Triangulation(*(skin.points[:, :2] * [side, 1]).T, skin.regular_faces)
+    mesh = Triangulation(*skin.points[:, :2].T, skin.regular_faces)
     values, norm, colours = skin["values"], picture.norm, picture.colours
     if "values" in skin.cell_data:
         ax.tripcolor(mesh, facecolors=values, norm=norm, cmap=colours, rasterized=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from contact.errors import InputError
 from contact.plot.run import Run
 from contact.plot.style import (
     BLUE,
@@ -22,7 +20,6 @@ from contact.plot.style import (
     NARROW,
     ORANGE,
     ZONES,
-    Look,
     page_width,
     sheet,
 )
@@ -72,55 +69,18 @@ def along(table: Table, run: Run) -> str:
     return run.units.label(f"${name}$ along $\\Gamma_3${begin}", "length")
 
 
-def shown(
-    tables: Sequence[Table], run: Run, look: Look, touching: Sequence[NDArray[np.bool_]]
-) -> list[tuple[float, float] | None]:
-    """Return the ends of the axes along Gamma_3 of some contacts; None for one beside `look`.
-
-    They are the coordinates that are asked for, of an arc length that of the nodes within; else
-    they show all, or the vicinity of a small contact zone, by which nodes are `touching`.
-    """
-    given = {"xlim": look.xlim, "ylim": look.ylim}
-    asked = {k: ends for k, ends in enumerate(given.values()) if ends is not None}
-    if 0 in asked and len(look.sides(run.axes)) > 1:
-        # Its radii, of both halves.
-        low, high = asked[0]
-        asked[0] = max(low, -high, 0.0), min(max(high, -low), run.body.bounds[1])
-    found: list[tuple[float, float] | None] = []
-    for table, there in zip(tables, touching, strict=True):
-        where, name, whole = position(table, run)
-        spans = [np.ptp(table[key]) for key in "xy"]
-        straight = [k for k in (0, 1) if run.axes[k] == name and spans[1 - k] <= 1e-9 * spans[k]]
-        chosen = {k: asked[k] for k in straight or (0, 1) if k in asked}
-        inside = np.ones(len(where), dtype=bool)
-        for k, (low, high) in chosen.items():
-            inside &= (table["xy"[k]] >= low) & (table["xy"[k]] <= high)
-        if not chosen:
-            (low,), (high,) = window(where[:, None], there, 0.0)
-            cut = low > where.min() or high < where.max()
-            found.append(tuple(np.clip([low, high], *whole)) if cut else whole)
-        elif straight:
-            low, high = chosen[straight[0]]
-            found.append((low, high) if low < whole[1] and whole[0] < high else None)
-        elif inside.any():
-            room = table["weight"][inside].max() / 2
-            low, high = where[inside].min() - room, where[inside].max() + room
-            found.append(tuple(np.clip([low, high], *whole)))
-        else:
-            found.append(None)
-    if all(each is None for each in found):
-        words = " ".join(f"--{k} {ends[0]:g},{ends[1]:g}" for k, ends in given.items() if ends)
-        lies = " and ".join(
-            f"{run.axes[k]} from {min(t['xy'[k]].min() for t in tables):.4g} to "
-            f"{max(t['xy'[k]].max() for t in tables):.4g}"
-            for k in asked
-        )
-        raise InputError(
-            f"{words}: beside the contact part, which has {lies}; accepted: coordinates of the "
-            "mesh that show some of it, or --field for the body alone",
-            "figure-option",
-        )
-    return found
+def shown(table: Table, run: Run, touching: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the ends of the axis along Gamma_3: all, or the vicinity of a small contact zone."""
+    where, _, whole = position(table, run)
+    zone = float(np.ptp(where[touching])) if touching.any() else np.inf
+    extent = float(np.ptp(where))
+    if zone >= SMALL * extent:
+        return whole
+    # A zone of a node or two is seen beside its neighbours.
+    apart = float(np.abs(np.gradient(where))[touching].max())
+    room = max(0.4 * zone, 0.02 * extent, BESIDE * apart)
+    low, high = where[touching].min() - room, where[touching].max() + room
+    return max(low, whole[0]), min(high, whole[1])
 
 
 def ends(table: Table, held: Array) -> Array:
@@ -170,34 +130,16 @@ def patches(frictional: bool) -> list[Patch]:
     return [Patch(color=ZONES[zone][0], label=label) for zone, label in words.items()]
 
 
-def window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[Array, Array]:
-    """Return the corners of the part that is shown: all, or a small contact zone's vicinity.
-
-    About all there is a margin, in shares of the extent.
-    """
-    extent = float(np.ptp(places, axis=0).max())
-    zone = float(np.ptp(places[touching], axis=0).max()) if touching.any() else extent
-    room = margin * extent
-    if zone < SMALL * extent:
-        # A zone of a node or two is seen beside its neighbours.
-        apart = KDTree(np.unique(places, axis=0)).query(places[touching], k=2)[0][:, 1].max()
-        places, room = places[touching], max(0.4 * zone, 0.02 * extent, BESIDE * apart)
-    return places.min(axis=0) - room, places.max(axis=0) + room
-
-
-def draw_line(run: Run, look: Look) -> Figure:
+def draw_line(run: Run) -> Figure:
     """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane."""
-    touching = [part["status"] != "open" for part in run.contacts]
-    ends_of = shown(run.contacts, run, look, touching)
-    pairs = [(p, e) for p, e in zip(run.contacts, ends_of, strict=True) if e is not None]
-    parts = [part for part, _ in pairs]
+    parts = run.contacts
     frictional = bool(np.any(run.table["bound"] > 0))
     narrow = page_width() <= NARROW
     figure = sheet((0.8 if frictional else 0.48) * (1.5 if narrow else 1.0))
     size = (2 if frictional else 1, len(parts))
     grid = figure.subplots(*size, sharex="col", sharey="row", squeeze=False)
-    for rows, (part, limits) in zip(grid.T, pairs, strict=True):
-        _draw_rows(rows, part, run, limits)
+    for rows, part in zip(grid.T, parts, strict=True):
+        _draw_rows(rows, part, run, shown(part, run, part["status"] != "open"))
     for ax in grid[:, 1:].ravel():
         ax.set_ylabel("")
     for ax, part in zip(grid[0] if len(parts) > 1 else [], parts, strict=False):

@@ -1,28 +1,22 @@
-"""All figures of a run, and animations, from the files that it has left."""
+"""All figures of a run, from the files that it has left."""
 
 from __future__ import annotations
 
 import base64
-import io
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import matplotlib
-import numpy as np
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpi4py import MPI
-from PIL import Image
 
 from contact.errors import InputError
 from contact.io.folder import added, result_folder
 from contact.plot.body import body_figure, picture
 from contact.plot.contact import draw_line
-from contact.plot.foundation import magnification
-from contact.plot.run import Run, read_run, read_step, read_steps
+from contact.plot.run import Run, read_run, read_step
 from contact.plot.series import steps_figures
 from contact.plot.space import Scene, contact_figure
 from contact.plot.style import DEFORMED, PAGE, STYLE, Look, fitted, image, named
@@ -30,15 +24,6 @@ from contact.ranks import refused
 
 #: Endings of files that figures may have.
 FORMATS = ("png", "pdf", "svg")
-
-#: Dots per inch of an animation: a file that a page can show.
-DPI = 90
-
-#: Least red, green and blue of paper, in animations.
-PAPER = 246
-
-#: Milliseconds of the whole animation, and of a frame at least and at most.
-LENGTH, SHORTEST, LONGEST = 6000, 40, 500
 
 
 class Gallery(dict[str, Figure]):
@@ -63,13 +48,13 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
     found = Gallery()
     with matplotlib.rc_context(look.style):
         if not fields:
-            contact = draw_line(run, look) if run.plane else contact_figure(run, look)
+            contact = draw_line(run) if run.plane else contact_figure(run, look)
             if contact is not None:
                 found["contact"] = contact
                 if run.title:
                     contact.suptitle(fitted(run.title), fontsize="large")
             if run.steps is not None:
-                found |= steps_figures(run, look)
+                found |= steps_figures(run)
         for field in fields or [field for field in DEFORMED if field in run.body.point_data]:
             figure = body_figure(picture(run, field, look=look))
             if figure is not None:
@@ -139,19 +124,6 @@ def export(folder: Path, fields: Sequence[str] = ()) -> list[Path]:
     return _added(folder, draw)
 
 
-def animate(folder: Path, fields: Sequence[str] = (), look: Look = PAGE) -> list[Path]:
-    """Draw ``animation-FIELD.gif`` from the files of an evolution; return the files. On one rank.
-
-    Scale, colours and axes are the same in all frames.
-    """
-
-    def draw(new: Path) -> list[Path]:
-        steps = read_steps(folder)
-        return [_animation(steps, field, new, look) for field in fields or ("von_mises",)]
-
-    return _added(folder, draw)
-
-
 def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
     """Let files be drawn, and add them to the results in a folder."""
     if not (folder / "summary.json").is_file():
@@ -165,43 +137,3 @@ def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
         except OSError as error:
             raise refused(error) from None
     return [folder / path.name for path in files]
-
-
-def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
-    runs = [run for _, run in steps]
-    scale = magnification(*runs)
-    pictures = [picture(run, field, scale, look) for run in runs]
-    # Colours of all frames.
-    ends = np.array([(made.norm.vmin, made.norm.vmax) for made in pictures])
-    alike = {
-        "norm": Normalize(ends[:, 0].min(), ends[:, 1].max()),
-        "label": named(field, runs[0].units)[1],
-    }
-    boxes = np.array([made.box for made in pictures])
-    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
-    with matplotlib.rc_context(look.style):
-        found = [body_figure(replace(made, box=box, **alike)) for made in pictures]
-        figures = [figure for figure in found if figure is not None]
-        if not figures:
-            raise InputError(
-                "--animate: pyvista cannot draw here; accepted: a display, or Xvfb",
-                "figure-of-steps",
-            )
-        if runs[0].plane:
-            axes = [figure.axes[0] for figure in figures]
-            shown = np.array([(ax.get_xlim(), ax.get_ylim()) for ax in axes])
-            low, high = shown[..., 0].min(axis=0), shown[..., 1].max(axis=0)
-            for ax in axes:
-                ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        files = [io.BytesIO(image(figure, "png", DPI)) for figure in figures]
-    images = [Image.open(file).convert("RGB") for file in files]
-    # One for all, so that nothing flickers; the bar has it. Paper is white, and not nearly so.
-    palette = images[-1].quantize(256, Image.Quantize.MAXCOVERAGE)
-    entries = np.array(palette.getpalette(), dtype=np.uint8).reshape(-1, 3)
-    entries[entries.min(axis=1) >= PAPER] = 255
-    palette.putpalette(entries.tobytes())
-    first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in images)
-    path = folder / f"animation-{named(field, runs[0].units)[0]}.gif"
-    duration = int(np.clip(LENGTH / len(steps), SHORTEST, LONGEST))
-    first.save(path, save_all=True, append_images=rest, duration=duration, loop=0)
-    return path

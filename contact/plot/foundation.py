@@ -86,20 +86,19 @@ def scalings(run: Run, table: Table, box: Array | None) -> list[Scaling]:
     return [Scaling.of(approach, distance, more, diameter, seen) for more in found]
 
 
-def magnification(*runs: Run, box: Array | None = None) -> float:
+def magnification(run: Run, box: Array | None = None) -> float:
     """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of a diameter.
 
     Displacements that are visible anyway are drawn as they are. Bodies do not overlap each other or
     their foundation, whose gap a displacement would close many times over. Box as in `scalings`.
     """
-    diameter = runs[0].diameter if box is None else float(np.ptp(box, axis=0).max())
-    largest = max(float(np.linalg.norm(run.displacement, axis=1).max()) for run in runs)
+    diameter = run.diameter if box is None else float(np.ptp(box, axis=0).max())
+    largest = float(np.linalg.norm(run.displacement, axis=1).max())
     if not 0 < largest < 0.02 * diameter:
         return 1.0
     wanted = 0.05 * diameter / largest
-    for run in runs:
-        for table in run.contacts:
-            wanted = min(wanted, max(each.largest for each in scalings(run, table, box)))
+    for table in run.contacts:
+        wanted = min(wanted, max(each.largest for each in scalings(run, table, box)))
     if wanted < 1:
         return 1.0
     power = 10.0 ** np.floor(np.log10(wanted))
@@ -146,11 +145,11 @@ class Profile:
         ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)
 
 
-def profiles(run: Run, scale: float, places: Array, side: int, box: Array | None) -> list[Profile]:
+def profiles(run: Run, scale: float, places: Array, box: Array | None) -> list[Profile]:
     """Return the foundations of a run in 2-D, as far as they face the body.
 
     Not one that is farther from the deformed body, given by its points, than that is thick: that
-    would be a dot then. The side is -1 for mirror images, else 1.
+    would be a dot then.
     """
     found = []
     for table in run.contacts:
@@ -169,8 +168,7 @@ def profiles(run: Run, scale: float, places: Array, side: int, box: Array | None
         first, last = ends(table, run.held)
         points = np.concatenate([first[None], points, last[None]])
         normal, drawn, gap = (np.concatenate([v[:1], v, v[-1:]]) for v in (normal, drawn, gap))
-        mirror = np.array([side, 1])
-        found.append(Profile((points + drawn[:, None] * normal) * mirror, normal * mirror, gap))
+        found.append(Profile(points + drawn[:, None] * normal, normal, gap))
     return found
 
 

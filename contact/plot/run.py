@@ -25,9 +25,6 @@ from contact.results.options import Units
 from contact.results.quantities import OPPOSITE
 from contact.typing import Array
 
-#: Most frames of an animation.
-MOST = 100
-
 _SET = re.compile(r'timestep="([^"]+)" file="([\w-]+\.vtu)"')
 
 
@@ -152,13 +149,6 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             steps=_columns(folder / "steps.csv") if "steps.csv" in files else None,
             tables=_tables(folder / "contact-steps.csv") if "steps.csv" in files else (),
         )
-
-
-def read_steps(folder: Path) -> list[tuple[float, Run]]:
-    """Read an evolution: at most `MOST` of its times and results then, the last one always."""
-    run, frames = _frames(folder)
-    chosen = frames[:: -int(np.ceil(len(frames) / MOST))][::-1]
-    return [(frame[0], _at(run, folder, *frame)) for frame in chosen]
 
 
 def read_step(folder: Path, number: int) -> Run:

@@ -51,7 +51,7 @@ COLOURS = BLUE, ORANGE, GREEN, SKY, GREY
 MOVES = 1e-3
 
 
-def steps_figures(run: Run, look: Look) -> dict[str, Figure]:
+def steps_figures(run: Run) -> dict[str, Figure]:
     """Return the figures of an evolution by name.
 
     The loop is drawn where a part is driven, and zones in 2-D.
@@ -62,7 +62,7 @@ def steps_figures(run: Run, look: Look) -> dict[str, Figure]:
     if moves is not None:
         found["loop"] = draw_loop(run, moves)
     if run.plane and len(run.tables) > 1 and "on" not in run.tables[0]:
-        found["zones"] = draw_zones(run, look)
+        found["zones"] = draw_zones(run)
     for figure in found.values():
         figure.suptitle(fitted(run.title), fontsize="large")
     return found
@@ -140,15 +140,14 @@ def draw_energies(run: Run) -> Figure:
     return figure
 
 
-def draw_zones(run: Run, look: Look) -> Figure:
+def draw_zones(run: Run) -> Figure:
     """Draw the status of each node at the end of each step, over its position and the time."""
     where, _, whole = position(run.tables[0], run)
     status = np.array([table["status"] for table in run.tables])
     figure = sheet(0.7)
     ax = figure.subplots()
     zones(ax, where, whole, status, _course(run, "t"))
-    (ends,) = shown([run.tables[0]], run, look, [(status != "open").any(axis=0)])
-    ax.set_xlim(ends)
+    ax.set_xlim(shown(run.tables[0], run, (status != "open").any(axis=0)))
     frictional = any(np.any(table["bound"] > 0) for table in run.tables)
     ax.legend(handles=patches(frictional), ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     ax.set_xlabel(along(run.tables[0], run))

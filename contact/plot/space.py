@@ -365,7 +365,7 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
     scene, table = Scene.of(run), run.table
     zone, norm, shades = scene.zone, scene.norm, scene.shades
     sides = [(run.surface, side) for side in zone.sides]
-    cameras = [close_camera(run, zone, look, side) for side in zone.sides]
+    cameras = [close_camera(run, zone, side) for side in zone.sides]
     touching = bool(np.any(table["status"] != "open"))
     box = np.reshape(scene.body.bounds, (3, 2)).T
     frictional, narrow = bool(np.any(table["bound"] > 0)), page_width() < NARROW
@@ -428,13 +428,9 @@ def _legend(run: Run, frictional: bool) -> list[Patch]:
     return found
 
 
-def close_camera(run: Run, zone: Zone, look: Look, side: int) -> Camera:
+def close_camera(run: Run, zone: Zone, side: int) -> Camera:
     """Return the camera of a close-up: in coordinate planes the first axis runs to the right."""
     places = np.asarray(run.surface.points, dtype=float)
-    asked = [(k, e) for k, e in enumerate((look.xlim, look.ylim)) if e is not None]
-    for k, _ in asked:
-        asked_ends = look.ends(k, places[:, k].min(), places[:, k].max(), "the contact part")
-        assert asked_ends is not None
     if abs(zone.normal).max() == 1:
         right, up = np.delete(np.eye(3), np.argmax(abs(zone.normal)), axis=0)
     else:
@@ -449,15 +445,6 @@ def close_camera(run: Run, zone: Zone, look: Look, side: int) -> Camera:
     room = ROOM * size
     low = np.maximum(camera.low - room, flat.min(axis=0) - 0.03 * extent)
     high = np.minimum(camera.high + room, flat.max(axis=0) + 0.03 * extent)
-    if asked:
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        for k, ends in asked:
-            for i, axis in enumerate((right, up)):
-                if abs(axis[k]) == 1:
-                    low[i], high[i] = np.clip(ends, low[i], high[i])
-        span, middle = high - low, (low + high) / 2
-        span = np.minimum(span, 3 * span.min())
-        low, high = middle - span / 2, middle + span / 2
     return Camera(right, up, low, high, camera.depth)
 
 

@@ -14,7 +14,6 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
-from contact.errors import InputError
 from contact.model.units import force_of
 from contact.results.options import Units
 from contact.results.quantities import BODY, quantities
@@ -69,18 +68,11 @@ class Look:
     ----------
     width
         Of the figures (inches); None for that of a page.
-    mirror
-        Whether both halves of a body of revolution are drawn.
-    xlim, ylim
-        Ends of the coordinates x (r) and y (z) of the mesh; None for those that suit the figure.
     view
         Direction from a body in 3-D to the eye; None for one that sees the contact.
     """
 
     width: float | None = None
-    mirror: bool = False
-    xlim: tuple[float, float] | None = None
-    ylim: tuple[float, float] | None = None
     view: tuple[float, float, float] | None = None
 
     @property
@@ -92,26 +84,6 @@ class Look:
         small = {"font.size": 7, "legend.fontsize": 6, "axes.formatter.limits": (-2, 4)}
         small = small if self.width < NARROW else {}
         return STYLE | {"figure.figsize": (self.width, self.width)} | small
-
-    def sides(self, axes: str) -> tuple[int, ...]:
-        """Return the signs of the first coordinate that are drawn of a body with some axes."""
-        return (-1, 1) if self.mirror and axes == "rz" else (1,)
-
-    def ends(self, axis: int, low: float, high: float, shown: str) -> tuple[float, float] | None:
-        """Return the ends that are asked for of the x or y axis (0 or 1); None for any.
-
-        They are refused beside that which is drawn, which has a name and is between low and high.
-        """
-        given = (self.xlim, self.ylim)[axis]
-        if given is not None and not (given[0] < high and low < given[1]):
-            least = 1e-9 * (high - low)  # less is rounding
-            low, high = (0.0 if abs(end) < least else end for end in (low, high))
-            raise InputError(
-                f"--{'xy'[axis]}lim {given[0]:g},{given[1]:g}: beside {shown}, which is drawn from "
-                f"{low:.4g} to {high:.4g}; accepted: ends that show some of it",
-                "figure-option",
-            )
-        return given
 
 
 #: Figures as wide as a page, with axes that suit them.

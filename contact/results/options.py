@@ -59,11 +59,8 @@ class OutputOptions:
         Steps of an evolution from one whose fields are written to the next.
     checkpoint
         `true`: write a checkpoint from which a computation can go on.
-    mirror
-        `true`: figures show both halves of a body of revolution.
     """
 
     fields: Literal["vtu", "vtx", "xdmf", "none"] = "vtu"
     every: Count = 1
     checkpoint: Switch = False
-    mirror: Switch = False

@@ -269,7 +269,7 @@ class Solution(Solved):
         from contact.plot.figures import Look, figures_of  # which take a while to load
 
         run = self.written()
-        return None if run is None else figures_of(run, fields, Look(width, self.output.mirror))
+        return None if run is None else figures_of(run, fields, Look(width))
 
     def view(self, field: str | None = None) -> Any:
         """Show a body in 3-D in a window or a notebook, on rank 0. Collective.

@@ -206,8 +206,8 @@ def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
     assert main(["plot", out, "--field", "contact_are"]) == 2
     told = "no such column of sweep.csv (did you mean contact_area?); accepted: converged"
     assert told in capsys.readouterr().err
-    assert main(["plot", out, "--xlim", "-0.5,1"]) == 2
-    assert "--xlim: the figure of a sweep shows no places" in capsys.readouterr().err
+    assert main(["plot", out, "--view", "0,0,1"]) == 2
+    assert "--view: the figure of a sweep shows no places" in capsys.readouterr().err
     (tmp_path / "out" / "sweep.csv").write_text("nothing")
     assert main(["plot", out]) == 2
     assert "damaged" in capsys.readouterr().err

@@ -56,7 +56,7 @@ def test_foundations_are_no_spikes_and_bodies_touch_them(name: str, tmp_path: Pa
     run = pressed({"foundation": shape})
     made = picture(run, "von_mises")
     assert made.scale > 1 and np.ptp(run.points[run.table["status"] != "open", 0]) >= 0
-    (profile,) = profiles(run, made.scale, made.skin.points[:, :2], 1, made.near)
+    (profile,) = profiles(run, made.scale, made.skin.points[:, :2], made.near)
     size = run.diameter if made.near is None else np.ptp(made.near, axis=0).max()
     seen = np.ones(len(run.points), dtype=bool)
     if made.near is not None:
@@ -87,7 +87,7 @@ def test_a_moving_foundation_is_drawn_where_the_body_meets_it() -> None:
         by=0.0,
     )
     made = picture(run, "von_mises")
-    (profile,) = profiles(run, made.scale, made.skin.points[:, :2], 1, made.near)
+    (profile,) = profiles(run, made.scale, made.skin.points[:, :2], made.near)
     touching = run.table["status"] != "open"
     assert abs(profile.gap[1:-1][touching]).max() <= UNSEEN * run.diameter
     # Round about the place of the ball, a little larger so that it is in the magnified dent; gaps
