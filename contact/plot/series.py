@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import csv
-import itertools
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import cycle
 from pathlib import Path
@@ -16,6 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from contact.errors import InputError, nearest
 from contact.io.folder import write_whole
@@ -49,6 +49,14 @@ COLOURS = BLUE, ORANGE, GREEN, SKY, GREY
 
 #: Share of the largest motion from which on a part moves along an axis.
 MOVES = 1e-3
+
+#: Columns of a sweep that are drawn by default, as far as they vary.
+DRAWN = (
+    *(f"contact_force_{axis}" for axis in "xyz"),
+    *("max_pressure", "contact_area", "max_displacement", "max_von_mises", "dissipation"),
+)
+#: Variation over the size of a vector, or number, that is rounding and the tolerance of solves.
+ROUNDING = 1e-6
 
 
 def steps_figures(run: Run) -> dict[str, Figure]:
@@ -155,106 +163,27 @@ def draw_zones(run: Run) -> Figure:
     return figure
 
 
-#: Columns that are drawn by default, as far as they vary.
-DRAWN = (
-    *(f"contact_force_{axis}" for axis in "xyz"),
-    *("max_pressure", "contact_area", "max_displacement", "max_von_mises", "dissipation"),
-)
-#: Variation over the size of a vector, or number, that is rounding and the tolerance of solves.
-ROUNDING = 1e-6
-#: Quantities that keys of the case file give, as far as they have a unit, and symbols of others.
-KEYS = {
-    **dict.fromkeys(("displacement", "normal", "gap", "shortening", "layer"), "length"),
-    **dict.fromkeys(("traction", "pressure", "young", "yield_stress"), "stress"),
-    **{"force": "force", "potential": "potential", "phi_f": "potential", "charge": "charge"},
-}
-SYMBOLS = {"mu": r"$\mu$"}
-#: Lines, by turns.
-LINES = [*itertools.product(("-", "--", ":"), (BLUE, ORANGE, GREEN, SKY, GREY))]
-
-
-def plot_sweep(
-    folder: Path, columns: Sequence[str], formats: Sequence[str], look: Look
-) -> list[Path]:
-    """Draw ``figure-sweep``, or ``figure-sweep-COLUMN``, from the tables of a sweep; return files.
-
-    Each column has a figure, with a panel for each component, or entry of a table; by default one
-    has those of `DRAWN`, and those asked for with ``--columns``, as far as they vary. On one rank.
-    """
-    swept = _read(folder)
-    figures = {f"-{name.replace('/', '-')}": swept.chosen(name) for name in columns}
-    figures = figures or {"": swept.default}
-    if not all(figures.values()):
-        raise InputError(
-            f"{folder}: no result of the sweep varies; accepted: --field COLUMN", "sweep-column"
-        )
-    files = []
-    with matplotlib.rc_context(look.style):
-        for ending, chosen in figures.items():
-            figure = _figure(swept, chosen)
-            for kind in formats:
-                files.append(folder / f"figure-sweep{ending}.{kind}")
-                try:
-                    drawn = image(figure, kind)
-                    write_whole(files[-1], partial(Path.write_bytes, data=drawn))
-                except OSError as error:
-                    raise refused(error) from None
-    return files
-
-
 @dataclass(frozen=True)
 class Swept:
-    """A sweep, as its figures see it.
+    """The table of a sweep, with title and units of its case.
 
     Attributes
     ----------
-    title, units, kinematics
-        Of the case.
     keys, rows
-        The swept keys, and the rows of the table as texts.
+        The swept keys, and the rows as texts.
+    title, units, plane
+        Of the case; whether results are those of a unit of thickness.
     """
 
-    title: str
-    units: Units
-    kinematics: str
     keys: list[str]
     rows: list[dict[str, str]]
-
-    @property
-    def columns(self) -> list[str]:
-        """The columns of results."""
-        return [name for name in self.rows[0] if name not in self.keys]
-
-    @property
-    def plane(self) -> bool:
-        """Whether the body is plane."""
-        return self.kinematics != "axisymmetric" and "contact_force_z" not in self.columns
-
-    def varies(self, name: str) -> bool:
-        """Tell whether a column is there and varies, by more than rounding of its vector."""
-        base = _parts(name)[0]
-        whole = [column for column in self.columns if _parts(column)[0] == base]
-        if name not in self.columns:
-            return False
-        size = max(np.abs(self.values(column)).max() for column in whole)
-        return bool(np.ptp(self.values(name)) > ROUNDING * size)
-
-    @property
-    def default(self) -> list[str]:
-        """The columns that are drawn by default: results that vary, and those asked for."""
-        summary = {quantity.name for quantity in quantities(SUMMARY)}
-        always = {quantity.name.removesuffix("_AXIS") for quantity in quantities(SWEEP)}
-
-        def asked(name: str) -> bool:
-            base = _parts(name)[0]
-            return base.partition(".")[0] in summary and ("." in base or base not in always)
-
-        names = [*DRAWN, *filter(asked, self.columns)]
-        return [name for name in names if self.varies(name)]
+    title: str = ""
+    units: Units = field(default_factory=Units)
+    plane: bool = False
 
     def chosen(self, key: str) -> list[str]:
         """Return the columns of a key: those that vary, if any does."""
-        known = [name for name in self.columns if name != "input"]
+        known = [name for name in self.rows[0] if name not in (*self.keys, "input")]
         found = [name for name in known if is_of(name, key)]
         if not found:
             raise InputError(
@@ -263,6 +192,25 @@ class Swept:
                 "sweep-column",
             )
         return [name for name in found if len(found) > 1 and self.varies(name)] or found
+
+    @property
+    def default(self) -> list[str]:
+        """The columns that are drawn by default: results that vary, and those asked for."""
+        always = {quantity.name.removesuffix("_AXIS") for quantity in quantities(SWEEP)}
+        summary = {quantity.name for quantity in quantities(SUMMARY)}
+        names = [*DRAWN]
+        for name in self.rows[0]:
+            base = _parts(name)[0]
+            if base.split(".")[0] in summary and ("." in base or base not in always):
+                names.append(name)
+        return [name for name in names if self.varies(name)]
+
+    def varies(self, name: str) -> bool:
+        """Tell whether a column varies, by more than rounding of its vector."""
+        if name not in self.rows[0]:
+            return False
+        whole = [self.values(k) for k in self.rows[0] if _parts(k)[0] == _parts(name)[0]]
+        return bool(np.ptp(self.values(name)) > ROUNDING * np.abs(whole).max())
 
     def values(self, name: str) -> Array:
         """Return a column of numbers."""
@@ -274,26 +222,13 @@ class Swept:
             ) from None
 
     def label(self, name: str) -> str:
-        """Return a column in words, with its unit: a component by its axis."""
+        """Return a column in words, with its unit."""
         base, entry = _parts(name)
-        top = base.partition(".")[0]
-        own = {each.name.removesuffix("_AXIS"): each.unit for each in quantities(SWEEP)}
-        known = {each.name: each.unit for each in quantities(SUMMARY)}
-        words = base.replace(".", ": ").replace("_", " ").replace("von mises", "von Mises stress")
-        words = f"largest {words.removeprefix('max ')}" if base.startswith("max_") else words
-        unit = unit_of(own.get(base, known.get(top, "")), self.units, self.plane)
-        entry = f", ${entry}$" if entry in AXES else f", {entry}" if entry else ""
-        return f"{words}{entry}{unit}"
-
-    def key(self, key: str, axis: str = "") -> str:
-        """Return a swept key in words, with its unit: ``fixed.0.normal`` is fixed 0: normal."""
-        *section, last = key.split(".")
-        if last.isdigit() and int(last) < 3:
-            axis, last = "xyz"[int(last)], section.pop()
-        unit = unit_of(KEYS.get(last, ""), self.units, self.plane)
-        of = " ".join(section).replace("_", " ")
-        words = SYMBOLS.get(last, last.replace("_", " "))
-        return f"{f'{of}: ' if of else ''}{words}{f', ${axis}$' if axis else ''}{unit}"
+        units = {q.name.removesuffix("_AXIS"): q.unit for q in quantities(SWEEP)}
+        known = {q.name: q.unit for q in quantities(SUMMARY)} | units
+        unit = known.get(base, known.get(base.split(".")[0], ""))
+        words = f"{base} {entry}".rstrip().replace(".", " ").replace("_", " ")
+        return words + unit_of(unit, self.units, self.plane)
 
 
 def _parts(column: str) -> tuple[str, str]:
@@ -302,24 +237,25 @@ def _parts(column: str) -> tuple[str, str]:
     return (base, end) if end in AXES + ENDS else (column, "")
 
 
-def _read(folder: Path) -> Swept:
+def read_sweep(folder: Path) -> Swept:
     """Read the table of a sweep, and the case beside it."""
     path = folder / SWEEP
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file, strict=True))
-        keys = [*itertools.takewhile(lambda name: name != "converged", rows[0])]
-    except (OSError, ValueError, IndexError, csv.Error):
-        keys = []
-    if not keys or any(None in row.values() for row in rows):
+            header, *texts = csv.reader(file, strict=True)
+        keys = header[: header.index("converged")]
+        rows = [dict(zip(header, row, strict=True)) for row in texts]
+    except (OSError, ValueError, csv.Error):
+        keys, rows = [], []
+    if not keys or not rows:
         raise InputError(
             f"{path}: damaged, or no table of a sweep; accepted: a sweep's folder", "sweep-table"
         )
     try:
         case = tomllib.loads(path.with_suffix(".toml").read_text("utf-8"))
-        about = case.get("case", {})
-        title, units = heading(str(case.get("title", ""))), Units(**about.get("units", {}))
-        return Swept(title, units, str(case["space"]["kinematics"]), keys, rows)
+        units = Units(**case.get("case", {}).get("units", {}))
+        plane = case["space"]["kinematics"] != "axisymmetric" and "contact_force_z" not in header
+        return Swept(keys, rows, heading(str(case.get("title", ""))), units, plane)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         accepted = "the case that a sweep has left beside its table"
         raise InputError(
@@ -327,65 +263,71 @@ def _read(folder: Path) -> Swept:
         ) from None
 
 
-def _places(texts: Sequence[str]) -> tuple[Array, str] | None:
-    """Return the numbers of a key, or of the only component that varies, and its axis.
+def plot_sweep(
+    folder: Path, columns: Sequence[str], formats: Sequence[str], look: Look
+) -> list[Path]:
+    """Draw ``figure-sweep``, or ``figure-sweep-COLUMN``, from the tables of a sweep; return files.
 
-    None for texts, and vectors of which several vary.
+    By default one figure has the columns of `DRAWN`, and those asked for with ``--columns``, as far
+    as they vary. On one rank.
     """
-    try:
-        found = [tomllib.loads(f"value = {text}")["value"] for text in texts]
-        numbers = np.array(found, dtype=float)
-    except ValueError:
-        return None
-    if numbers.ndim == 2:
-        moving = np.flatnonzero(np.ptp(numbers, axis=0))
-        return (numbers[:, moving[0]], "xyz"[moving[0]]) if moving.size == 1 else None
-    return (numbers, "") if numbers.ndim == 1 and bool not in map(type, found) else None
+    swept, files = read_sweep(folder), []
+    figures = {f"-{name.replace('/', '-')}": swept.chosen(name) for name in columns}
+    figures = figures or {"": swept.default}
+    if not all(figures.values()):
+        raise InputError(
+            f"{folder}: no result of the sweep varies; accepted: --field COLUMN", "sweep-column"
+        )
+    with matplotlib.rc_context(look.style):
+        for ending, chosen in figures.items():
+            figure = sweep_figure(swept, chosen)
+            for kind in formats:
+                files.append(folder / f"figure-sweep{ending}.{kind}")
+                try:
+                    drawn = image(figure, kind)
+                    write_whole(files[-1], partial(Path.write_bytes, data=drawn))
+                except OSError as error:
+                    raise refused(error) from None
+    return files
 
 
-def _figure(swept: Swept, drawn: Sequence[str]) -> Figure:
-    """Return the figure: a panel for each column."""
+def sweep_figure(swept: Swept, drawn: Sequence[str]) -> Figure:
+    """Draw a panel for each column over the last key, a line for each value of the others."""
     *others, last = swept.keys
-    given = [tuple(row[key] for key in others) for row in swept.rows]
-    lines = list(dict.fromkeys(given))
-    across = 2 if len(drawn) > 1 else 1
+    lines: dict[str, list[int]] = {}
+    for i, row in enumerate(swept.rows):
+        lines.setdefault(", ".join(f"{key} = {row[key]}" for key in others), []).append(i)
+    places = _places([row[last] for row in swept.rows])
+    across = min(len(drawn), 2)
     down = -(-len(drawn) // across)
-    tall = 0.5 if page_width() < NARROW else 0.4
-    more = 0.1 * (len(lines) > 1) + 0.06 * bool(swept.title)
-    figure = sheet((tall if across > 1 else 0.66) * down + more)
-    panels = np.ravel(figure.subplots(down, across, squeeze=False))
-    texts = [row[last] for row in swept.rows]
-    places, axis = _places(texts) or (np.array(texts), "")
+    figure = sheet(0.45 * down * (1.5 if across == 1 else 1.0) + 0.05 * len(lines))
+    panels = figure.subplots(down, across, squeeze=False).ravel()
     for panel, name in zip(panels, drawn, strict=False):
         values = swept.values(name)
-        for line, (style, colour) in zip(lines, itertools.cycle(LINES), strict=False):
-            own = np.flatnonzero([each == line for each in given])
+        for words, own in lines.items():
+            order = np.array(own)
             if places.dtype.kind == "f":  # texts stand in their own order
-                own = own[np.argsort(places[own], kind="stable")]
-                panel.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-            pairs = zip(others, line, strict=True)
-            words = ", ".join(f"{swept.key(k)} = {_short(v)}" for k, v in pairs)
-            look: dict[str, Any] = {"linestyle": style, "color": colour, "label": words}
-            panel.plot(places[own], values[own], marker="o", markersize=3, **look)
-        panel.set_xlabel(swept.key(last, axis))
-        panel.set_ylabel(swept.label(name))
-        panel.yaxis.set_major_locator(MaxNLocator(5))
+                order = order[np.argsort(places[order], kind="stable")]
+            panel.plot(places[order], values[order], marker="o", markersize=3, label=words)
+        panel.set(xlabel=last, ylabel=swept.label(name))
+        if places.dtype.kind == "f":
+            panel.xaxis.set_major_locator(MaxNLocator(5))
         panel.grid(alpha=0.25)
-    figure.align_ylabels()
     for panel in panels[len(drawn) :]:
         panel.axis("off")
-    if len(lines) > 1:
-        handles, labels = panels[0].get_legend_handles_labels()
-        columns = 1 if page_width() < NARROW else 2
-        figure.legend(handles, labels, loc="outside lower center", ncols=columns)
-    if swept.title:
-        figure.suptitle(fitted(swept.title), fontsize="large")
+    if others:
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center")
+    figure.suptitle(fitted(swept.title), fontsize="large")
     return figure
 
 
-def _short(text: str) -> str:
-    """Return a number with six digits; anything else as it is."""
+def _places(texts: Sequence[str]) -> NDArray[Any]:
+    """Return the values of a key: numbers, the only component of a vector that varies, or texts."""
     try:
-        return f"{float(text):.6g}"
+        numbers = np.array([tomllib.loads(f"v = {text}")["v"] for text in texts], dtype=float)
     except ValueError:
-        return text
+        return np.array(texts)
+    moving = np.flatnonzero(np.ptp(numbers, axis=0)) if numbers.ndim == 2 else np.arange(0)
+    if moving.size == 1:
+        return numbers[:, moving[0]]
+    return numbers if numbers.ndim == 1 else np.array(texts)

@@ -211,3 +211,23 @@ def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
     (tmp_path / "out" / "sweep.csv").write_text("nothing")
     assert main(["plot", out]) == 2
     assert "damaged" in capsys.readouterr().err
+
+
+def test_panels_of_a_sweep(tmp_path):
+    """Columns that vary by more than rounding, over the component of a vector that varies."""
+    columns = "contact_force_x,contact_force_y,max_pressure,contact_area"
+    (tmp_path / "sweep.csv").write_text(
+        f"friction.mu,load.0.traction,converged,{columns}\n"
+        '0.1,"[0.0, -1.0]",True,1e-15,-2.0,3.0,1.0\n0.1,"[0.0, -4.0]",True,-3e-15,-8.0,9.0,1.0\n'
+    )
+    (tmp_path / "sweep.toml").write_text(
+        'title = "Bars"\n[case.units]\nlength = "mm"\nstress = "MPa"\n'
+        '[space]\nkinematics = "plane_strain"\n'
+    )
+    swept = read_sweep(tmp_path)
+    assert swept.default == ["contact_force_y", "max_pressure"]
+    force, pressure = sweep_figure(swept, swept.default).axes
+    assert (force.get_xlabel(), force.get_ylabel()) == ("load.0.traction", "contact force y (N/mm)")
+    assert pressure.get_ylabel() == "max pressure (MPa)"
+    assert list(force.lines[0].get_xdata()) == [-4.0, -1.0]
+    assert force.lines[0].get_label() == "friction.mu = 0.1"
