@@ -8,6 +8,7 @@ import pytest
 
 from contact.cli.main import main
 from contact.errors import InputError
+from contact.plot.series import read_sweep, sweep_figure
 from contact.sweeping import Axis
 from tests.cli.running import MESH
 from tests.problems.bar import BAR
