@@ -1,14 +1,11 @@
 """Adaptive refinement: rates, marks that ranks do not change, names, two bodies, evolutions."""
 
-import csv
-import json
-
 import numpy as np
 import pytest
 from dolfinx.mesh import compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 
-from contact import InputError, build_problem, load_case, parse_case, solve, write_outputs
+from contact import InputError, build_problem, load_case, parse_case, solve
 from contact.mesh.domain import from_mesh
 from contact.mesh.geometry import area, volume
 from contact.mesh.grid import box, rectangle
@@ -132,18 +129,6 @@ def test_names_are_inherited_where_some_cells_are_refined(dim):
         assert volume(fine, name) == pytest.approx(1.0, rel=1e-13)
 
 
-def test_the_files_have_the_history(tmp_path):
-    solution = bar(max_unknowns=300)
-    write_outputs(solution, tmp_path)
-    rows = list(csv.DictReader((tmp_path / "adapt.csv").open()))
-    assert [int(row["unknowns"]) for row in rows] == [r["unknowns"] for r in solution.adaptation]
-    assert len(rows) > 1 and int(rows[-1]["unknowns"]) <= 300
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    assert float(rows[-1]["error"]) == pytest.approx(summary["error"]["energy"])
-    assert float(rows[-1]["contact_force_y"]) == pytest.approx(summary["contact_force"][1])
-    assert "[mesh.adapt]" in summary["case"]
-
-
 def test_intervals_hold_the_values_of_a_much_finer_mesh():
     """The pressure at the clamped corner is infinite, and has none."""
     solution = bar(max_unknowns=3000, fraction=1)
@@ -237,15 +222,6 @@ def test_the_pressure_of_an_adapted_cylinder_is_that_of_curved_cells():
     # On curved cells of size 0.025.
     assert adapted["contact_force_y"] == pytest.approx(-23.092, rel=2e-3)
     assert adapted["max_pressure"] == pytest.approx(63.59, rel=5e-3)
-
-
-def test_an_error_that_is_not_reached_is_told():
-    solution = bar(error=1e-6, max_unknowns=600)
-    (said,) = [text for text in solution.warnings if text.endswith("[adapt]")]
-    assert "mesh.adapt.error = 1e-06: the next mesh would have more unknowns" in said
-    unknowns = np.array([row["unknowns"] for row in solution.adaptation])
-    assert np.all(unknowns[1:] > 1.4 * unknowns[:-1])
-    assert not [text for text in bar(error=0.05).warnings if text.endswith("[adapt]")]
 
 
 def test_a_first_mesh_that_sees_nothing_does_not_reach_the_goal():

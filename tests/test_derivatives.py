@@ -35,7 +35,6 @@ from contact.case.file import number_at, with_number
 from contact.derivatives.by_parameters import logger
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
-from contact.problem.linearised import Linearised
 from contact.results.quantities import named_functionals
 from scripts.studies.cattaneo import ball_values, cylinder_values, cylinders
 from scripts.studies.derivative_values import products
@@ -459,19 +458,6 @@ def test_transposed_solves(family):
     assert products(solution(FAMILIES.index(family))) < 1e-12
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("max_pressure", "friction.mu"), "field_gradient: parameter: given 'friction.mu'; accept"),
-        (("max_pressure", "material.young", 2), "field_gradient: degree: given 2; accepted: 0"),
-        ((lambda problem, state: 0.0,), "quantity: given .*; accepted: a quantity with a gradient"),
-    ],
-)
-def test_gradients_refused(arguments, message):
-    with pytest.raises(InputError, match=message):
-        field_gradient(solution(0), *arguments)
-
-
 def test_an_unsymmetric_stiffness_beside_a_free_foundation_is_refused():
     data = problem(FAMILIES.index("ball under a force"))[1]
     kinematic = [{"modulus": 0.3, "recovery": 5.0}]
@@ -479,11 +465,6 @@ def test_an_unsymmetric_stiffness_beside_a_free_foundation_is_refused():
     data["material"]["kinematic"] = kinematic
     with pytest.raises(InputError, match=r"is not symmetric, .* accepted: kinematic hardening"):
         sensitivity(solve(parse_case(data), comm=SELF), ["rigid_y"], ["friction.mu"])
-
-
-def test_a_smoothed_pressure_that_couples_too_much_is_refused():
-    with pytest.raises(InputError, match=r"friction.radius: the coupling .* accepted: a smaller"):
-        Linearised._enough([0.9**k for k in range(60)], 1.0)
 
 
 @pytest.mark.parametrize(

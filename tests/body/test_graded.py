@@ -7,12 +7,10 @@ from dolfinx.mesh import create_rectangle, locate_entities, locate_entities_boun
 from mpi4py import MPI
 
 from contact import (
-    J2,
     Body,
     Contact,
     Fixed,
     Friction,
-    InputError,
     Linear,
     Load,
     Log,
@@ -111,10 +109,3 @@ def test_a_column_whose_modulus_grows_with_the_height():
         moved = problem.equilibrium.nodal(solution.state.x)[top, 1].mean()
         errors.append(abs(moved / (-0.01 * np.log(2)) - 1))
     assert errors[0] > 3.5 * errors[1] and errors[2] < 1e-4
-
-
-def test_refused():
-    with pytest.raises(InputError, match=r"material: factor: given -0\.5.*; accepted: a function"):
-        pressed(block(), Material(Linear(1.0, 0.3), factor=lambda x: x[0] - 0.5417 + 0 * x[1]))
-    with pytest.raises(InputError, match=r"factor: given .*; accepted: a material without"):
-        Material(J2(1.0, 0.3, yield_stress=0.01), factor=2.0)

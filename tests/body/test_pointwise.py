@@ -7,8 +7,6 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.body import elements
-from contact.history import BodyState
-from contact.results.fields import DerivedFields
 from forms.hencky import Linear
 from tests.problems import mechanics
 
@@ -45,14 +43,3 @@ def test_two_readers_of_one_body_do_not_disturb_each_other(monkeypatch, body):
         assert np.array_equal(chosen, same)
         assert np.allclose(one, 1.0) and np.allclose(other, 3.0)
     assert np.array_equal(np.concatenate([row[0] for row in found]), cells)
-
-
-def test_an_expression_is_compiled_once_a_body(monkeypatch, body):
-    made = []
-    expression = fem.Expression
-    monkeypatch.setattr(fem, "Expression", lambda *given: made.append(1) or expression(*given))
-    first, second = (
-        DerivedFields(body, BodyState(stretched(body, by))).extremes()[0] for by in (1e-3, 2e-3)
-    )
-    assert len(made) == 1
-    assert second.von_mises == pytest.approx(2 * first.von_mises, rel=1e-12)

@@ -2,7 +2,6 @@
 
 import csv
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,7 @@ from mpi4py import MPI
 
 from contact.methods.options import OPTIONS, with_method
 from contact.results.contact_nodes import contact_table, tangent_of
-from contact.results.options import OutputOptions
 from contact.solving import solve
-from contact.writing import write_outputs
 from tests.problems.written import block, electric, written
 
 # Debian's adios2 would take its serial library in a run without mpirun.
@@ -76,18 +73,6 @@ def test_raw_residuals_are_written_beside_their_floors(method: str, tmp_path: Pa
     kkt, floors = summary["kkt"], summary["rounding"]
     assert 0 < kkt["equilibrium"] <= max(1e-8, floors["equilibrium"])
     assert kkt.keys() == floors.keys() and 0 < floors["equilibrium"] < 1e-8
-
-
-def test_iterations_of_the_linear_solver_are_written(tmp_path: Path) -> None:
-    """Those of MINRES where it is asked for, one each with a factorisation."""
-    counts = []
-    for kind in ("lu", "iterative"):
-        case = electric(2)
-        settings = replace(case.solver, linear=kind)
-        summary, _ = written(solve(case.model_copy(update={"solver": settings})), tmp_path / kind)
-        assert summary["converged"] is True
-        counts.append(summary["linear_iterations"] / summary["linear_solves"])
-    assert counts[0] == 1 < 5 < counts[1]
 
 
 @pytest.mark.core
@@ -160,26 +145,6 @@ def test_contact_force_balances_the_supports(shared_tmp_path: Path) -> None:
     assert summary["contact_force"][1] == pytest.approx(-0.4, rel=1e-8)
     weighted = sum(float(row["weight"]) * float(row["pressure"]) for row in rows)
     assert weighted == pytest.approx(0.4, rel=1e-8)
-
-
-def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
-    """A second run into the same folder leaves its own files alone, and what is not ours."""
-    first, second = solve(block(2)), solve(block(2, 2))
-    first.output = OutputOptions(fields="xdmf")
-    write_outputs(first, shared_tmp_path, figures=True)
-    assert len(list(shared_tmp_path.glob("figure-*.png"))) == 2
-    (shared_tmp_path / "notes.txt").write_text("mine")
-    summary, rows = written(second, shared_tmp_path)
-    assert sorted(path.name for path in shared_tmp_path.iterdir()) == [
-        "contact.csv",
-        "contact.vtu",
-        "fields.vtu",
-        "history.csv",
-        "notes.txt",
-        "summary.json",
-    ]
-    assert summary["dofs"] == 2 * (2 * 4 + 1) * (2 * 4 + 1)
-    assert len(rows) == 9
 
 
 @pytest.mark.parallel

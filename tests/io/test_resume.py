@@ -2,7 +2,6 @@
 
 import csv
 import json
-import shutil
 import signal
 from pathlib import Path
 
@@ -18,24 +17,6 @@ from tests.problem.test_plasticity import block
 from tests.results.test_steps import case_of as steps_case
 
 SELF = MPI.COMM_SELF
-MESHES = Path(__file__).parents[2] / "meshes" / "fixtures"
-
-#: A case with a mesh file.
-SQUARE = """
-[mesh]
-file = "{mesh}"
-[material]
-young = 1.0
-poisson = 0.3
-[[fixed]]
-on = "top"
-displacement = ["0", "-0.001*t"]
-[contact]
-on = "bottom"
-[evolution]
-times = [0.0, 1.0]
-steps = [3]
-"""
 
 
 class Killed(BaseException):
@@ -133,30 +114,6 @@ def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
     assert sorted(path.name for path in place.iterdir()) == [f"{k:05d}.npz" for k in range(1, 7)]
     again = read_steps(shared_tmp_path, whole.problem)
     assert [step.state.time for step in again] == [step.state.time for step in whole.steps]
-
-
-def test_all_steps_were_there(tmp_path):
-    """A run that is ended while it writes its results has nothing left to solve."""
-    whole = solve_and_keep(steps_case(), None, SELF, tmp_path)
-    again = solve_and_keep(steps_case(), None, SELF, tmp_path, tmp_path)
-    assert again.converged
-    assert again.state.near(whole.state)
-    assert again.history == []
-
-
-def test_another_mesh_file_is_not_continued(tmp_path, ended, capfd):
-    """Of the same nodes."""
-    out, case, mesh = tmp_path / "out", tmp_path / "case.toml", tmp_path / "square.msh"
-    shutil.copy(MESHES / "square.msh", mesh)
-    case.write_text(SQUARE.format(mesh=mesh))
-    heal = ended(1)
-    with pytest.raises(Killed):
-        on_the_line("solve", case, "--out", out)
-    heal()
-    mesh.write_text(mesh.read_text() + "\n")
-    assert on_the_line("solve", "--restart", out) == 2
-    words = "the file mesh.file has changed since the checkpoints were written"
-    assert words in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("data", [b"", b"no archive"])

@@ -1,6 +1,5 @@
 """Fields that other programs open: pyvista and meshio read what was solved."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -8,14 +7,13 @@ import pytest
 from mpi4py import MPI
 from pyvista import UnstructuredGrid
 
-from contact.cli.main import CONVERGED, main
 from contact.io.fields import gathered, write_grid
 from contact.mesh.cells import TRIANGLE, VTK
 from contact.plot.run import read_grid
 from contact.results.contact_nodes import Grid
 from contact.solving import solve
 from contact.writing import write_outputs
-from tests.problems.written import block, electric
+from tests.problems.written import block
 
 ROOT = MPI.COMM_WORLD.rank == 0
 
@@ -97,26 +95,3 @@ def test_ranks_with_nothing(shared_tmp_path: Path) -> None:
         np.testing.assert_array_equal(read.cells.reshape(-1, 4)[:, 1:], whole.cells)
         np.testing.assert_array_equal(read.point_data["number"], whole.at_points["number"])
         np.testing.assert_array_equal(read.cell_data["v"][:, :2], whole.in_cells["v"])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("dim", [2, 3])
-def test_figures_are_drawn_again(dim: int, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    """From the files alone, in the formats and for the fields that are asked for."""
-    if dim == 3:
-        pytest.importorskip("pyvista")
-    write_outputs(solve(electric(dim)), tmp_path)
-    before = json.loads((tmp_path / "summary.json").read_text())
-    arguments = ["plot", str(tmp_path)]
-    assert main(arguments) == CONVERGED
-    names = ["figure-contact.png", "figure-deformed.png", "figure-potential.png"]
-    assert capsys.readouterr().out.split() == [str(tmp_path / name) for name in names]
-    more = ["--field", "stress_xy", "--field", "electric_field", "--format", "pdf,svg"]
-    assert main([*arguments, *more, "--width", "85mm"]) == CONVERGED
-    for name in ("figure-stress_xy", "figure-electric_field"):
-        names += [f"{name}.pdf", f"{name}.svg"]
-    assert (tmp_path / "figure-stress_xy.pdf").read_bytes().startswith(b"%PDF")
-    after = json.loads((tmp_path / "summary.json").read_text())
-    assert after.pop("files") == sorted([*before.pop("files"), *names])
-    assert after == before
-    assert all((tmp_path / name).stat().st_size > 5000 for name in names)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gc
 import weakref
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -14,8 +12,6 @@ from petsc4py import PETSc
 
 from contact.errors import InputError
 from contact.history import BodyState
-from contact.linear import multigrid
-from contact.linear.layout import Layout
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -142,20 +138,6 @@ def test_without_contact_the_interpolation_is_that_of_the_body() -> None:
     assert np.array_equal(finest.getValuesCSR()[2], body)
 
 
-def test_one_level_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """GAMG makes no coarse level where it finds no aggregates."""
-    monkeypatch.setattr(multigrid, "tentative", lambda *_: None)
-    problem = mechanics.leaning_block(SELF, 2)
-    x, operator = problem.start().x, operator_of(problem, "iterative")
-    operator.ksp.getPC().setGAMGLevels(1)
-    operator.update("secant", BodyState(x), sticking(problem))
-    assert operator.ksp.getPC().getMGLevels() == 1
-    direct = operator_of(problem, "lu")
-    direct.update("secant", BodyState(x), sticking(problem))
-    solutions = [each.solve(problem.equilibrium.external(), 1e-10) for each in (operator, direct)]
-    assert np.allclose(*solutions, rtol=0, atol=1e-9 * np.abs(solutions[0]).max())
-
-
 @pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
@@ -212,14 +194,3 @@ def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPat
     operator.update("secant", BodyState(problem.equilibrium.rest()), sticking(problem))
     with pytest.raises(InputError, match="out of memory in the factorisation"):
         operator.solve_all(np.ones((problem.equilibrium.owned, 2)))
-
-
-@pytest.mark.parametrize(
-    ("unknowns", "iterative"),
-    [(5_000, ()), (19_000, ("auto",)), (149_000, ("auto",)), (1_000_000, ("auto", "many"))],
-)
-def test_many_solves_ask_for_a_factorisation(unknowns: int, iterative: tuple[str, ...]) -> None:
-    layout = SimpleNamespace(dim=3, coupled=False, unknowns=unknowns)
-    for kind in ("auto", "many", "lu", "iterative"):
-        expected = kind == "iterative" or kind in iterative
-        assert multigrid.is_chosen(kind, cast(Layout, layout)) == expected

@@ -361,44 +361,6 @@ def test_damaged_files_end_in_one_line(name, share, tmp_path, capsys):
     assert [p.name for p in tmp_path.glob("*.toml")] == []
 
 
-@pytest.mark.parametrize(
-    ("added", "words"),
-    [
-        ("*NODE\n4, 0., 2.\n", "NODE: node 4 is at two places"),
-        ("*ELEMENT, TYPE=CPE4\n8, 1, 2, 5, 4\n", "ELEMENT: element 8 is there twice"),
-        ("*NODE, SYSTEM=C\n20, 1., 90.\n", "NODE, SYSTEM=C makes or moves nodes"),
-        ("*System\n0, 0, 1\n", "SYSTEM makes or moves nodes"),
-        ("*NGEN\n1, 3, 1\n", "NGEN makes or moves nodes"),
-        ("*ELGEN\n7, 2\n", "ELGEN makes or moves nodes"),
-    ],
-)
-def test_keywords_that_change_the_mesh_are_refused(added, words, tmp_path, capsys):
-    (tmp_path / "plate.inp").write_text(PLATE.replace("*BOUNDARY", f"{added}*BOUNDARY"))
-    assert main(["new", str(tmp_path / "plate.inp")]) == BAD_INPUT
-    said = capsys.readouterr().err
-    assert words in said and "; accepted: " in said
-
-
-def test_data_lines_from_another_file(tmp_path):
-    """Of a keyword that stands before *INCLUDE, or by INPUT: they are as if they stood there."""
-    (tmp_path / "plate.inp").write_text(PLATE)
-    head, rest = PLATE.split("1, 0., 0., 0.\n")
-    nodes, rest = ("1, 0., 0., 0.\n" + rest).split("** elements")
-    elements, rest = rest.split("*Element, type=CPE4, elset=Eall\n")[1].split("*NSET, NSET=ground")
-    (tmp_path / "nodes.inc").write_text(nodes)
-    (tmp_path / "elements.inc").write_text(elements)
-    (tmp_path / "split.inp").write_text(
-        f"{head}*INCLUDE,\n INPUT=nodes.inc\n*ELEMENT, TYPE=CPE4, ELSET=Eall, "
-        f"INPUT=elements.inc\n*NSET, NSET=ground{rest}"
-    )
-    whole, split = (from_file(MPI.COMM_SELF, tmp_path / f"{n}.inp") for n in ("plate", "split"))
-    assert measures(split) == measures(whole) and regions(split) == regions(whole)
-    assert np.array_equal(split.mesh.geometry.x, whole.mesh.geometry.x)
-    found = [path.name for path in mesh_files(tmp_path / "split.inp")]
-    assert found == ["split.inp", "nodes.inc", "elements.inc"]
-    assert mesh_files(tmp_path / "plate.inp") == [tmp_path / "plate.inp"]
-
-
 def test_binary_arrays_are_beside_their_xdmf(tmp_path, monkeypatch):
     """Wherever the program runs."""
     meshio = pytest.importorskip("meshio")

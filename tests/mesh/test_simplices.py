@@ -9,7 +9,6 @@ import pytest
 from mpi4py import MPI
 
 import meshes
-from contact.errors import InputError
 from contact.mesh.cells import FACES, simplices
 from contact.mesh.contents import Cells, Contents, Groups, check
 from contact.mesh.reader import from_file
@@ -269,10 +268,3 @@ def test_quadrilaterals_that_are_triangles_and_free_faces_of_prisms(tmp_path):
     domain = from_file(MPI.COMM_SELF, tmp_path / "prisms.inp")
     assert integral(domain) == pytest.approx(1.0)
     assert measures(domain) == pytest.approx({"skin": 6.0, "low": 1.0, "end": 2.0})
-
-
-def test_a_cell_that_has_collapsed_to_nothing_is_refused(tmp_path):
-    plate = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n*ELEMENT,TYPE=CPE4\n1,1,2,3,4\n2,1,1,2,2\n"
-    (tmp_path / "plate.inp").write_text(plate)
-    with pytest.raises(InputError, match=r"it has 1 cell\(s\) of zero volume"):
-        from_file(MPI.COMM_SELF, tmp_path / "plate.inp")

@@ -6,7 +6,6 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 import meshes
-from contact.errors import InputError
 from contact.mesh.cells import shape_of
 from contact.mesh.reader import from_generator, from_msh
 from meshes.__main__ import main
@@ -256,25 +255,6 @@ def test_quarter_disc_resolves_the_hertz_contact(half_width, contact_size):
     assert nodes(domain) < 3000
 
 
-#: Generators that take more than two tenths of a second.
-LONG = (
-    "ball_between_plates", "bracket", "cylinder_on_block", "half_cylinder", "half_space", "sphere",
-    "two_boxes", "two_half_cylinders", "two_spheres",
-)  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow if name in LONG else ())
-        for name in meshes.GENERATORS
-    ],
-)
-def test_smaller_sizes_give_more_nodes(name):
-    sizes = {k: 0.7 * v for k, v in meshes.parameters(name).items() if k.endswith("size")}
-    assert nodes(from_generator(COMM, name, **sizes)) > nodes(from_generator(COMM, name))
-
-
 WRONG = [
     ("quarter_disk", {}),
     ("bar", {"lenght": 3.0}),
@@ -321,13 +301,3 @@ def test_command_line_writes_a_mesh(tmp_path, version):
     assert main(disc) == 0
     domain = from_msh(COMM, path)
     assert (shape_of(domain.mesh).name, domain.order) == ("quadrilateral", 2)
-
-
-def test_spheres_of_two_quarters():
-    """Twice as much of all, and one plane of symmetry."""
-    domain = from_generator(COMM, "two_spheres", quarters=2)
-    _, expected = GENERATORS["two_spheres"]
-    twice = {name: 2 * area for name, area in expected.items() if name != "symmetry_x"}
-    assert measures(domain) == pytest.approx(twice, rel=1e-2)
-    with pytest.raises(InputError, match="quarters of the mesh generator must be 1 or 2; given: 3"):
-        from_generator(COMM, "two_spheres", quarters=3)

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from scipy.optimize import minimize_scalar
 
-from contact import Body, Contact, Fixed, InputError, Linear, Problem
-from contact.mesh.grid import rectangle
 from contact.model.obstacle import (
     Cone,
     Cylinder,
@@ -17,7 +14,6 @@ from contact.model.obstacle import (
     Paraboloid,
     Plane,
     Punch,
-    Shape,
     Sphere,
     Triangles,
 )
@@ -175,56 +171,12 @@ def test_a_ray_passes_by_no_side_of_a_body_that_is_not_convex():
     assert np.all((found[met] <= first[met]) & (found[met] > first[met] - 0.0021))
 
 
-class Turned(Shape):
-    """A cylinder about z, or its like in 2-D, whose normals are turned and longer."""
-
-    def __init__(self, degrees=0.0, length=1.0):
-        super().__init__()
-        turn = np.deg2rad(degrees)
-        rotation = [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
-        object.__setattr__(self, "matrix", length * np.array(rotation))
-
-    def distance(self, points):
-        size = np.linalg.norm(points[:, :2], axis=1)
-        normal = np.zeros_like(points)
-        normal[:, :2] = points[:, :2] @ self.matrix / size[:, None]
-        return size - 0.5, normal
-
-
-@pytest.mark.parametrize(
-    ("shape", "fits"),
-    [
-        (Turned(), True),
-        (Turned(5.0), False),
-        (Turned(180.0), False),
-        (Turned(length=1.1), False),
-        (Turned(length=0.0), False),
-    ],
-)
-@pytest.mark.parametrize("dim", [2, 3])
-def test_normals_that_are_not_the_slope_of_the_distance_are_refused(shape, fits, dim):
-    if fits:
-        shape.check_normals(POINTS[:, :dim])
-        return
-    with pytest.raises(InputError, match=r"Turned: distance: the normal .* the slope of"):
-        shape.check_normals(POINTS[:, :dim])
-
-
 @pytest.mark.core
 @pytest.mark.parametrize("name", SHAPES)
 def test_normals_are_the_slope_of_the_distance(name):
     """Also beside edges and tips, where there are several slopes."""
     SHAPES[name][0].check_normals(POINTS)
     SHAPES[name][0].check_normals(1e-3 * POINTS + np.array(TIP))
-
-
-@pytest.mark.parallel
-def test_a_problem_names_the_shape():
-    domain = rectangle(MPI.COMM_WORLD, (-0.2, 0.6), (0.4, 0.2), (8, 4))
-    body = Body(Linear(1.0, 0.3), Fixed("top", [0.0, -0.01]))
-    Problem(domain, body, Contact("bottom", Turned()))
-    with pytest.raises(InputError, match=r"contact\.foundation: Turned: distance"):
-        Problem(domain, body, Contact("bottom", Turned(10.0)))
 
 
 def test_shapes_by_formulas_and_files_are_those_of_functions_and_arrays(tmp_path):

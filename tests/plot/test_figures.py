@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -120,23 +119,3 @@ def test_a_loop_is_drawn_for_each_direction_that_moves(
     assert [ax.get_xlabel() for ax in axes] == [f"displacement $u_{axis}$" for axis in drawn]
     for ax, axis in zip(axes, drawn, strict=True):
         assert ax.lines[0].get_xdata()[1:] == pytest.approx(columns[f"rigid_{axis}"])
-
-
-def curved(nodes: int = 9, turn: float = np.pi / 2, **columns: Any) -> Run:
-    """Return the run of a block whose contact part is taken for a quarter of a circle, or more."""
-    run = run_of(solve(block(2)))
-    angle = np.linspace(0.0, turn, len(run.table["x"]))
-    places = {"x": 3 - np.cos(angle), "y": np.sin(angle), "gap": 0 * angle}
-    table = {k: v[:nodes] for k, v in (run.table | places | columns).items()}
-    surface = run.surface.copy()
-    surface["row"][:] = 0  # nothing is held
-    return replace(run, table=table, surface=surface)
-
-
-def test_a_contact_of_one_node_has_the_width_of_its_share() -> None:
-    run = curved(nodes=1)
-    ax = draw_line(run).axes[0]
-    low, high = ax.get_xlim()
-    assert (low + high) / 2 == pytest.approx(run.table["x"][0])
-    assert high - low == pytest.approx(run.table["weight"][0])
-    assert ax.lines[0].get_marker() == "o"

@@ -1,15 +1,11 @@
 """Figures in 3-D: what the cameras see, and what of the tables is drawn."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import pyvista
 
-from contact.cli.main import main
-from contact.plot import figures
 from contact.plot.body import picture
 from contact.plot.foundation import foundation
 from contact.plot.run import Run, linear
@@ -21,7 +17,6 @@ from contact.plot.space import (
 )
 from contact.plot.style import Look
 from contact.solving import solve
-from contact.writing import write_outputs
 from tests.problems.written import block
 
 AXES = {"left": -1, "right": 1, "front": -2, "back": 2, "bottom": -3, "top": 3}
@@ -90,18 +85,3 @@ def test_the_peak_is_that_of_all_nodes() -> None:
     body.point_data["potential"] = np.where(distance < 1e-9, 100.0, 1.0 + distance)
     made = picture(replace(run, body=body), "potential")
     assert max(made.norm.vmax, float(made.label.split()[-1]) if "peak" in made.label else 0) == 100
-
-
-def test_a_page_needs_its_packages(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(figures, "find_spec", lambda name: None)
-    assert main(["plot", str(tmp_path), "--html"]) == 2
-    assert "--html: no package trame, trame_vtk, trame_vuetify; accepted" in capsys.readouterr().err
-    # With them pyvista is asked for the file.
-    write_outputs(solve(block(3)), tmp_path)
-    monkeypatch.setattr(figures, "find_spec", lambda name: name)
-    write = lambda self, path: Path(path).write_text("page")  # noqa: E731
-    monkeypatch.setattr(pyvista.Plotter, "export_html", write)
-    assert main(["plot", str(tmp_path), "--html"]) == 0
-    assert (tmp_path / "figure-view.html").read_text() == "page"

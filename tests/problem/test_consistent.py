@@ -16,7 +16,6 @@ from contact import (
     Electrode,
     Fixed,
     Friction,
-    InputError,
     Layer,
     Level,
     Linear,
@@ -29,7 +28,6 @@ from contact import (
     Rigid,
     Sphere,
     UserLaw,
-    build_problem,
     evolve,
     make_material,
     parse_case,
@@ -175,27 +173,6 @@ CASE = {
     "fixed": [{"on": "top", "displacement": [0, -0.005]}],
     "contact": {"on": "bottom"},
 }
-
-
-def test_a_case_is_refused_in_the_same_words() -> None:
-    supports = [*CASE["fixed"], {"on": "top", "displacement": ["free", "-0.001*x"]}]
-    case = parse_case({**CASE, "fixed": supports}, source="bar.toml")
-    with pytest.raises(InputError, match=r"^bar\.toml: fixed\.1\.displacement\.1: .*as fixed\.0"):
-        build_problem(case)
-    table = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}
-    later = {
-        "evolution": {"times": [0.0, 1.0, 2.0], "steps": [1, 1], "amplitudes": {"back": table}}
-    }
-    given = [{**CASE["fixed"][0], "amplitude": "back"}, CASE["fixed"][0]]
-    with pytest.raises(InputError, match=r"fixed\.1\.displacement\.1: -0\.005 on top"):
-        build_problem(parse_case({**CASE, **later, "fixed": given}))
-    # At the ends of all stages both are 0, but for rounding.
-    waves = [{"on": "top", "displacement": [f, -0.005]} for f in ("0.01*sin(pi*t)", 0)]
-    steps = {"evolution": {"times": [0.0, 1.0, 2.0], "steps": [1, 2]}}
-    with pytest.raises(InputError, match=r"displacement\.0: 0 on top; .* -0\.01, .* at t = 1\.5"):
-        build_problem(parse_case({**CASE, **steps, "fixed": waves}))
-    steps["evolution"]["steps"] = [1, 1]
-    build_problem(parse_case({**CASE, **steps, "fixed": waves}))
 
 
 @pytest.mark.parallel(2)

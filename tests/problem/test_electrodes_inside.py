@@ -1,6 +1,5 @@
 """Electrodes inside of the body: bimorphs and stacks against closed forms, refused uses."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -98,14 +97,6 @@ def test_a_parallel_bimorph_bends_twice_as_far_as_one_in_series():
     assert abs(tip(parallel)) == pytest.approx(known, rel=0.01)
     assert abs(tip(series)) == pytest.approx(known / 2, rel=0.01)
     assert abs(tip(parallel) / tip(series)) == pytest.approx(2.0, rel=2e-3)
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("rotation", [0.0, 40.0])
-def test_names_are_given_before_the_rotation(rotation):
-    solution = solve(bimorph("parallel", 1e-4, rotation=rotation, degree=1), comm=COMM)
-    straight = solve(bimorph("parallel", 1e-4, degree=1), comm=COMM)
-    assert tip(solution, rotation=rotation) == pytest.approx(tip(straight), rel=1e-9)
 
 
 LAYERS, THICKNESS = 10, 0.1
@@ -290,26 +281,3 @@ def test_groups_of_a_file_that_lie_inside_may_be_fixed(shared, tmp_path):
     problem = Problem(domain, body, Contact("bottom", 1.0))
     with pytest.raises(InputError, match="'top' has 1 interior facet"):
         problem.domain.ds("top")
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
-@pytest.mark.parametrize(("top", "got"), [(0.25, None), (0.3, 0.25), (0.32, 0.375)])
-def test_regions_whose_boundary_cuts_cells_are_warned_of(cell, top, got, caplog):
-    """Rows of cells are 0.125 high, in which the middles of triangles lie at thirds."""
-    mesh = {"generator": "rectangle", "size": [1.0, 1.0], "cells": [8, 8], "cell": cell}
-    data = {
-        "mesh": mesh | {"regions": {"layer": f"y < {top}", "rest": f"y >= {top}"}},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "contact": {"on": "bottom"},
-    }
-    if cell == "triangle" and got is not None:
-        got = {0.3: 0.3125, 0.32: 0.3125}[top]
-    domain = parse_case(data).mesh.build(COMM)
-    notes = [note for note in domain.notes if "mesh.regions.layer" in note]
-    assert len(notes) == (got is not None)
-    if got is not None:
-        said = re.search(r"the area ([\d.]+) instead of about ([\d.]+),", notes[0])
-        assert said is not None and float(said[1]) == pytest.approx(got, rel=1e-3)
-        assert float(said[2]) == pytest.approx(top, abs=0.005)
-        assert COMM.rank > 0 or notes[0] in caplog.text

@@ -16,8 +16,7 @@ from contact import InputError, evolve, parse_case, solve, solve_steps
 from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
 from contact.io.checkpoint import Checkpoints, read_steps
-from contact.io.fields import body_share
-from contact.results.fields import DerivedFields, check_variables
+from contact.results.fields import DerivedFields
 from forms.hencky import Isotropic
 from forms.history import Response, isotropic_stiffness
 from scripts.examples.own_return_mapping import DruckerPrager
@@ -193,23 +192,6 @@ class Other(Damage):
         after = (found.variables["kappa"] + 0 * before.T).T
         found = replace(found, variables={self.name: after})
         return self.changed(found) if self.acts else found
-
-
-@pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress"])
-def test_a_variable_has_a_name_that_no_field_has(kinematics):
-    """The fields are those that a solution writes."""
-    given = case(cells=2, space={"kinematics": kinematics})
-    problem = build_problem(given, MPI.COMM_SELF, law=Damage(YOUNG, POISSON))
-    check_variables(problem.equilibrium)
-    written = {*body_share(problem, problem.start()).at_points} - {"kappa"}
-    assert written >= {"displacement", "stress"}
-    for name in written:
-        words = rf"^case: Other: variables: the name: given '{name}'; .*no other field \(.*{name}"
-        with pytest.raises(InputError, match=words):
-            solve(given, law=Other(YOUNG, POISSON, name), comm=MPI.COMM_SELF)
-    problem = build_problem(given, MPI.COMM_SELF, law=Other(YOUNG, POISSON, written.pop()))
-    with pytest.raises(InputError, match="the name of no other field"):
-        next(evolve(problem, [1.0]))
 
 
 CHANGED = {

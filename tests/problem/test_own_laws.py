@@ -192,22 +192,6 @@ def test_a_crystal_in_the_plane_is_stiffer_along_its_axis():
     assert law.stiffness[0, 0] == pytest.approx(STIFF["c11"])
 
 
-@pytest.mark.parametrize(
-    ("function", "slope"),
-    [
-        (np.abs, np.sign),
-        (lambda s: np.minimum(s, 0.1), lambda s: np.where(s < 0.1, 1.0, 0.0)),
-        (lambda s: np.floor(s), lambda s: 0 * s),
-        (lambda s: 1e6 + 1e-6 * s, lambda s: 1e-6 + 0 * s),
-        (lambda s: np.sin(1e7 * s), lambda s: 1e7 * np.cos(1e7 * s)),
-        (lambda s: s**3, lambda s: 3 * s**2),
-    ],
-)
-def test_kinks_jumps_and_rounding_are_no_faults(function, slope):
-    at = np.concatenate([-np.logspace(-9, 3, 49), np.logspace(-9, 3, 49)])
-    check_slope("f", function, slope, at)
-
-
 @pytest.mark.parametrize("slope", [lambda s: 1 + 0 * s, lambda s: -3 * s**2, lambda s: 0 * s])
 def test_a_wrong_derivative_is_one_anywhere(slope):
     with pytest.raises(InputError, match=r"f: .* where differences"):

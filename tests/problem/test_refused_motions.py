@@ -6,7 +6,7 @@ from mpi4py import MPI
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.solving import build_problem
-from tests.problems.rigid import column, indented, plate
+from tests.problems.rigid import indented, plate
 
 SELF = MPI.COMM_SELF
 
@@ -38,16 +38,6 @@ def test_bad_motions_are_refused(changes, words):
         build_problem(parse_case(data), SELF)
 
 
-@pytest.mark.parametrize("changes", [{"displacement": ["free", 0.0]}, {"rotation": 1.0}])
-def test_nothing_leaves_the_axis_of_revolution(changes):
-    data = indented().model_dump(exclude_unset=True)
-    data["space"] = {"kinematics": "axisymmetric"}
-    data["contact"]["foundation"]["centre"] = [0.0, 2.0]
-    data["contact"]["rigid"] |= changes
-    with pytest.raises(InputError, match="of a body of revolution"):
-        build_problem(parse_case(data), SELF)
-
-
 @pytest.mark.parametrize(
     ("rigid", "words"),
     [
@@ -61,27 +51,3 @@ def test_nothing_leaves_the_axis_of_revolution(changes):
 def test_bad_rigid_parts_are_refused(rigid, words):
     with pytest.raises(InputError, match=words):
         build_problem(plate(rigid=rigid), SELF)
-
-
-@pytest.mark.parametrize("axis", [[0.0, -1.0], [1.0, 0.0]])
-def test_an_axis_that_leads_away_is_no_contact_direction(axis):
-    data = indented().model_dump(exclude_unset=True)
-    shape = {"shape": "paraboloid", "apex": [1.0, 1.0], "axis": [0.0, 1.0], "radius": 1.0}
-    data["contact"] |= {"direction": "axis", "axis": axis, "foundation": shape}
-    with pytest.raises(InputError, match="from no node of the part 'top' does the contact direct"):
-        build_problem(parse_case(data), SELF)
-
-
-def test_bad_electrodes_are_refused():
-    with pytest.raises(InputError, match=r"electrode.0.on.*potential is not fixed"):
-        column(electrode=[{"on": "bottom"}])
-    with pytest.raises(InputError, match=r"electrode.*\[material.piezo\]"):
-        plate(electrode=[{"on": "top"}])
-    with pytest.raises(InputError, match="shares nodes with an electrode"):
-        build_problem(
-            column(electrode=[{"on": "right"}], electric={"k_e": 1.0}, fixed=[
-                {"on": "left", "displacement": [0.0, "free"], "potential": 0.0}]),
-            SELF,
-        )  # fmt: skip
-    with pytest.raises(InputError, match="a part whose potential is fixed"):
-        build_problem(column(electrode=[{"on": "right"}]), SELF)

@@ -114,20 +114,6 @@ def test_overlapping_bodies_are_refused():
     np.testing.assert_allclose(geometry.nodes.gap, -0.2, atol=1e-12)
 
 
-def test_what_is_said_of_the_choice_of_sides():
-    """The coarser, or the stiffer side should not be the one with the multipliers."""
-    fine = {"generator": "two_blocks", "lower_size": 0.1, "upper_size": 0.3}
-    warned = solve(parse_case(case(mesh=fine))).warnings
-    assert any("times finer" in warning and "exchanged" in warning for warning in warned)
-    moduli = {"upper": 1e4, "lower": 1e2}
-    stiff = [{"on": name, "young": young, "poisson": 0.3} for name, young in moduli.items()]
-    warned = solve(parse_case(case(material=stiff))).warnings
-    assert any("100 times softer" in warning for warning in warned)
-    swapped = {"on": "lower_top", "against": "upper_bottom"}
-    said = solve(parse_case(case(mesh=fine, contact=swapped))).warnings
-    assert not any("exchanged" in warning for warning in said)
-
-
 def test_bodies_that_may_pass_through_each_other_are_named():
     """Only the upper block can touch a foundation: nothing keeps it off the lower one."""
     foundation = {"shape": "plane", "point": [0.0, -0.05], "normal": [0.0, 1.0]}

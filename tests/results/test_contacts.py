@@ -5,16 +5,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from mpi4py import MPI
 
-from contact import InputError, parse_case, sensitivity, solve, write_outputs
+from contact import parse_case, sensitivity, solve, write_outputs
 from contact.case.file import Case
 from contact.results import quantities as registry
 from contact.results.quantities import CONTACTS, Quantity
-
-COMM = MPI.COMM_WORLD
 
 
 def between_plates(**more: Any) -> Case:
@@ -79,25 +75,6 @@ def test_they_stand_in_the_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert list(summary["contacts"]["lid"])[:-1] == [
         "force", "moment", "area", "max_pressure", "mean_pressure", "stick", "slip", "dissipation"
     ]  # fmt: skip
-
-
-def test_a_single_contact_has_no_columns_of_its_own(tmp_path: Path):
-    """They would be those of the sum."""
-    case = between_plates(
-        contact={"on": "bottom"},
-        load=[{"on": "top", "traction": [0.0, -0.01]}],
-        evolution={"times": [0.0, 1.0], "steps": [1]},
-    )
-    solution = solve(case)
-    assert list(solution.contacts) == ["bottom"]
-    assert not any(column.endswith("_bottom") for column in solution.steps[-1].row)
-    np.testing.assert_allclose(solution.contacts["bottom"].force, solution.contact_force)
-
-
-def test_the_same_name_twice_is_refused():
-    contacts = [{"on": "top", "name": "side", "gap": 0.1}, {"on": "bottom", "name": "side"}]
-    with pytest.raises(InputError, match=r"side.*several contacts"):
-        solve(between_plates(contact=contacts))
 
 
 def test_derivatives_of_the_force_on_one_contact():

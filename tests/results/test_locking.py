@@ -130,15 +130,3 @@ def test_exact_solutions_do_not_lock(sides):
     assert solution.error.stiffness_ratio > 1000
     assert solution.error.relative < 1e-6
     assert not says(solution)
-
-
-def test_check_says_which_materials_lock():
-    for poisson, degree, warns in ((0.3, 1, False), (0.49, 1, True), (0.49, 2, False)):
-        data = changed(**SOFT)
-        data["material"]["poisson"], data["space"]["degree"] = poisson, degree
-        lines = expectations(build_problem(parse_case(data)))
-        assert any("Poisson's ratio 0.49" in line for line in lines) == warns
-        data["space"]["kinematics"] = "plane_stress"
-        assert not any(
-            "Poisson's ratio" in line for line in expectations(build_problem(parse_case(data)))
-        )

@@ -171,19 +171,6 @@ def test_forces_that_are_rounding_are_not_out_of_balance() -> None:
     assert not [text for text in solution.warnings if "out of balance" in text]
 
 
-@pytest.mark.parametrize("nested", [False, True])
-def test_the_warning_says_where_the_iteration_started(nested: bool) -> None:
-    """Several solutions may exist: which one is found depends on the start."""
-    case = block(
-        2,
-        mesh={"generator": "rectangle", "size": [2.0, 1.0], "cells": [16, 8]},
-        friction={"law": "coulomb", "mu": {"law": "slip", "rho": 1e4}},
-        solver={"nested": nested},
-    )
-    start = "the solution on a coarser mesh" if nested else "the zero initial guess"
-    assert any(f"reached from {start}" in text for text in solve(case).warnings)
-
-
 @pytest.mark.parallel
 def test_a_gap_that_was_forgotten() -> None:
     """A curved part without a gap fits its foundation; a plane one lies on it."""

@@ -51,22 +51,6 @@ def test_fields() -> None:
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("dim", [2, 3])
-def test_figures_for_a_notebook(dim: int) -> None:
-    if dim == 3:
-        pytest.importorskip("pyvista")
-    solution = solve(block(dim))
-    gallery, one = solution.plot(), solution.plot("stress_xy", width=4.0)
-    assert (gallery is None) == (MPI.COMM_WORLD.rank > 0)
-    if gallery is None or one is None:
-        return
-    assert list(gallery) == ["contact", "deformed"]
-    assert gallery._repr_html_().count("data:image/png;base64,") == 2
-    assert list(one) == ["stress_xy"]
-    assert one["stress_xy"].get_figwidth() == 4.0
-
-
-@pytest.mark.parallel
 def test_a_body_that_nothing_holds_is_refused() -> None:
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (1.0, 1.0), (2, 2))
     body = Body(Linear(1.0, 0.3), [], [Load("top", traction=[0.1, 0.0])])

@@ -70,20 +70,3 @@ def test_the_solution_of_a_case_starts_another():
 def test_what_a_problem_would_ignore_is_refused(given, message):
     with pytest.raises(InputError, match=message):
         solve(build_problem(bar()), **given)
-
-
-def test_what_a_case_would_ignore_is_refused():
-    state = solve(bar()).state
-    with pytest.raises(InputError, match="start: given together with nested = true"):
-        solve(bar("solver.nested=true"), start=state)
-    with pytest.raises(InputError, match=r"start: given together with \[evolution\]"):
-        solve(load_case(CASES / "fretting.toml"), start=state)
-
-
-def test_a_state_of_another_problem_is_refused():
-    state = solve(bar()).state
-    with pytest.raises(InputError, match="given a state of another problem"):
-        solve(bar("mesh.cells=[32, 8]"), start=state)
-    shorter = replace(state, x=state.x[:-2].copy())
-    with pytest.raises(InputError, match="given a state of another problem"):
-        solve(build_problem(bar()), start=shorter)

@@ -9,11 +9,7 @@ from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
 from contact.case.build import build_problem
-from contact.io.tables import write_mappings
-from contact.plot.figures import plot
-from contact.plot.run import read_grid, read_run
-from contact.plot.series import draw_loop
-from contact.results.resultants import rigid_columns
+from contact.plot.run import read_grid
 from contact.solving import evolve
 from tests.problems.bar import changed
 from tests.problems.piezo import COUPLING, PERMITTIVITY
@@ -156,47 +152,6 @@ def test_unloading_is_warned_of():
     assert not any("nonlinear" in text for text in solve(case, comm=SELF).warnings)
 
 
-def test_figures(tmp_path):
-    """Of a run, and once more from its files: the same figures, all of them drawn."""
-    moved = {"on": "left", "displacement": ["0.001*sin(4*t)", 0.0]}
-    case = case_of(load__0__amplitude=None, fixed=[moved])
-    solution = solve(case, comm=SELF)
-    write_outputs(solution, tmp_path, figures=True)
-    drawn = {path.name for path in tmp_path.glob("figure-*.png")}
-    assert {"figure-loop.png", "figure-zones.png", "figure-energy.png"} <= drawn
-    again = {path.name for path in plot(tmp_path, formats=["svg"])}
-    assert {name.removesuffix(".svg") for name in again} == {
-        name.removesuffix(".png") for name in drawn
-    }
-    figure = solution.plot()["loop"]
-    (line,) = figure.axes[0].lines
-    way = [0.0, *(record.row["driven_x"] for record in solution.steps)]
-    np.testing.assert_allclose(line.get_xdata(), way)
-
-
-@pytest.mark.parametrize("frictional", [True, False])
-def test_figures_name_what_a_run_has(frictional):
-    """Without friction nothing sticks, slides or is dissipated."""
-    changes = {} if frictional else {"friction": {"law": "none"}}
-    figures = solve(case_of(**changes), comm=SELF).plot()
-    zones = [text.get_text() for text in figures["zones"].axes[0].get_legend().texts]
-    lines = [line.get_label() for line in figures["energy"].axes[0].lines]
-    if frictional:
-        assert zones == ["sticking", "sliding", "open"]
-        assert lines == ["work done", "stored and dissipated", "stored", "dissipated by friction"]
-    else:
-        assert zones == ["in contact", "open"]
-        assert lines == ["work done", "stored"]
-
-
-def test_what_is_driven_is_what_moves_not_what_is_held_before_it():
-    """The load is no way either; the amplitude ends at a fifth."""
-    held = {"on": "left", "displacement": [0.0, 0.0]}
-    moved = {"on": "right", "displacement": ["free", -1e-4], "amplitude": "press"}
-    last = solve(case_of(fixed=[held, moved]), comm=SELF).steps[-1].row
-    assert last["driven_y"] == pytest.approx(-2e-5)
-
-
 def test_the_summary_has_the_most_that_rounding_was_granted(tmp_path):
     """A slender beam that is let go at the end: the last step has nothing to be rounded."""
     press = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}
@@ -232,41 +187,3 @@ def test_rigid_parts_and_reactions_have_columns():
         assert row["rigid_y"] < 0 and row["rigid_rotation"] != 0
         balance = row["rigid_force_x"] + row["reaction_x_left"] - row["contact_force_x"]
         assert abs(balance) < 1e-10
-
-
-def test_several_rigid_parts_are_told_apart_by_their_names():
-    moving = {"displacement": [0.0, -0.1], "rotation": 0.0, "force": [1.0, 2.0], "moment": 0.5}
-    columns = rigid_columns({"rigid_parts": {"top": moving, "left": moving}})
-    assert columns["moved"]["rigid_y_top"] == columns["moved"]["rigid_y_left"] == -0.1
-    assert columns["acting"]["rigid_force_x_top"] == 1.0
-    both = rigid_columns({"rigid": moving, "rigid_parts": {"top": moving}})
-    assert {"rigid_x", "rigid_x_top"} <= {*both["moved"]}
-    assert {*rigid_columns({"rigid_parts": {"top": moving}})["acting"]} == {
-        *("rigid_force_x", "rigid_force_y", "rigid_moment"),
-    }
-
-
-def test_the_loop_is_drawn_along_the_way_of_a_rigid_part_with_units_of_force(tmp_path):
-    """It slides there and back, and sinks in by far less, up and down a little."""
-    rigid = {"on": "top", "displacement": ["0.01*sin(pi*t)", "free"], "force": [0.0, -0.02]}
-    steps = {"times": [0.0, 1.0], "steps": [4]}
-    case = plate(
-        rigid=[rigid],
-        fixed=[],
-        friction={"law": "coulomb", "mu": 0.3},
-        evolution=steps,
-        case={"units": {"length": "mm", "stress": "MPa"}},
-    )
-    write_outputs(solve(case, comm=SELF), tmp_path / "out")
-    axes = draw_loop(read_run(tmp_path / "out"), "rigid").axes[0]
-    assert axes.get_xlabel() == "displacement $u_x$ (mm)"
-    assert axes.get_ylabel() == "force along $x$ (N/mm)"
-
-
-def test_a_quantity_that_the_first_step_does_not_have_keeps_the_columns(tmp_path):
-    write_mappings(tmp_path / "table.csv", [{"t": 1.0, "force": 2.0}, {"t": 2.0, "slip": 0.1}])
-    rows = list(csv.DictReader((tmp_path / "table.csv").open()))
-    assert rows == [
-        {"t": "1.0", "force": "2.0", "slip": ""},
-        {"t": "2.0", "force": "", "slip": "0.1"},
-    ]

@@ -17,7 +17,7 @@ from contact.history import BodyState
 from contact.interface.friction import Smoothing
 from contact.mesh.domain import revolved
 from contact.mesh.geometry import area, volume
-from contact.mesh.grid import box, rectangle
+from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
@@ -261,32 +261,3 @@ def test_a_body_that_nothing_holds_along_its_axis(comm):
     body = Body(Linear(1.0, 0.3), [Fixed("left", [constant(0.0, 2), None])])
     with pytest.raises(InputError, match="translation along y"):
         check_rigid_modes(ContactProblem(domain, body, Contact("right", flat())))
-
-
-def test_the_case_file_and_its_figures(tmp_path):
-    data = {
-        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
-        "space": {"kinematics": "axisymmetric"},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "top", "displacement": ["free", -0.01]}],
-        "contact": {"on": "bottom"},
-    }
-    solution = contact.solve(parse_case(data))
-    # Uniform pressure E eps under the area pi: the side is free.
-    assert solution.contact_force == pytest.approx([0.0, -0.01 * np.pi], rel=1e-8)
-    figures = solution.plot()
-    if figures is not None:
-        ax = figures["deformed"].axes[0]
-        assert ax.get_xlabel().startswith("$r$")
-        assert ax.get_ylabel().startswith("$z$")
-    space = {"generator": "box", "size": [1.0, 1.0, 1.0], "cells": [1, 1, 1]}
-    fixed = [{"on": "top", "displacement": [0.0, 0.0, 0.0]}]
-    with pytest.raises(InputError, match=r"space\.kinematics"):
-        parse_case({**data, "mesh": space, "fixed": fixed})
-
-
-def test_what_is_no_half_plane_is_refused(comm):
-    with pytest.raises(InputError, match="x >= 0"):
-        revolved(rectangle(comm, [-1.0, 0.0], [2.0, 1.0], [4, 2]))
-    with pytest.raises(InputError, match="a mesh in 2-D"):
-        revolved(box(comm, [0.0] * 3, [1.0] * 3, [1, 1, 1]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import InputError, Solution, build_problem, load_case, solve
+from contact import Solution, build_problem, load_case, solve
 from contact.model.formula import Expression
 from contact.model.foundation import Layer
 from contact.model.friction import Friction
@@ -168,13 +168,6 @@ def solved_by_penalty(name: str, changes: list[str]) -> Solution:
     )
 
 
-@pytest.mark.parametrize("key", ["contact", "electric"])
-def test_newton_has_nothing_to_lag(key):
-    changes = [f"{key}.lagged=true", "solver.method=newton"]
-    with pytest.raises(InputError, match=f"{key}.lagged: given true"):
-        load_case(CASES / "compliance-8-4-layer.toml", changes)
-
-
 @pytest.mark.core
 @pytest.mark.parametrize("law", ["tresca", "slip"])
 def test_other_friction_laws_on_a_layer(law):
@@ -264,14 +257,6 @@ def test_iterations_are_counted_where_the_residual_ends_the_run():
     assert tables_compliance.iterations(solution) == (2, 1)
 
 
-def test_a_mesh_that_does_not_resolve_the_default_ramp_is_warned_of():
-    """The ramp's width is a length of the body: finer meshes resolve it."""
-    for cells, said in ((48, True), (96, False)):
-        run = solved("8-4", cells, NEWTON)
-        assert run.problem.interface.layer.conductor.psi.delta == pytest.approx(1 / 0.3, rel=1e-12)
-        assert ("the mesh decides" in " ".join(run.warnings)) is said
-
-
 @pytest.mark.slow
 def test_the_default_ramp_has_a_mesh_limit():
     """Its width is a length of the body; with a steep one, the mesh decides how often it touches.
@@ -299,15 +284,3 @@ def test_newton_ends_in_contact_with_a_steep_ramp_too():
     solution = solved("8-4", 96, "solver.method=newton", "electric.k_e=0.6", STEEP)
     assert solution.converged
     assert 35.0 < -solution.contact_force[1] < 55.0
-
-
-def test_mean_pressure_of_the_review_does_not_count_rounding():
-    slip = "friction.mu={law='slip', a=0.05, b=0.02, rho=1e6}"
-    said = []
-    for method in ("uzawa", "newton"):
-        changes = slip, "electric.k_e=0.05", f"solver.method={method}"
-        solution = solved("8-4", 24, *changes)
-        assert np.any(solution.status == "open")
-        said += [text for text in solution.warnings if "sliding block" in text]
-    assert said[0] == said[1]
-    assert "under the pressure" in said[0]

@@ -225,15 +225,6 @@ def test_known_contacts_on_moved_cells(tmp_path, monkeypatch) -> None:
         assert all(float(row["p in L2"]) < 0.017 for row in csv.DictReader(file))
 
 
-@pytest.mark.slow
-def test_quadrilaterals_need_fewer_unknowns_than_triangles(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(cell_orders, "ELEMENTS", ((1, 1),))
-    found = cell_orders.times(Report(tmp_path), coarse=True)
-    for name in ("ring on a shaft", "root-like"):
-        one, other = (found[name, cell, 1, 1] for cell in ("triangle", "quadrilateral"))
-        assert other < 0.75 * one
-
-
 def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(curved_cells, "SHAPES", SHAPES[:1])
     monkeypatch.setattr(curved_cells, "rim", lambda *_: {})

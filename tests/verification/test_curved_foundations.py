@@ -10,10 +10,7 @@ from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, Linear, Plane, Problem, Sphere, parse_case, solve
 from contact.mesh.grid import rectangle
-from contact.mesh.transfer import refined
 from scripts.studies import curved_foundations as study
-from scripts.studies.curved_cells import supports
-from scripts.studies.lame_rings import rings
 
 COMM = MPI.COMM_WORLD
 
@@ -182,26 +179,6 @@ def told(warning):
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
-@pytest.mark.parametrize("finer", [0, 1])
-def test_the_scatter_of_two_rings_on_straight_edges_is_told(cell, finer):
-    """On 24, 40 and 80 edges around; of the stress 3.9 % were told, where nodes are 18 % off."""
-    a, c, b = radii = (1.0, 1.5, 2.0)
-    body = Body(Linear(1.0, 0.3), supports(2))
-    # Of a press fit in plane strain, of one material.
-    way = c * (1 - 0.3**2) * ((b**2 + c**2) / (b**2 - c**2) + (c**2 + a**2) / (c**2 - a**2))
-    for interference in (1e-3, 1e-6):
-        for edges in (24, 40, 80):
-            domain = rings(COMM, cell, 1, radii, (edges // 8, edges // 8 + finer))
-            contact = Contact("outer0", -interference, against="inner1", press=True)
-            solution = solve(Problem(domain, body, contact, degree=2))
-            nodes = solution.problem.nodes
-            off = nodes.maximum(np.abs(solution.pressure * way / interference - 1))
-            (found,) = warnings(solution)
-            assert off / 1.5 < told(found) < 1.7 * off
-
-
-@pytest.mark.parallel
 @pytest.mark.parametrize(("count", "node"), [(8, 0.14), (10, 0.1), (12, 0.08), (6, None)])
 def test_pins_of_few_edges(count, node):
     """A body around half a pin: vertices counted as corners have 20 times the pressure.
@@ -224,26 +201,3 @@ def test_pins_of_few_edges(count, node):
     else:
         assert solution.problem.nodes.maximum(np.abs(p - 1)) < node
         assert not said
-
-
-def test_chords_that_hide_a_contact_are_named():
-    """The facets deviate by eight times the interference: nothing touches."""
-    solution, _ = study.two_rings(0.1, 1, 1e-4)
-    assert np.all(solution.pressure == 0)
-    assert "nothing touches, but straight facets deviate by up to" in warnings(solution)[0]
-
-
-@pytest.mark.parametrize("levels", [0, 1])
-def test_refined_chords_are_warned_of(levels):
-    domain = study.mesh(study.RING, 0.1, 2)
-    for _ in range(levels):
-        domain = refined(domain)
-    sides = [Fixed("side0", [None, 0.0]), Fixed("side2", [0.0, None])]
-    shaft = Sphere(centre=(0.0, 0.0), radius=1.001)
-    body = Body(Linear(1e3, 0.3), sides)
-    problem = Problem(domain, body, Contact("contact", shaft, press=True), degree=2 - levels)
-    # Displacements of chords are told of both.
-    found = [text for text in warnings(solve(problem)) if "facets deviate" in text]
-    assert len(found) == levels
-    if found:
-        assert "by up to 0.00119 " in found[0]

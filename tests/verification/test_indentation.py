@@ -10,7 +10,6 @@ import pytest
 pytest.importorskip("gmsh")
 from contact import load_case, parse_case, solve
 from contact.errors import InputError
-from contact.library.materials import find
 from forms.elasticity import hexagonal
 from scripts.cases import CASES
 from scripts.reporting import Report
@@ -132,11 +131,6 @@ def test_the_cone_of_sneddon():
     a = np.sqrt(3 * nodes.sum(pressure * r[:, 0] ** 2) / nodes.sum(pressure))
     cot, stiff = 1 / np.tan(np.deg2rad(70.3)), 1000.0 / (1 - 0.3**2)
     assert solution.contact_force[1] == pytest.approx(np.pi / 2 * stiff * a**2 * cot, rel=1e-3)
-
-
-def test_the_library_and_the_study_have_the_same_pzt4():
-    entry = find("PZT-4")
-    assert np.array_equal(entry.stiffness / 1e9, hexagonal(139.0, 77.8, 74.3, 113.0, 25.6))
 
 
 def test_the_charge_of_a_ball_that_is_driven_at_constant_velocity():

@@ -142,19 +142,6 @@ def test_heights_that_are_none(tmp_path, name):
     assert message in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ({"spacing": [0.1]}, r"contact.foundation.spacing: given .0.1.*; accepted: that of a .npy"),
-        ({"origin": [0.1]}, r"contact.foundation.origin: given .0.1.*; accepted: that of a .npy"),
-        ({"origin": {"x": 0.1}}, "origin: given a table; accepted: numbers, one per direction"),
-    ],
-)
-def test_places_of_an_array_alone(more, message):
-    with pytest.raises(InputError, match=message):
-        pressed({"shape": "heights", "file": "points.csv"} | more)
-
-
 def flat(tmp_path, x, approach):
     """Return a block that is moved towards heights of 0 in some places."""
     write(tmp_path / "flat.csv", np.asarray(x), np.zeros(len(x)))
@@ -183,17 +170,6 @@ def test_contact_beyond_the_heights_is_told(shared_tmp_path, direction):
     away = solve(flat(shared_tmp_path, places, 0.01))
     whole = solve(flat(shared_tmp_path, np.linspace(0.05, 1.95, 20), -0.01))
     assert not any("[part-end]" in text for text in [*away.warnings, *whole.warnings])
-
-
-def test_a_hole_in_the_heights_is_told(tmp_path):
-    """One place that is left out is none; a graded profile has none."""
-    every = np.linspace(0.0, 2.0, 41)
-    hole = flat(tmp_path, np.delete(every, slice(15, 24)), -0.01)
-    (said,) = (w for w in solve(hole).warnings if "[part-end]" in w)
-    assert "20.0% of the area" in said and "x from 0 to 2 but 0.725 to 1.175" in said
-    for places in (np.delete(every, 15), 2 * np.linspace(0.0, 1.0, 21) ** 3):
-        solution = solve(flat(tmp_path, places, -0.01))
-        assert not any("[part-end]" in text for text in solution.warnings)
 
 
 def half_plane(x, heights, load):

@@ -9,7 +9,6 @@ from mpi4py import MPI
 from contact import Body, Contact, Fixed, Linear, Plane, Problem, parse_case, solve
 from contact.errors import InputError
 from contact.interface.pairing import facing_parts
-from contact.mesh.transfer import refined
 from tests.problems import overlapping
 from tests.problems.overlapping import POISSON, UNIAXIAL, YOUNG, body, layers, pressure
 
@@ -214,20 +213,6 @@ def test_parts_that_face_each_other_may_overlap(form):
         ((gap, *pair),) = facing_parts(layers(COMM, "triangle", 1, form, depth, counts=(16, 16)))
         assert sorted(pair) == ["inner1", "outer0"]
         assert gap == pytest.approx(-depth, rel=0.5)
-
-
-@pytest.mark.parallel
-def test_refined_chords():
-    """New nodes of a refined mesh are on chords: their sagitta is explained, more is not."""
-    for depth, refused in ((0.0, False), (0.02, True)):
-        domain = refined(layers(COMM, "quadrilateral", 1, "ring", depth, counts=(8, 10)))
-        for on, against in (("outer0", "inner1"), ("inner1", "outer0")):
-            contact = Contact(on, against=against)
-            if refused:
-                with pytest.raises(InputError, match="undeformed bodies overlap"):
-                    Problem(domain, body("ring", 2, 2), contact)
-            else:
-                Problem(domain, body("ring", 2, 2), contact)
 
 
 def test_the_closed_form_is_that_of_lame():

@@ -9,10 +9,8 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 from contact import Body, Contact, Fixed, Linear, Load, Log, Material, Problem, parse_case, solve
-from contact.body.elements import MEAN_DILATATION as MEAN
 from contact.case.build import build_problem
 from contact.errors import InputError
-from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
 from contact.results.fields import DerivedFields
 from forms.hencky import Isotropic
@@ -21,7 +19,6 @@ from forms.j2 import J2, Voce
 from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory, in_plane_stress
 from tests.body.test_rollers import sector
 from tests.problem.test_electrodes_inside import BETA33, C11, C13, C33, CERAMIC, E31, E33
-from tests.problems.piezo import pzt
 
 COMM = MPI.COMM_WORLD
 YOUNG, POISSON = 200.0, 0.3
@@ -304,17 +301,3 @@ def test_no_strain_without_stress_across_is_no_solution():
 def test_what_is_refused(data, words):
     with pytest.raises(InputError, match=words):
         build_problem(strip(**{"material": {"law": "linear"}} | data))
-
-
-def test_python_takes_plane_stress_for_whole_plane_bodies_alone():
-    """Its stiffness knows nothing of a strain across that the kinematics give."""
-    thin = Material(Linear(YOUNG, POISSON)).plane_stress()
-    with pytest.raises(InputError, match="None in plane stress"):
-        Material(Log(YOUNG, POISSON, yield_strain=0.003), pzt(2)).plane_stress()
-    square = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [2, 2])
-    fixed = [Fixed("left", [0.0, 0.0])]
-    for domain, more in ((revolved(square), {}), (square, {"degree": 2, "element": MEAN})):
-        fixed = [Fixed("bottom", [None, 0.0])] if domain.revolved else fixed
-        problem = Problem(domain, Body(thin, fixed), Contact("top", 1.0), **more)
-        with pytest.raises(InputError, match="plane stress; accepted: all materials of a body"):
-            solve(problem)
