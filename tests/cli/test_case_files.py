@@ -13,51 +13,25 @@ FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"
 #: Name -> (text that is replaced, its replacement, key that the message names).
 WRONG = {
     "a typing error in a key": ("poisson", "poison", "material.poison"),
-    "an unknown table": ("[friction]", "[friktion]", "friktion"),
     "a missing key": ("young = 1.0", "", "material.young"),
-    "a text for a number": ("young = 1.0", 'young = "one"', "material.young"),
     "Poisson's ratio 1/2": ("0.3\nyield", "0.5\nyield", "material.poisson"),
-    "no yield strain": ("yield_strain = 0.05", "", "material.yield_strain"),
-    "no cells along an edge": ("[4, 2]", "[4, 0]", "mesh.cells"),
     "a negative size": ("[2.0, 1.0]", "[2.0, -1.0]", "mesh.size"),
     "an unknown generator": ('"rectangle"', '"rectangel"', "mesh.generator"),
-    "a piece between grid positions": ("to = 1.0", "to = 0.9", "half"),
-    "a piece of an unknown side": ('side = "bottom"', 'side = "base"', "half.side"),
     "an unknown part": ('on = "bottom"', 'on = "botom"', "contact.on"),
-    "a load on an unknown part": ('on = "top"', 'on = "topp"', "load.0.on"),
     "three components in the plane": (
         "[0.0, -0.001]",
         "[0.0, 0.0, -0.001]",
         "load.0.traction",
     ),
-    "z in the plane": ("-0.001", '"-z"', "load.0.traction"),
     "a load on the contact part": (
         'on = "top"',
         'on = "bottom"',
-        "load.0.on",
-    ),
-    "a load on some of the contact part": (
-        'on = "top"',
-        'on = "half"',
         "load.0.on",
     ),
     "a formula with a mistake": ("-0.001", '"-0.001*(x"', "load.0.traction"),
     "a formula that would run code": ("-0.001", '"__import__(x)"', "load.0.traction"),
     "a load that is not finite": ("-0.001", '"log(x-1)"', "load.0.traction.1"),
     "a load that overflows": ("-0.001", "-1e300", "load.0.traction.1"),
-    "a load formula that overflows": ("-0.001", '"-1e200*x"', "load.0.traction.1"),
-    "a displacement that overflows": (
-        "[0.0, 0.0]",
-        "[0.0, 1e300]",
-        "fixed.0.displacement.1",
-    ),
-    "a modulus that overflows": ("young = 1.0", "young = 1e300", "material.young"),
-    "a modulus that underflows": ("young = 1.0", "young = 1e-300", "material.young"),
-    "a body that overflows": (
-        '[2.0, 1.0]\ncells = [4, 2]\n[mesh.parts.half]\nside = "bottom"\nto = 1.0',
-        "[2e300, 1e300]\ncells = [4, 2]",
-        "mesh",
-    ),
     "more cells than memory": (
         "[4, 2]",
         "[1000000, 1000000]",
@@ -74,11 +48,6 @@ WRONG = {
         'gap = 0.0\nfoundation = { shape = "plane", point = [0, 0], normal = [0, 1] }',
         "contact.gap",
     ),
-    "a plane without a normal": (
-        "gap = 0.0",
-        'foundation = { shape = "plane", point = [0.0, 0.0], normal = [0.0, 0.0] }',
-        "contact.foundation.normal",
-    ),
     "a sphere around a contact node": (
         "gap = 0.0",
         'foundation = { shape = "sphere", centre = [1.0, 0.0], radius = 1.0 }',
@@ -94,45 +63,7 @@ WRONG = {
         'foundation = { shape = "plane", point = [0.0, 0.25], normal = [0.0, 1.0] }',
         "contact.foundation",
     ),
-    "an oblique plane into the body": (
-        "gap = 0.0",
-        'direction = "body"\n'
-        'foundation = { shape = "plane", point = [1.0, 0.0], normal = [0.5, 1.0] }',
-        "contact.foundation",
-    ),
-    "a sphere on the other side": (
-        "gap = 0.0",
-        'foundation = { shape = "sphere", centre = [1.0, 3.0], radius = 1.0 }',
-        "contact.foundation",
-    ),
-    "a sphere that does not hold the body": (
-        "gap = 0.0",
-        'foundation = { shape = "sphere", centre = [1.0, 0.5], radius = 0.9, inside = true }',
-        "contact.foundation",
-    ),
-    "a sphere that overflows": (
-        "gap = 0.0",
-        'direction = "body"\n'
-        'foundation = { shape = "sphere", centre = [0.0, -1e200], radius = 1e200 }',
-        "contact.foundation.centre",
-    ),
-    "a plane that overflows": (
-        "gap = 0.0",
-        'foundation = { shape = "plane", point = [0.0, -1e300], normal = [0.0, 1.0] }',
-        "contact.foundation.point",
-    ),
-    "nested meshes of too few cells": (
-        "[friction]",
-        "[solver]\nnested = true\n[friction]",
-        "solver.nested",
-    ),
     "friction negative somewhere": ("mu = 0.3", 'mu = "0.3-x"', "friction.mu"),
-    "Coulomb without mu": ("mu = 0.3", "", "friction.mu"),
-    "charge without piezoelectricity": (
-        "traction = [0.0, -0.001]",
-        "charge = 1.0",
-        "load.0.charge",
-    ),
     "contact on a clamped part": ('on = "bottom"\ngap', 'on = "left"\ngap', "contact.on"),
     "contact nodes that are all fixed": (
         "displacement = [0.0, 0.0]",
@@ -155,25 +86,13 @@ WRONG = {
         PIEZO.replace("7.4", "-7.4") + "[[load]]",
         "material.piezo.beta33",
     ),
-    "an unknown method": (
-        "[friction]",
-        '[solver]\nmethod = "uzava"\n[friction]',
-        "solver.method",
-    ),
     "a tolerance of 0": ("[friction]", "[solver]\ntolerance = 0.0\n[friction]", "tolerance"),
-    "a table twice": ("[friction]", "[contact]\n[friction]", "not a TOML file"),
 }
 
 MESHES = {
-    "no mesh at all": ("bad/text.msh", "text.msh"),
     "an empty file": ("bad/empty.msh", "empty.msh"),
-    "no named groups": ("bad/no-groups.msh", "no-groups.msh"),
-    "a degenerate cell": ("bad/degenerate.msh", "degenerate.msh"),
     "a folded mesh": ("bad/folded.msh", "folded.msh"),
-    "quadrangles": ("bad/quadrangle.msh", "quadrangle.msh"),
-    "a group inside the body": ("bad/interior.msh", "interior.msh"),
     "a mesh in space for a plane case": ("block.msh", "displacement"),
-    "parts of other names": ("square.msh", "a part of the mesh"),
 }
 
 
