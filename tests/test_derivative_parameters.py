@@ -218,7 +218,7 @@ def test_a_parameter_of_a_generator_stands_where_the_case_has_it():
 
 def test_a_number_with_a_single_value_is_refused():
     run = solve(parse_case(plate(revolved=True)), comm=SELF)
-    with pytest.raises(InputError, match=r"accepted: 0 across the axis"):
+    with pytest.raises(InputError, match=r"\[rigid-part\]"):
         sensitivity(run, ["max_pressure"], ["rigid.0.displacement.0"])
 
 
@@ -255,12 +255,12 @@ def test_solutions_of_a_penalty_have_none():
         fixed=[{"on": "top", "displacement": [0.0, -0.02]}],
         solver={"method": "penalty", "tolerance": 1e-10},
     )
-    with pytest.raises(InputError, match="a penalty lets the body penetrate"):
+    with pytest.raises(InputError, match=r"\[penalised\]"):
         sensitivity(solve(given, comm=SELF), ["contact_force_y"], ["material.young"])
 
 
 def test_a_number_that_brings_a_variable_of_the_material_has_none_at_0():
     steel = {"law": "j2", "young": 200e3, "poisson": 0.3, "yield_stress": 250.0, "kinematic": 0.0}
     given = block(steel, fixed=[{"on": "top", "displacement": [0.0, -0.009]}])
-    with pytest.raises(InputError, match=r"material\.kinematic: 0 is a border .*variables"):
+    with pytest.raises(InputError, match=r"material\.kinematic.*\[border\]"):
         sensitivity(solve(given, comm=SELF), ["contact_force_y"], ["material.kinematic"])

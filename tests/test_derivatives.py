@@ -106,8 +106,8 @@ def test_units_and_directions_change_nothing(angle, method):
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("friction.mu", "given 0.0; accepted: a number above 0: friction begins at 0"),
-        ("solver.tolerance", "given 'solver.tolerance'; accepted: a number of the mesh"),
+        ("friction.mu", r"\[value\]"),
+        ("solver.tolerance", r"\[value\]"),
     ],
 )
 def test_numbers_without_a_derivative(key, words):
@@ -245,9 +245,9 @@ def test_a_problem_in_python_and_a_function():
     named = sensitivity(run, ["rigid_y"], parameter, "adjoint")
     assert found.method == "tangent"
     assert found["compliance"]["E"] == pytest.approx(-0.01 * named["rigid_y"]["E"], rel=1e-7)
-    with pytest.raises(InputError, match="'compliance' has no gradient; accepted: 'tangent'"):
+    with pytest.raises(InputError, match=r"\[value\]"):
         sensitivity(run, work, parameter, "adjoint")
-    with pytest.raises(InputError, match="built in Python; accepted"):
+    with pytest.raises(InputError, match=r"\[value\]"):
         sensitivity(run, ["rigid_y"], ["material.young"])
 
 
@@ -463,17 +463,17 @@ def test_an_unsymmetric_stiffness_beside_a_free_foundation_is_refused():
     kinematic = [{"modulus": 0.3, "recovery": 5.0}]
     data["material"] = {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 1.0}
     data["material"]["kinematic"] = kinematic
-    with pytest.raises(InputError, match=r"is not symmetric, .* accepted: kinematic hardening"):
+    with pytest.raises(InputError, match=r"\[no-derivative\]"):
         sensitivity(solve(parse_case(data), comm=SELF), ["rigid_y"], ["friction.mu"])
 
 
 @pytest.mark.parametrize(
     ("quantity", "parameter", "message"),
     [
-        ("pressure", "friction.mu", r"quantities: given 'pressure'; accepted: contact_force_x, "),
-        ("max_pressure", "friction.nu", r"friction.nu: nothing stands there; accepted: a key with"),
-        ("max_pressure", "friction.law", r"friction.law: 'coulomb' stands there; accepted"),
-        ("max_pressure", "mesh.cells.0", r"mesh.cells.0: .*accepted"),
+        ("pressure", "friction.mu", r"\[value\]"),
+        ("max_pressure", "friction.nu", r"friction.nu.*\[no-number\]"),
+        ("max_pressure", "friction.law", r"friction.law.*\[no-number\]"),
+        ("max_pressure", "mesh.cells.0", r"mesh.cells.0.*\[value\]"),
     ],
 )
 def test_refused(quantity, parameter, message):
@@ -487,5 +487,5 @@ def test_an_end_that_has_not_converged_is_refused():
     data["solver"] = {"max_outer": 1}
     run = solve(parse_case(data), comm=SELF)
     assert not run.converged
-    with pytest.raises(InputError, match="accepted: one that has converged"):
+    with pytest.raises(InputError, match=r"\[no-derivative\]"):
         sensitivity(run, ["max_pressure"], ["friction.mu"])

@@ -66,11 +66,11 @@ def test_noise_widens_the_intervals():
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        ({"contact_force_x": [1.0]}, "data: columns contact_force_x; accepted: t and columns"),
-        ({"t": [1.0, 4.0], "contact_force_x": [1.0, 1.0]}, "data: t: .*times between 0 and 3"),
-        ({"t": [1.0, 2.0], "force": [1.0, 1.0]}, "data: given 'force'; accepted: columns of"),
-        ({"t": [1.0], "contact_force_x": [1.0]}, "data: given '1 values'; accepted: more than 1"),
-        ({"t": [1.0, 2.0], "contact_force_x": [1.0, np.nan]}, "data: contact_force_x: given"),
+        ({"contact_force_x": [1.0]}, r"\[data-file\]"),
+        ({"t": [1.0, 4.0], "contact_force_x": [1.0, 1.0]}, r"\[value\]"),
+        ({"t": [1.0, 2.0], "force": [1.0, 1.0]}, r"\[value\]"),
+        ({"t": [1.0], "contact_force_x": [1.0]}, r"\[value\]"),
+        ({"t": [1.0, 2.0], "contact_force_x": [1.0, np.nan]}, r"\[value\]"),
     ],
 )
 def test_refused(data, message):

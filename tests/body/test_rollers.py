@@ -245,11 +245,11 @@ def test_a_roller_in_front_of_a_plate_that_moves():
 WRONG = {
     "two": (
         {"displacement": [0.0, "free"]},
-        r"fixed\.0\.normal: .*one of normal and displacement, and for more another entry",
+        r"fixed\.0\.normal.*\[one-condition\]",
     ),
-    "no number": ({"normal": "log(-1 - x)"}, r"fixed\.0\.normal: .*(finite|number)"),
-    "no part": ({"on": "base"}, r"fixed\.0\.on: given .base."),
-    "an edge": ({"on": ["left", "top"]}, r"fixed\.0\.normal: left\+top has an edge"),
+    "no number": ({"normal": "log(-1 - x)"}, r"fixed\.0\.normal.*\[not-finite\]"),
+    "no part": ({"on": "base"}, r"fixed\.0\.on.*\[part-name\]"),
+    "an edge": ({"on": ["left", "top"]}, r"fixed\.0\.normal.*\[roller-normal\]"),
 }
 
 
@@ -264,7 +264,7 @@ def test_what_is_refused(name):
 
 def test_a_roller_alone_leaves_a_motion_along_it():
     far = {"on": "bottom", "gap": 1.0}
-    with pytest.raises(InputError, match="rigid body"):
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
         build_problem(block(30.0, contact=far | {"on": "right"}, friction={"law": "none"}))
 
 
@@ -315,17 +315,17 @@ def test_rollers_on_two_pieces_of_a_face_bear_the_same_in_any_order():
 
 @pytest.mark.parallel
 @pytest.mark.parametrize(
-    ("given", "more", "words"),
+    ("given", "more"),
     [
-        ((0.01, 0.0), [Fixed("bottom", [0.0, 0.0])], "'bottom' asks for 0;"),
-        ((0.01, 0.0), [Fixed("left", normal=0.02)], r"given 0.01.* 'left' asks for 0.015"),
-        ((0.0, 0.0), [Fixed("bottom", [0.01, 0.0])], "given 0 along .*'bottom' asks for -0.009397"),
+        ((0.01, 0.0), [Fixed("bottom", [0.0, 0.0])]),
+        ((0.01, 0.0), [Fixed("left", normal=0.02)]),
+        ((0.0, 0.0), [Fixed("bottom", [0.01, 0.0])]),
     ],
 )
-def test_rollers_that_contradict_other_supports_are_refused(given, more, words):
+def test_rollers_that_contradict_other_supports_are_refused(given, more):
     order = ["left"] if more[0].normal is None else ["left", "bottom"]
     domain, body = wedge(order, given, more)
-    with pytest.raises(InputError, match=r"fixed.0.normal:.* " + words):
+    with pytest.raises(InputError, match=r"fixed\.0\.normal.*\[roller-values\]"):
         Problem(domain, body, Contact("top", gap=1.0))
     agreeing = [Fixed("bottom", [-0.01 / np.cos(np.deg2rad(20)), 0.0])]
     domain, body = wedge(["left"], (0.01, 0.0), agreeing)
@@ -360,5 +360,5 @@ def test_rollers_at_jumps_of_several_nodes(kind, words):
         case["fixed"] = [{"on": "upper_left", "normal": 0.0}]
         case["load"] = [{"on": "upper_top", "traction": [0.0, -0.01]}]
         case["contact"] = {"on": "upper_bottom", "against": "lower_top"}
-    with pytest.raises(InputError, match=f"shares nodes with a {words}, where jumps are sums"):
+    with pytest.raises(InputError, match=rf"{words}.*\[roller-contact\]"):
         build_problem(parse_case(case))

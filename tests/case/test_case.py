@@ -84,7 +84,7 @@ def test_a_mesh_file_belongs_to_the_folder_of_the_case(bar):
     lines = [line for line in text.splitlines() if not line.startswith(("origin", "size", "cells"))]
     start, stop = lines.index("[mesh.parts.loaded]"), lines.index("[space]")
     bar.write_text("\n".join(lines[:start] + lines[stop:]))
-    with pytest.raises(InputError, match=r"mesh\.file: no file .*body\.msh; accepted: a mesh file"):
+    with pytest.raises(InputError, match=r"mesh\.file.*\[file-name\]"):
         load_case(bar)
     (bar.parent / "body.msh").touch()
     assert load_case(bar).mesh.file == str(bar.parent / "body.msh")
@@ -158,7 +158,7 @@ def test_messages_of_bad_overrides(bar, snapshot):
 def test_what_only_the_mesh_can_tell():
     case = parse_case(changed(mesh={"generator": "quarter_disc"}), source="disc.toml")
     case.check_mesh(2, ["left", "loaded", "bottom"])
-    with pytest.raises(InputError, match=r"disc\.toml: contact\.on: given .* accepted: a part"):
+    with pytest.raises(InputError, match=r"\[part-name\]"):
         case.check_mesh(2, ["left", "loaded", "arc"])
-    with pytest.raises(InputError, match=r"fixed\.0\.displacement: given .* 3 components in 3-D"):
+    with pytest.raises(InputError, match=r"fixed\.0\.displacement.*\[value\]"):
         case.check_mesh(3, ["left", "loaded", "bottom"])

@@ -62,7 +62,7 @@ def test_a_file_has_changed(written, name, said):
     first = digest(load_case(written))
     with (written.parent / name).open("a") as file:
         file.write("\n")
-    with pytest.raises(InputError, match=f"{said} has changed since then; accepted"):
+    with pytest.raises(InputError, match=rf"{said} .*\[changed-input\]"):
         check_files("here", "then", first, digest(load_case(written)))
 
 
@@ -70,5 +70,5 @@ def test_the_case_has_changed(written):
     first, other = (
         to_toml(load_case(written, changes)) for changes in ([], ["fixed.0.displacement=[0, 0, 1]"])
     )
-    with pytest.raises(InputError, match=r"there fixed\.0\.displacement\.2 is 0\.0, here 1\.0"):
+    with pytest.raises(InputError, match=r"\[other-case\]"):
         check_same("here", "results", first, other, "")

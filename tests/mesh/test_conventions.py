@@ -258,7 +258,7 @@ def test_a_mesh_without_tags_names_them(shared_tmp_path):
     path = shared_tmp_path / "bare.xdmf"
     with io.XDMFFile(MPI.COMM_SELF, path, "w") as file:
         file.write_mesh(unit_block(MPI.COMM_SELF, "triangle").mesh)
-    with pytest.raises(InputError, match="nor sets or tags of facets or nodes: no part has a name"):
+    with pytest.raises(InputError, match=r"\[no-groups\]"):
         from_file(MPI.COMM_SELF, path)
 
 
@@ -274,10 +274,10 @@ def test_mixed_topologies_of_second_order(tmp_path):
     domain = from_file(MPI.COMM_SELF, tmp_path / "piece.xdmf")
     assert [*domain.parts] == ["tags 6"] and [*domain.regions] == ["tags 4"]
     assert domain.order == 2 and integral(domain) == pytest.approx(1.0)
-    for name, accepted in (("Hexahedron", "several meshes"), ("Mixed", "number 99")):
+    for name in ("Hexahedron", "Mixed"):
         text = "<Geometry><DataItem Dimensions='1 3'>0 0 {}</DataItem></Geometry><Topology "
         text += f"TopologyType='{name}'><DataItem Dimensions='1 2'>99 0</DataItem></Topology>"
         grids = "".join(f"<Grid>{text.format(z)}</Grid>" for z in range(2 - (name == "Mixed")))
         (tmp_path / "other.xdmf").write_text(f"<Xdmf><Domain>{grids}</Domain></Xdmf>")
-        with pytest.raises(InputError, match=f"the XDMF reader says of it: .*{accepted}"):
+        with pytest.raises(InputError, match=r"\[mesh-file\]"):
             from_file(MPI.COMM_SELF, tmp_path / "other.xdmf")

@@ -242,7 +242,7 @@ def test_bent_edges_are_kept(tmp_path):
     assert domain.mesh.geometry.index_map().size_global == 45
     assert domain.notes == (SERENDIPITY,)
     (tmp_path / "folded.inp").write_text(bricks(1.5))
-    with pytest.raises(InputError, match=r"folded\.inp: .* folded by their curved edges"):
+    with pytest.raises(InputError, match=r"\[folded-edges\]"):
         from_file(MPI.COMM_SELF, tmp_path / "folded.inp")
 
 
@@ -281,7 +281,7 @@ def test_a_med_file_of_two_meshes_is_refused(tmp_path):
 
     with h5py.File(tmp_path / "piece.med", "a") as data:
         data.copy("ENS_MAA/piece", "ENS_MAA/other")
-    with pytest.raises(InputError, match=r"piece\.med: the MED reader says of it: 2 meshes"):
+    with pytest.raises(InputError, match=r"\[mesh-file\]"):
         from_file(MPI.COMM_SELF, tmp_path / "piece.med")
 
 

@@ -162,13 +162,13 @@ def test_an_elastic_part_carries_no_field() -> None:
 @pytest.mark.parametrize(
     ("material", "message"),
     [
-        (materials()[:1], r"the region 'upper' has none; accepted: a \[\[material\]\] with on"),
-        ([*materials()[:1], {"young": 1.0, "poisson": 0.3}], r"material\.1\.on: missing"),
-        (materials(second={"on": "lower"}), r'material\.1\.on: given "lower"; accepted: regions'),
-        (materials(second={"on": "uper"}), "no region 'uper'; did you mean 'upper'"),
-        (materials(second={"on": "upper", "yung": 1}), r"material\.1\.yung: unknown key"),
-        (materials(second={"on": []}), r"material\.1\.on: given \[\]; accepted: a name, or a list"),
-        ([], r"material: given \[\]; accepted: a table \[material\], or tables \[\[material\]\]"),
+        (materials()[:1], r"\[regions\]"),
+        ([*materials()[:1], {"young": 1.0, "poisson": 0.3}], r"material\.1\.on.*\[missing\]"),
+        (materials(second={"on": "lower"}), r"material\.1\.on.*\[value\]"),
+        (materials(second={"on": "uper"}), r"\[part-name\]"),
+        (materials(second={"on": "upper", "yung": 1}), r"material\.1\.yung.*\[unknown-key\]"),
+        (materials(second={"on": []}), r"material\.1\.on.*\[value\]"),
+        ([], r"\[value\]"),
     ],
 )
 def test_what_is_refused(material, message: str) -> None:
@@ -181,9 +181,9 @@ def test_a_cell_has_one_material() -> None:
     mesh = two_layers().mesh
     sides = {name: facets for name, facets in two_layers().parts.items()}
     regions = {"lower": lambda x: x[1] < 0.51, "all": lambda x: x[1] < 2.0}
-    with pytest.raises(InputError, match=r"material\.1\.on: all shares cells with .* material\.0"):
+    with pytest.raises(InputError, match=r"material\.1\.on.*\[regions\]"):
         build_problem(given, domain=from_mesh(mesh, sides, regions=regions))
     del regions["all"]
     alone = case([{**materials()[0], "on": "lower"}])
-    with pytest.raises(InputError, match="64 cells of the mesh are in no region"):
+    with pytest.raises(InputError, match=r"\[regions\]"):
         build_problem(alone, domain=from_mesh(mesh, sides, regions=regions))

@@ -40,19 +40,19 @@ GOOD = {
     "mixed.msh": (2, {"bottom": 1.0, "top": 1.0}),  # two groups in one elementary entity
 }
 BAD = {
-    "line.msh": "no triangles, quadrilaterals, tetrahedra or hexahedra",
-    "no-cells.msh": "no triangles, quadrilaterals, tetrahedra or hexahedra",
-    "empty.msh": "no triangles, quadrilaterals, tetrahedra or hexahedra",
-    "no-groups.msh": "no physical groups of curves",
-    "no-boundary.msh": "no physical groups of curves",
-    "degenerate.msh": r"1 cell\(s\) of zero volume, the first near \(0.5, 0\)",
-    "folded.msh": "cells overlap",
-    "arrow.msh": r"1 cell\(s\) with a corner of 180 degrees or more",
-    "curled.msh": r"1 cell\(s\) that are folded by their curved edges, the first near \(0\.333",
-    "surface.msh": "surface in 3-D",
-    "text.msh": "no Gmsh .msh file",
-    "cut.msh": "it is cut off",
-    "absent.msh": "no such file",
+    "line.msh": "no-groups",
+    "no-cells.msh": "no-groups",
+    "empty.msh": "no-groups",
+    "no-groups.msh": "no-groups",
+    "no-boundary.msh": "no-groups",
+    "degenerate.msh": "mesh-geometry",
+    "folded.msh": "mesh-geometry",
+    "arrow.msh": "folded-cells",
+    "curled.msh": "folded-edges",
+    "surface.msh": "surface-mesh",
+    "text.msh": "mesh-file",
+    "cut.msh": "mesh-file",
+    "absent.msh": "file-name",
 }
 
 
@@ -78,7 +78,7 @@ def test_cells_of_second_order_keep_their_nodes():
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", BAD)
 def test_bad_mesh_files_are_refused_on_all_ranks(name):
-    with pytest.raises(InputError, match=f"mesh file .*{name}: .*{BAD[name]}"):
+    with pytest.raises(InputError, match=rf"{name}.*\[{BAD[name]}\]"):
         from_msh(COMM, FIXTURES / "bad" / name)
 
 
@@ -97,7 +97,7 @@ def test_a_group_that_is_no_part_is_ignored_until_it_is_used(name, reason, caplo
     assert len(domain.notes) == 1
     assert reason in domain.notes[0]
     assert [reason in message for message in caplog.messages] == [True] * (COMM.rank == 0)
-    with pytest.raises(InputError, match=f"mesh file .*{name}: .*{re.escape(reason)}"):
+    with pytest.raises(InputError, match=rf"{name}.*\[part-facets\]"):
         domain.ds("top")
     case = {
         "mesh": {"file": str(FIXTURES / name)},
@@ -105,13 +105,13 @@ def test_a_group_that_is_no_part_is_ignored_until_it_is_used(name, reason, caplo
         "fixed": [{"on": "bottom", "displacement": [0.0, 0.0]}],
         "contact": {"on": "top"},
     }
-    with pytest.raises(InputError, match=f"{name}: .*{re.escape(reason)}"):
+    with pytest.raises(InputError, match=rf"{name}.*\[part-facets\]"):
         build_problem(parse_case(case), COMM)
 
 
 @pytest.mark.parametrize("unit", ["e-200", "e-9", "e150"])
 def test_shapes_are_judged_in_any_unit_of_length(unit, tmp_path):
-    for name, message in (("square.msh", None), ("bad/degenerate.msh", "zero volume")):
+    for name, message in (("square.msh", None), ("bad/degenerate.msh", r"\[mesh-geometry\]")):
         head, tail = (FIXTURES / name).read_text().split("$EndNodes")
         text = re.sub(r"(?m)^(\d+) (\S+) (\S+) (\S+)$", rf"\1 \g<2>{unit} \g<3>{unit} \4", head)
         (tmp_path / "body.msh").write_text(f"{text}$EndNodes{tail}")
@@ -126,7 +126,7 @@ def test_shapes_are_judged_in_any_unit_of_length(unit, tmp_path):
 def test_one_part_at_least_is_needed(tmp_path):
     text = (FIXTURES / "interior.msh").read_text().replace("1 1 2 2 1 1 2", "1 1 2 3 1 1 3")
     (tmp_path / "body.msh").write_text(text)
-    with pytest.raises(InputError, match=r"'top' has \d interior facet"):
+    with pytest.raises(InputError, match=r"\[part-facets\]"):
         from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
 
 
@@ -164,6 +164,6 @@ def test_a_mesh_file_is_never_executed(start, name, tmp_path):
     mark = tmp_path / "executed"
     command = f'SystemCall "touch {mark}";\nPrintf("x") > "{mark}";\n'
     (tmp_path / name).write_text(start + command, encoding="utf-8")
-    with pytest.raises(InputError, match=r"no Gmsh .msh file"):
+    with pytest.raises(InputError, match=r"\[mesh-file\]"):
         from_msh(MPI.COMM_SELF, tmp_path / name)
     assert not mark.exists()

@@ -32,9 +32,9 @@ def test_regions(refine):
     one = fem.Constant(domain.mesh, 1.0)
     mixed = fem.form(one * domain.dx + one * domain.dx_in("left") + one * domain.ds("bottom"))
     assert COMM.allreduce(fem.assemble_scalar(mixed)) == pytest.approx(9.0)
-    with pytest.raises(InputError, match=r"no region 'lift'; did you mean 'left'\? \(its regions"):
+    with pytest.raises(InputError, match=r"\[part-name\]"):
         domain.cells("lift")
-    with pytest.raises(InputError, match="region 'none' contains no cell"):
+    with pytest.raises(InputError, match=r"\[part-facets\]"):
         from_mesh(domain.mesh, {}, regions={"none": lambda x: x[0] > 5.0})
 
 

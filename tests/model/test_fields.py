@@ -129,7 +129,7 @@ def test_vectors() -> None:
         np.testing.assert_allclose(y.numpy(points), 2 * points[:, 1], atol=1e-12)
     assert Fixed("top", ["free", None], 0.0).displacement == ("free", "free")
     for given in (["free", 1.0], [None, 1.0]):
-        with pytest.raises(InputError, match=r"Load on 'top': traction\.0: "):
+        with pytest.raises(InputError, match=r"\[formula\]"):
             Load("top", traction=given)
 
 
@@ -139,7 +139,7 @@ TOP = Fixed("top", [0.0, -0.01])
 def test_a_function_of_another_mesh() -> None:
     elsewhere = dmesh.create_rectangle(MPI.COMM_SELF, [[5, 5], [6, 6]], [1, 1])
     function = fem.Function(fem.functionspace(elsewhere, ("Lagrange", 1)))
-    with pytest.raises(InputError, match="not defined everywhere"):
+    with pytest.raises(InputError, match=r"\[field\]"):
         field(function).numpy(np.zeros((1, 2)))
 
 

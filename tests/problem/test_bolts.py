@@ -234,23 +234,23 @@ def test_results_have_derivatives_by_a_shortening():
 
 
 WRONG = {
-    "both": ({"force": 1.0, "shortening": 1.0}, {}, r"bolt\.0\.force: both"),
-    "neither": ({}, {}, r"bolt\.0\.force: neither"),
-    "a side": ({"on": "top", "force": 1.0}, {}, "'top': it is on the boundary"),
+    "both": ({"force": 1.0, "shortening": 1.0}, {}, r"bolt\.0\.force.*\[bolt\]"),
+    "neither": ({}, {}, r"bolt\.0\.force.*\[bolt\]"),
+    "a side": ({"on": "top", "force": 1.0}, {}, r"\[bolt\]"),
     "half a section": (
         {"force": 1.0},
         {"mesh": {"inside": {"cut": "(abs(y - 0.8) < 1e-6)*(x < 0.3)"}}},
-        "'cut': the cut ends within the body",
+        r"\[bolt\]",
     ),
     "two planes": (
         {"force": 1.0},
         {"mesh": {"inside": {"cut": "(abs(y - 0.8) < 1e-6) + (abs(y - 1.2) < 1e-6)"}}},
-        "'cut': the cut is not plane",
+        r"\[bolt\]",
     ),
     "plastic": (
         {"force": 1.0},
         {"material": {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 1.0}},
-        "bolt on 'cut': a material of the body has internal variables",
+        r"\[bolt\]",
     ),
 }
 
@@ -276,7 +276,7 @@ def two(one, other, cut="abs(y - 1.2) < 1e-6", **more):
 @pytest.mark.parallel
 def test_forces_in_series_leave_the_piece_between_to_nothing():
     """Its place is that of one bolt's shortening: where it is given, the other's force decides."""
-    with pytest.raises(InputError, match=r"cuts of bolts make 3 pieces.*0\.2, 1.*along y\)"):
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
         solve(two({"force": 0.02}, {"force": 0.02}), comm=COMM)
     solution = solve(two({"force": 0.02}, {"shortening": 0.001}), comm=COMM)
     found = solution.movements["bolts"]
@@ -293,7 +293,7 @@ def test_cuts_that_cross_make_four_pieces():
     stress = stresses(solution)
     assert np.allclose(stress[:, 1, 1], 0.02 / 0.4) and np.allclose(stress[:, 0, 0], -0.05 / LENGTH)
     free = two(*bolts, fixed=held[::2], contact={"on": "top"})
-    with pytest.raises(InputError, match=r"make 4 pieces, and the group .*along x, together\)"):
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
         check_problem(build_problem(free, COMM))
 
 
@@ -341,7 +341,7 @@ def test_two_bolts_beside_a_column_that_bears_them():
     found = solution.movements["bolts"]
     assert found["left"] == pytest.approx(found["right"], rel=1e-8)
     alone = Problem(frame((0, 2)), body, Contact("head", gap=1.0))
-    with pytest.raises(InputError, match="or the force of a bolt one side of its cut"):
+    with pytest.raises(InputError, match=r"\[pulled-off\]"):
         check_problem(alone)
 
 
@@ -353,7 +353,7 @@ def test_a_force_that_nothing_bears_is_refused():
         solve(bar({"force": 0.02}, **held, contact={"on": "bottom"}), comm=COMM)
     pressed = solve(bar({"force": -0.02}, **held, contact={"on": "bottom"}), comm=COMM)
     assert pressed.contact_force[1] == pytest.approx(-0.02)
-    with pytest.raises(InputError, match=r"make 2 pieces, and the one about \(0\.2, 0\.4\)"):
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
         solve(bar({"force": 0.02}, **held), comm=COMM)
 
 
@@ -407,7 +407,7 @@ def test_supports_and_contact_that_meet_a_cut(more, words):
     held = [{"on": "bottom", "displacement": [0.0, 0.0]}, *more.pop("fixed", [])]
     case = bar({"shortening": 0.004}, rotation=more.pop("rotation", 0.0), fixed=held, **more)
     if words:
-        with pytest.raises(InputError, match=rf"bolt on 'cut': {words}.* along its normal"):
+        with pytest.raises(InputError, match=rf"{words}.*\[bolt-held\]"):
             build_problem(case, MPI.COMM_SELF)
     else:
         build_problem(case, MPI.COMM_SELF)

@@ -199,7 +199,7 @@ WRONG = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_nothing_acts_inside(name):
-    with pytest.raises(InputError, match="'hot' lies inside of the body; a part must") as error:
+    with pytest.raises(InputError, match=r"\[part-facets\]") as error:
         build_problem(stack(2, dict(WRONG[name])))
     assert "\n" not in str(error.value)
 
@@ -207,10 +207,10 @@ def test_nothing_acts_inside(name):
 @pytest.mark.parametrize(
     ("mesh", "words"),
     [
-        ({"inside": {"middle": "abs(y - 0.3) < 1e-6"}}, "'middle' contains no facet inside"),
-        ({"regions": {"far": "y > 7"}}, "'far' contains no cell"),
-        ({"inside": {"left": "y < 1"}}, r"mesh\.inside\.left: given again"),
-        ({"inside": {"middle": "z > 1"}}, "formulas in x and y"),
+        ({"inside": {"middle": "abs(y - 0.3) < 1e-6"}}, r"\[part-facets\]"),
+        ({"regions": {"far": "y > 7"}}, r"\[part-facets\]"),
+        ({"inside": {"left": "y < 1"}}, r"mesh\.inside\.left.*\[part-facets\]"),
+        ({"inside": {"middle": "z > 1"}}, r"\[formula-variable\]"),
     ],
 )
 def test_names_that_are_refused(mesh, words):
@@ -279,5 +279,5 @@ def test_groups_of_a_file_that_lie_inside_may_be_fixed(shared, tmp_path):
     assert COMM.allreduce(domain.facets_anywhere("top").size) == 1
     body = Body(Linear(1.0, 0.3), Fixed("top", [0.0, 0.0]))
     problem = Problem(domain, body, Contact("bottom", 1.0))
-    with pytest.raises(InputError, match="'top' has 1 interior facet"):
+    with pytest.raises(InputError, match=r"\[part-facets\]"):
         problem.domain.ds("top")

@@ -50,10 +50,10 @@ def test_a_body_that_lies_on_another_is_held_by_friction(condense):
 @pytest.mark.parametrize(
     ("held", "traction", "mu", "words"),
     [
-        ((0.0, 0.0), (0.0, -0.01), 0.0, r"the one about \(0.5, 1.5\) is not held.*along x\)"),
-        ((None, 0.0), (0.0, -0.01), 0.5, r"the group about \(.*\) and \(.*\) .*along x, together"),
-        ((0.0, 0.0), (0.0, 0.01), 0.5, "pull the body off"),
-        ((0.0, 0.0), (0.01, -0.01), 0.5, "pull the body off"),
+        ((0.0, 0.0), (0.0, -0.01), 0.0, r"\[unsupported\]"),
+        ((None, 0.0), (0.0, -0.01), 0.5, r"\[unsupported\]"),
+        ((0.0, 0.0), (0.0, 0.01), 0.5, r"\[pulled-off\]"),
+        ((0.0, 0.0), (0.01, -0.01), 0.5, r"\[pulled-off\]"),
     ],
 )
 def test_pairs_that_fly_away_are_refused(held, traction, mu, words):
@@ -74,7 +74,7 @@ def test_a_potential_that_no_contact_could_determine_is_refused_before_anything_
     if electric.get("law") != "none":
         given["electric"] = electric
     if refused:
-        with pytest.raises(InputError, match="potential of the component of the mesh about"):
+        with pytest.raises(InputError, match=r"\[ungrounded\]"):
             build_problem(parse_case(given), SELF)
     else:
         build_problem(parse_case(given), SELF)
@@ -105,7 +105,7 @@ def test_a_stack_that_nothing_but_contact_holds(linear):
 
 
 @pytest.mark.parametrize(
-    ("push", "mu", "words"), [(0.0, 0.0, "is not held"), (0.31, 0.3, "pull the body off")]
+    ("push", "mu", "words"), [(0.0, 0.0, r"\[unsupported\]"), (0.31, 0.3, r"\[pulled-off\]")]
 )
 def test_a_stack_that_slides_off_is_refused(push, mu, words):
     with pytest.raises(InputError, match=words):
@@ -122,5 +122,5 @@ def test_a_box_that_slides_off_is_refused_whichever_way(angle):
         return build_problem(block(3, fixed=[], load=load), SELF)
 
     pushed(1.0)
-    with pytest.raises(InputError, match="pull the body off"):
+    with pytest.raises(InputError, match=r"\[pulled-off\]"):
         pushed(1.021)

@@ -56,7 +56,7 @@ def test_poling_of_the_case_file():
 
 def test_plane_body_refuses_a_crystal_that_leaves_the_plane(monkeypatch):
     monkeypatch.setattr("tests.problems.piezo.pzt", lambda *_: CRYSTAL.poled_along([1.0, 1.0, 1.0]))
-    with pytest.raises(InputError, match="shears the body out of it"):
+    with pytest.raises(InputError, match=r"\[material-constants\]"):
         example(COMM, (4, 2))
 
 

@@ -146,5 +146,5 @@ def test_checkpoints_of_other_materials_are_refused(tmp_path):
     folder = MPI.COMM_WORLD.bcast(tmp_path)
     assert solve_and_keep(block(), None, MPI.COMM_WORLD, folder).converged
     assert len(read_steps(folder, build_problem(block()))) == 6
-    with pytest.raises(InputError, match=r"does not fit the problem .*back_stress_2.*materials"):
+    with pytest.raises(InputError, match=r"\[other-checkpoint\]"):
         read_steps(folder, build_problem(block("chaboche")))

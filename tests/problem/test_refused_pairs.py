@@ -28,19 +28,19 @@ ZERO = constant(0.0, 2)
     [
         (
             {"contact": {"on": "upper_bottom", "against": "upper_bottom"}},
-            r'contact\.against: given "upper_bottom"; accepted: another part than `on`',
+            r"contact\.against.*\[value\]",
         ),
         (
             {"contact": {"on": "upper_bottom", "against": "upper_left"}},
-            r"contact\.against: 'upper_bottom' and 'upper_left' share nodes",
+            r"contact\.against.*\[pair\]",
         ),
         (
             {"contact": {"on": "upper_bottom", "against": "upper_top"}},
-            "'upper_bottom' and 'upper_top' are sides of one body that look away from each other",
+            r"\[pair\]",
         ),
         (
             {"contact": {"on": "upper_bottom", "against": "lower_tip"}},
-            r'contact\.against: given "lower_tip"; accepted: a part of the mesh',
+            r"contact\.against.*\[part-name\]",
         ),
         (
             {
@@ -50,7 +50,7 @@ ZERO = constant(0.0, 2)
                     "foundation": {"shape": "plane", "point": [0, 0], "normal": [0, 1]},
                 }
             },
-            r"contact\.against: both against and foundation; accepted: one of them",
+            r"contact\.against.*\[exclusive-keys\]",
         ),
         (
             {
@@ -60,11 +60,11 @@ ZERO = constant(0.0, 2)
                     "rigid": {"displacement": [0.0, 0.01]},
                 }
             },
-            r"contact\.rigid: both against and rigid; accepted: one of them",
+            r"contact\.rigid.*\[exclusive-keys\]",
         ),
         (
             {"contact": {"on": "upper_top", "against": "lower_top"}, "load": []},
-            r"contact\.against: 'upper_top' and 'lower_top' have no facets that face each other",
+            r"contact\.against.*\[pair\]",
         ),
         (
             {
@@ -73,7 +73,7 @@ ZERO = constant(0.0, 2)
                     {"on": "lower_top", "against": "upper_bottom"},
                 ]
             },
-            "contact nodes follow, by way of the nodes opposite, themselves",
+            r"\[contact-cycle\]",
         ),
         (
             {
@@ -82,7 +82,7 @@ ZERO = constant(0.0, 2)
                     {"on": "upper_bottom", "displacement": ["free", 0.0]},
                 ]
             },
-            r"contact\.against: .* no facets that face each other within .*, or their nodes",
+            r"contact\.against.*\[pair\]",
         ),
         (
             {
@@ -91,7 +91,7 @@ ZERO = constant(0.0, 2)
                     {"on": "upper_bottom", "displacement": [0.0, "free"]},
                 ]
             },
-            "supports hold the first along its surface, where friction would pull at the second",
+            r"\[held-side\]",
         ),
     ],
 )
@@ -108,7 +108,7 @@ def test_overlapping_bodies_are_refused():
     problem = ContactProblem(
         domain, body, Contact("left", GapFunction(lambda p: np.full(len(p), 9.0)))
     )
-    with pytest.raises(InputError, match=r"the undeformed bodies overlap, by up to 0\.2"):
+    with pytest.raises(InputError, match=r"\[overlap\]"):
         find_pair(problem.equilibrium, "under", "over", NOTHING)
     _, geometry = find_pair(problem.equilibrium, "under", "over", NOTHING, press=True)
     np.testing.assert_allclose(geometry.nodes.gap, -0.2, atol=1e-12)

@@ -145,7 +145,7 @@ def test_supports_on_an_inclined_normal_take_their_share(condense):
 def test_a_press_fit_presses():
     data = indented(n=8, displacement=[0.0, 0.0]).model_dump(exclude_unset=True)
     data["contact"]["foundation"]["centre"] = [1.0, 1.98]
-    with pytest.raises(InputError, match="overlap"):
+    with pytest.raises(InputError, match=r"\[overlap\]"):
         build_problem(parse_case(data), SELF)
     data["contact"]["overlap"] = "press"
     pressed = solved(parse_case(data), SELF)[0]

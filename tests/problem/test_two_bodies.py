@@ -157,11 +157,11 @@ def test_a_body_may_be_held_by_contact_alone(pair):
     clamped, guided = Fixed("bottom", [ZERO, ZERO]), Fixed("upper_left", [ZERO, None])
     check_rigid_modes(held([clamped, guided], PRESS, pair=pair))
     check_rigid_modes(held([clamped], PRESS, mu=0.2, pair=pair))
-    with pytest.raises(InputError, match=r"not held: it can move as a rigid body"):
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
         check_rigid_modes(held([clamped], PRESS, pair=pair))
-    with pytest.raises(InputError, match="the loads pull the body off"):
+    with pytest.raises(InputError, match=r"\[pulled-off\]"):
         check_rigid_modes(held([clamped, guided], PULL, pair=pair))
-    with pytest.raises(InputError, match=r"not held: it can move as a rigid body"):
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
         check_rigid_modes(held([guided], PRESS, mu=0.0, pair=pair))
 
 
@@ -247,9 +247,7 @@ def test_columns_in_series(pair, degree):
 
 
 def test_a_foundation_of_its_own_potential_is_no_body():
-    with pytest.raises(
-        InputError, match=r"contact\.electric\.phi_f: .*; accepted: 0, or none, with"
-    ):
+    with pytest.raises(InputError, match=r"contact\.electric\.phi_f.*\[value\]"):
         parse_case(columns("upper_bottom", "lower_top", 1, phi_f=2.0))
 
 

@@ -34,7 +34,7 @@ def test_contact_as_arrays_and_functions(dim: int, degree: int) -> None:
         integral = MPI.COMM_WORLD.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
         assert integral == pytest.approx(contact.weight @ contact.pressure, rel=1e-10)
     assert contact.function("traction").x.array.size == dim * pressure.x.array.size
-    with pytest.raises(InputError, match="accepted: points, weight"):
+    with pytest.raises(InputError, match=r"\[no-such-name\]"):
         contact.function("status")
 
 
@@ -54,5 +54,5 @@ def test_fields() -> None:
 def test_a_body_that_nothing_holds_is_refused() -> None:
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (1.0, 1.0), (2, 2))
     body = Body(Linear(1.0, 0.3), [], [Load("top", traction=[0.1, 0.0])])
-    with pytest.raises(InputError, match="held"):
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
         solve(Problem(domain, body, Contact("bottom")))

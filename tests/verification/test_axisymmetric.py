@@ -250,7 +250,7 @@ def test_a_radial_displacement_on_the_axis_is_refused(comm):
     for given, wrong in ((constant(0.1, 2), True), (Affine((0.1, 0.0)), False)):
         body = Body(Linear(1.0, 0.3), [Fixed("top", [given, constant(0.0, 2)])])
         if wrong:
-            with pytest.raises(InputError, match=r"'top': a radial displacement of 0\.1"):
+            with pytest.raises(InputError, match=r"\[axis\]"):
                 ContactProblem(domain, body, Contact("bottom", flat()))
         else:
             ContactProblem(domain, body, Contact("bottom", flat()))
@@ -259,5 +259,5 @@ def test_a_radial_displacement_on_the_axis_is_refused(comm):
 def test_a_body_that_nothing_holds_along_its_axis(comm):
     domain = half_plane(comm, 1.0, 2.0, 1.0, 3)
     body = Body(Linear(1.0, 0.3), [Fixed("left", [constant(0.0, 2), None])])
-    with pytest.raises(InputError, match="translation along y"):
+    with pytest.raises(InputError, match=r"\[unsupported\]"):
         check_rigid_modes(ContactProblem(domain, body, Contact("right", flat())))

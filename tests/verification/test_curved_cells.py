@@ -173,10 +173,10 @@ def test_estimates_follow_the_error(name: str) -> None:
 def test_curved_cells_are_neither_refined_nor_of_mean_dilatation() -> None:
     domain = rings(MPI.COMM_SELF, "triangle", 2, (1.0, 2.0), (2,))
     for marked in (None, np.array([0], dtype=np.int32)):
-        with pytest.raises(InputError, match=r"mesh\.refine, mesh\.adapt: the cells are curved"):
+        with pytest.raises(InputError, match=r"mesh\.refine.*\[refine\]"):
             refined(domain, marked)
     body, contact = Body(LAW, supports(2)), Contact("inner0", Sphere((0.0, 0.0), 1.0))
-    with pytest.raises(InputError, match="accepted: 'standard' on curved cells"):
+    with pytest.raises(InputError, match=r"\[value\]"):
         ContactProblem(domain, body, contact, degree=2, element="mean_dilatation")
 
 

@@ -49,7 +49,7 @@ def test_overlaps_are_refused(cell, element):
             domain = layers(COMM, cell, order, form, depth)
             for on, against in (("outer0", "inner1"), ("inner1", "outer0")):
                 contact = Contact(on, against=against)
-                with pytest.raises(InputError, match="undeformed bodies overlap, by up") as raised:
+                with pytest.raises(InputError, match=r"\[overlap\]") as raised:
                     Problem(domain, body(form, domain.dim, 2), contact, degree=degree)
                 told = float(re.search(r"by up to (\S+) more", str(raised.value))[1])
                 # Beside a facet's vertices a hundredth of its sagitta may be an error of the curve.
@@ -153,7 +153,7 @@ def test_rigid_foundations(degree):
         held = [Fixed("below", [None, 0.0]), Fixed("above", [None, 0.0])]
         held += [Fixed(part, [0.0, None]) for part in ("outer0", "inner1")]
         ring = Body(Linear(YOUNG, POISSON), held)
-        with pytest.raises(InputError, match="the undeformed body cuts it, by up to"):
+        with pytest.raises(InputError, match=r"\[overlap\]"):
             Problem(domain, ring, Contact("inner0", plane), degree=degree)
         for contact in (Contact("inner0", plane, press=True), Contact("inner0", -depth)):
             solution = solve(Problem(domain, ring, contact, degree=degree))
@@ -173,7 +173,7 @@ def test_flat_sides_beside_curved_ones(degree):
         x[second, 0] -= depth * np.clip(4 - 10 * y[second], 0.0, 1.0)
         given, contact = body("flat", 2, 2), Contact("outer0", against="inner1")
         if depth > 0:
-            with pytest.raises(InputError, match=r"overlap, by up to 0\.0001 "):
+            with pytest.raises(InputError, match=r"\[overlap\]"):
                 Problem(domain, given, contact, degree=degree)
         else:
             assert Problem(domain, given, contact, degree=degree).nodes.size > 0
@@ -198,7 +198,7 @@ def test_several_pairs():
         return [Contact(a, against=b, press=p) for (a, b), p in zip(pairs, press, strict=True)]
 
     for press in ((False, False), (True, False)):
-        with pytest.raises(InputError, match=r"contact\.1\.against: 'outer1' and 'inner2': the un"):
+        with pytest.raises(InputError, match=r"contact\.1\.against.*\[overlap\]"):
             Problem(domain, given, contacts(*press))
     solution = solve(Problem(domain, given, contacts(False, True)))
     exact = UNIAXIAL * (sum(depths) + push) / 1.5

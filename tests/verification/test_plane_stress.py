@@ -270,7 +270,7 @@ def test_no_strain_without_stress_across_is_no_solution():
     found = law.respond(np.full((2, 4), 1e-3), {ACROSS: np.zeros(2)}, "tangent")
     assert np.isnan(found.stress).all()
     problem = build_problem(strip({}), law=Steep(YOUNG, POISSON, swollen=10.0))
-    with pytest.raises(InputError, match="law that is given has no value at these strains"):
+    with pytest.raises(InputError, match=r"\[overflow\]"):
         solve(problem)
 
 
@@ -279,14 +279,14 @@ def test_no_strain_without_stress_across_is_no_solution():
     [
         (
             {"space": {"kinematics": "plane_stress", "element": "mean_dilatation", "degree": 2}},
-            "locks",
+            r"\[plane-stress\]",
         ),
         (
             {
                 "material": LAWS["log"] | {"piezo": CERAMIC["piezo"]},
                 "fixed": [{"on": "left", "displacement": [0, 0], "potential": 0.0}],
             },
-            'given "log".*in plane stress with',
+            r"\[plane-stress\]",
         ),
         (
             {
@@ -294,7 +294,7 @@ def test_no_strain_without_stress_across_is_no_solution():
                 "load": [],
                 "fixed": [{"on": "left", "displacement": [0, 0, 0]}],
             },
-            "plane_strain. with a mesh in 3-D",
+            r"\[value\]",
         ),
     ],
 )
