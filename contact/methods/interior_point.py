@@ -4,8 +4,7 @@ Frictionless contact and Tresca's friction are convex. The linear systems of an 
 those of a Newton step with other nodal blocks: along the normal, force over slack in place of
 gamma. So it runs on whole bodies and condensed ones alike, on any number of ranks.
 
-1. The first friction bound is zero; where friction alone constrains a rigid-body mode, or has to
-   balance loads on one, it is above all loads at the nodes that touch first.
+1. The first friction bound is zero.
 2. A step of the interior point is Mehrotra's predictor and corrector with the scaling of Nesterov
    and Todd (`Cones`), both with one matrix. Every step linearises layer and current, and the
    material by its secant.
@@ -14,9 +13,8 @@ gamma. So it runs on whole bodies and condensed ones alike, on any number of ran
 4. Without convergence, or where a rigid-body mode has become unconstrained at the solution, the
    friction bound becomes that of the pressures found (Haslinger's fixed point), and the next
    problem begins at 2. It has a solution if this friction balances the loads on rigid motions
-   (`problem.rigid_modes.Overload`). If not, the bound is scaled once, to twice its least multiple
-   that does. The method ends where no multiple does, where a later bound does not either, where a
-   body with an unconstrained mode is not in contact, or after a number of bounds.
+   (`problem.rigid_modes.sliding_mode`). The method ends where it does not, where a body with an
+   unconstrained mode is not in contact, or after a number of bounds.
 
 Pressures and gaps are in half lines, friction and slip in second-order (Lorentz) cones: with the
 slip a, its length t >= |a|, the friction force q and its bound h >= |q|, the pairs (t, a) and
@@ -45,7 +43,7 @@ from mpi4py import MPI
 from contact.errors import InputError, SingularError
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import unit_vectors
-from contact.methods.report import PROGRESS, Outcome
+from contact.methods.report import Outcome
 from contact.methods.semismooth import SemismoothNewton
 from contact.methods.unconstrained_modes import all_loads
 from contact.problem.residuals import evaluate, evaluate_forces, residual_forces
@@ -321,10 +319,8 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
         a rigid-body mode or the potential.
     """
     problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
-    stuck = modes.stuck_bound()
-    bound = np.zeros(interface.nodes.weight.size) if stuck is None else stuck
+    bound = np.zeros(interface.nodes.weight.size)
     aside: tuple[State, Outcome] | None = None
-    best, raised = 1.0, False
     for _ in range(UPDATES):
         method = InteriorPoint(newton, bound, begin)
         outcome, state = method.iterate(), method.state
@@ -340,22 +336,15 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
             return last, outcome
         if newton.steps_left <= 0:
             break
-        # Pressures of Newton's last steps if these have made progress, else of the interior point.
-        if aside is None and outcome.residuals.significant < PROGRESS * best:
-            state = last
-        best = min(best, outcome.residuals.significant)
         nodal = interface.nodes.apply(state.x)
         bound = interface.bound(nodal, state.forces)
         # With all nodes open the next bound is zero, and the solution the same.
         if aside is not None and interface.nodes.maximum(bound) <= interface.rounding(nodal):
             break
-        multiple = modes.overload(bound)
-        if multiple == np.inf or (raised and multiple > 1):
+        if modes.overloaded(bound):
             outcome = replace(outcome, residuals=evaluate(problem, state))
             last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
             break
-        if multiple > 1:  # pressures may differ with as much friction as the loads need
-            bound, raised = np.asarray(multiple / PROGRESS * bound, dtype=float), True
     return aside or (last, outcome)
 
 

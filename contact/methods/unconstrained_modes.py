@@ -1,8 +1,8 @@
 """Rigid-body modes that the supports do not constrain: by contact, by friction alone, by nothing.
 
-A mode that friction alone constrains makes the linear systems singular at zero displacement, where
-no pressure gives a friction bound: the nodes that touch first get a bound at which they stick
-(`UnconstrainedModes.stuck_bound`).
+A mode that friction alone constrains makes the linear systems of fixed points singular at zero
+displacement, where no pressure gives a friction bound: the nodes that touch first get a bound at
+which they stick (`UnconstrainedModes.stuck_bound`).
 
 Solutions with an unconstrained mode differ by a rigid motion: the one of least displacements in L2
 is taken (`with_least_displacements`).
@@ -33,7 +33,13 @@ from contact.methods.report import Outcome
 from contact.problem.condensed import CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_forces
-from contact.problem.rigid_modes import Group, Overload, constrained_by_supports, groups, null_space
+from contact.problem.rigid_modes import (
+    Group,
+    constrained_by_supports,
+    groups,
+    null_space,
+    sliding_mode,
+)
 from contact.problem.state import Problem, State
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
@@ -113,7 +119,7 @@ class UnconstrainedModes:
         weight = problem.interface.nodes.weight
         if not problem.frictional:
             return None
-        if not self.friction_alone and self.overload(np.zeros_like(weight)) == 1:
+        if not (self.friction_alone or self.overloaded(np.zeros_like(weight))):
             return None
         loads = _loads(problem)
         borne, total = float(loads[_without_supports(problem)].sum()), float(loads.sum())
@@ -121,14 +127,11 @@ class UnconstrainedModes:
         bound = STUCK * (borne if borne > EPS * total else total)
         return np.where(self._nearest(), bound / weight, 0.0)
 
-    def overload(self, bound: Array) -> float:
-        """Return the least multiple, >= 1, of friction bounds (n,) that balances the loads.
-
-        Infinity where none does. Collective.
-        """
+    def overloaded(self, bound: Array) -> bool:
+        """Tell whether the loads are more than friction bounds (n,) balance. Collective."""
         friction, time = self.problem.nodes.weight * bound, self.problem.time
-        found = [Overload.of(group, time, friction) for group in self._unsupported]
-        return max((lost.multiple for lost in found if lost is not None), default=1.0)
+        found = [sliding_mode(group, time, friction) for group in self._unsupported]
+        return any(mode is not None for mode in found)
 
     def _nearest(self) -> NDArray[np.bool_]:
         """Return which nodes of each unsupported body touch first, shape (n,). Collective."""

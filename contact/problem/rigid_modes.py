@@ -395,84 +395,73 @@ def released(supports: Sequence[UnilateralSupport], begin: float, end: float) ->
     return ""
 
 
-@dataclass(frozen=True)
-class Overload:
-    """Loads on a group that friction within given bounds does not balance.
+def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
+    """Return the mode, shape (m,), by which the loads of a time slide a group; None if balanced.
 
-    Attributes
+    Collective.
+
+    Parameters
     ----------
-    motion
-        The mode by which the bodies slide, shape (m,).
-    multiple
-        Least multiple of all bounds that balances the loads; infinity for none.
+    group, time
+        The bodies, and the time.
+    friction
+        Bounds of the friction forces at the nodes of this rank, shape (n,) (force).
     """
+    problem, free = group.problem, null_space(group.supports)
+    if free.shape[1] == 0:
+        return None
+    nodes, near = problem.nodes, np.isfinite(problem.interface.gap)
+    normal, tangential, bound = (
+        nodes.gather(of[near]) for of in (group.normal @ free, group.tangential @ free, friction)
+    )
+    sideways = [nodes.gather(along[near]) for along in _sideways(nodes.normal)]
+    work, scale = _work(group, free, time)
+    if np.abs(work).max() <= NEGLIGIBLE * scale:
+        return None
 
-    motion: Array
-    multiple: float
+    def found() -> Array | None:
+        bears = bound > NEGLIGIBLE * scale / bound.size
+        along = [unit_vectors(of[bears]) for of in sideways]
+        own = np.asarray(bound[bears] / scale, dtype=float)
+        mode = _most_power(work / scale, normal, tangential[bears], own, along)
+        return None if mode is None else np.asarray(free @ mode)
 
-    @staticmethod
-    def of(group: Group, time: float, friction: Array) -> Overload | None:
-        """Return the overload of a group by the loads of a time; None for none. Collective.
-
-        `friction`: bounds of the friction forces at the nodes of this rank, shape (n,) (force).
-        """
-        problem, free = group.problem, null_space(group.supports)
-        if free.shape[1] == 0:
-            return None
-        nodes, near = problem.nodes, np.isfinite(problem.interface.gap)
-        normal, tangential, bound = (
-            nodes.gather(of[near])
-            for of in (group.normal @ free, group.tangential @ free, friction)
-        )
-        sideways = [nodes.gather(along[near]) for along in _sideways(nodes.normal)]
-        work, scale = _work(group, free, time)
-        if np.abs(work).max() <= NEGLIGIBLE * scale:
-            return None
-
-        def found() -> Overload | None:
-            bears = bound > NEGLIGIBLE * scale / bound.size
-            along = [unit_vectors(of[bears]) for of in sideways]
-            slips, own = tangential[bears], np.asarray(bound[bears] / scale, dtype=float)
-            each = np.asarray(work / scale, dtype=float)
-            return _overload(free, each, normal, slips, own, along)
-
-        return on_root(problem.comm, found)
+    return on_root(problem.comm, found)
 
 
-def _overload(
-    free: Array, work: Array, normal: Array, tangential: Array, bound: Array, along: list[Array]
-) -> Overload | None:
-    """Maximise the power of the loads minus the dissipation of friction.
+def _most_power(
+    work: Array, normal: Array, tangential: Array, bound: Array, along: list[Array]
+) -> Array | None:
+    """Return the mode of largest ratio of the loads' power to the dissipation, if it is above 1.
 
     The dissipation, bound times |slip|, is approximated from below by slips along unit vectors;
-    slip directions of the last motion are added (Kelley's cutting planes). The multiple of the
-    bounds is updated from the motion (Dinkelbach).
+    slip directions of the last mode are added (Kelley's cutting planes). The ratio is updated from
+    the mode (Dinkelbach).
     """
     from scipy.optimize import linprog  # takes a while to load
     from scipy.sparse import block_array, eye_array
 
     one = eye_array(bound.size)
     bounds = [(-1, 1)] * work.size + [(0, None)] * bound.size
-    multiple, motion = 1.0, None
+    ratio, mode = 1.0, None
     for _ in range(ROUNDS):
         slips = [np.einsum("ni,nik->nk", of, tangential) for of in along]
         rows = [[normal, None], *([sign * of, -one] for of in slips for sign in (1, -1))]
         cone = block_array(rows, format="csr")
-        cost = np.concatenate([-work, multiple * bound])
+        cost = np.concatenate([-work, ratio * bound])
         found = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
         if found.status != 0 or -found.fun <= BALANCED:
             break
-        worst = found.x[: work.size]
+        worst = np.asarray(found.x[: work.size])
         ways = tangential @ worst
-        driven, taken = float(work @ worst), float(bound @ np.linalg.norm(ways, axis=1))
-        if driven - multiple * taken > BALANCED:
-            motion = worst
-            if taken <= BALANCED * driven:
-                multiple = np.inf
+        power, dissipation = float(work @ worst), float(bound @ np.linalg.norm(ways, axis=1))
+        if power - ratio * dissipation > BALANCED:
+            mode = worst
+            if dissipation <= BALANCED * power:
                 break
-            multiple = driven / taken
+            ratio = power / dissipation
         along.append(unit_vectors(ways))
-    return None if motion is None else Overload(free @ motion, multiple)
+    return mode
 
 
 def _work(group: Group, free: Array, time: float) -> tuple[Array, float]:

@@ -19,12 +19,12 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
     Group,
-    Overload,
     UnilateralSupport,
     constrained_by_supports,
     described,
     groups,
     null_space,
+    sliding_mode,
 )
 from contact.problem.state import State
 from contact.results.solution import Note, Remark, Solution
@@ -249,8 +249,7 @@ def not_held(solution: Solution) -> Iterator[Remark]:
     for group in groups(problem):
         if solution.outcome.overloaded:
             bound = problem.nodes.weight * solution.friction_bound
-            overload = Overload.of(group, time, bound)
-            motion = None if overload is None else overload.motion
+            motion = sliding_mode(group, time, bound)
             why = "friction bounded by the pressures that were found does not balance"
         else:
             support = UnilateralSupport.of(group)

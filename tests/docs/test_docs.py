@@ -179,3 +179,11 @@ def test_pages_build_without_warnings(tmp_path: Path) -> None:
     if Path("/usr/share/javascript/mathjax").is_dir():  # formulas are drawn without a network
         assert "_static/mathjax/MathJax.js" in (tmp_path / "theory.html").read_text()
         assert (tmp_path / "_static/mathjax/jax/output/SVG/jax.js").exists()
+
+
+def test_files_that_pages_name_are_there() -> None:
+    pages = [page for page in DOCS.glob("*.md") if page.name != "changes.md"]
+    pattern = r"`((?:contact|forms|meshes|scripts|tests)/[\w/.-]+)`"
+    named = {name for page in pages for name in re.findall(pattern, page.read_text())}
+    missing = [name for name in sorted(named) if not (ROOT / name).exists()]
+    assert len(named) > 20 and not [name for name in missing if "NAME" not in name]

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, parse_case, solve
-from contact.problem.rigid_modes import Overload, groups
+from contact.problem.rigid_modes import groups, sliding_mode
 from contact.results.remarks import untouched
 
 MU, PRESS = 0.3, 1e-3
@@ -34,18 +34,16 @@ def wall(dim, part, angle=0.0):
 @pytest.mark.core
 @pytest.mark.parallel
 @pytest.mark.parametrize(("dim", "angle"), [(2, 0.0), (3, 0.0), (3, 0.3)])
-def test_the_multiple_of_friction_that_holds_a_block(dim, angle):
-    """Of a third of that friction there is three times too little, in all directions of 3-D."""
+def test_the_friction_that_holds_a_block(dim, angle):
+    """A thousandth more than its load holds it, a thousandth less does not, in any direction."""
     problem = build_problem(wall(dim, 1.0, angle), MPI.COMM_WORLD)
     (group,) = groups(problem)
-    nodes = problem.nodes
-    friction = nodes.weight * MU * PRESS
-    assert Overload.of(group, 1.0, 1.01 * friction) is None
-    found = Overload.of(group, 1.0, friction / 3)
-    assert found.multiple == pytest.approx(3.0, rel=1e-5)
-    named = {name: abs(size) for name, size in zip(group.names, found.motion, strict=True)}
-    assert max(named, key=named.get) == f"translation along {'xyz'[dim - 1]}"
-    assert Overload.of(group, 1.0, 0.0 * friction).multiple == np.inf
+    friction = problem.nodes.weight * MU * PRESS
+    assert sliding_mode(group, 1.0, 1.001 * friction) is None
+    for part in (0.0, 0.3, 0.999):
+        mode = sliding_mode(group, 1.0, part * friction)
+        named = {name: abs(size) for name, size in zip(group.names, mode, strict=True)}
+        assert max(named, key=named.get) == f"translation along {'xyz'[dim - 1]}"
 
 
 @pytest.mark.parallel
