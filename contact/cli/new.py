@@ -75,11 +75,17 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 def _convert(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     """Write a mesh file as one that many ranks read in shares."""
     to = Path(options.to)
-    cells = on_root(comm, lambda: convert(Path(options.file), to))
+
+    def converted() -> str:
+        domain = convert(Path(options.file), to)
+        count = domain.mesh.topology.index_map(domain.dim).size_global
+        parts = ", ".join([*domain.parts, *domain.inside])
+        names = f"parts {parts}; regions {', '.join(domain.regions)}"
+        return f"{to}, {to.with_suffix('.h5')}: {count} cells\n{names}"
+
+    words = on_root(comm, converted)
     if comm.rank == 0:
-        parts, regions = (", ".join(group.names) for group in (cells.parts, cells.regions))
-        print(f"{to}, {to.with_suffix('.h5')}: {len(cells.regions.rows)} cells")
-        print(f"parts {parts}; regions {regions}")
+        print(words)
     return CONVERGED
 
 

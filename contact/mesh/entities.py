@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -34,6 +34,14 @@ def combinations(
         numbers[members] = len(combined) + within
         combined += [(*combined[old], position) for old in met]
     return numbers, tuple(combined)
+
+
+def labels_of(names: Iterable[str], combined: Sequence[tuple[int, ...]]) -> dict[str, list[int]]:
+    """Return the labels of `combinations` that each of the groups, by name, consists of."""
+    return {
+        name: [label for label, groups in enumerate(combined) if i in groups]
+        for i, name in enumerate(names)
+    }
 
 
 def owned_among(

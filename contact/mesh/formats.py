@@ -1,14 +1,17 @@
-"""Readers of mesh files: Gmsh's .msh and models by physical groups, MED, Exodus.
+"""Readers of mesh files: Gmsh's .msh and models by physical groups, MED, Exodus, XDMF.
 
 A MED file of Salome and code_aster has families of cells and nodes, and a family is in groups;
 family 0 is in none. Where all are in it the array of families may be missing, which meshio's reader
 refuses. Of Exodus files meshio drops side sets and names, and refuses elements of MOOSE, such as
-TET10, and node sets without names.
+TET10, and node sets without names. meshio reads XDMF of one grid alone, and of mixed topologies
+those of first order; dolfinx writes tags as grids of their own, behind the mesh whose nodes they
+share.
 
 References
 ----------
 Schoof and Yarberry, EXODUS II: a finite element data model, Sandia report SAND92-2137 (1994),
-tables of the nodes and the sides of elements.
+tables of the nodes and the sides of elements. XDMF Model and Format,
+https://www.xdmf.org/index.php/XDMF_Model_and_Format: numbers of cells in mixed topologies.
 """
 
 from __future__ import annotations
@@ -16,9 +19,11 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -308,3 +313,169 @@ def _side_facets(contents: Contents, elements: Ints, sides: Ints) -> Ints:
                 found.append(rows[:, list(table[side])])
         first += len(nodes)
     return joined_facets(found)
+
+
+#: First words of the names of topologies, and names of cells.
+XDMF_KINDS = {
+    "polyvertex": "vertex",
+    "polyline": "interval",
+    "edge": "interval",
+    "triangle": "triangle",
+    "tri": "triangle",
+    "quadrilateral": "quadrilateral",
+    "quad": "quadrilateral",
+    "tetrahedron": "tetrahedron",
+    "tet": "tetrahedron",
+    "pyramid": "pyramid",
+    "wedge": "prism",
+    "hexahedron": "hexahedron",
+    "hex": "hexahedron",
+}
+
+#: Cells of mixed topologies by their number: names, and numbers of nodes.
+MIXED = {
+    1: ("vertex", 1),
+    2: ("interval", 2),
+    4: ("triangle", 3),
+    5: ("quadrilateral", 4),
+    6: ("tetrahedron", 4),
+    7: ("pyramid", 5),
+    8: ("prism", 6),
+    9: ("hexahedron", 8),
+    34: ("interval", 3),
+    35: ("quadrilateral", 9),
+    36: ("triangle", 6),
+    37: ("quadrilateral", 8),
+    38: ("tetrahedron", 10),
+    39: ("pyramid", 13),
+    40: ("prism", 15),
+    48: ("hexahedron", 20),
+    50: ("hexahedron", 27),
+}
+
+#: Cells of mixed topologies whose number of nodes stands before these.
+COUNTED = (1, 2)
+
+#: Cells of a mixed topology that are read at once.
+WINDOW = 10_000
+
+#: NumPy's letters of types of numbers.
+TYPES = {"Int": "i", "UInt": "u", "Float": "f", "Char": "i", "UChar": "u"}
+
+#: Formats of arrays that are in files of their own.
+FILES = ("HDF", "Binary")
+
+XDMF_ACCEPTED = "accepted: one mesh, and tags of its cells and facets on the nodes of the mesh"
+
+
+def read_xdmf(file: Path) -> Contents:
+    """Read an XDMF file of one mesh with tags; raise errors of any kind if it is damaged."""
+    root = ElementTree.parse(file).getroot()
+    grids = [grid for grid in root.iter("Grid") if grid.find("Topology/DataItem") is not None]
+    given = [item for grid in grids if (item := grid.find("Geometry/DataItem")) is not None]
+    if not given:
+        raise ValueError(f"it has no mesh; {XDMF_ACCEPTED}")
+    places, *others = (_xdmf_array(item, root, file) for item in given)
+    if any(not np.array_equal(places, other) for other in others):
+        raise ValueError(f"it has several meshes; {XDMF_ACCEPTED}")
+    points, blocks = np.zeros((len(places), 3)), list[tuple[str, Ints]]()
+    points[:, : places.shape[1]] = places
+    made = Contents(points, blocks, repeats=True)
+    for grid in grids:
+        own, first = _xdmf_blocks(grid, root, file), len(blocks)
+        ends = np.cumsum([len(rows) for _, rows in own])
+        for name, on, values in _xdmf_attributes(grid, root, file):
+            if on == "Node" and len(values) == len(points):
+                made.add_nodes(name, values)
+            elif on == "Cell" and len(values) == ends[-1]:
+                made.add_groups(name, np.split(values, ends[:-1]), first)
+        blocks += own
+    return made
+
+
+def array_files(file: Path) -> list[Path]:
+    """Return the files of the arrays of an XDMF file, each once; none if it is damaged."""
+    with suppress(ElementTree.ParseError):
+        items = [item for _, item in ElementTree.iterparse(file) if item.tag == "DataItem"]
+        texts = [(item.get("Format"), (item.text or "").strip()) for item in items]
+        names = [t.rpartition(":")[0] if f == "HDF" else t for f, t in texts if f in FILES]
+        return [file.parent / name for name in dict.fromkeys(names)]
+    return []
+
+
+def _xdmf_attributes(grid: Element, root: Element, file: Path) -> list[tuple[str, str, Any]]:
+    """Return the scalar arrays of a grid: name, "Node" or "Cell", values."""
+    found = []
+    for given in grid.iter("Attribute"):
+        item = given.find("DataItem")
+        if item is not None:
+            values = _xdmf_array(item, root, file)
+            if values.size == len(values):
+                on = given.get("Center", "Node")
+                found.append((given.get("Name", ""), on, values.reshape(-1)))
+    return found
+
+
+def _xdmf_blocks(grid: Element, root: Element, file: Path) -> list[tuple[str, Ints]]:
+    """Return the cells of a grid: names, and nodes."""
+    topology = next(grid.iter("Topology"))
+    given = topology.get("TopologyType") or topology.get("Type") or ""
+    rows = _xdmf_array(next(topology.iter("DataItem")), root, file).astype(np.int64)
+    if given == "Mixed":
+        return _xdmf_mixed(rows.ravel())
+    name = XDMF_KINDS.get(given.split("_")[0].lower())
+    if name is None or rows.ndim != 2:
+        raise ValueError(f"a topology {given!r}, which is not known")
+    return [(name, rows)]
+
+
+def _xdmf_mixed(data: Ints) -> list[tuple[str, Ints]]:
+    """Return the cells of a mixed topology, a list of type, nodes, type, nodes, ..."""
+    runs: list[tuple[tuple[str, int], list[Ints]]] = []
+    at = 0
+    while at < len(data):
+        number = int(data[at])
+        if number not in MIXED:
+            raise ValueError(f"cells of number {number} in a mixed topology, which are not known")
+        nodes = MIXED[number][1]
+        before = 1 + (number in COUNTED)
+        width = before + nodes
+        ahead = data[at : at + WINDOW * width]
+        ahead = ahead[: len(ahead) // width * width].reshape(-1, width)
+        alike = ahead[:, 0] == number
+        count = len(alike) if alike.all() else int(alike.argmin())
+        if not count or (before == 2 and np.any(ahead[:count, 1] != nodes)):
+            raise ValueError("a mixed topology that is cut off, or lines of several points")
+        if not runs or runs[-1][0] != MIXED[number]:
+            runs.append((MIXED[number], []))
+        runs[-1][1].append(ahead[:count, before:])
+        at += count * width
+    return [(name, np.concatenate(rows)) for (name, _), rows in runs]
+
+
+def _xdmf_array(item: Element, root: Element, file: Path) -> Any:
+    """Return the array of a data item."""
+    import h5py
+
+    text = (item.text or "").strip()
+    reference = item.get("Reference")
+    if reference is not None:
+        path = text if reference == "XML" else reference
+        other = root.find("./" + "/".join(path.strip("/").split("/")[1:]))
+        if other is None:
+            raise ValueError(f"there is no {path!r}")
+        return _xdmf_array(other, root, file)
+    kind = item.get("Format", "XML")
+    if kind == "HDF":
+        name, _, place = text.rpartition(":")
+        with h5py.File(file.parent / name, "r") as data:
+            return data[place][()]
+    size = item.get("Precision", "1" if "Char" in item.get("NumberType", "") else "4")
+    letter = TYPES[item.get("NumberType") or item.get("DataType") or "Float"]
+    dtype = np.dtype(f"{letter}{size}")
+    shape = [int(n) for n in item.get("Dimensions", "").split()]
+    if kind == "Binary":
+        return np.fromfile(file.parent / text, dtype=dtype).reshape(shape)
+    if kind != "XML":
+        raise ValueError(f"arrays of the format {kind!r}; accepted: HDF, XML, Binary")
+    return np.array(text.split(), dtype=dtype).reshape(shape)

@@ -1,9 +1,15 @@
-"""Meshes from files and from generators. One rank reads and checks, or each reads its share."""
+"""Meshes from files and from generators: rank 0 reads and checks them.
+
+It has to hold all of a mesh. `convert` writes the checked mesh as XDMF, of which each rank reads
+its share by dolfinx.
+"""
 
 from __future__ import annotations
 
+import json
 import logging
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -21,17 +27,22 @@ from contact.errors import InputError
 from contact.mesh.abaqus import included_files, read_abaqus
 from contact.mesh.contents import Cells, Contents, Groups, check
 from contact.mesh.domain import Domain, Indices, exterior_facets, with_names
-from contact.mesh.formats import model_contents, read_exodus, read_med, read_msh, session
-from contact.mesh.xdmf import (
+from contact.mesh.entities import combinations, labels_of
+from contact.mesh.formats import (
     array_files,
-    distributed_arrays,
-    read_distributed,
+    model_contents,
+    read_exodus,
+    read_med,
+    read_msh,
     read_xdmf,
-    write_distributed,
+    session,
 )
 from contact.ranks import on_all_ranks, on_root
 
 logger = logging.getLogger("contact.mesh")
+
+#: Beginning of the names that `write` puts into an XDMF file.
+CONVERTED = '<Information Name="contact" Value="{'
 
 
 def _by_meshio(module: str, file: Path) -> Contents:
@@ -130,14 +141,13 @@ def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
     InputError
         As `from_msh`, and if a set has no meaning.
     """
-    file, source = Path(path), f"mesh file {path}"
-    arrays = on_root(comm, lambda: distributed_arrays(file))
-    if arrays is None:
-        return _from_rank_0(comm, lambda: _read(file, file.suffix.lower()), source)
-    return _distribute(comm, read_distributed(comm, arrays), source)
+    file = Path(path)
+    if on_root(comm, lambda: _is_converted(file)):
+        return _read_share(comm, file)
+    return _from_rank_0(comm, lambda: _read(file, file.suffix.lower()), f"mesh file {path}")
 
 
-def convert(file: Path, to: Path) -> Cells:
+def convert(file: Path, to: Path) -> Domain:
     """Write a mesh file as XDMF of which each rank reads its share. On one rank.
 
     Parameters
@@ -156,9 +166,76 @@ def convert(file: Path, to: Path) -> Cells:
     InputError
         As `from_file`, and if one of the new files is there already.
     """
-    cells = _checked(lambda: _read(file, file.suffix.lower()), f"mesh file {file}")
-    write_distributed(cells, to)
-    return cells
+    domain = from_file(MPI.COMM_SELF, file)
+    write(domain, to)
+    return domain
+
+
+def write(domain: Domain, path: Path) -> None:
+    """Write a mesh and its names to ``path``, a new .xdmf file, and an .h5 file. On one rank."""
+    heavy = path.with_suffix(".h5")
+    if path.suffix.lower() != ".xdmf":
+        raise InputError(
+            f"{path}: given another ending; accepted: a name that ends with .xdmf", "xdmf-files"
+        )
+    for file in (path, heavy):
+        if file.exists():
+            raise InputError(f"{file}: it is there already; accepted: another name", "file-name")
+    names: dict[str, Any] = {key: getattr(domain, key) for key in ("unusable", "notes", "space")}
+    names["inside"] = [*domain.inside]
+    tags, facets = [], {**domain.parts, **domain.inside}
+    kinds = ("parts", domain.dim - 1, facets), ("regions", domain.dim, domain.regions)
+    for kind, dim, groups in kinds:
+        count = domain.mesh.topology.index_map(dim).size_local
+        labels, sets = combinations(count, groups.values())
+        names[kind] = labels_of(groups, sets)
+        tagged = np.flatnonzero(labels).astype(np.int32)
+        tags.append(dmesh.meshtags(domain.mesh, dim, tagged, labels[tagged]))
+        tags[-1].name = kind
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        made = Path(folder) / path.name
+        with io.XDMFFile(domain.comm, str(made), "w") as store:
+            store.write_information("contact", json.dumps(names))
+            store.write_mesh(domain.mesh)
+            for some in tags:
+                store.write_meshtags(some, domain.mesh.geometry)
+        made.with_suffix(".h5").rename(heavy)
+        made.rename(path)
+
+
+def _is_converted(path: Path) -> bool:
+    """Tell whether `write` has made a file; refuse it without its arrays. On one rank."""
+    if path.suffix.lower() != ".xdmf" or not path.is_file():
+        return False
+    with path.open(errors="replace") as file:
+        if CONVERTED not in file.read(1000):
+            return False
+    import h5py
+
+    heavy = path.with_suffix(".h5")
+    try:
+        h5py.File(heavy, "r", locking=False).close()
+    except OSError as error:
+        raise InputError(
+            f"{heavy}: it is missing or damaged ({' '.join(str(error).split())}); accepted: "
+            "the file that contact mesh has written beside its .xdmf file",
+            "xdmf-files",
+        ) from error
+    return True
+
+
+def _read_share(comm: MPI.Intracomm, path: Path) -> Domain:
+    """Read this rank's share of a mesh that `write` has written. Collective."""
+    with io.XDMFFile(comm, str(path), "r") as file:
+        names = json.loads(file.read_information("contact"))
+        mesh = file.read_mesh(ghost_mode=dmesh.GhostMode.none)
+        exterior_facets(mesh)
+        parts = _named(file.read_meshtags(mesh, "parts"), names["parts"], mesh)
+        regions = _named(file.read_meshtags(mesh, "regions"), names["regions"], mesh)
+    inside = {name: parts.pop(name) for name in names["inside"]}
+    domain = with_names(mesh, parts, regions)
+    kept = {key: names[key] for key in ("unusable", "space")}
+    return replace(domain, notes=tuple(names["notes"]), inside=inside, **kept)
 
 
 def _read(file: Path, ending: str) -> Contents:
@@ -233,10 +310,13 @@ def _sets(mesh: dmesh.Mesh, dim: int, groups: Groups) -> dict[str, Indices]:
     tags = dmesh.meshtags_from_entities(
         mesh, dim, graph.adjacencylist(vertices), labels.astype(np.int32)
     )
-    owned = tags.indices < mesh.topology.index_map(dim).size_local
+    return _named(tags, groups.labels_of, mesh)
+
+
+def _named(
+    tags: dmesh.MeshTags, labels_of: Mapping[str, Sequence[int]], mesh: dmesh.Mesh
+) -> dict[str, Indices]:
+    """Return the owned entities with the labels of each name."""
+    owned = tags.indices < mesh.topology.index_map(tags.dim).size_local
     indices, values = tags.indices[owned], tags.values[owned]
-    labels_of = {
-        name: [label for label, inside in enumerate(groups.sets) if i in inside]
-        for i, name in enumerate(groups.names)
-    }
     return {name: indices[np.isin(values, labels)] for name, labels in labels_of.items()}

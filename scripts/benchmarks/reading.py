@@ -11,40 +11,14 @@ import argparse
 import json
 import time
 from collections.abc import Sequence
-from itertools import permutations
 from pathlib import Path
 
-import numpy as np
 from mpi4py import MPI
 
-from contact.mesh.cells import TETRAHEDRON
-from contact.mesh.contents import Cells, Groups
 from contact.mesh.geometry import area, volume
-from contact.mesh.reader import from_file
-from contact.mesh.xdmf import write_distributed
+from contact.mesh.grid import box
+from contact.mesh.reader import from_file, write
 from scripts.benchmarks.bench_one import memory
-
-
-def cube(n: int) -> Cells:
-    """Return a unit cube, each of its n^3 cubes cut into six tetrahedra (Kuhn)."""
-    g = np.arange(n + 1) / n
-    points = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
-    numbers = np.arange(len(points)).reshape(n + 1, n + 1, n + 1)
-    first, steps = numbers[:-1, :-1, :-1].ravel(), ((n + 1) ** 2, n + 1, 1)
-    ways = [np.cumsum([0, *(steps[axis] for axis in way)]) for way in permutations(range(3))]
-    cells = np.concatenate([first[:, None] + way for way in ways])
-    flat = [np.cumsum([0, *(steps[axis] for axis in way)]) for way in permutations(range(2))]
-    sides = [numbers[:-1, :-1, k].ravel()[:, None] + way for k in (0, n) for way in flat]
-    labels = np.repeat(np.array([0, 1], dtype=np.int32), 2 * n * n)
-    of_all = np.zeros(len(cells), dtype=np.int32)
-    return Cells(
-        TETRAHEDRON,
-        points,
-        Groups(("body",), cells, of_all, ((0,),)),
-        Groups(("bottom", "top"), np.concatenate(sides), labels, ((0,), (1,))),
-        {},
-        (),
-    )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -55,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     made.add_argument("n", type=int, nargs="?", default=20)
     given, comm = made.parse_args(arguments), MPI.COMM_WORLD
     if given.action == "make":
-        write_distributed(cube(given.n), given.file)
+        write(box(MPI.COMM_SELF, [0.0] * 3, [1.0] * 3, [given.n] * 3), given.file)
         return
     before, begin = memory(), time.perf_counter()
     domain = from_file(comm, given.file)

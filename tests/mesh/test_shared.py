@@ -106,7 +106,7 @@ def test_dolfinx_reads_it_too(shared_tmp_path, capsys):
 
     _, made = written(shared_tmp_path, "plate.inp")
     with XDMFFile(COMM, str(made), "r") as file:
-        mesh = file.read_mesh(name="regions")
+        mesh = file.read_mesh()
     assert mesh.topology.index_map(2).size_global == 2
     assert mesh.topology.cell_name() == "quadrilateral"
     assert mesh.geometry.x[:, 0].max(initial=0.0) <= 2.0
