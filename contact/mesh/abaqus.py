@@ -24,7 +24,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from contact.mesh.cells import joined_facets, single_facets, unique_rows
-from contact.mesh.contents import ELEMENTS, Contents, Ints, Kind, decoded, name_clash
+from contact.mesh.contents import ELEMENTS, Contents, Ints, Kind, decoded
 from contact.typing import Array
 
 #: Types of elements: beginnings of their names, and their dimension.
@@ -64,9 +64,6 @@ FACES = {
 #: Either side of a shell, which is a facet of solids as a whole.
 SIDES = {"", "S1", "S2", "SPOS", "SNEG"}
 
-#: Keywords without a meaning for a mesh that are not worth a word.
-SILENT = {"HEADING", "PREPRINT", "ASSEMBLY", "END ASSEMBLY"}
-
 #: Keywords that make or move nodes and elements which do not stand in the file.
 MAKING = {"SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPORT"}
 MAKING |= {"SYMMETRIC MODEL GENERATION"}
@@ -91,38 +88,28 @@ def read_abaqus(file: Path) -> Contents:
     """Read an input file, and those that it includes; raise errors of any kind if it is wrong."""
     deck = Deck()
     parts: dict[str, list[Block]] = {}
-    unused: dict[str, str] = {}
     part: list[Block] | None = None
     for block in _blocks(file):
         keyword, options, lines = block
-        if keyword in NESTING:
-            part = None
-            deck.enter("")
-        if keyword in ("PART", "INSTANCE"):
-            name = options["NAME"].strip('"')
-            if name.upper() in (parts if keyword == "PART" else deck.instances):
-                raise ValueError(f"*{keyword}, NAME={name}: it is there twice; accepted: once")
-        if keyword == "PART":
-            part = parts[name.upper()] = []
-            unused[name.upper()] = name
-        elif keyword == "INSTANCE":
-            of = options["PART"].strip('"')
-            if of.upper() not in parts:
-                word = f"*INSTANCE, NAME={name}: there is no part {of!r}"
-                raise ValueError(f"{word}; accepted: those that stand above it")
-            deck.enter(name, _motion(name, lines))
-            unused.pop(of.upper(), None)
-            for inside in parts[of.upper()]:
-                deck.take(*inside)
-        elif part is not None:
-            part.append(block)
-        elif keyword not in NESTING:
-            deck.take(*block)
-    deck.other[:0] = [f"PART, NAME={name} without an instance" for name in unused.values()]
-    try:
-        return _contents(deck)
-    except RecursionError:
-        raise ValueError("a set holds itself") from None
+        try:
+            if keyword in NESTING:
+                part = None
+                deck.enter("")
+            if keyword == "PART":
+                part = parts[options["NAME"].strip('"').upper()] = []
+            elif keyword == "INSTANCE":
+                deck.enter(options["NAME"].strip('"'), _motion(lines))
+                for inside in parts[options["PART"].strip('"').upper()]:
+                    deck.take(*inside)
+            elif part is not None:
+                part.append(block)
+            elif keyword not in NESTING:
+                deck.take(*block)
+        except (KeyError, ValueError) as error:
+            said = f"there is no {error}" if isinstance(error, KeyError) else error
+            name = f", NAME={options['NAME']}" if "NAME" in options else ""
+            raise ValueError(f"*{keyword}{name}: {said}") from error
+    return _contents(deck)
 
 
 def included_files(file: Path) -> list[Path]:
@@ -162,10 +149,8 @@ def _keyword(line: str) -> tuple[str, dict[str, str]]:
     return " ".join(first.upper().split()), options
 
 
-def _lines(file: Path, depth: int = 0) -> Iterator[tuple[Path, str]]:
+def _lines(file: Path) -> Iterator[tuple[Path, str]]:
     """Yield the lines without comments, those of included files in their places, with the files."""
-    if depth > 10:
-        raise ValueError(f"*INCLUDE: {file.name} includes itself")
     pending = ""
     for raw in decoded(file.read_bytes()).splitlines():
         line = pending + raw.strip()
@@ -183,18 +168,15 @@ def _lines(file: Path, depth: int = 0) -> Iterator[tuple[Path, str]]:
             inner = file.parent / given
             if not given or not inner.is_file():
                 raise ValueError(f"*{keyword}: there is no file {given!r} beside {file.name}")
-            yield from _lines(inner, depth + 1)
+            yield from _lines(inner)
 
 
 def _real(value: str) -> float:
     """Return a number, which may have Fortran's exponent, 0 for none."""
-    try:
-        return float(value or 0)
-    except ValueError:
-        return float(re.sub(r"[Dd](?=[+-]?\d+$)", "E", value))
+    return float(value.replace("D", "E").replace("d", "e") or 0)
 
 
-def _motion(instance: str, lines: Sequence[str]) -> tuple[Array, Array]:
+def _motion(lines: Sequence[str]) -> tuple[Array, Array]:
     """Return R and t of x -> R x + t: a translation, then a rotation about an axis."""
     rows = [[_real(value) for value in _row(line)] for line in lines]
     shift, about = (*rows, [], [])[:2]
@@ -203,8 +185,8 @@ def _motion(instance: str, lines: Sequence[str]) -> tuple[Array, Array]:
     known = len(rows) <= 2 and len(shift) <= 3 and len(about) in (0, 7)
     if not known or not np.isfinite([*shift, *about]).all() or bool(about) != (length > 0):
         raise ValueError(
-            f"*INSTANCE, NAME={instance}: given {'; '.join(lines)}; accepted: a line of its "
-            "translation, then one of two points of an axis and an angle"
+            f"given {'; '.join(lines)}; accepted: a line of its translation, then one of two "
+            "points of an axis and an angle"
         )
     turn = Rotation.from_rotvec(about[6] / length * axis if about else axis, degrees=True)
     moved, start = (np.array([*row, 0.0, 0.0, 0.0][:3]) for row in (shift, about))
@@ -228,7 +210,6 @@ class Deck:
     surfaces: dict[str, tuple[str, list[tuple[Member, str]]]] = field(default_factory=dict)
     names: dict[str, tuple[str, str]] = field(default_factory=dict)
     instances: dict[str, int] = field(default_factory=dict)
-    other: list[str] = field(default_factory=list)
     home: str = ""
     offset: int = 0
     motion: tuple[Array, Array] | None = None
@@ -237,15 +218,16 @@ class Deck:
         """Let the next keywords be those of a new instance, moved; of the assembly for ""."""
         self.home, self.motion = home, motion
         self.offset = STRIDE * (len(self.instances) + 1) if home else 0
+        if home.upper() in self.instances:
+            raise ValueError("it is there twice; accepted: once")
         if home:
             self.instances[home.upper()] = self.offset
 
     def take(self, keyword: str, options: Mapping[str, str], lines: Sequence[str]) -> None:
         """Take a keyword with its data."""
         if keyword in MAKING or (keyword == "NODE" and options.get("SYSTEM", "R").upper() != "R"):
-            word = keyword if keyword in MAKING else f"NODE, SYSTEM={options['SYSTEM']}"
-            every = "accepted: every node and element in the file"
-            raise ValueError(f"*{word} makes or moves nodes or elements; {every}")
+            word = keyword if keyword in MAKING else f"SYSTEM={options['SYSTEM']}"
+            raise ValueError(f"{word} makes or moves nodes or elements; accepted: all in the file")
         if keyword == "NODE":
             self._take_nodes(options, lines)
         elif keyword == "ELEMENT":
@@ -254,14 +236,11 @@ class Deck:
             self._take_set(keyword, options, lines)
         elif keyword == "SURFACE":
             if "COMBINE" in options:
-                word = f"*SURFACE, COMBINE={options['COMBINE']}: no surfaces are made of others"
-                raise ValueError(f"{word}; accepted: faces of elements")
+                raise ValueError("it is made of other surfaces; accepted: faces of elements")
             instance, kind = options.get("INSTANCE", ""), options.get("TYPE", "ELEMENT").upper()
             rows = [(*_row(line), "")[:2] for line in lines]
             faces = [(self.member(own, instance), label.upper()) for own, label in rows]
             self.surfaces.setdefault(self.key(options["NAME"]), (kind, []))[1].extend(faces)
-        elif keyword not in SILENT and keyword not in self.other:
-            self.other.append(keyword)
 
     def _take_nodes(self, options: Mapping[str, str], lines: Sequence[str]) -> None:
         rows = [_row(line) for line in lines]
@@ -273,21 +252,19 @@ class Deck:
                 points = [[*map(float, x)] for x in np.array(points) @ turn.T + shift]
         for number, point in zip(numbers, points, strict=True):
             if self.points.setdefault(number, point) != point and not np.isnan(point).any():
-                raise ValueError(f"*NODE: node {number % STRIDE} is at two places; accepted: one")
+                raise ValueError(f"node {number % STRIDE} is at two places; accepted: one")
         if "NSET" in options:
             self.nodes.setdefault(self.key(options["NSET"]), []).extend(numbers)
 
     def _take_elements(self, options: Mapping[str, str], lines: Sequence[str]) -> None:
         kind = options.get("TYPE", "").upper()
         if NO_CELLS.match(kind):
-            if f"ELEMENT, TYPE={kind}" not in self.other:
-                self.other.append(f"ELEMENT, TYPE={kind}")
             self.sets.setdefault(self.key(options.get("ELSET", kind)), [])
             return
         count = _element_type(kind).nodes + 1
         values = [self.number(value) for line in lines for value in _row(line) if value]
         if len(values) % count:
-            raise ValueError(f"*ELEMENT, TYPE={kind}: {len(values)} numbers, {count} an element")
+            raise ValueError(f"TYPE={kind}: {len(values)} numbers, {count} an element")
         self.elements.setdefault(kind, []).extend(values)
         if "ELSET" in options:
             self.sets.setdefault(self.key(options["ELSET"]), []).extend(values[::count])
@@ -323,10 +300,7 @@ class Deck:
 
     def number(self, given: str, instance: str = "") -> int:
         """Return the number that a word stands for."""
-        member = self.member(given, instance)
-        if isinstance(member, str):
-            raise ValueError(f"{given!r} where a number belongs")
-        return member
+        return int(self.member(given, instance))
 
     def _resolve(self, given: str, instance: str) -> tuple[str, str]:
         """Return the instance of a name or a number, "" for none, and its own name or number."""
@@ -335,7 +309,7 @@ class Deck:
             return before, own
         home = instance.strip('"') or self.home
         if home and home.upper() not in self.instances:
-            raise ValueError(f"there is no instance {home}; accepted: those that have ended above")
+            raise KeyError(home)
         return home, given.strip().strip('"')
 
     def as_given(self, member: Member) -> Member:
@@ -363,7 +337,7 @@ def _element_type(kind: str) -> Kind:
             for name, (of, corners, second) in ELEMENTS.items():
                 if of == dim and count in (corners, *second):
                     return Kind(name, count)
-    raise ValueError(f"*ELEMENT, TYPE={kind}: elements that are not known")
+    raise ValueError(f"TYPE={kind}: elements that are not known")
 
 
 def _contents(found: Deck) -> Contents:
@@ -386,11 +360,8 @@ def _contents(found: Deck) -> Contents:
         places = np.arange(len(rows))
         homes.append(np.column_stack([rows[:, 0], np.full_like(places, block), places]))
     elements = np.concatenate(homes)
-    elements = elements[np.argsort(elements[:, 0], kind="stable")]
-    twice = elements[1:, 0][np.diff(elements[:, 0]) == 0]
-    if twice.size:
-        number = found.as_given(int(twice[0]))
-        raise ValueError(f"*ELEMENT: element {number} is there twice; accepted: once")
+    if np.unique(elements[:, 0]).size < len(elements):
+        raise ValueError("*ELEMENT: a number is there twice; accepted: once")
     made, names = Contents(points, blocks), found.names_by_key()
     for key in found.sets:
         members = _members(found.sets, key)
@@ -402,25 +373,18 @@ def _contents(found: Deck) -> Contents:
     for key in found.nodes:
         numbers = _members(found.nodes, key)
         made.nodes[names[key]] = np.flatnonzero(np.isin(tags, numbers))
-    dim, twice = max((kind.dim for kind in made.kinds), default=0), []
+    dim = max((kind.dim for kind in made.kinds), default=0)
     for key, (sort, lines) in found.surfaces.items():
         name = names[key]
         if sort == "NODE":
             numbers = _numbers(found.nodes, [member for member, _ in lines])
-            own = np.flatnonzero(np.isin(tags, numbers))
-            if not np.array_equal(made.nodes.setdefault(name, own), own):
-                twice.append(name)
-            made.nodes[name] = own
+            made.nodes[name] = np.flatnonzero(np.isin(tags, numbers))
         elif sort == "ELEMENT":
             made.surfaces[name] = _faces(found, lines, elements, blocks, dim)
-    if twice:
-        made.notes.append(name_clash(twice))
     plane = [kind for kind in found.elements if dim == 2 and _element_type(kind).dim == 2]
     made_for = {own for kind in plane for of, own in KINEMATICS.items() if kind.startswith(of)}
     if len(made_for) == 1 and made_for != {"plane_strain"}:
         made.space["kinematics"] = made_for.pop()
-    if found.other:
-        made.notes.append(f"left out: {', '.join(f'*{word}' for word in found.other)}")
     return made
 
 

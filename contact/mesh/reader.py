@@ -250,6 +250,7 @@ def _read(file: Path, ending: str) -> Contents:
     except Exception as error:
         said = " ".join(str(error).split()) or type(error).__name__
         said = f"not found: {said}" if isinstance(error, KeyError) else said
+        said = "a set or a file contains itself" if isinstance(error, RecursionError) else said
         accepted = "" if "accepted:" in said else f"; accepted: {ACCEPTED}"
         words = f"the {program} reader says of it: {said}{accepted}"
         raise InputError(words, "mesh-file") from error
