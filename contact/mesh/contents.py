@@ -23,7 +23,6 @@ from contact.mesh.cells import (
     simplices,
     single_facets,
     uncollapsed,
-    unique_rows,
 )
 from contact.mesh.domain import BODY, UNLESS
 from contact.mesh.entities import combinations, labels_of
@@ -116,8 +115,6 @@ class Contents:
         Its other contents, one sentence each.
     space
         Keys of a case's ``[space]`` for which its elements were made: degree, kinematics.
-    repeats
-        Whether cells stand in it once for each of their groups.
     by_groups
         Whether cells in no group are no part of the body.
     """
@@ -129,7 +126,6 @@ class Contents:
     surfaces: dict[str, Ints] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     space: dict[str, int | str] = field(default_factory=dict)
-    repeats: bool = False
     by_groups: bool = False
 
     @property
@@ -172,11 +168,6 @@ def _by_number(key: str, arrays: Sequence[Array]) -> Iterator[tuple[str, int, In
             yield names.get(number, f"{before}{number}"), block, np.flatnonzero(values == number)
 
 
-def name_clash(names: Sequence[str]) -> str:
-    """Return the note on sets of nodes that are left out for a surface of the same name."""
-    return f"sets left out, as a surface of other facets has their name: {', '.join(names)}"
-
-
 def with_one_shape(contents: Contents) -> Contents:
     """Return contents with cells of one of `SHAPES`: others, or several, are cut into simplices.
 
@@ -187,23 +178,16 @@ def with_one_shape(contents: Contents) -> Contents:
     cells = list(dict.fromkeys(kind for kind in kinds if kind.dim == dim))
     if dim < 2 or not all(kind.known for kind in cells):
         return contents
-    collapsed = sum(
-        int(np.count_nonzero(~uncollapsed(rows[:, : kind.corners])))
+    alone = len(cells) == 1 and Shape(cells[0].name) in SHAPES
+    if alone and all(
+        uncollapsed(rows[:, : kind.corners]).all()
         for kind, (_, rows) in zip(kinds, contents.blocks, strict=True)
         if kind.dim == dim and kind.corners > dim + 1
-    )
-    if not collapsed and len(cells) == 1 and Shape(cells[0].name) in SHAPES:
+    ):
         return contents
     found = " beside ".join(repr(str(kind)) for kind in cells)
-    if collapsed:
-        found += f", {collapsed} of them with one node at several corners"
     shape = "triangles" if dim == 2 else "tetrahedra"
-    note = f"its cells, {found}, become {shape}: a mesh has cells of one kind"
-    if any(kind.order > 1 for kind in cells):
-        note = (
-            f"its cells, {found}, become {shape} with straight edges: a mesh has cells of one "
-            "kind, and curved edges in files of one kind alone"
-        )
+    note = f"its cells, {found}, become {shape} with straight edges: a mesh has cells of one kind"
     return _cut(contents, kinds, dim, note)
 
 
@@ -381,15 +365,7 @@ def check(contents: Contents) -> Cells:
     number = _number(rows)
     first = np.unique(number, return_index=True)[1]
     notes = [*contents.notes]
-    if first.size < len(rows) and not contents.repeats:
-        notes.append(f"{len(rows) - first.size} cell(s) that stand twice in it count once")
-
-    parts, left, without = _parts(contents, shape, corners[first])
-    if left:
-        notes.append(name_clash(left))
-    if without:
-        notes.append(f"sets of nodes that hold no facet of the boundary: {', '.join(without)}")
-
+    parts = _parts(contents, shape, corners[first])
     regions, body = _regions(contents, dim, number)
     new = np.full(first.size, -1)
     new[body] = np.arange(body.size)
@@ -472,20 +448,11 @@ def _regions(contents: Contents, dim: int, number: Ints) -> tuple[dict[str, Ints
     return regions, body
 
 
-def _parts(
-    contents: Contents, shape: Shape, corners: Ints
-) -> tuple[dict[str, Ints], list[str], list[str]]:
-    """Return parts by their corners, names of surfaces and other sets, and names without facets."""
-    of, left, without = shape.facet.corners, list[str](), list[str]()
+def _parts(contents: Contents, shape: Shape, corners: Ints) -> dict[str, Ints]:
+    """Return parts by their corners: surfaces, then sets of facets and of nodes, by new names."""
+    of, kinds = shape.facet.corners, contents.kinds
     none = np.zeros((0, of), dtype=np.int64)
     parts = {name: v if v.shape[1] == of else none for name, v in contents.surfaces.items()}
-
-    def add(name: str, facets: Ints) -> None:
-        there = parts.setdefault(name, facets)
-        if len(unique_rows(np.concatenate([there, facets]))) > len(unique_rows(there)):
-            left.append(name)
-
-    kinds = contents.kinds
     for name, group in contents.groups.items():
         sides = [
             contents.blocks[b][1][members][:, :of]
@@ -493,17 +460,15 @@ def _parts(
             if kinds[b].name == shape.facet.name and len(members)
         ]
         if sides:
-            add(name, np.concatenate(sides))
+            parts.setdefault(name, np.concatenate(sides))
     if contents.nodes:
         facets = corners[:, shape.facet_corners[:, shape.facet.around]]
         outside = single_facets(facets.reshape(-1, of))
     for name, nodes in contents.nodes.items():
         found = outside[np.isin(outside, nodes).all(axis=1)]
         if len(found):
-            add(name, found)
-        else:
-            without.append(name)
-    return parts, left, without
+            parts.setdefault(name, found)
+    return parts
 
 
 def _curved(points: Array, cells: Ints, shape: Shape) -> bool:

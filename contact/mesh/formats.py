@@ -115,7 +115,7 @@ def model_contents(model: Any, entities_are_groups: bool = False) -> Contents:
                 raise InputError("it has elements whose nodes it does not have", "mesh-file")
             blocks.append((name.split()[0].lower(), rows))
         at[dim, entity] = range(first, len(blocks))
-    made = Contents(points.reshape(-1, 3)[order], blocks, repeats=True, by_groups=True)
+    made = Contents(points.reshape(-1, 3)[order], blocks, by_groups=True)
     groups = [pair for pair in at if pair[1]] if entities_are_groups else model.getPhysicalGroups()
     for dim, tag in groups:
         entities = [tag] if entities_are_groups else model.getEntitiesForPhysicalGroup(dim, tag)
@@ -380,7 +380,7 @@ def read_xdmf(file: Path) -> Contents:
         raise ValueError(f"it has several meshes; {XDMF_ACCEPTED}")
     points, blocks = np.zeros((len(places), 3)), list[tuple[str, Ints]]()
     points[:, : places.shape[1]] = places
-    made = Contents(points, blocks, repeats=True)
+    made = Contents(points, blocks)
     for grid in grids:
         own, first = _xdmf_blocks(grid, root, file), len(blocks)
         ends = np.cumsum([len(rows) for _, rows in own])

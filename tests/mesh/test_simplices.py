@@ -86,7 +86,7 @@ def test_neighbours_cut_their_faces_alike_whatever_the_numbers(seed):
     cells = check(numbered(contents, order))  # which finds faces of two cells that do not meet
     assert cells.notes[-1] == (
         "its cells, 'Hexahedron 8' beside 'Prism 6' beside 'Pyramid 5' beside 'Tetrahedron 4', "
-        "become tetrahedra: a mesh has cells of one kind"
+        "become tetrahedra with straight edges: a mesh has cells of one kind"
     )
     rows = cells.regions.rows
     assert len(rows) == 6 + 2 * 3 + 6 * 2 + 1
@@ -169,7 +169,7 @@ def test_files_of_unlike_cells_keep_their_sets(name, shared_tmp_path):
         expected |= {"side": 3.0, "below": 1.5, "skin": SKIN}
         assert integral(domain, region="all") == pytest.approx(sum(VOLUMES.values()))
     assert {part: areas[part] for part in expected} == pytest.approx(expected)
-    assert any("become tetrahedra: a mesh has cells of one kind" in note for note in domain.notes)
+    assert any("become tetrahedra with straight edges" in note for note in domain.notes)
 
 
 @pytest.mark.parallel
@@ -178,8 +178,8 @@ def test_quadrilaterals_beside_triangles():
     domain = from_file(COMM, FIXTURES / "two-kinds.msh")
     assert measures(domain) == pytest.approx({"bottom": 1.0, "top": 1.0})
     assert integral(domain, region="body") == pytest.approx(1.5)
-    note = "its cells, 'Triangle 3' beside 'Quadrilateral 4', become triangles: a mesh has cells "
-    assert domain.notes == (note + "of one kind",)
+    note = "its cells, 'Triangle 3' beside 'Quadrilateral 4', become triangles with straight edges"
+    assert domain.notes == (f"{note}: a mesh has cells of one kind",)
 
 
 def test_cells_of_second_order_become_straight(tmp_path):
@@ -195,7 +195,7 @@ def test_cells_of_second_order_become_straight(tmp_path):
     assert integral(domain, region="corner") == pytest.approx(0.5)
     assert domain.notes == (
         "its cells, 'Quadrilateral 4' beside 'Triangle 6', become triangles with straight edges: a "
-        "mesh has cells of one kind, and curved edges in files of one kind alone",
+        "mesh has cells of one kind",
     )
 
 
@@ -213,7 +213,7 @@ def test_prisms_alone_and_side_sets_of_exodus(tmp_path):
     domain = from_file(MPI.COMM_SELF, path)
     assert measures(domain) == pytest.approx({"1": 3 + 2**0.5})
     assert domain.notes == (
-        "its cells, 'Prism 6', become tetrahedra: a mesh has cells of one kind",
+        "its cells, 'Prism 6', become tetrahedra with straight edges: a mesh has cells of one kind",
     )
 
 
@@ -243,8 +243,8 @@ def test_hexahedra_that_have_collapsed_are_cut(seed):
     order = np.random.default_rng(seed).permutation(len(contents.points))
     cells = check(numbered(contents, order))
     assert cells.notes == (
-        "its cells, 'Hexahedron 8', 3 of them with one node at several corners, become "
-        "tetrahedra: a mesh has cells of one kind",
+        "its cells, 'Hexahedron 8', become tetrahedra with straight edges: a mesh has cells of one "
+        "kind",
     )
     found = totals(cells, cells.regions)
     expected = {"cube": 1.0, "prism": 1 / 2, "pyramid": 1 / 3, "tetrahedron": 1 / 6}
