@@ -35,7 +35,7 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     bounds = dict(_bound(text) for text in options.bound)
     for key in bounds.keys() - set(keys):
         raise InputError(f"--bound {key}: no parameter; accepted: {', '.join(keys)}", "bound")
-    with progress(comm, options.quiet) as monitor:
+    with progress(comm, options.quiet, over="contact.identify") as monitor:
         found = identify(case, data, keys, bounds, monitor=monitor, comm=comm)
     if comm.rank == 0:
         print("\n".join(report(found)))

@@ -1,17 +1,14 @@
-"""The console output of a solve: a table of its iterations, a bar on a terminal, and a log."""
+"""The console output of a run: a table of iterations, or a line a step; a bar; a log."""
 
 from __future__ import annotations
 
 import logging
-import os
 import platform
-import re
 import shlex
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
@@ -20,68 +17,41 @@ from contact.errors import InputError
 from contact.methods.report import Monitor, Record
 from contact.ranks import on_root
 
-#: Seconds between two reports of inner iterations: on a terminal, and in plain lines.
-OFTEN, SELDOM = 0.2, 10.0
-#: Loggers, each within the next: the iterations of a solve, its steps, the cases of a sweep.
-RANKS = ("contact.inner", "contact.solver", "contact.steps", "contact.sweep")
-OUTER = "contact.solver"
-#: The bar of one solve, the bar of many, and its size where the terminal does not tell its own.
-COUNT = "iterations: {n_fmt}, {elapsed}{postfix}"
+#: Loggers of iterations, load steps and the cases of a sweep: one of them is shown.
+INNER, OUTER, STEPS, SWEEP = "contact.inner", "contact.solver", "contact.steps", "contact.sweep"
+#: The bar of one solve, and of the finished share of many.
+COUNT = "iterations: {n_fmt}, {elapsed}"
 SHARES = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
-WIDTH, HEIGHT = 80, 20
 #: Head of the table of iterations: linear solves, residuals, and numbers of nodes that are open,
 #: stick and slip. Newton iterations on the condensed problem, within step 2, are 2.1, 2.2, ...
 HEAD = "   step solves  equilibrium  contact friction   open  stick   slip  note"
 
 
-def table(record: Record, within: str = "") -> list[str]:
-    """Return the rows of an outer iteration and of those within it, below `HEAD`."""
-    if not shown(record.iteration):
-        return []
-    kkt, sets, number = (
-        record.residuals,
-        record.sizes or ("", "", ""),
-        f"{within}{record.iteration}",
-    )
-    row = (
-        f"{number:>7} {record.inner:6}  {kkt.equilibrium:11.1e} {kkt.contact:8.1e} "
-        f"{kkt.friction:8.1e} {sets[0]:6} {sets[1]:6} {sets[2]:6}  {record.note}"
-    )
-    inner = [line for step in record.steps for line in table(step, f"{number}.")]
-    return [*inner, row.rstrip()]
-
-
-def shown(iteration: int) -> bool:
-    """Tell whether an iteration has a row: all up to 30, then each tenth, from 100 each 100th."""
-    return iteration <= 30 or iteration % 10 ** (len(str(iteration)) - 1) == 0
-
-
 @contextmanager
 def progress(
-    comm: MPI.Intracomm, quiet: bool = False, log: str | None = None, verbose: bool = False
+    comm: MPI.Intracomm,
+    quiet: bool = False,
+    log: str | None = None,
+    verbose: bool = False,
+    over: str = OUTER,
 ) -> Iterator[Monitor | None]:
-    """Show the logs of ``contact`` on rank 0 and yield the monitor that shows the iterations.
+    """Show the log of ``contact`` on rank 0 and yield the monitor that shows the iterations.
 
-    If `quiet` warnings alone are shown, if `verbose` all records with the time, which are written
-    to the end of a `log` too.
+    Iterations are shown as a table, and the steps or cases that a run is `over` as lines. If
+    `quiet` warnings alone are shown, if `verbose` all records with the time, which are written to
+    the end of a `log` too.
     """
     handlers: list[logging.Handler] = [logging.NullHandler()] if comm.rank > 0 else []
     on_root(comm, lambda: handlers.append(_log(log)) if log is not None else None)
-    monitor = bar = None
+    monitor = None
     if comm.rank == 0:
+        bar = None
         if not (quiet or verbose) and sys.stderr.isatty():
             from tqdm import tqdm
 
-            # tqdm takes a terminal that does not tell its size for one of size 0.
-            columns, lines = os.get_terminal_size(sys.stderr.fileno())
-            bar = tqdm(
-                file=sys.stderr,
-                ncols=columns or WIDTH,
-                nrows=lines or HEIGHT,
-                bar_format=COUNT,
-                leave=False,
-            )
-        monitor = Console(quiet, bar, verbose)
+            counts = {"bar_format": COUNT} if over == OUTER else {"bar_format": SHARES, "total": 1}
+            bar = tqdm(file=sys.stderr, leave=False, **counts)
+        monitor = Console(over, quiet, verbose, bar)
         handlers.append(monitor)
     logger = logging.getLogger("contact")
     level = logger.level
@@ -99,23 +69,17 @@ def progress(
 
 
 class Console(logging.Handler):
-    """Shows the table of iterations and the lines of the leading logger, or a bar instead of these.
+    """Prints the table of iterations, or the lines that a run is over, above a bar of tqdm."""
 
-    The leading one is the highest of those in `RANKS` that has spoken so far; the others are heard
-    in long silence. tqdm's bar, on a terminal, is over outer iterations, or over the finished share
-    of many solves.
-    """
-
-    def __init__(self, quiet: bool = False, bar: Any = None, verbose: bool = False) -> None:
-        super().__init__(logging.WARNING if quiet else logging.DEBUG)
-        self._quiet, self._bar, self._verbose = quiet, bar, verbose
-        self._lead = RANKS.index(OUTER)
-        self._last = time.monotonic()
+    def __init__(self, over: str, quiet: bool, verbose: bool, bar: Any = None) -> None:
+        super().__init__(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
+        self._over, self._verbose, self._bar = over, verbose, bar
+        self._table = over == OUTER and not (quiet or verbose)
         self._headed = False
 
     def __call__(self, record: Record) -> None:
-        """Show an outer iteration, where iterations lead."""
-        if self._quiet or self._verbose or RANKS[self._lead] != OUTER:
+        """Show an outer iteration in the table."""
+        if not self._table:
             return
         for line in ([] if self._headed else [HEAD]) + table(record):
             self._write(line)
@@ -124,27 +88,17 @@ class Console(logging.Handler):
             self._bar.update(1)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show a line of the leading logger, or of none of the ranks; others now and then."""
+        """Show a line: any with the time, warnings, or those that the run is over."""
+        text, name = record.getMessage(), record.name
         if self._verbose:
-            self._write(f"{time.strftime('%H:%M:%S')} {_told(record)}")
-            return
-        rank = RANKS.index(record.name) if record.name in RANKS else None
-        self._lead = max(self._lead, rank or 0)
-        leads, warns = rank in (None, self._lead), record.levelno >= logging.WARNING
-        silent = time.monotonic() - self._last >= (SELDOM if self._bar is None else OFTEN)
-        in_table = record.name == OUTER and leads and not warns
-        if in_table:
-            self._last = time.monotonic()
-        elif self._bar is not None and rank is not None:
-            if leads and hasattr(record, "share"):
-                self._bar.total, self._bar.bar_format, self._bar.n = 1.0, SHARES, record.share
-            elif not silent:
-                return
-            self._bar.set_postfix_str(record.getMessage())
-            self._last = time.monotonic()
-        elif (leads and record.levelno >= logging.INFO) or (rank is not None and silent):
-            self._write(_told(record))
-            self._last = time.monotonic()
+            self._write(f"{time.strftime('%H:%M:%S')} {text}")
+        elif record.levelno >= logging.WARNING:
+            self._write(f"warning: {text}")
+        elif name == self._over != OUTER and self._bar is not None:
+            self._bar.n = getattr(record, "share", self._bar.n)
+            self._bar.set_postfix_str(text)
+        elif name == self._over != OUTER or name not in (INNER, OUTER, STEPS, SWEEP):
+            self._write(text)
 
     def _write(self, line: str) -> None:
         if self._bar is None:
@@ -159,21 +113,28 @@ class Console(logging.Handler):
         super().close()
 
 
-def _told(record: logging.LogRecord) -> str:
-    """Return a record as it is shown."""
-    return ("warning: " if record.levelno >= logging.WARNING else "") + record.getMessage()
+def table(record: Record, within: str = "") -> list[str]:
+    """Return the rows of an outer iteration and of those within it, below `HEAD`."""
+    if not shown(record.iteration):
+        return []
+    kkt, sets = record.residuals, record.sizes or ("", "", "")
+    number = f"{within}{record.iteration}"
+    row = (
+        f"{number:>7} {record.inner:6}  {kkt.equilibrium:11.1e} {kkt.contact:8.1e} "
+        f"{kkt.friction:8.1e} {sets[0]:6} {sets[1]:6} {sets[2]:6}  {record.note}"
+    )
+    inner = [line for step in record.steps for line in table(step, f"{number}.")]
+    return [*inner, row.rstrip()]
+
+
+def shown(iteration: int) -> bool:
+    """Tell whether an iteration has a row: all up to 30, then each tenth, from 100 each 100th."""
+    return iteration <= 30 or iteration % 10 ** (len(str(iteration)) - 1) == 0
 
 
 def _log(name: str) -> logging.Handler:
     """Open a log, and write the command line and its process there."""
     try:
-        if (path := Path(name)).is_file():
-            with path.open("rb") as file:
-                begin = file.read(5)
-            if begin and not re.fullmatch(rb"\d{4}-", begin):
-                raise InputError(
-                    f"--log {name}: given no log; accepted: a new file, or a log", "log-file"
-                )
         handler = logging.FileHandler(name, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise InputError(

@@ -18,7 +18,7 @@ from contact.case.digest import check_same
 from contact.case.file import Case, load_case, override, parse_case, to_toml
 from contact.cli.check import amplitude_notes
 from contact.cli.main import CONVERGED, NOT_CONVERGED
-from contact.cli.progress import progress
+from contact.cli.progress import OUTER, STEPS, SWEEP, progress
 from contact.errors import InputError, counted
 from contact.io.checkpoint import (
     Checkpoints,
@@ -65,7 +65,8 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     with result_folder(out, comm, options.overwrite) as folder:
         if not options.overwrite:
             on_root(comm, lambda: _check_results(folder.path, case))
-        with progress(comm, options.quiet, options.log, options.verbose) as monitor:
+        over = OUTER if case.evolution is None else STEPS
+        with progress(comm, options.quiet, options.log, options.verbose, over) as monitor:
             try:
                 solution = solve_and_keep(case, monitor, comm, folder.path, restart)
             except SolveInterrupted as interrupt:
@@ -201,7 +202,7 @@ def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not options.out:
         raise InputError("--out: missing; accepted: a folder to write to", "missing")
     axes = [Axis.of(text) for text in options.over]
-    shown = progress(comm, options.quiet, options.log, options.verbose)
+    shown = progress(comm, options.quiet, options.log, options.verbose, SWEEP)
     with result_folder(options.out, comm, overwrite=True) as folder, shown as monitor:
         rows = sweep(
             options.case,

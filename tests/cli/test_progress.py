@@ -1,4 +1,4 @@
-"""What is shown of a run: lines of what leads, a bar over steps on a terminal, a log of all."""
+"""What is shown of a run: a table or lines, a bar on a terminal, a log of all."""
 
 import json
 import re
