@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
+from argparse import Action
 from pathlib import Path
-from typing import Any
 
-from contact.cli.arguments import EXIT, offered
+from contact.cli.arguments import EXIT, parser
 
 PAGE = Path(__file__).parents[1] / "docs" / "command-line.md"
 
@@ -26,14 +26,16 @@ and come last, those of the linear solver with the prefix `contact_`: `-contact_
 def page() -> str:
     """Return the reference page (Markdown)."""
     lines = [INTRODUCTION]
-    for usage, purpose, epilog, arguments in offered():
-        lines += [f"## contact {usage.partition(' ')[0]}", ""]
-        lines += ["```text", f"contact {usage}", "```", "", f"{purpose[0].upper()}{purpose[1:]}."]
+    for name, command in parser()[1].items():
+        text = str(command.description)
+        lines += [f"## contact {name}", ""]
+        lines += ["```text", str(command.usage), "```", "", f"{text[0].upper()}{text[1:]}."]
+        arguments = [action for action in command._actions if action.dest != "help"]
         if arguments:
             lines += ["", "| argument | meaning |", "|---|---|"]
-            lines += [_row(name, options) for name, options in arguments.items()]
-        if epilog is not None:
-            lines += ["", "```text", epilog.rstrip(), "```"]
+            lines += [_row(action) for action in arguments]
+        if command.epilog is not None:
+            lines += ["", "```text", command.epilog.rstrip(), "```"]
         lines.append("")
     lines += ["## Exit status", "", "| status | meaning |", "|---|---|"]
     said = " ".join(EXIT.split()).removeprefix("exit status: ")
@@ -43,10 +45,9 @@ def page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _row(name: str, options: dict[str, Any]) -> str:
-    shown = options.get("metavar", "")
-    usage = f"{name} {shown}".strip() if name.startswith("-") else shown
-    text = options["help"].replace("|", r"\|")
+def _row(action: Action) -> str:
+    usage = " ".join([*action.option_strings, str(action.metavar or "")]).strip()
+    text = str(action.help).replace("|", r"\|")
     return f"| `{usage}` | {text[0].upper()}{text[1:]}. |"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from mpi4py import MPI
@@ -29,14 +29,11 @@ PETSc's options have one dash, those of the linear solver the prefix contact_, a
 -contact_ksp_monitor -contact_pc_type gamg
 """
 
-#: PETSc's options begin with one dash and any letter, -h among them.
-COMMON: dict[str, Any] = {
-    "add_help": False,
-    "allow_abbrev": False,
-    "formatter_class": argparse.RawDescriptionHelpFormatter,
-}
+#: Options without a value, and those that may be repeated.
+FLAG: dict[str, Any] = {"action": "store_true"}
+MANY: dict[str, Any] = {"action": "append", "default": []}
 
-#: Options of one letter: not argparse's, which would take PETSc's for several of them.
+#: Options of one letter: argparse would take PETSc's, -help or -vec_view, for several of them.
 SHORT = {"-h": "--help", "-v": "--verbose"}
 
 #: Names of arguments that are no options.
@@ -51,7 +48,6 @@ ONE = {
     "materials": 'name of a material, in quotes where it has spaces: "PZT-4 Clevite"',
 }
 
-
 #: Files whose keys and columns the help of a command lists.
 FILES = {
     "solve": ("summary.json", "contact.csv", "steps.csv", "history.csv"),
@@ -62,7 +58,10 @@ FILES = {
 class Parser(argparse.ArgumentParser):
     """A parser that raises InputError, and prints its help on one rank alone."""
 
-    files: tuple[str, ...] = ()
+    def __init__(self, **options: Any) -> None:
+        raw = argparse.RawDescriptionHelpFormatter
+        super().__init__(add_help=False, allow_abbrev=False, formatter_class=raw, **options)
+        self._negative_number_matcher = re.compile(r"-[\d.]")  # "-1,0,0" is a value, too
 
     def error(self, message: str) -> NoReturn:
         """Raise an InputError that names the command whose help has the usage."""
@@ -70,11 +69,12 @@ class Parser(argparse.ArgumentParser):
 
     def format_help(self) -> str:
         """Return the help, with the keys and columns of the files that the command writes."""
-        if not self.files:
+        files = FILES.get(self.prog.rpartition(" ")[2], ())
+        if not files:
             return super().format_help()
         from contact.io.tables import files_help  # loads dolfinx, which options precede
 
-        return f"{super().format_help()}\n{files_help(*self.files)}\n"
+        return f"{super().format_help()}\n{files_help(*files)}\n"
 
     def _print_message(self, message: str, file: Any = None) -> None:
         if MPI.COMM_WORLD.rank == 0:
@@ -89,8 +89,8 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     InputError
         If it is not understood.
     """
-    arguments = _joined([SHORT.get(argument, argument) for argument in arguments])
-    options, rest = _parser().parse_known_args(arguments)
+    given = [SHORT.get(argument, argument) for argument in arguments]
+    options, rest = parser()[0].parse_known_args(given)
     known = [f"--{name}" for name in vars(options) if name not in POSITIONAL]
     known.append("--help")
     for i, argument in enumerate(rest):
@@ -108,218 +108,177 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     return options, rest
 
 
-def _joined(arguments: Sequence[str]) -> list[str]:
-    """Join options and values that begin with a minus sign, which argparse takes for options."""
-    found: list[str] = []
-    for argument in arguments:
-        if found and re.fullmatch(r"--[a-z-]+", found[-1]) and re.match(r"-[\d.]", argument):
-            found[-1] += f"={argument}"
-        else:
-            found.append(argument)
-    return found
+def parser() -> tuple[Parser, dict[str, Parser]]:
+    """Return the parser of all commands, and that of each by its name."""
+    whole = Parser(prog="contact", description=DESCRIPTION, epilog=EXIT)
+    names = "demo|new|mesh|check|solve|sweep|plot|view|identify|materials|schema"
+    commands = whole.add_subparsers(dest="command", required=True, metavar=names)
+    version = f"contact {__version__}"
+    whole.add_argument("--help", action="help", help="show this help and leave")
+    whole.add_argument("--version", action="version", version=version, help="show the version")
 
+    def command(usage: str, text: str, epilog: str | None = None) -> Parser:
+        name, usage = usage.partition(" ")[0], f"contact {usage}"
+        made = commands.add_parser(name, help=text, description=text, epilog=epilog, usage=usage)
+        made.add_argument("--help", action="help", help="show this help and leave")
+        return made
 
-def _parser() -> Parser:
-    parser = Parser(prog="contact", description=DESCRIPTION, epilog=EXIT, **COMMON)
-    parser.add_argument("--help", action="help", help="show this help and leave")
-    parser.add_argument(
-        "--version", action="version", version=f"contact {__version__}", help="show the version"
-    )
-    commands = parser.add_subparsers(
-        dest="command",
-        required=True,
-        metavar="demo|new|mesh|check|solve|sweep|plot|view|identify|materials|schema",
-    )
-    for usage, text, epilog, arguments in offered():
-        command = commands.add_parser(
-            usage.partition(" ")[0],
-            help=text,
-            description=text,
-            epilog=epilog,
-            usage=f"contact {usage}",
-            **COMMON,
-        )
-        command.files = FILES.get(usage.partition(" ")[0], ())
-        command.add_argument("--help", action="help", help="show this help and leave")
-        for name, options in arguments.items():
-            command.add_argument(name, **options)
-    return parser
-
-
-def _value(metavar: str, text: str, **more: Any) -> dict[str, Any]:
-    return {"metavar": metavar, "help": text, **more}
-
-
-def _values(metavar: str, text: str) -> dict[str, Any]:
-    return {
-        "metavar": metavar,
-        "help": f"{text}; may be repeated",
-        "action": "append",
-        "default": [],
-    }
-
-
-def _flag(text: str) -> dict[str, Any]:
-    return {"help": text, "action": "store_true"}
-
-
-def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]]:
-    """Give the commands: usage, purpose, the text below the options, and the arguments."""
-    case = _value("CASE.toml", "case file (TOML)")
-    replaced = _values(
-        "KEY=VALUE", "replace a value of the case file, for instance load.0.traction='[0, -1]'"
-    )
-    replaces = _flag("replace results or checkpoints of another case, if DIR has any")
-    shown = {
-        "--quiet": _flag("show no progress"),
-        "--verbose": _flag("-v: show all iterations and remarks, with the time"),
-        "--log": _value("FILE", "write a log to the end of a file"),
-    }
-    yield (
+    demo = command(
         "demo [--out DIR] [options]",
         "solve an example, a bar pressed on a foundation, with its figures",
-        None,
-        {
-            "--out": _value("DIR", "folder for results; contact-demo by default"),
-            "--set": replaced,
-            **shown,
-            "--overwrite": replaces,
-        },
     )
-    yield (
-        "new MESH [--case CASE.toml]",
-        "write a commented case file for a mesh file, with its parts",
-        None,
-        {
-            "mesh": _value(
-                "MESH", "mesh file: .msh with named physical groups, .inp, .vtu, .med, ..."
-            ),
-            "--case": _value("FILE", "file to write; MESH.toml by default"),
-        },
+    demo.add_argument("--out", metavar="DIR", help="folder for results; contact-demo by default")
+    new = command(
+        "new MESH [--case CASE.toml]", "write a commented case file for a mesh file, with its parts"
     )
-    yield (
+    new.add_argument(
+        "mesh",
+        metavar="MESH",
+        help="mesh file: .msh with named physical groups, .inp, .vtu, .med, ...",
+    )
+    new.add_argument("--case", metavar="FILE", help="file to write; MESH.toml by default")
+    mesh = command(
         "mesh FILE PART.xdmf",
         "write a mesh file as XDMF of which each rank reads its share, for many ranks",
-        None,
-        {
-            "file": _value("FILE", "mesh file: .msh, .inp, .vtu, .med, ..."),
-            "to": _value("PART.xdmf", "the new file; PART.h5 is written beside it"),
-        },
     )
-    yield (
+    mesh.add_argument("file", metavar="FILE", help="mesh file: .msh, .inp, .vtu, .med, ...")
+    mesh.add_argument("to", metavar="PART.xdmf", help="the new file; PART.h5 is written beside it")
+    check = command(
         "check CASE.toml [options] [PETSc options]",
         "validate a case and print it with its mesh parts and unknowns",
-        None,
-        {
-            "case": case,
-            "--set": replaced,
-            "--plot": _flag("draw the set-up too: CASE-setup.png and .pdf in the present folder"),
-        },
     )
-    yield (
+    solve = command(
         "solve CASE.toml --out DIR [options] [PETSc options]",
         "solve a case and write the results",
         PETSC,
-        {
-            "case": {**case, "nargs": "?"},
-            "--set": replaced,
-            "--plot": _flag("draw the figures too"),
-            "--out": _value("DIR", "folder for results"),
-            "--restart": _value(
-                "DIR",
-                "go on with an interrupted evolution from its checkpoints in DIR, which have the "
-                "case too; the results go to DIR unless --out names another folder",
-            ),
-            **shown,
-            "--overwrite": replaces,
-        },
     )
-    yield (
+    sweep = command(
         "sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]",
         "solve a case for several values of some keys: sweep.csv, one row per value",
-        None,
-        {
-            "case": case,
-            "--set": replaced,
-            "--over": _values(
-                "KEY=V1,V2,...", "the values of a key, for all combinations; a:b:n is n numbers"
-            ),
-            "--columns": _values(
-                "KEY,...",
-                "further columns: keys of summary.json, max_dev_strain, reactions.left, ...",
-            ),
-            "--out": _value("DIR", "folder for the table; rows in it are kept"),
-            "--cold": _flag("start each solve from the zero initial guess, without a warm start"),
-            **shown,
-        },
     )
-    yield (
-        "plot DIR [options]",
-        "draw the figures of a run from its files, or the figure of a sweep",
-        None,
-        {
-            "folder": _value("DIR", "folder with the results of a run, or of a sweep"),
-            "--field": _values(
-                "NAME",
-                "colour the body by this field of fields.vtu, von_mises, displacement, "
-                "displacement_y, stress_xy, potential, ..., and draw this figure alone; of a "
-                "sweep, draw this column, as figure-sweep-NAME",
-            ),
-            "--format": _value("pdf,png", "formats of the files: png, pdf, svg", default="png"),
-            "--width": _value("85mm", "width of the figures, in mm, cm or in"),
-            "--view": _value(
-                "X,Y,Z",
-                "direction from a body in 3-D to the eye; without it one that sees the contact",
-            ),
-            "--step": _value(
-                "N",
-                "draw the results at the end of a step of an evolution, from 1, as "
-                "figure-NAME-step-N",
-                type=int,
-            ),
-            "--html": _flag(
-                "write figure-view.html instead, a body in 3-D to turn in a browser (needs trame)"
-            ),
-        },
+    plot = command(
+        "plot DIR [options]", "draw the figures of a run from its files, or the figure of a sweep"
     )
-    yield (
+    view = command(
         "view DIR [options]",
         "show the body of a run in 3-D and its contact in a window, to turn it",
-        None,
-        {
-            "folder": _value("DIR", "folder with the results of a run"),
-            "--field": _value(
-                "NAME", "colour the body by this field, as contact plot; else contact pressure"
-            ),
-        },
     )
-    yield (
+    identify = command(
         "identify CASE.toml DATA.csv --for KEY,... [options]",
         "find the parameters with which a case fits measured columns of steps.csv best",
-        None,
-        {
-            "case": case,
-            "data": _value("DATA.csv", "measurements: t, and columns of steps.csv"),
-            "--for": _value("KEY,...", "keys of the case whose numbers are sought", dest="keys"),
-            "--bound": _values("KEY=A:B", "least and largest value of a parameter"),
-            "--set": replaced,
-            "--plot": _value("FILE", "draw fit and residuals into a new file"),
-            "--quiet": shown["--quiet"],
-        },
     )
-    yield (
+    materials = command(
         "materials [NAME] [--file FILE]",
         "list the materials that have a name, or show one with its derived constants",
-        None,
-        {
-            "name": _value("NAME", "material to show", nargs="?"),
-            "--file": _value("FILE", "a library of one's own (TOML)"),
-        },
     )
-    yield (
+    schema = command(
         "schema",
         "print the JSON schema of the case file, by which editors complete and check TOML",
         "contact schema > contact.schema.json, and as the first line of a case file\n"
         "#:schema ./contact.schema.json",
-        {},
     )
+    for one, nargs in ((check, None), (solve, "?"), (sweep, None), (identify, None)):
+        one.add_argument("case", metavar="CASE.toml", help="case file (TOML)", nargs=nargs)
+    for one in (demo, check, solve, sweep, identify):
+        one.add_argument(
+            "--set",
+            metavar="KEY=VALUE",
+            **MANY,
+            help="replace a value of the case file, for instance load.0.traction='[0, -1]'; "
+            "may be repeated",
+        )
+    check.add_argument(
+        "--plot", **FLAG, help="draw the set-up too: CASE-setup.png and .pdf in the present folder"
+    )
+    solve.add_argument("--plot", **FLAG, help="draw the figures too")
+    solve.add_argument("--out", metavar="DIR", help="folder for results")
+    solve.add_argument(
+        "--restart",
+        metavar="DIR",
+        help="go on with an interrupted evolution from its checkpoints in DIR, which have the "
+        "case too; the results go to DIR unless --out names another folder",
+    )
+    sweep.add_argument(
+        "--over",
+        metavar="KEY=V1,V2,...",
+        **MANY,
+        help="the values of a key, for all combinations; a:b:n is n numbers; may be repeated",
+    )
+    sweep.add_argument(
+        "--columns",
+        metavar="KEY,...",
+        **MANY,
+        help="further columns: keys of summary.json, max_dev_strain, reactions.left, ...; "
+        "may be repeated",
+    )
+    sweep.add_argument("--out", metavar="DIR", help="folder for the table; rows in it are kept")
+    sweep.add_argument(
+        "--cold", **FLAG, help="start each solve from the zero initial guess, without a warm start"
+    )
+    for one in (demo, solve, sweep, identify):
+        one.add_argument("--quiet", **FLAG, help="show no progress")
+    for one in (demo, solve, sweep):
+        one.add_argument(
+            "--verbose", **FLAG, help="-v: show all iterations and remarks, with the time"
+        )
+        one.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
+    for one in (demo, solve):
+        one.add_argument(
+            "--overwrite",
+            **FLAG,
+            help="replace results or checkpoints of another case, if DIR has any",
+        )
+    plot.add_argument(
+        "folder", metavar="DIR", help="folder with the results of a run, or of a sweep"
+    )
+    plot.add_argument(
+        "--field",
+        metavar="NAME",
+        **MANY,
+        help="colour the body by this field of fields.vtu, von_mises, displacement, "
+        "displacement_y, stress_xy, potential, ..., and draw this figure alone; of a sweep, draw "
+        "this column, as figure-sweep-NAME; may be repeated",
+    )
+    plot.add_argument(
+        "--format", metavar="pdf,png", default="png", help="formats of the files: png, pdf, svg"
+    )
+    plot.add_argument("--width", metavar="85mm", help="width of the figures, in mm, cm or in")
+    plot.add_argument(
+        "--view",
+        metavar="X,Y,Z",
+        help="direction from a body in 3-D to the eye; without it one that sees the contact",
+    )
+    plot.add_argument(
+        "--step",
+        metavar="N",
+        type=int,
+        help="draw the results at the end of a step of an evolution, from 1, as figure-NAME-step-N",
+    )
+    plot.add_argument(
+        "--html",
+        **FLAG,
+        help="write figure-view.html instead, a body in 3-D to turn in a browser (needs trame)",
+    )
+    view.add_argument("folder", metavar="DIR", help="folder with the results of a run")
+    view.add_argument(
+        "--field",
+        metavar="NAME",
+        help="colour the body by this field, as contact plot; else contact pressure",
+    )
+    identify.add_argument(
+        "data", metavar="DATA.csv", help="measurements: t, and columns of steps.csv"
+    )
+    identify.add_argument(
+        "--for", metavar="KEY,...", dest="keys", help="keys of the case whose numbers are sought"
+    )
+    identify.add_argument(
+        "--bound",
+        metavar="KEY=A:B",
+        **MANY,
+        help="least and largest value of a parameter; may be repeated",
+    )
+    identify.add_argument("--plot", metavar="FILE", help="draw fit and residuals into a new file")
+    materials.add_argument("name", metavar="NAME", help="material to show", nargs="?")
+    materials.add_argument("--file", metavar="FILE", help="a library of one's own (TOML)")
+    every = (demo, new, mesh, check, solve, sweep, plot, view, identify, materials, schema)
+    return whole, {one.prog.rpartition(" ")[2]: one for one in every}

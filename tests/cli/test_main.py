@@ -24,6 +24,7 @@ def test_petsc_options_are_told_from_ours():
     assert options.set == ["a.b=1", "c=2"]
     assert petsc == "-ksp_type cg -mat_view -eps -1.5".split()
     assert parse("check a.toml -help -history".split())[1] == ["-help", "-history"]
+    assert parse("plot out --view -1,0,-.5".split())[0].view == "-1,0,-.5"
 
 
 @pytest.mark.parametrize(
