@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 
 from contact import _compat
 from contact.body.elements import CHUNK, unlocked
-from contact.body.global_unknowns import Member
 from contact.case.build import build_problem
 from contact.case.checks import growing
 from contact.case.file import Case, load_case, to_toml
@@ -49,8 +47,6 @@ THIN = 0.1
 INCOMPRESSIBLE = 0.475
 #: Stiffness of a crystal's strain over that of another one, from which on check warns, too.
 STIFFER = 100.0
-#: Most steps of an evolution whose loads are looked at.
-LOOKS = 20
 #: Length of the mean of a part's normals from which on the part counts as flat, and below which
 #: they cancel.
 FLAT, CLOSED = 1 - 1e-6, 1e-6
@@ -59,8 +55,6 @@ LARGE = 0.05
 #: Loads over the contact part and Young's modulus from which on units are asked for: sharp
 #: indenters come to a tenth.
 SOFT = 0.25
-#: Words for components that have no displacement given, or no force.
-WORDS = {True: "free", False: "held"}
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -86,6 +80,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
     cells = domain.mesh.topology.index_map(domain.dim).size_global
     layout = problem.equilibrium.layout
     library, path = _compat.blas()
+    end = 1.0 if case.evolution is None else case.evolution.ends[-1]
     lines = [
         to_toml(case, domain.dim),
         f"# mesh: {counted(cells, 'cell')} in {domain.dim}-D on {counted(comm.size, 'rank')}, "
@@ -95,7 +90,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
         *(f"# note: {note}" for note in (*domain.notes, *amplitude_notes(case))),
         f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
         f"{problem.nodes.size}",
-        *expectations(problem, _times(case)),
+        *expectations(problem.at(end)),
         f"# blas: {library} {path}".rstrip(),
         "# versions: " + ", ".join(f"{k} {v}" for k, v in _compat.versions().items()),
     ]
@@ -120,28 +115,19 @@ def amplitude_notes(case: Case) -> list[str]:
     ]
 
 
-def _times(case: Case) -> list[float]:
-    """Return times at which loads are looked at: ends of stages and steps, of some of many."""
-    if case.evolution is None:
-        return [1.0]
-    ends, stages = case.evolution.ends, case.evolution.times[1:]
-    some = [times[:: 1 + len(times) // LOOKS] for times in (ends, stages)]
-    return sorted({*some[0], *some[1], ends[-1]})
-
-
-def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> list[str]:
-    """Return lines on the mesh, and on loads and prescribed values at some times. Collective."""
+def expectations(problem: ContactProblem) -> list[str]:
+    """Return lines on the mesh, and on all that acts at the time of a problem. Collective."""
     warnings = [
         f"# warning: {text} [{identifier}]"
         for identifier, remarks in {
             "own-shape": own_shape(problem),
             "part-end": without_heights(problem),
-            "meeting-supports": meeting_supports(problem, times),
+            "meeting-supports": meeting_supports(problem, [problem.time]),
             "two-bodies": apart(problem),
         }.items()
         for text in remarks
     ]
-    return [*_quality(problem), *acting(problem, times), *_locking(problem), *warnings]
+    return [*_quality(problem), *acting(problem), *_locking(problem), *warnings]
 
 
 def _locking(problem: ContactProblem) -> list[str]:
@@ -198,34 +184,23 @@ def _quality(problem: ContactProblem) -> list[str]:
 
 def parts(domain: Domain) -> list[str]:
     """Return a line for each part: its facets, area, centroid and mean normal. Collective."""
-    rows, inside = [], []
-    for name in sorted(domain.parts):
-        count, area, centroid, mean = _sizes(domain, domain.parts[name])
-        if not area > 0:  # facets on the axis of revolution
-            rows.append([name, counted(count, "facet"), "on the axis", "", ""])
-            continue
-        length = float(np.linalg.norm(mean))
-        across = f"normal {vector(mean)}"
-        if length < CLOSED:
-            across = "not plane, normals that cancel"
-        elif length < FLAT:
-            across = f"not plane, mean normal {vector(mean / length)}"
-        rows.append([*_row(domain, name, count, area, centroid), across])
-    for name in sorted(domain.inside):
-        count, area, centroid, _ = _sizes(domain, domain.inside[name])
-        inside.append(_row(domain, name, count, area, centroid))
-    return [
-        "# parts of its boundary:",
-        *table(rows),
-        *(["# parts inside of it:"] if inside else []),
-        *table(inside),
-    ]
-
-
-def _row(domain: Domain, name: str, count: int, area: float, centroid: Array) -> list[str]:
-    extent = "area" if domain.dim == 3 or domain.revolved else "length"
-    place = f"centroid {vector(domain.resultant(centroid))}"
-    return [name, counted(count, "facet"), f"{extent} {area:.6g}", place]
+    found = []
+    for title, group in {"of its boundary": domain.parts, "inside of it": domain.inside}.items():
+        rows = []
+        for name in sorted(group):
+            count, area, centroid, mean = _sizes(domain, group[name])
+            row = [name, counted(count, "facet"), "on the axis", "", ""]
+            if area > 0:  # else facets on the axis of revolution
+                words = "length" if domain.dim == 2 and not domain.revolved else "area"
+                row[2:4] = f"{words} {area:.6g}", f"centroid {vector(domain.resultant(centroid))}"
+                length = float(np.linalg.norm(mean))
+                if group is domain.parts:
+                    across = mean / length if length > CLOSED else mean
+                    row[4] = f"normal {vector(across)}"
+                    row[4] = row[4] if length >= FLAT else f"not plane, mean {row[4]}"
+            rows.append(row)
+        found += [f"# parts {title}:", *table(rows)] if rows else []
+    return found
 
 
 def _sizes(domain: Domain, facets: Indices) -> tuple[int, float, Array, Array]:
@@ -257,10 +232,97 @@ def regions(domain: Domain) -> list[str]:
     return ["# regions:", *table(rows)]
 
 
+def acting(problem: ContactProblem) -> list[str]:
+    """Return lines on all that acts at the time of a problem, and warnings of it. Collective."""
+    body, comm, size, time = problem.equilibrium, problem.comm, problem.domain.size, problem.time
+    gap = problem.interface.gap
+    gap = np.where(np.abs(gap) < NEGLIGIBLE * size, 0.0, gap)  # rounding is no gap
+    least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
+    largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
+    loads, given = body.external(time), body.prescribe(body.rest(), time)
+    pressed, moved = (x / size for x in expected_displacements(problem, loads, given))
+    rows = [*_resultants(problem, loads, given), *_members(problem)]
+    rows += [
+        [f"foundation of {contact.on!r}", f"potential {float(phi):.4g}"]
+        for contact in problem.contacts
+        if contact.conductor is not None
+        and (phi := np.abs(contact.conductor.at(time).phi_f).max(initial=0.0)) > 0
+    ]
+    layers = any(contact.compliant_layer is not None for contact in problem.contacts)
+    if not rows and least >= 0 and not layers:
+        return ["# warning: nothing is loaded or moved: all results will be 0"]
+    over = " (below 0: an overlap, which is pressed apart)" if least < 0 else ""
+    lines = ["# acting:", *table([*rows, ["gap", f"{least:.4g} to {largest:.4g}{over}"]])]
+    if moved > LARGE:
+        lines.append(
+            f"# warning: displacements of {moved:.0%} of the body are prescribed, and strains are "
+            "taken as small"
+        )
+    if pressed > SOFT:
+        lines.append(
+            f"# warning: the loads over the area of the contact part are {pressed:.0%} of Young's "
+            "modulus, and strains are taken as small; are both in the same units?"
+        )
+    if pressed == 0 and least > 10 * moved * size:
+        lines.append("# warning: the gap is far larger: the body may not touch at all")
+    return lines
+
+
+def _resultants(problem: ContactProblem, external: Array, prescribed: Array) -> list[list[str]]:
+    """Return the loads, charges, and values of supports, as far as they are not 0. Collective."""
+    body, comm, d = problem.equilibrium, problem.comm, problem.dim
+    tied = body.global_unknowns.tied
+    loads, given = body.nodal(external), body.nodal(prescribed)[: len(tied)]
+    given = np.where(tied, 0.0, given)
+    loads[:, d:] /= body.phi_scale
+    given[:, d:] *= body.phi_scale
+    total, size = (
+        np.asarray(comm.allreduce(x.sum(axis=0), op=MPI.SUM)) for x in (loads, np.abs(loads))
+    )
+    moved, raised = (
+        comm.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX)
+        for x in (given[:, :d], given[:, d:])
+    )
+    balanced = np.abs(total[:d]).max() <= NEGLIGIBLE * size[:d].sum()
+    force = f"resultant {vector(problem.domain.resultant(total[:d]))}"
+    force = f"forces of {size[:d].sum():.4g} in all, which balance" if balanced else force
+    rows = {
+        ("loads", force): size[:d].sum(),
+        ("charges", f"{size[d:].sum():.4g} in all"): size[d:].sum(),
+        ("supports", f"displacements of up to {moved:.4g}"): moved,
+        ("supports", f"potentials of up to {raised:.4g}"): raised,
+    }
+    return [[*row] for row, size in rows.items() if size > 0]
+
+
+def _members(problem: ContactProblem) -> list[list[str]]:
+    """Return the given motions and forces of rigid bodies, electrodes and bolts."""
+    rows = []
+    for member in problem.equilibrium.global_unknowns.members:
+        given, d = member.description, problem.dim
+        names = ["shortening", "force"]
+        where = f"{given.name} {given.on!r}"
+        if isinstance(given, Electrode):
+            names = ["potential", "charge"]
+        if isinstance(given, Rigid):
+            names = ["displacement", "force", "rotation (radians)", "moment"]
+            where = f"{'foundation of' if given.foundation else 'rigid part'} {given.on!r}"
+        moves = member.given(problem.time) * member.units
+        forces = member.forces(problem.time) / member.units
+        values = [moves[:d], forces[:d], moves[d:], forces[d:]]
+        rows += [
+            [where, f"{name} {vector(value)}"]
+            for name, value in zip(names, values, strict=False)
+            if np.any(value)
+        ]
+    return rows
+
+
 def vector(values: NDArray[np.floating]) -> str:
-    """Return a vector, without the rounding of its zeros."""
+    """Return a number or a vector, without the rounding of its zeros."""
     values = np.where(np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0), 0.0, values)
-    return f"({', '.join(f'{value:.6g}' for value in values)})"
+    text = ", ".join(f"{value:.6g}" for value in values)
+    return text if values.size == 1 else f"({text})"
 
 
 def table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -269,146 +331,3 @@ def table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
     for row in rows:
         cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
         yield "#   " + "  ".join(cells).rstrip()
-
-
-class Row(NamedTuple):
-    """One thing that acts, or would if its size were not 0.
-
-    Attributes
-    ----------
-    where, text
-        The thing, and its values in words.
-    size
-        Of its values, by which those of several times are compared.
-    moves
-        Whether it prescribes a displacement.
-    """
-
-    where: str
-    text: str
-    size: float
-    moves: bool = False
-
-
-def acting(problem: ContactProblem, times: Sequence[float]) -> list[str]:
-    """Return lines on all that acts at some times, and warnings of these. Collective.
-
-    Each thing is told at the time at which it is largest, and not at all if it is 0 at all times.
-    """
-    comm, size = problem.comm, problem.domain.size
-    gap = problem.interface.gap
-    gap = np.where(np.abs(gap) < NEGLIGIBLE * size, 0.0, gap)  # rounding is no gap
-    least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
-    largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
-    problems = [problem.at(time) for time in times]
-    lines, forces = [], False
-    for seen in zip(*map(_rows, problems), strict=True):
-        time, row = max(zip(times, seen, strict=True), key=lambda pair: pair[1].size)
-        if row.size > 0:
-            forces |= not row.moves
-            lines.append([row.where, row.text, f"at t = {time:g}" if len(times) > 1 else ""])
-    if not lines and least >= 0:
-        return ["# warning: nothing is loaded or moved: all results will be 0"]
-    loads = [now.equilibrium.external(now.time) for now in problems]
-    given = [now.equilibrium.prescribe(now.equilibrium.rest(), now.time) for now in problems]
-    pairs = [expected_displacements(problem, *both) for both in zip(loads, given, strict=True)]
-    pressed, moved = (max(values) / size for values in zip(*pairs, strict=True))
-    over = " (below 0: an overlap, which is pressed apart)" if least < 0 else ""
-    return [
-        "# acting:",
-        *table([*lines, ["gap", f"{least:.4g} to {largest:.4g}{over}", ""]]),
-        *_warnings(pressed, moved, beyond=least > 10 * moved * size and not forces),
-    ]
-
-
-def _warnings(pressed: float, moved: float, beyond: bool) -> Iterator[str]:
-    """Give warnings of loads and displacements that are large, and of a gap that is."""
-    if moved > LARGE:
-        yield (
-            f"# warning: displacements of {moved:.0%} of the body are prescribed, and "
-            "strains are taken as small"
-        )
-    if pressed > SOFT:
-        yield (
-            f"# warning: the loads over the area of the contact part are {pressed:.0%} of Young's "
-            "modulus, and strains are taken as small; are both in the same units?"
-        )
-    if beyond:
-        yield "# warning: the gap is far larger: the body may not touch at all"
-
-
-def _rows(problem: ContactProblem) -> list[Row]:
-    """Return all that may act at the time of a problem, the same things at all. Collective."""
-    body, comm, d = problem.equilibrium, problem.comm, problem.dim
-    unknowns, time = body.global_unknowns, problem.time
-
-    def largest(values: Array) -> float:
-        return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
-
-    loads = body.nodal(body.external(time))
-    given = body.nodal(body.prescribe(body.rest(), time))[: len(unknowns.tied)]
-    given = np.where(unknowns.tied, 0.0, given)
-    charge = np.abs(loads[:, d:] / body.phi_scale).sum()
-    charge = float(comm.allreduce(float(charge), op=MPI.SUM))
-    moved, raised = largest(given[:, :d]), largest(given[:, d:] * body.phi_scale)
-    return [
-        _forces("loads", loads[:, :d], problem),
-        Row("charges", f"{charge:.4g} in all", charge),
-        Row("supports", f"displacements of up to {moved:.4g}", moved, moves=True),
-        Row("supports", f"potentials of up to {raised:.4g}", raised),
-        *(row for member in unknowns.members for row in _member(member, time)),
-        *_foundations(problem),
-    ]
-
-
-def _forces(where: str, nodal: Array, problem: ContactProblem) -> Row:
-    """Return the resultant of nodal forces, (nodes, d). Collective."""
-    total = np.asarray(problem.comm.allreduce(nodal.sum(axis=0), op=MPI.SUM))
-    size = float(problem.comm.allreduce(float(np.abs(nodal).sum()), op=MPI.SUM))
-    total = problem.domain.resultant(total)
-    balanced = np.abs(total).max() <= NEGLIGIBLE * size
-    text = (
-        f"forces of {size:.4g} in all, which balance" if balanced else f"resultant {vector(total)}"
-    )
-    return Row(where, text, size)
-
-
-def _member(member: Member, time: float) -> list[Row]:
-    """Return the given motions and forces of a rigid body, the charge of an electrode, a bolt's."""
-    given, where = member.description, f"{member.description.name} {member.description.on!r}"
-    names: tuple[tuple[str, ...], ...] = (("shortening",), ("force",))
-    if isinstance(given, Electrode):
-        names = (("potential",), ("charge",))
-    if isinstance(given, Rigid):
-        where = f"foundation of {given.on!r}" if given.foundation else f"rigid part {given.on!r}"
-        names = (("displacement", "rotation"), ("force", "moment"))
-    d = len(given.displacement or ()) if isinstance(given, Rigid) else 1
-    values = [member.given(time) * member.units, member.forces(time) / member.units]
-    values[0][d:] = np.rad2deg(values[0][d:])
-    rows = []
-    for moves, kinds, every in zip((True, False), names, values, strict=True):
-        told = [f"{value:.4g}" for value in every]
-        told = [t if f != moves else WORDS[moves] for t, f in zip(told, member.free, strict=True)]
-        for name, own, texts in zip(
-            kinds, np.split(every, [d]), (told[:d], told[d:]), strict=False
-        ):
-            one = texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
-            text = f"{name} {one}{' degrees' if name == 'rotation' else ''}"
-            rows.append(Row(where, text, np.abs(own).max(), moves))
-    return rows
-
-
-def _foundations(problem: ContactProblem) -> list[Row]:
-    """Return the potentials of foundations, and the forces of layers before any motion."""
-    body, start = problem.equilibrium, problem.start()
-    forces = np.zeros(body.owned + body.global_unknowns.size)
-    problem.interface.add_forces(forces, body.rest(), start.forces)
-    found = [
-        (contact.on, float(np.abs(contact.conductor.at(problem.time).phi_f).max(initial=0.0)))
-        for contact in problem.contacts
-        if contact.conductor is not None
-    ]
-    return [
-        _forces("layers", -body.nodal(forces)[:, : problem.dim], problem),
-        *(Row(f"foundation of {on!r}", f"potential {phi:.4g}", phi) for on, phi in found),
-    ]
