@@ -23,47 +23,23 @@ CASE = """\
 # Units are yours, but all the same: with mm and N, stresses are in MPa.
 title = {title}
 
-[case]
-# units = "N-mm-MPa"          # labels of figures, and constants of materials by name
-
 [mesh]
 file = {file}
-# Parts of its boundary, to be named below:
-{parts}# Regions: {regions}.
+# Parts of its boundary: {parts}.
+# Parts inside of it, for supports, electrodes and bolts: {inside}.
+# Regions: {regions}.
 
-{space}{materials}
+{space}[material]                    # of several regions a list: [[material]], on = "REGION"
+young = 210e3                 # Young's modulus (stress); or by name: name = "steel"
+poisson = 0.3
+
 [[fixed]]                     # the part that lies highest; "free": no support in this direction
 on = {highest}
 displacement = {pressed}
-{held}
-# [[load]]                    # a resultant on any part but those of contacts
-# on = {highest}
-# force = {load}
-
 {contacts}
 [friction]
 law = "coulomb"
 mu = 0.2
-
-[solver]
-method = "newton"
-tolerance = 1e-8
-"""
-
-MATERIAL = """\
-young = 210e3                 # Young's modulus (stress); or by name: name = "steel"
-poisson = 0.3
-"""
-
-HENCKY = """\
-# law = "log"                 # Hencky's law, plastic beyond this strain:
-# yield_strain = 0.002
-"""
-
-PAIRS = """\
-# Bodies of this mesh that can touch each other. Friction and current can be given for each; `on`
-# is the finer side here, or take the softer body. A rigid foundation instead of a body:
-# on = ..., foundation = { shape = "plane", point = [...], normal = [...] }
 """
 
 
@@ -129,74 +105,43 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
             "new-parts",
         )
     lowest, highest = order[0], order[-1]
-    step = float(f"{1e-3 * domain.size:.0e}")
-    closed = np.ceil(max(facing[0][0], 0.0) / step - NEGLIGIBLE) if facing else 0.0
+    step, closed, contacts = float(f"{1e-3 * domain.size:.0e}"), 0.0, ""
+    opposite: dict[str, tuple[float, list[str]]] = {}  # contacts share no nodes: one each `on`
+    for gap, on, against in facing:
+        opposite.setdefault(on, (gap, []))[1].append(against)
+    for on, (gap, others) in opposite.items():
+        against = literal(others if len(others) > 1 else others[0])
+        contacts += f"\n[[contact]]\non = {literal(on)}\nagainst = {against}\n"
+        contacts += 'overlap = "press"             # the meshes overlap\n' if gap < 0 else ""
+    if facing:
+        closed = float(np.ceil(max(facing[0][0], 0.0) / step - NEGLIGIBLE))
+        held = f"on = {literal(lowest)}\ndisplacement = {_along(d, 0.0)}\n"
+        contacts = f"\n[[fixed]]\n{held}{contacts}"
+    else:
+        least = domain.mesh.geometry.x[:, d - 1].min(initial=np.inf)
+        ground = _along(d, domain.comm.allreduce(float(least), op=MPI.MIN) + 0.0)
+        contacts = f'\n[contact]\non = {literal(lowest)}\nfoundation = {{ shape = "plane", '
+        contacts += f"point = {ground}, normal = {_along(d, 1.0)} }}\n"
     try:
         name = str(mesh.resolve().relative_to(path.resolve().parent))
     except ValueError:
         name = str(mesh.resolve())
-    parts = "".join(f"#   {part}\n" for part in sorted(domain.parts))
-    if domain.inside:
-        parts += "# Parts inside of it, for supports, electrodes and bolts:\n"
-        parts += "".join(f"#   {part}\n" for part in sorted(domain.inside))
     space = "".join(f"{key} = {literal(value)}\n" for key, value in domain.space.items())
-    held = f"\n[[fixed]]                     # the part that lies lowest\non = {literal(lowest)}\n"
+    parts, inside, regions = (
+        ", ".join(sorted(group)) for group in (domain.parts, domain.inside, domain.regions)
+    )
     return CASE.format(
         title=literal(mesh.stem),
         file=literal(name),
         parts=parts,
-        regions=", ".join(sorted(domain.regions)),
+        inside=inside or "none",
+        regions=regions,
         space=f"[space]                       # as the elements of the file\n{space}\n"
         * bool(space),
-        materials=_materials(domain),
         highest=literal(highest),
         pressed=_along(d, -float(f"{(1 + closed) * step:.6g}")),
-        held=f"{held}displacement = {_along(d, 0.0)}\n" * bool(facing),
-        load=_along(d, -1.0),
-        contacts=_pairs(facing) if facing else _foundation(domain, lowest),
+        contacts=contacts,
     )
-
-
-def _materials(domain: Domain) -> str:
-    """Return a material for each region, where each cell has one; else one for all. Collective."""
-    counts = [domain.comm.allreduce(cells.size, op=MPI.SUM) for cells in domain.regions.values()]
-    apart = sum(counts) == domain.mesh.topology.index_map(domain.dim).size_global
-    if not apart or len(counts) == 1:
-        return f"[material]\n{MATERIAL}{HENCKY}"
-    first, *others = [
-        f"[[material]]\non = {literal(k)}\n{MATERIAL}" for k in sorted(domain.regions)
-    ]
-    return "\n".join([first + HENCKY, *others])
-
-
-def _foundation(domain: Domain, lowest: str) -> str:
-    """Return the contact of one body with a plane. Collective."""
-    d = domain.dim
-    least = domain.mesh.geometry.x[:, d - 1].min(initial=np.inf)
-    ground = _along(d, domain.comm.allreduce(float(least), op=MPI.MIN) + 0.0)
-    return f"""\
-[contact]                     # the part that lies lowest
-on = {literal(lowest)}
-foundation = {{ shape = "plane", point = {ground}, normal = {_along(d, 1.0)} }}
-# gap = 0.0                   # instead: to a foundation along the part's normal; a formula, too
-"""
-
-
-def _pairs(facing: list[tuple[float, str, str]]) -> str:
-    """Return the contacts between bodies, given their gaps, the least first, and sides."""
-    sides: dict[str, list[str]] = {}  # contacts share no nodes: one for each `on`
-    for _, on, against in facing:
-        sides.setdefault(on, []).append(against)
-    text, overlap = PAIRS, -facing[0][0]
-    if overlap > 0:
-        text += f"""
-# The meshes overlap, by up to {overlap:.3g}, which is refused: move a body, or, where that is an
-# interference, add overlap = "press".
-"""
-    for side, others in sides.items():
-        opposite = literal(others if len(others) > 1 else others[0])
-        text += f"\n[[contact]]\non = {literal(side)}\nagainst = {opposite}\n"
-    return text
 
 
 def _along(dim: int, value: float) -> str:
