@@ -158,15 +158,8 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
     mark = "o" if len(where) == 1 else ""  # a line of one point is not seen
     bound, tau, units = table["bound"], table["tau"], run.units
     frictional = len(rows) > 1
-    order, borders = np.argsort(where), shares(where, whole)
-    seen = table["status"][order[(borders[1:] > limits[0]) & (borders[:-1] < limits[1])]]
-    inside = where[(where >= limits[0]) & (where <= limits[1])]
-    cuts = [end for end in limits if where.min() < end < where.max()]
-
-    def within(values: Array) -> Array:
-        """Return the values that are shown: of the nodes, and where the axis cuts the line."""
-        return np.interp([*inside, *cuts], where[order], values[order])
-
+    inside = (where >= limits[0]) & (where <= limits[1])
+    seen = table["status"][inside]
     for ax in rows:
         zones(ax, where, whole, table["status"][None], np.array([0.0, 1.0]))
     for zone, (colour, label) in ZONES.items():
@@ -175,7 +168,7 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
             rows[0].fill_between([], [], color=colour, lw=0, label=words)
     rows[0].plot(where, table["pressure"], color=BLUE, marker=mark, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
-    _focus(rows[0], within(table["pressure"]), 0.0)
+    _focus(rows[0], table["pressure"][inside], 0.0)
     if np.all(seen == "open"):
         _tell_open(rows[0])
     if frictional:
@@ -186,7 +179,7 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
         rows[1].plot(where, -bound, "--", color=GREY, lw=0.8)
         rows[1].axhline(0.0, color="black", lw=0.4)
         rows[1].set_ylabel(units.label(r"$-\sigma_\tau\cdot t$", "stress"))
-        _focus(rows[1], within(bound), -1.0)
+        _focus(rows[1], bound[inside], -1.0)
     if run.opposite is not None:
         _draw_opposite(rows[0], table, where, run.opposite, limits)
     rows[-1].set_xlabel(along(table, run))

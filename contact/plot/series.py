@@ -7,7 +7,6 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -43,9 +42,6 @@ from contact.typing import Array
 
 #: Parts that move, as the columns of ``steps.csv`` begin, and labels of their displacement.
 DRIVEN = {"driven": "mean displacement", "rigid": "displacement"}
-
-#: Colours of several parts that move, by turns.
-COLOURS = BLUE, ORANGE, GREEN, SKY, GREY
 
 #: Share of the largest motion from which on a part moves along an axis.
 MOVES = 1e-3
@@ -106,11 +102,11 @@ def draw_loop(run: Run, moves: str) -> Figure:
         spare.axis("off")
     unit = unit_of("force", run.units, run.axes == "xy")
     for ax, k in zip(panels, chosen, strict=False):
-        for i, (body, colour) in enumerate(zip(bodies, cycle(COLOURS), strict=False)):
+        for i, body in enumerate(bodies):
             if seen[i, k]:
                 force = _course(run, f"{moves}_force_{names[k]}{body}")
                 label = body.removeprefix("_") or "foundation"
-                ax.plot(ways[i][k], force, "-o", color=colour, markersize=2.5, label=label)
+                ax.plot(ways[i][k], force, "-o", color=f"C{i}", markersize=2.5, label=label)
         ax.xaxis.set_major_locator(MaxNLocator(6 - across, steps=[1, 2, 5, 10]))
         ax.set_xlabel(run.units.label(f"{words} $u_{run.axes[k]}$", "length"))
         ax.set_ylabel(f"force along ${run.axes[k]}${unit}")

@@ -15,7 +15,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from contact.plot.foundation import add_foundation, foundation, magnification
@@ -247,8 +246,8 @@ def chosen_view(run: Run, skin: Any, zone: Zone) -> tuple[Array, bool] | None:
     if not images:
         return None
     lit = np.array([(image[..., 0] > 127).mean() for image in images])
-    seen = lit * [np.prod(camera.high - camera.low) for camera in cameras]
-    shares = seen / np.maximum(zone.area @ views.T, 0.0).sum(axis=0)
+    lit = lit * [np.prod(camera.high - camera.low) for camera in cameras]
+    shares = lit / np.maximum(zone.area @ views.T, 0.0).sum(axis=0)
     if shares.max() >= SEEN:
         preferred = np.minimum(shares, 0.8) - 0.1 * (np.arange(len(views)) >= len(turns))
         return views[np.argmax(preferred + 0.2 * views @ USUAL)], False
@@ -345,8 +344,8 @@ def show_body(ax: Axes, run: Run, scene: Scene, view: Any, box: Array) -> Camera
     eye = towards + 0.35 * scene.zone.normal if cut else towards
     corners = np.array([box[list(which), range(3)] for which in np.ndindex(2, 2, 2)])
     shape = scene.foundation
-    seen = corners if shape is None else np.concatenate([corners, shape.points])
-    camera = Camera.of(eye, seen)
+    points = corners if shape is None else np.concatenate([corners, shape.points])
+    camera = Camera.of(eye, points)
     images = rendered(lambda plotter: scene.add(plotter, towards, cut), [camera])
     if not images:
         return None
@@ -363,14 +362,14 @@ def show_body(ax: Axes, run: Run, scene: Scene, view: Any, box: Array) -> Camera
 def contact_figure(run: Run, look: Look) -> Figure | None:
     """Draw the body where it is in contact, pressure, status and friction; None undrawn."""
     scene, table = Scene.of(run), run.table
-    zone, norm, shades = scene.zone, scene.norm, scene.shades
-    sides = [(run.surface, side) for side in zone.sides]
-    cameras = [close_camera(run, zone, side) for side in zone.sides]
+    zone, norm = scene.zone, scene.norm
     touching = bool(np.any(table["status"] != "open"))
     box = np.reshape(scene.body.bounds, (3, 2)).T
     frictional, narrow = bool(np.any(table["bound"] > 0)), page_width() < NARROW
     others = [] if run.opposite is None else [run.opposite]
-    rows, columns = 2 + len(others), len(sides)
+    rows, columns = 2 + len(others), len(zone.sides)
+    words = [""] if columns == 1 else [" (front)", " (back)"]
+    shades = scene.shades | {"nan_color": ZONES["open"][0]}
     figure = sheet(2.1 if narrow else 0.7 if rows == 2 else 0.95)
     figure.set_layout_engine("compressed")
     grid = (
@@ -383,27 +382,25 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
         return None
     whole.set_title("pressure on the body" if touching else "no contact", fontsize="medium")
     axes = []
-    for k, ((surface, side), camera) in enumerate(zip(sides, cameras, strict=True)):
+    for k, (side, which) in enumerate(zip(zone.sides, words, strict=True)):
+        camera = close_camera(run, zone, side)
+        front = seen(run, run.surface, side * zone.normal, camera)
+        meshes = [front, *(seen(run, other, None, camera) for other in others)]
+        titles = ["contact pressure", *["pressure on the other side"] * len(others), "status"]
         panels = [
             figure.add_subplot(grid[1 + r, k] if narrow else grid[r, 1 + k]) for r in range(rows)
         ]
-        axes += panels
-        front = Front.of(run, surface, side * zone.normal, camera)
-        _show_pressure(panels[0], front, camera, shades)
-        for panel, other in zip(panels[1:-1], others, strict=True):
-            _show_pressure(panel, Front.of(run, other, None, camera), camera, shades)
-            panel.set_title("pressure on the other side", fontsize="medium")
+        for panel, mesh in zip(panels, meshes, strict=False):
+            _shown(panel, camera, mesh, **shades)
         _show_status(panels[-1], front, camera)
-        names = ["contact pressure", "status"]
         longest = _show_friction(panels[-1], front, camera) if frictional else 0.0
         if longest:
             unit = f" {run.units.stress}" if run.units.stress else ""
-            names[1] = f"status, friction\n(longest arrow {longest:.3g}{unit})"
-        for panel, name in zip((panels[0], panels[-1]), names, strict=True):
-            seen = "" if columns == 1 else (" (front)", " (back)")[k]
-            panel.set_title(name + seen, fontsize="medium")
-        for panel in panels:
+            titles[-1] = f"status, friction\n(longest arrow {longest:.3g}{unit})"
+        for panel, title in zip(panels, titles, strict=True):
+            panel.set_title(title + which, fontsize="medium")
             _frame(panel, camera, run, last=panel is panels[-1])
+        axes += panels
     if touching:
         label = run.units.label(r"$-\sigma_\nu$", "stress")
         label += f", peak {norm.vmax:.4g}"
@@ -448,36 +445,22 @@ def close_camera(run: Run, zone: Zone, side: int) -> Camera:
     return Camera(right, up, low, high, camera.depth)
 
 
-@dataclass(frozen=True)
-class Front:
-    """The triangles of a contact part that are seen in a close-up.
+def seen(run: Run, grid: Any, towards: Array | None, camera: Camera) -> Any:
+    """Return the triangles of a contact part near the scene of a camera.
 
-    Attributes
-    ----------
-    skin, faces
-        The surface of all, and the corners of those that are seen, shape (n, 3).
+    Those alone that face a direction, if one is given.
     """
-
-    skin: Any
-    faces: NDArray[np.int64]
-
-    @staticmethod
-    def of(run: Run, grid: Any, towards: Array | None, camera: Camera) -> Front:
-        """Return those near the scene of a camera that face a direction, if that is given."""
-        skin = linear(grid)
-        faces = np.asarray(skin.regular_faces)
-        centres = skin.points[faces].mean(axis=1)
-        room = camera.high - camera.low
-        there = np.all(abs(camera.flat(centres) - (camera.low + camera.high) / 2) < room, axis=1)
-        there &= abs(centres @ camera.view - camera.depth) < room.max()
-        if towards is not None:
-            there &= areas(run, skin) @ towards > 0
-        return Front(skin, faces[there])
-
-    @property
-    def nodes(self) -> NDArray[np.int64]:
-        """The points that are seen."""
-        return np.unique(self.faces)
+    skin = linear(grid)
+    faces = np.asarray(skin.regular_faces)
+    centres = skin.points[faces].mean(axis=1)
+    room = camera.high - camera.low
+    there = np.all(abs(camera.flat(centres) - (camera.low + camera.high) / 2) < room, axis=1)
+    there &= abs(centres @ camera.view - camera.depth) < room.max()
+    if towards is not None:
+        there &= areas(run, skin) @ towards > 0
+    front = pyvista.PolyData.from_regular_faces(skin.points, faces[there])
+    front.point_data.update(skin.point_data)
+    return front
 
 
 def _shown(ax: Axes, camera: Camera, mesh: Any, **colours: Any) -> None:
@@ -491,32 +474,26 @@ def _shown(ax: Axes, camera: Camera, mesh: Any, **colours: Any) -> None:
     ax.imshow(image, extent=camera.extent, interpolation="antialiased")
 
 
-def _show_pressure(ax: Axes, front: Front, camera: Camera, shades: dict[str, Any]) -> None:
-    mesh = pyvista.PolyData.from_regular_faces(front.skin.points, front.faces)
-    mesh["pressure"] = front.skin["pressure"]
-    _shown(ax, camera, mesh, nan_color=ZONES["open"][0], **shades)
-
-
-def _show_status(ax: Axes, front: Front, camera: Camera) -> None:
+def _show_status(ax: Axes, front: Any, camera: Camera) -> None:
     """Colour the share of each node of triangles by its status."""
-    corners = front.skin.points[front.faces]
+    corners = front.points[front.regular_faces]
     middle = np.broadcast_to(corners.mean(axis=1, keepdims=True), corners.shape)
     after, before = (np.roll(corners, k, axis=1) for k in (-1, 1))
     quads = np.stack([corners, (corners + after) / 2, middle, (corners + before) / 2], axis=2)
     mesh = polygons(quads.reshape(-1, 4, 3))
     order = np.argsort([STATUS[zone] for zone in ZONES])
-    status = front.skin["status"][front.faces].ravel().astype(int)
+    status = front["status"][front.regular_faces].ravel().astype(int)
     known = status >= STATUS["open"]  # nodes that are held are no contact nodes
     mesh.cell_data["zone"] = np.where(known, order[np.maximum(status, 0)], len(ZONES))
     listed = ListedColormap([*(colour for colour, _ in ZONES.values()), UNKNOWN])
     _shown(ax, camera, mesh, scalars="zone", cmap=listed, clim=[-0.5, len(ZONES) + 0.5])
 
 
-def _show_friction(ax: Axes, front: Front, camera: Camera) -> float:
+def _show_friction(ax: Axes, front: Any, camera: Camera) -> float:
     """Draw friction as arrows; return the stress of the longest, 0 without any."""
-    nodes, skin = front.nodes, front.skin
-    flat = camera.flat(skin.points[nodes])
-    traction, normal = (np.nan_to_num(skin[name][nodes]) for name in ("traction", "normal"))
+    nodes = np.unique(front.regular_faces)
+    flat = camera.flat(front.points[nodes])
+    traction, normal = (np.nan_to_num(front[name][nodes]) for name in ("traction", "normal"))
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
     size = np.linalg.norm(along, axis=1)
     size[np.any((flat < camera.low) | (flat > camera.high), axis=1)] = 0.0
