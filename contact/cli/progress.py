@@ -49,8 +49,8 @@ def progress(
         if not (quiet or verbose) and sys.stderr.isatty():
             from tqdm import tqdm
 
-            counts = {"bar_format": COUNT} if over == OUTER else {"bar_format": SHARES, "total": 1}
-            bar = tqdm(file=sys.stderr, leave=False, **counts)
+            total, words = (None, COUNT) if over == OUTER else (1, SHARES)
+            bar = tqdm(file=sys.stderr, leave=False, total=total, bar_format=words)
         monitor = Console(over, quiet, verbose, bar)
         handlers.append(monitor)
     logger = logging.getLogger("contact")
