@@ -41,7 +41,6 @@ NARROW = 4.5
 LONGEST_TITLE = 70
 #: Okabe and Ito's palette: told apart by colour-blind readers, and in grey.
 BLUE, SKY, ORANGE, GREEN, GREY = "#0072B2", "#56B4E9", "#D55E00", "#009E73", "#555555"
-PURPLE, YELLOW = "#CC79A7", "#F0E442"
 #: Status of a node -> colour of its zone, and its name in legends.
 ZONES = {
     "stick": ("#CDE7F0", "sticking"),
