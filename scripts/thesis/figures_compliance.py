@@ -17,7 +17,6 @@ from contact.interface.complementarity import project_disc
 from contact.interface.law import NormalLaw
 from contact.plot.body import Picture, draw_plane, picture
 from contact.plot.contact import draw_line
-from contact.plot.style import Look
 from contact.results.contact_nodes import Table, contact_table, tangent_of
 from contact.typing import Array
 from forms.foundation import contact_multiplier
@@ -160,7 +159,7 @@ def example(
     report.figure(
         f"figure-{number}a{ending}",
         f"Figure {dotted} (a){of}: {stress} on Gamma_3, {topic}",
-        draw_line(run, Look()),
+        draw_line(run),
         table,
         f"{remark(solution, table)}{yielding(solution.max_dev_strain, share)} {note}".rstrip(),
     )

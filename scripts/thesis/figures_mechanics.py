@@ -14,7 +14,6 @@ from mpi4py import MPI
 from contact import Case, Solution
 from contact.plot.body import draw_plane, picture
 from contact.plot.contact import draw_line
-from contact.plot.style import Look
 from contact.results.contact_nodes import Table, contact_table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
@@ -54,7 +53,7 @@ def draw(report: Report, number: str, case: Case, text: str, load: float) -> Tab
     report.figure(
         f"figure-{number}a",
         f"Figure {dotted} (a): stresses on Gamma_3, {where}",
-        draw_line(run, Look()),
+        draw_line(run),
         table,
         f"{_remark(solution, table)} {OF_7_4 if number == '7-4' else ''}".rstrip(),
     )
