@@ -36,7 +36,7 @@ from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.refining import coarser_cases
 from contact.results.bodies import apart
-from contact.results.discretisation import own_shape, without_heights
+from contact.results.remarks import own_shape, without_heights
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 from forms.elasticity import Anisotropic
@@ -120,9 +120,9 @@ def expectations(problem: ContactProblem) -> list[str]:
     warnings = [
         f"# warning: {text} [{identifier}]"
         for identifier, remarks in {
-            "own-shape": own_shape(problem),
+            "curved-surface": own_shape(problem),
             "part-end": without_heights(problem),
-            "meeting-supports": meeting_supports(problem, [problem.time]),
+            "supports": meeting_supports(problem, [problem.time]),
             "two-bodies": apart(problem),
         }.items()
         for text in remarks

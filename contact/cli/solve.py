@@ -32,7 +32,7 @@ from contact.io.folder import SUMMARY, read_json, result_folder
 from contact.methods.report import Monitor
 from contact.methods.signals import SIGNALLED, Terminated, signals_held
 from contact.ranks import on_root
-from contact.results.discretisation import locks
+from contact.results.remarks import locks
 from contact.results.solution import Solution
 from contact.solving import SolveInterrupted, reviewed, solve, solve_problem, step_times
 from contact.sweeping import TABLE, Axis, sweep

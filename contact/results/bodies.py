@@ -27,7 +27,7 @@ from contact.problem.rigid_modes import (
     sliding_mode,
 )
 from contact.problem.state import State
-from contact.results.solution import Note, Remark, Solution
+from contact.results.solution import Remark, Solution
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -80,14 +80,13 @@ def sides(solution: Solution) -> Iterator[Remark]:
                 "the other side: the pressure there is a mean over the rest"
             )
         states = [record.state for record in solution.steps] or [solution.state]
-        slips = [_slip(problem, state, nodes) for state in states]
-        largest, facet = max(slips), max(size, other_size)
+        largest = max(_slip(problem, state, nodes) for state in states)
+        facet = max(size, other_size)
         if largest > facet:
-            when = f" at t = {states[slips.index(largest)].time:g}" if solution.steps else ""
             yield (
-                f"{sides}: points in contact are {largest:.3g} along the surface from the points "
-                f"they faced{when}, and facets are {facet:.3g} long: in linear kinematics each "
-                "stays opposite the point it faced in the beginning"
+                f"{sides}: points in contact slide by up to {largest:.3g} along the surface, and "
+                f"facets are {facet:.3g} long: in linear kinematics each stays opposite the point "
+                "it faced in the beginning"
             )
 
 
@@ -143,26 +142,6 @@ def apart(problem: ContactProblem) -> Iterator[Remark]:
         )
 
 
-def held_along(solution: Solution) -> Iterator[Remark]:
-    """Tell of supports that hold touching nodes along the contact: no friction acts there.
-
-    Aslant to the contact direction, or moved along another body that is free there.
-    """
-    problem, nodes, d = solution.problem, solution.problem.nodes, solution.problem.dim
-    rubs = solution.friction_bound > 0
-    aslant = np.where(rubs, np.linalg.norm(nodes.admissible_normal - nodes.normal, axis=1), 0.0)
-    jump = problem.nodal(solution.state)[:, :d]
-    along = jump - nodes.normal_component(jump)[:, None] * nodes.normal
-    held = np.linalg.norm(along - nodes.tangential_component(jump), axis=1)
-    moves = np.linalg.norm(problem.equilibrium.nodal(solution.state.x)[nodes.nodes, :d], axis=1)
-    moved = nodes.maximum(np.where(rubs, held, 0.0)) > 0.1 * nodes.maximum(moves)
-    if nodes.maximum(aslant) > 0.1 or moved:
-        yield Note(
-            "supports hold contact nodes aslant to the contact direction, or move them along "
-            "another body: no friction acts at these nodes along the directions that supports hold"
-        )
-
-
 def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     """Warn of rigid-body modes that the supports leave free and contact hardly resists. Collective.
 
@@ -190,18 +169,16 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
         motions = linalg.orth(motions[:, : max(1, np.count_nonzero(shares < EPS))])
         words, name = described(motions, group.names), _named(group, motions)
         if share < EPS:
-            which = "rigid motions" if motions.shape[1] > 1 else "a rigid motion"
             yield (
-                f"nothing holds {name} against {which} ({words}): of all places the one with the "
-                "least displacements is given; accepted: friction, or supports"
+                f"nothing holds {name} against rigid motions ({words}): of all places the one with "
+                "the least displacements is given; accepted: friction, or supports"
             )
             return
         moved = left * _reach(group, motion) / (whole * share)
         if share < CONSTRAINED or moved > MOVED * largest:
             yield (
-                f"contact resists a rigid motion of {name} ({words}) by next to nothing: the mesh "
-                f"decides how far it goes, and residual forces may move it by up to {moved:.2g}, "
-                f"where displacements reach {largest:.2g}; accepted: friction, or a support"
+                f"contact resists a rigid motion of {name} ({words}) by next to nothing: residual "
+                f"forces may move it by up to {moved:.2g}; accepted: friction, or supports"
             )
             return
 
@@ -245,25 +222,20 @@ def not_held(solution: Solution) -> Iterator[Remark]:
     problem, time = solution.problem, solution.state.time
     if solution.converged:
         return
-    contact = "friction" if problem.frictional else "contact"
     for group in groups(problem):
+        motion = None
         if solution.outcome.overloaded:
             bound = problem.nodes.weight * solution.friction_bound
             motion = sliding_mode(group, time, bound)
-            why = "friction bounded by the pressures that were found does not balance"
-        else:
-            support = UnilateralSupport.of(group)
-            motion, why = (
-                None if support is None else support.release(time),
-                "no contact force balances",
-            )
+        elif (support := UnilateralSupport.of(group)) is not None:
+            motion = support.release(time)
         if motion is None:
             continue
         large = np.abs(motion) > 0.1 * np.abs(motion).max()
         words = ", ".join(dict.fromkeys(np.array(group.names)[large].tolist()))
         yield (
-            f"{contact} cannot hold {_named(group, motion[:, None])} ({words}): {why} its loads; "
-            "accepted: supports, more friction, or a load that presses it"
+            f"contact and friction cannot hold {_named(group, motion[:, None])} ({words}), by "
+            "limit analysis; accepted: supports, more friction, or a load that presses it"
         )
 
 

@@ -7,23 +7,33 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
+from numpy.typing import NDArray
 
-from contact.model.foundation import Conductor
+from contact.body.elements import unlocked
+from contact.errors import counted
+from contact.interface.mortar.search import nearest
+from contact.interface.mortar.surface import Surface, surface_of
+from contact.mesh.cells import shape_of
+from contact.mesh.deviation import ALIKE_NORMALS
+from contact.mesh.entities import cells_at, exterior_facets
+from contact.model.obstacle import Heights, Shape
 from contact.problem.checks import meeting_supports
+from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_as_pressures, residual_forces
-from contact.problem.rigid_modes import constrained_by_supports
-from contact.results import bodies, discretisation
+from contact.results import bodies
 from contact.results.error_estimate import estimated
 from contact.results.fields import DerivedFields, deformation, unloaded
 from contact.results.solution import Note, Remark, Solution
-from contact.tolerances import EPS, LARGEST_VIOLATION
+from contact.tolerances import EPS, NEGLIGIBLE
+from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.history import HistoryLaw
-from forms.laws import PerfectConductivity, RampConductivity
 from forms.monotonicity import check_monotonicity
 
 logger = logging.getLogger("contact.solve")
@@ -40,8 +50,34 @@ SMALL = 0.1
 #: Relative rounding of contact forces that is warned of.
 KNOWN = 1e-3
 
-#: Share of the friction bound up to which a node sticks: the penalised bound is reached slowly.
-STICKS = 0.9
+#: Ratio of bulk to shear modulus, of nu = 0.475, from which on elements of degree 1 lock.
+LOCKED = 20.0
+
+#: Estimated error below which no mesh locks: there the solution is one that these elements have.
+EXACT = 5e-3
+
+#: Largest estimated error without a warning: its square is that of displacements under loads.
+COARSE = 0.15
+
+#: Largest deviation of facets from a curved surface, as a share of the gaps that are closed; and
+#: of the directions of its tangents along a straight edge of degree 2.
+DEVIATION = 0.1
+
+#: Scatter of pressures by chords, over their mean, without a warning.
+SCATTER = 0.05
+
+#: The same by chords, over the plane modulus times their normal strain and their turn.
+CHORDS = 0.5
+
+#: Least number of nodes across a contact zone.
+ACROSS = 5
+
+#: Penetration of the boundary beside a contact part, over the largest displacement.
+PASSED = 0.01
+
+#: Remedies of straight facets of a curved surface.
+FINER = "a finer mesh from the beginning, or space.degree = 2"
+CURVED = "a finer mesh, or curved cells (mesh.order = 2)"
 
 
 def announce(solution: Solution) -> None:
@@ -55,14 +91,7 @@ def announce(solution: Solution) -> None:
 def evaluate_extremes(solution: Solution, whole: bool = True) -> list[float]:
     """Give a solution its extremes of stress and strain, and return |dev eps| by material.
 
-    Collective.
-
-    Parameters
-    ----------
-    solution
-        The solution.
-    whole
-        Whether it is given deformation and error estimate too.
+    `whole`: it is given deformation and error estimate too. Collective.
     """
     body = solution.problem.equilibrium
     fields = DerivedFields(body, solution.state)
@@ -73,12 +102,10 @@ def evaluate_extremes(solution: Solution, whole: bool = True) -> list[float]:
     yielded = [largest.yielded for largest in extremes if largest.yielded is not None]
     if yielded:
         solution.plastic_share = sum(yielded) / sum(largest.volume for largest in extremes)
-    plastic = [largest.plastic for largest in extremes if largest.plastic is not None]
+    plastic = [largest for largest in extremes if largest.plastic is not None]
     if plastic:
-        solution.equivalent_plastic_strain = max(plastic)
-        solution.plastic_volume = sum(
-            e.yielded for e in extremes if e.plastic is not None and e.yielded is not None
-        )
+        solution.equivalent_plastic_strain = max(largest.plastic or 0.0 for largest in plastic)
+        solution.plastic_volume = sum(largest.yielded or 0.0 for largest in plastic)
     if whole:
         solution.deformation = deformation(body, solution.state.x)
         if not solution.converged:
@@ -96,22 +123,17 @@ def review(solution: Solution) -> None:
         "unloading": unloading(solution),
         "material": monotonicity(solution, strains),
         "small-strain": small_strain(solution),
-        "curved-surface": discretisation.coarse_curves(solution),
-        "own-shape": discretisation.own_shape(problem),
-        "part-end": discretisation.beyond_part(solution),
-        "locking": discretisation.locking(solution),
-        "discretisation-error": discretisation.large_error(solution),
+        "curved-surface": chain(coarse_curves(solution), own_shape(problem)),
+        "part-end": beyond_part(solution),
+        "locking": locking(solution),
+        "discretisation-error": large_error(solution),
         "no-contact": untouched(solution),
-        "pressure-resolution": discretisation.resolution(solution),
+        "resolution": chain(resolution(solution), charge_resolution(solution)),
         "rounding": rounding(solution),
-        "layer": layers(solution),
-        "strong-friction": chain(falling_friction(solution), strong_friction(solution)),
-        "conductivity": conductivity(solution),
+        "several-solutions": several_solutions(solution),
         "two-bodies": chain(bodies.sides(solution), bodies.apart(problem)),
-        "meeting-supports": chain(meeting_supports(problem, times), bodies.held_along(solution)),
-        "unresisted-motion": bodies.unresisted_motions(solution),
-        "not-held": bodies.not_held(solution),
-        "penalty": giving_way(solution),
+        "supports": meeting_supports(problem, times),
+        "unresisted-motion": chain(bodies.unresisted_motions(solution), bodies.not_held(solution)),
     }.items():
         for text in remarks:
             listed = solution.notes if isinstance(text, Note) else solution.warnings
@@ -132,30 +154,28 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
     """Tell of strong monotonicity, (h1), on the strains in Hencky's materials, and of g(0)."""
     dim = 3 if solution.problem.domain.revolved else solution.problem.dim
     for material, strain in zip(solution.problem.body.materials, strains, strict=True):
-        law, place = material.law, f" in {', '.join(material.on)}" if material.on else ""
+        law = material.law
         if not np.isfinite(strain) or isinstance(law, Anisotropic | HistoryLaw):
             continue
         found = check_monotonicity(law, strain, dim=dim)
-        text = (
-            f"strong monotonicity is {'met' if found.holds else 'not met'} on the strains of this "
-            f"solution{place}, |dev eps| <= {strain:.4g}: g_0 = {found.g_0:.4g} <= g <= "
-            f"{found.largest:.4g}, (d/2) k_0 = {found.ceiling:.4g}, alpha = {found.alpha:.4g}, "
-            f"beta = {found.beta:.4g}"
+        constants = (
+            f"up to |dev eps| = {strain:.4g} g_0 = {found.g_0:.4g} <= g <= {found.largest:.4g}, "
+            f"(d/2) k_0 = {found.ceiling:.4g}, alpha = {found.alpha:.4g}, beta = {found.beta:.4g}"
         )
         if found.hardens and found.g_0 > 0:  # where g is above (d/2) k_0 alone it is monotone too
-            yield Note(text)
+            yield Note(f"strong monotonicity is {'met' if found.holds else 'not met'}: {constants}")
         else:
-            yield f"the material softens, there may be several solutions or none: {text}"
+            yield f"the material softens, there may be several solutions or none: {constants}"
         modulus, shear = np.ravel(law.secant_modulus(np.zeros(1)))[0], float(law.shear)
         if abs(modulus - shear) > MODULUS_OFF * abs(shear):
             yield (
-                f"the secant modulus{place} is {modulus:.4g} without strain, and Young's modulus "
-                f"and Poisson's ratio say mu_1 = {shear:.4g}: the deviator follows the first"
+                f"the secant modulus is {modulus:.4g} without strain, and Young's modulus and "
+                f"Poisson's ratio say mu_1 = {shear:.4g}"
             )
 
 
 def small_strain(solution: Solution) -> Iterator[Remark]:
-    """Warn of strains or rotations that are not small, or a deformed body that turns inside out.
+    """Warn of strains or rotations that are not small.
 
     To turn by an angle a makes the determinant 1 + a^2, and strains at most 1 + sqrt(3) |eps|.
     """
@@ -164,31 +184,11 @@ def small_strain(solution: Solution) -> Iterator[Remark]:
         return
     turned = made.largest_volume - 1 - np.sqrt(3) * made.largest_strain
     if max(made.largest_strain, turned) > SMALL:
-        which = "strains" if made.largest_strain > SMALL else "rotations"
-        inside_out = made.least_volume <= 0
         yield (
-            f"{which} are not small, and kinematics is linear: |eps| reaches "
+            "strains or rotations are not small, and kinematics is linear: |eps| reaches "
             f"{made.largest_strain:.3g}, and det(I + grad u) lies between "
             f"{made.least_volume:.3g} and {made.largest_volume:.3g}"
-            f"{', where the body would pass through itself' if inside_out else ''}"
         )
-
-
-def layers(solution: Solution) -> Iterator[Remark]:
-    """Warn of layers that press on the undeformed body, or whose p_nu falls: (h6) asks for less."""
-    problem = solution.problem
-    law, size = problem.interface.layer, problem.domain.size
-    if law.compliance is None:
-        return
-    least = -problem.nodes.maximum(-law.touch, -np.inf)
-    if least < -1e-9 * size:
-        yield (
-            f"the layer is thicker than the gap, by up to {-least:.4g}, and presses on the "
-            "undeformed body"
-        )
-    layers = (contact.compliant_layer for contact in problem.contacts)
-    if any(layer is not None and layer.falls(size) for layer in layers):
-        yield "several solutions may exist, for p_nu falls with the penetration of the layer"
 
 
 def untouched(solution: Solution) -> Iterator[Remark]:
@@ -214,17 +214,18 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     its loads.
     """
     problem, state, outcome = solution.problem, solution.state, solution.outcome
-    body, known, asked = problem.equilibrium, list[str](), outcome.allowed.equilibrium
+    body, asked, larger = problem.equilibrium, outcome.allowed.equilibrium, "far larger forces act"
     if solution.rounding > asked:
-        known.append(f"rounding decides how well the forces balance, to {solution.rounding:.1e}")
-    residual = residual_forces(problem, state)
-    unknown = max(
+        yield f"rounding decides how well forces balance, to {solution.rounding:.1e}: {larger}"
+    if not solution.converged:
+        return
+    residual, loads = residual_forces(problem, state), body.load_norms(state.time)
+    uncertainty = max(
         outcome.residuals.pressure_rounding, residual_as_pressures(problem, state, residual)
     )
     moved = bool(problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR))
-    loads = body.load_norms(state.time)
-    if solution.converged and unknown > KNOWN and (moved or loads[0].max() > 0):
-        known.append(f"contact forces are known to {unknown:.1e} of their size only")
+    if uncertainty > KNOWN and (moved or loads[0].max() > 0):
+        yield f"contact forces are known to {uncertainty:.1e} of their size only: {larger}"
     on_contact = np.zeros_like(residual)
     problem.interface.add_forces(on_contact, state.x, state.forces)
     acting = (loads + body.norms(on_contact))[0]
@@ -234,17 +235,22 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     # body that are rounding of those on others.
     much = (acting > EPS * acting.max()) & (left > max(IMBALANCE, asked) * acting)
     much &= borne > acting
-    if solution.converged and not moved and much.any():
+    if not moved and much.any():
         worst = np.max(left[much] / acting[much])
-        known.append(
-            f"{worst:.1e} of loads and contact forces are out of balance, displacements likewise"
+        yield f"{worst:.1e} of loads and contact forces are out of balance: {larger}"
+
+
+def several_solutions(solution: Solution) -> Iterator[Remark]:
+    """Warn where several solutions may exist. Collective."""
+    reasons = falling_friction, strong_friction, falling_layer, unstable_charge
+    for reason in chain.from_iterable(find(solution) for find in reasons):
+        yield (
+            f"several solutions may exist, and this is one reached from {solution.start}: {reason}"
         )
-    if known:
-        yield f"{'; '.join(known)}: far larger forces act in the bodies"
 
 
-def falling_friction(solution: Solution) -> Iterator[Remark]:
-    """Warn of an L_mu above the bound that a sliding block gives.
+def falling_friction(solution: Solution) -> Iterator[str]:
+    """Find an L_mu above the bound that a sliding block gives.
 
     A block of height H under the pressure p slides by s where G (U - s)/H = mu(s) p; the
     left-hand side falls faster than the right for all s if L_mu < G/(p H), and only then is s
@@ -266,109 +272,353 @@ def falling_friction(solution: Solution) -> Iterator[Remark]:
     bound = 0.5 * problem.scales.shear / (mean * problem.scales.height)
     if lipschitz >= bound:
         yield (
-            f"{_several(solution)}: friction falls with the slip by up to L_mu = {lipschitz:.4g}"
-            f"/length, and a sliding block under the pressure {mean:.4g} has one solution where "
-            f"L_mu < {bound:.4g}/length"
+            f"friction falls with the slip by up to L_mu = {lipschitz:.4g}/length, and a sliding "
+            f"block under the pressure {mean:.4g} has one solution where L_mu < {bound:.4g}/length"
         )
 
 
-def _several(solution: Solution) -> str:
-    return f"several solutions may exist, and this is one reached from {solution.start}"
-
-
-def strong_friction(solution: Solution) -> Iterator[Remark]:
-    """Warn of friction that suffices for several solutions, see `contact.results.uniqueness`."""
+def strong_friction(solution: Solution) -> Iterator[str]:
+    """Find friction that suffices for several solutions, see `contact.results.uniqueness`."""
+    law, nodes = solution.problem.interface.friction.law, solution.problem.nodes
     if solution.jammed:
-        held = constrained_by_supports(solution.problem)
-        which = "keeps the bodies in contact" if held else "jams the bodies"
         yield (
-            f"{_several(solution)}: friction alone {which}, which without any contact force are in "
+            "friction alone keeps the bodies in contact, which without any contact force are in "
             "balance where they do not meet"
         )
     elif solution.critical_factor <= 1:
-        law, nodes = solution.problem.interface.friction.law, solution.problem.nodes
         own = law.maximum if law is not None and nodes.nodes.size else 0.0
-        largest = solution.problem.comm.allreduce(own, op=MPI.MAX)
-        factor = solution.critical_factor
-        yield (
-            f"{_several(solution)}: the linearised problem is singular from {factor:.3g} of this "
-            f"friction on, mu up to {factor * largest:.4g}"
-        )
+        critical = solution.critical_factor * solution.problem.comm.allreduce(own, op=MPI.MAX)
+        yield f"the linearised problem is singular from a friction coefficient of {critical:.4g} on"
 
 
-def _conductor(solution: Solution) -> Conductor | None:
-    """Return the foundation's electric contact; None where nothing is conducted."""
-    conductor = solution.problem.interface.layer.conductor
-    if conductor is None or not solution.problem.piezoelectric or conductor.psi.k_e == 0:
-        return None
-    return conductor
+def falling_layer(solution: Solution) -> Iterator[str]:
+    """Find a layer whose p_nu falls: (h6) asks for less."""
+    problem = solution.problem
+    layers = (contact.compliant_layer for contact in problem.contacts)
+    if any(layer is not None and layer.falls(problem.domain.size) for layer in layers):
+        yield "p_nu falls with the penetration of the layer"
 
 
-def conductivity(solution: Solution) -> Iterator[Remark]:
-    """Warn of assumptions of the theory that a conductivity gives up, and of a steep ramp.
+def unstable_charge(solution: Solution) -> Iterator[str]:
+    """Find a charge that opens or closes gaps by itself.
 
     Of a column of height H with the stiffness C, coupling e and permittivity beta, the potential
     follows a change of the charge by the share Bi/(1 + Bi) of phi - phi_F, Bi = k_e H/beta, and
     presses with e/H. A gap that opens by less than 1/delta thus opens itself further where
     delta |phi - phi_F| (e/C) Bi/(1 + Bi) exceeds 1: several solutions may then exist.
     """
-    problem = solution.problem
-    conductor, piezo, scales = _conductor(solution), problem.body.piezo, problem.scales
-    if conductor is None or piezo is None:
+    problem, width = solution.problem, solution.conduction_ramp
+    piezo, scales, conductor = problem.body.piezo, problem.scales, problem.interface.layer.conductor
+    if width is None or piezo is None or conductor is None or conductor.psi.k_e == 0:
         return
-    laws = {type(c.conductor.psi) for c in problem.contacts if c.conductor is not None}
-    if RampConductivity in laws:
-        yield 'the foundation never conducts: electric.law = "ramp" does so where u_nu > rho alone'
-    if PerfectConductivity in laws:
-        yield (
-            'the charge jumps as the gap closes, electric.law = "perfect", and where contact ends '
-            "is not determined"
-        )
-    psi = conductor.psi
-    if not psi.follows_gap:
-        return
-    width = 1 / psi.delta
-    if width < 2 * scales.spacing:
-        yield (
-            "the mesh decides which contact nodes conduct: the charge rises within 1/delta = "
-            f"{width:.3g} of the gap, less than two elements ({2 * scales.spacing:.3g})"
-        )
     potential = problem.equilibrium.phi_scale * solution.nodal[:, -1]
     largest = problem.nodes.maximum(np.abs(conductor.phi_l(potential - conductor.phi_f)))
     permittivity = float(np.trace(np.asarray(piezo.beta))) / 3
-    biot = psi.k_e * scales.height / permittivity
+    biot = conductor.psi.k_e * scales.height / permittivity
     coupling = float(np.abs(np.asarray(piezo.e)).max()) / (scales.bulk + 4 / 3 * scales.shear)
-    number = psi.delta * largest * coupling * biot / (1 + biot)
+    number = largest * coupling * biot / (1 + biot) / width
     if number >= 1:
         yield (
-            f"{_several(solution)}: the charge opens or closes gaps by itself within 1/delta = "
-            f"{width:.3g} (a column asks for a number below 1, and it is {number:.3g})"
+            f"the charge opens or closes gaps by itself within 1/delta = {width:.3g} (a column "
+            f"asks for a number below 1, and it is {number:.3g})"
         )
 
 
-def giving_way(solution: Solution) -> Iterator[Remark]:
-    """Warn of penalties that move contact nodes by much of the largest displacement. Collective.
+def locks(solution: Solution) -> bool:
+    """Whether elements of degree 1 may be much too stiff, for volumes hardly change."""
+    error, body = solution.error, solution.problem.equilibrium
+    if error is None or error.stiffness_ratio is None:
+        return False
+    remedy = unlocked(body.element, body.degree, shape_of(body.domain.mesh))
+    return remedy is not None and error.stiffness_ratio >= LOCKED and error.relative > EXACT
 
-    The residuals weigh penetrations and slips by E/length, or more. A flat body is stiffer by far:
-    its displacements are those of the penalties where these are as small as the residuals ask for.
-    Later steps are not looked at: earlier slips stay.
-    """
-    problem = solution.problem
-    if solution.method != "penalty" or problem.since is not None:
-        return
-    size = np.linalg.norm(solution.friction, axis=1)
-    slip = np.linalg.norm(solution.slip[size < STICKS * solution.friction_bound], axis=1)
-    depth = (solution.normal_displacement - problem.interface.gap)[solution.pressure > 0]
-    if problem.interface.layer.compliance is not None:
-        depth = depth[:0]  # it gives way by itself
-    deep, far = (
-        problem.comm.allreduce(float(values.max(initial=0.0)), op=MPI.MAX)
-        for values in (depth, slip)
-    )
-    largest = solution.max_displacement
-    if max(deep, far) > LARGEST_VIOLATION * largest:
-        which, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")
+
+def locking(solution: Solution) -> Iterator[Remark]:
+    """Warn of volumetric locking, or that of stiff fibres."""
+    error, body = solution.error, solution.problem.equilibrium
+    if error is not None and locks(solution):
         yield (
-            f"the penalties give way: nodes that {which} by up to {max(deep, far):.2g}, where "
-            f"displacements reach {largest:.2g}; accepted: a smaller solver.eps_{key}"
+            f"the mesh may lock, displacements may be too small, and the estimated error a lower "
+            f"bound: the ratio of bulk and shear modulus is {error.stiffness_ratio:.3g} where the "
+            f"energy is; {unlocked(body.element, body.degree, shape_of(body.domain.mesh))}"
         )
+
+
+def large_error(solution: Solution) -> Iterator[Remark]:
+    """Warn of an estimated error that is large, as where slender parts bend."""
+    error = solution.error
+    if error is not None and error.relative > COARSE and not locks(solution):
+        yield (
+            "the mesh is too coarse: the estimated discretisation error is "
+            f"{error.relative:.1%} (energy norm), that of displacements about "
+            f"{error.relative**2:.1%}, more where slender parts bend"
+        )
+
+
+def resolution(solution: Solution) -> Iterator[Remark]:
+    """Warn of less than `ACROSS` nodes across a contact zone that ends within the contact part."""
+    problem, nodes = solution.problem, solution.problem.nodes
+    closed = solution.status != "open"
+    count = int(nodes.comm.allreduce(int(np.count_nonzero(closed)), op=MPI.SUM))
+    if count == 0 or count == nodes.size:
+        return
+    if problem.dim == 3:
+        # Of a round zone with that many nodes.
+        across = float(np.sqrt(4 * count / np.pi))
+        width = float(np.sqrt(4 * solution.contact_area / np.pi))
+    elif problem.domain.revolved:
+        # Both halves; the zone of one is known by its area, but for a ring.
+        nearest_axis = float(nodes.points[closed, 0].min(initial=np.inf))
+        on_axis = nodes.comm.allreduce(nearest_axis, op=MPI.MIN) < 1e-9 * problem.domain.size
+        across = 2 * count - 1 if on_axis else 2 * count
+        width = float(2 * np.sqrt(solution.contact_area / np.pi))
+    else:
+        across, width = count, solution.contact_area
+    if across < ACROSS:
+        yield (
+            f"the mesh is too coarse for the pressures: {counted(across, 'node')} across the "
+            f"contact zone; accepted: {ACROSS} at least, elements of at most {width / ACROSS:.2g}"
+        )
+
+
+def charge_resolution(solution: Solution) -> Iterator[Remark]:
+    """Warn of a charge that rises in front of the closed gap within less than two elements."""
+    problem, width = solution.problem, solution.conduction_ramp
+    conductor, spacing = problem.interface.layer.conductor, problem.scales.spacing
+    if width is None or conductor is None or conductor.psi.k_e == 0 or not problem.piezoelectric:
+        return
+    if width < 2 * spacing:
+        yield (
+            "the mesh decides which contact nodes conduct: the charge rises within 1/delta = "
+            f"{width:.3g} of the gap, less than two elements ({2 * spacing:.3g})"
+        )
+
+
+def own_shape(problem: ContactProblem) -> Iterator[Remark]:
+    """Warn of a curved part without a gap anywhere: its foundation has then its very shape."""
+    comm, size = problem.comm, problem.domain.size
+    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
+        nodes = geometry.nodes
+        sums = np.append(nodes.weight @ nodes.normal, nodes.weight.sum())
+        total = comm.allreduce(sums, op=MPI.SUM)
+        flat = np.linalg.norm(total[:-1]) > 0.995 * total[-1]
+        gap = comm.allreduce(float(np.abs(nodes.gap).max(initial=0.0)), op=MPI.MAX)
+        rigid = contact.against is None and not contact.obstacle.is_shape
+        if rigid and not flat and gap <= 1e-9 * size:
+            yield (
+                f"the part {contact.on} is curved and its gap is 0 everywhere: the foundation has "
+                "the body's own shape, unless contact.foundation or a gap is given"
+            )
+
+
+def beyond_part(solution: Solution) -> Iterator[Remark]:
+    """Warn of contact that goes on where its part, or the map of heights, ends. Collective."""
+    problem, d = solution.problem, solution.problem.dim
+    if any(isinstance(contact.foundation, Heights) for contact in problem.contacts):
+        yield from without_heights(problem, _touched(solution))
+    rigid = [contact for contact in problem.contacts if contact.against is None]
+    facing = [(c.on, c.foundation) for c in rigid if isinstance(c.foundation, Shape)]
+    if not facing or not solution.converged:
+        return
+    points, nodes = _beside(problem, [contact.on for contact in rigid])
+    states = [record.state for record in solution.steps] or [solution.state]
+    sizes = [record.row["max_displacement"] for record in solution.steps]
+    largest = max(sizes or [solution.max_displacement])
+    body, tiny = problem.equilibrium, NEGLIGIBLE * problem.domain.size
+    for part, shape in facing:
+        # Along the body's normal, which is not known there, those to the nearest point.
+        seen = shape if shape.direction == "axis" else replace(shape, direction="foundation")
+        with np.errstate(all="ignore"):  # not finite where nothing faces
+            direction, gap = seen.measure(points, points)
+        moves = body.global_unknowns.of_foundation(points, body.block_size, part)
+        depth = -np.inf
+        for state in states:
+            u = body.nodal(state.x)[nodes, :d]
+            if moves is not None:
+                u = u - (moves @ body.motion(state.x))[:, :d]
+            within = np.einsum("nd,nd->n", direction, u) - gap
+            # Nodes in the foundation in the reference configuration are left out.
+            within = within[(gap >= -tiny) & np.isfinite(within)]
+            depth = max(depth, float(within.max(initial=-np.inf)))
+        depth = problem.comm.allreduce(depth, op=MPI.MAX)
+        if depth > PASSED * largest:
+            yield (
+                f"beside the contact part {part!r} the body passes into the foundation, by up to "
+                f"{depth:.3g}: a larger part has other pressures"
+            )
+
+
+def _beside(problem: ContactProblem, parts: list[str]) -> tuple[Array, NDArray[np.int32]]:
+    """Return the owned nodes of the boundary beside some parts, and their points. Collective."""
+    domain, space = problem.domain, problem.equilibrium.space
+    taken = np.concatenate([domain.facets(part) for part in parts])
+    rest = np.setdiff1d(exterior_facets(domain.mesh), taken).astype(np.int32)
+    found, own = (fem.locate_dofs_topological(space, domain.dim - 1, f) for f in (rest, taken))
+    nodes = np.setdiff1d(found, own).astype(np.int32)
+    nodes = nodes[nodes < space.dofmap.index_map.size_local]
+    return space.tabulate_dof_coordinates()[nodes, : domain.dim], nodes
+
+
+def without_heights(
+    problem: ContactProblem, touched: NDArray[np.bool_] | None = None
+) -> Iterator[Remark]:
+    """Warn of contact parts without measured heights in front of them. Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    touched
+        Nodes that are in contact in some step, shape (n,); before a solve all may be.
+    """
+    begin = 0
+    for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
+        nodes, shape = geometry.nodes, contact.foundation
+        here = slice(begin, begin + len(nodes.weight))
+        begin = here.stop
+        if not isinstance(shape, Heights):
+            continue
+        aside = np.where(shape.direction == "foundation", 0.0, nodes.gap)
+        unknown = shape.unknown(nodes.points + aside[:, None] * nodes.normal)
+        seen = np.ones_like(unknown) if touched is None else touched[here]
+        area = nodes.sum((unknown & seen).astype(np.float64))
+        if area > 0:
+            yield (
+                f"{area / nodes.sum(seen.astype(np.float64)):.1%} of the area of {contact.on} lie "
+                "where its foundation has no heights, and is taken to go on smoothly"
+            )
+
+
+def _touched(solution: Solution) -> NDArray[np.bool_]:
+    """Return which contact nodes touch at the end of any step. Collective."""
+    interface, found = solution.problem.interface, solution.status != "open"
+    for record in solution.steps:
+        nodal = interface.nodes.apply(record.state.x)
+        found = found | (interface.pressure(nodal, record.state.forces) > interface.rounding(nodal))
+    return found
+
+
+def coarse_curves(solution: Solution) -> Iterator[Remark]:
+    """Warn of straight facets of a curved surface whose deviation decides gaps or pressures."""
+    problem, nodes = solution.problem, solution.problem.nodes
+    if nodes.cut > 0:
+        yield (
+            f"straight facets of curved contact surfaces overlap by up to {nodes.cut:.3g}, less "
+            f"than they deviate from the curves: the gap there is taken as 0; accepted: {FINER}"
+        )
+    closed, uncertainty = solution.status != "open", nodes.maximum(nodes.deviation)
+    if nodes.maximum(closed.astype(float)) == 0:
+        least = -nodes.maximum(-problem.interface.gap, -np.inf)
+        if uncertainty > max(DEVIATION * least, NEGLIGIBLE * problem.domain.size):
+            yield (
+                f"nothing touches, but straight facets deviate by up to {uncertainty:.3g} from a "
+                f"curved contact surface, and the least gap is {least:.3g}; accepted: {FINER}"
+            )
+    elif problem.equilibrium.degree == 2 and problem.domain.levels == 0:
+        yield from _straight_edges(solution, closed)
+    else:
+        size = nodes.maximum(np.where(closed, np.abs(problem.interface.gap), 0.0))
+        if size > 1e-9 * problem.domain.size and uncertainty > DEVIATION * size:
+            yield (
+                f"straight facets deviate by up to {uncertainty:.3g} from a curved contact "
+                f"surface, and contact closes gaps of at most {size:.3g}; accepted: {FINER}"
+            )
+
+
+def _straight_edges(solution: Solution, closed: NDArray[np.bool_]) -> Iterator[Remark]:
+    """Warn of straight edges of degree 2, whose gaps are those of fitted curves. Collective."""
+    problem, nodes = solution.problem, solution.problem.nodes
+    turn, waves, least = _of_edges(solution, closed)
+    pressed, force = nodes.maximum(solution.forces.pressure), nodes.sum(solution.pressure)
+    scatter = problem.scales.plane_modulus * np.pi / 4 * waves
+    if least < ALIKE_NORMALS:
+        yield (
+            f"contact directions turn by {np.arccos(least):.2g} along a straight edge that "
+            "touches, whose ends count as corners: their pressures may be many times too large; "
+            f"accepted: {CURVED}"
+        )
+    if pressed > 0 and scatter > DEVIATION * pressed:
+        yield (
+            "straight edges tell too little of a curved contact surface: nodal pressures scatter "
+            f"by about {scatter / pressed:.0%} of the largest; accepted: {CURVED}"
+        )
+    elif force > 0 and turn > NEGLIGIBLE:
+        mean, scatter = nodes.sum(solution.pressure**2) / force, _of_chords(solution, closed)
+        if scatter > SCATTER * mean:
+            yield (
+                f"straight edges of a curved contact surface turn by up to {turn:.2g} where it "
+                f"touches: nodal pressures scatter by about {scatter / mean:.0%} of the mean; "
+                f"accepted: {CURVED}"
+            )
+
+
+def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, float, float]:
+    """Return largest turn, waves, least cosine of directions along straight edges. Collective."""
+    # Where the curvature varies the deviation of the curve from an edge of the length h is known to
+    # some u: waves of this height and the length 2 h take pressures E' pi u/(4 h).
+    domain, space = solution.problem.domain, solution.problem.equilibrium.space
+    nodes = solution.problem.nodes
+    numbers = nodes.nodes + space.dofmap.index_map.local_range[0]
+
+    def here(asked: NDArray[np.int64]) -> Array:
+        found = np.full((asked.size, domain.dim + 1), np.nan)
+        _, of, at = np.intersect1d(asked, numbers, return_indices=True)
+        found[of] = np.column_stack([nodes.normal, nodes.deviation])[at]
+        return found
+
+    found: Array = np.array([0.0, 0.0, -1.0])
+    shapes = {c.on for c in solution.problem.contacts if isinstance(c.foundation, Shape)}
+    for part, side, near in _touching(solution, closed):
+        if side.follows:
+            there = side.owners.values(side.nodes.ravel(), here)
+            there = there.reshape(*side.nodes.shape, domain.dim + 1)[near]
+            first, second = (there[:, of, :-1] for of in np.array(side.shape.edges).T)
+            cosine = np.einsum("fed,fed->fe", first, second)
+            waves = side.waves[near]
+            if part in shapes:
+                waves = np.nan_to_num(there[:, side.middles, -1]) / side.edges[near]
+            most = (values.max(initial=0.0) for values in (side.turns[near], waves))
+            found = np.fmax(found, [*most, np.fmax.reduce(-cosine, axis=None, initial=-1.0)])
+    domain.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
+    return float(found[0]), float(found[1]), float(-found[2])
+
+
+def _touching(
+    solution: Solution, closed: NDArray[np.bool_]
+) -> Iterator[tuple[str, Surface, NDArray[np.bool_]]]:
+    """Give the contact parts, and which of their facets on this rank touch. Collective."""
+    problem, points = solution.problem, solution.problem.nodes.points[closed]
+    for part in dict.fromkeys(p for c in problem.contacts for p in (c.on, c.against) if p):
+        side = surface_of(problem.domain, problem.equilibrium.space, part)
+        yield part, side, nearest(problem.comm, side.centres, points) <= side.radii
+
+
+def _of_chords(solution: Solution, closed: NDArray[np.bool_]) -> float:
+    """Return by how much pressures scatter by displacements of chords (stress). Collective."""
+    # The middle of a straight edge of degree 2, f = h^2/(8 R) within the curve, moves by f eps_nn
+    # less or more. Pressures that even this out are E' eps_nn h/R times some number: from .33
+    # (rings on a rigid shaft) to .5 (rings in rings, on the finer side) on triangles, a third less
+    # on quadrilaterals, whatever the stiffness of the other side. Both sides' add up; where they
+    # cancel, since both move alike, edges that do not meet leave half of one.
+    domain, body = solution.problem.domain, solution.problem.equilibrium
+    fields = DerivedFields(body, solution.state)
+    strain, d = fields.columns["strain"], domain.dim
+    stresses = np.zeros((domain.mesh.topology.index_map(d).size_local, d, d))
+    for material, own in enumerate(body.body.materials):
+        modulus = own.law.young / (1 - own.law.poisson**2)
+        for cells, values in fields.of_material(material):
+            mean = values[..., strain].mean(axis=1).reshape(-1, 3, 3)
+            stresses[cells] = modulus * mean[:, :d, :d]
+    largest: dict[str, float] = {}
+    for part, side, near in _touching(solution, closed):
+        cells, _ = cells_at(domain.mesh, domain.facets(part))
+        across = np.einsum("fi,fij,fj->f", side.normal, stresses[cells], side.normal)
+        bends = 2 * side.deviation / side.edges  # h/R, below 0 where it is hollow
+        values = (bends * across[:, None])[near].ravel()
+        ends = domain.comm.allgather([values.min(initial=0.0), values.max(initial=0.0)])
+        largest[part] = max(np.ravel(ends), key=abs)
+    found = [0.0]
+    for contact in solution.problem.contacts:
+        sides = [largest[part] for part in (contact.on, contact.against) if part]
+        found.append(max(abs(sum(sides)), max(map(abs, sides)) / 2))
+    return CHORDS * max(found)

@@ -19,8 +19,8 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.results.discretisation import LOCKED
 from contact.results.error_estimate import estimated
+from contact.results.remarks import LOCKED
 from scripts.reporting import Report, append, options, subplots
 from tests.problems.bar import changed
 from tests.problems.membrane import cook

@@ -19,7 +19,7 @@ from forms.laws import (
     PotentialFactor,
 )
 from forms.ops import positive_part
-from tests.problems.compliance import REGIMES, LayerColumn
+from tests.problems.compliance import LayerColumn
 from tests.problems.mechanics import leaning_block
 
 
@@ -75,13 +75,11 @@ def test_falling_law_is_solved_with_a_warning(method):
     assert np.allclose(solution.normal_displacement, column.solution()[0], rtol=0, atol=1e-8)
 
 
-def test_layer_thicker_than_the_gap_presses_at_rest_with_a_warning():
+def test_layer_thicker_than_the_gap_presses_at_rest():
     column = LayerColumn(0.0, touch=-0.1, gap=0.05)
     solution = solve_case(column.problem(), NewtonOptions(tolerance=1e-11))
     assert solution.converged
-    assert any("presses on the undeformed body" in warning for warning in solution.warnings)
     u_n, _, layer, _, _ = column.solution()
     assert layer > 1.0
     assert np.allclose(solution.normal_displacement, u_n, rtol=0, atol=1e-10)
-    plain = solve_case(REGIMES["linear"].problem(), NewtonOptions())
-    assert not any("layer" in warning or "p_nu" in warning for warning in plain.warnings)
+    assert not any("p_nu" in warning for warning in solution.warnings)

@@ -110,17 +110,3 @@ def test_a_plane_of_symmetry_between_boxes(on, against):
     plane = contact.points[:, 0] < contact.points[:, 0].min() + 1e-9
     assert contact.slip[plane, 0] == pytest.approx(0.0, abs=1e-15)
     assert (contact.pressure[plane] > 0).any()
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("way", [0.0, WAY])
-def test_nodes_that_slide_over_free_ones_are_told(way):
-    supports = {
-        "bottom": [0.0] * 3,
-        "lower_left": [0.0, "free", "free"],
-        "upper_left": [way, "free", "free"],
-        "top": [way, 0.0, -0.005],
-    }
-    solution = moved(Blocks(3).domain(COMM), Contact("over", against="under"), supports)
-    notes = [note for note in solution.notes if "[meeting-supports]" in note]
-    assert len(notes) == (way > 0)

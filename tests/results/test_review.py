@@ -37,13 +37,6 @@ def test_a_material_of_ones_own_fits_its_constants(shear, warns):
     assert any(words in warning for warning in solution.warnings) == warns
 
 
-@pytest.mark.parametrize("law", ["ramp", "perfect"])
-def test_what_a_conductivity_gives_up_is_said(law):
-    solution = reviewed("piezo-8-1-conductive", "mesh.cells=[16, 8]", f"electric.law={law}")
-    words = {"ramp": "the foundation never conducts", "perfect": "the charge jumps"}
-    assert said(solution.warnings, words[law]).endswith("[conductivity]")
-
-
 @pytest.mark.parametrize("kinematics", ["axisymmetric", "plane_strain"])
 def test_contact_that_is_too_coarse_is_warned_of(kinematics):
     """A ball, or half a cylinder, that touches with a node or two; the named size is enough."""
@@ -98,7 +91,7 @@ def test_large_strains_are_warned_of():
     made = large.deformation
     assert made.largest_strain == pytest.approx(1.5, rel=1e-9)
     assert made.least_volume == pytest.approx(-0.5, rel=1e-9)
-    assert "pass through itself" in said(large.warnings, "strains are not small")
+    assert "lies between -0.5 and" in said(large.warnings, "rotations are not small")
 
 
 @pytest.mark.parametrize(("slope", "warned"), [(0.2, False), (0.5, True)])
@@ -186,26 +179,6 @@ def test_a_gap_that_was_forgotten() -> None:
     plane = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
     for other in (block(2), block(2, contact={"on": "contact", "foundation": plane}, **disc)):
         assert not any("curved and its gap" in text for text in solve(other).warnings)
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize(("height", "warned"), [(0.04, True), (1.0, False)])
-def test_penalties_that_move_a_body_more_than_its_loads_are_warned_of(
-    height: float, warned: bool
-) -> None:
-    """A flat block, stuck to its foundation, is stiffer than its slip length takes it for."""
-    flat = {
-        "mesh": {"generator": "rectangle", "size": [4.0, height], "cells": [20, 4]},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "top", "traction": [0.002, -0.01]}],
-        "friction": {"law": "coulomb", "mu": 0.5},
-    }
-    exact = solve(block(2, **flat, solver={"method": "newton"}))
-    penalised = solve(block(2, **flat, solver={"method": "penalty"}))
-    assert penalised.converged
-    assert (penalised.max_displacement > 2 * exact.max_displacement) == warned
-    assert any(w.startswith("the penalties give way") for w in penalised.warnings) == warned
-    assert not any("give way" in w for w in exact.warnings)
 
 
 PIECE = {"side": "bottom", "from": 1.5, "to": 2.5}

@@ -55,15 +55,15 @@ def test_several_solutions_of_a_triangle_are_warned_of(mu, warned, load, method,
     assert solution.converged
     said = [text for text in solution.warnings if SAID in text]
     assert bool(said) is warned
-    assert not warned or "mu up to 1.497" in said[0]
+    assert not warned or "a friction coefficient of 1.497 on" in said[0]
 
 
 def test_a_body_on_supports_that_friction_alone_keeps_in_contact(tmp_path):
     """It sticks, and without contact forces lifts off: nothing is jammed, nor lacks a support."""
     solution = solve(triangle(tmp_path, 3.0, [-0.02, -0.01]), comm=MPI.COMM_SELF)
     assert solution.converged and solution.pressure.max() > 0 and solution.jammed
-    (said,) = [text for text in solution.warnings if "[strong-friction]" in text]
-    assert "friction alone keeps the bodies in contact, which" in said and "jams" not in said
+    (said,) = [text for text in solution.warnings if "[several-solutions]" in text]
+    assert "friction alone keeps the bodies in contact, which" in said
 
 
 def under_a_cylinder(method):
@@ -234,7 +234,7 @@ def test_a_body_that_friction_alone_jams(tmp_path):
     assert free.pressure.max() == 0 < jammed.pressure.max()
     assert evaluate(jammed.problem, free.state).largest < 1e-8
     assert jammed.jammed and not free.jammed
-    said = "friction alone jams the bodies"
+    said = "friction alone keeps the bodies in contact"
     assert [said in "".join(each.warnings) for each in (free, jammed)] == [False, True]
     # Flat facets deviated by 1e-17 from a curve, and gaps are nothing.
     assert "curved" not in "".join(free.warnings)

@@ -164,9 +164,9 @@ def test_contact_beyond_the_heights_is_told(shared_tmp_path, direction):
     case = flat(shared_tmp_path, places, -0.01)
     contact = case.contact.model_copy(update={"direction": direction})
     case = case.model_copy(update={"contact": contact})
-    warned = "60.0% of the area of bottom that touches lie where its foundation has no heights"
+    warned = "60.0% of the area of bottom lie where its foundation has no heights"
     (said,) = (w for w in solve(case).warnings if "[part-end]" in w)
-    assert warned in said and "(x from 0.6 to 1.3)" in said
+    assert warned in said
     away = solve(flat(shared_tmp_path, places, 0.01))
     whole = solve(flat(shared_tmp_path, np.linspace(0.05, 1.95, 20), -0.01))
     assert not any("[part-end]" in text for text in [*away.warnings, *whole.warnings])
