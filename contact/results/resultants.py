@@ -13,18 +13,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.description import Body
-from contact.body.loads import Loads, assembled, expression
+from contact.body.loads import Loads
 from contact.errors import InputError
 from contact.mesh.domain import compiled, members
 from contact.mesh.geometry import area
 from contact.model.body import Bolt, Electrode
-from contact.model.fields import constant, knows_time, steady
+from contact.model.fields import knows_time, steady
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
@@ -260,27 +259,18 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     on_parts |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.body.electrodes}
     electrodes = {part: _sum(problem, charges) for part, charges in on_parts.items()}
     magnitude = sum(_sum(problem, np.abs(charges)) for charges in on_parts.values())
-    given: dict[str, float] = {}
-    body = 0.0
-    x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(equilibrium.space)
-    for i, load in enumerate(problem.body.loads):
-        key = "charge" if load.body_charge is None else "body_charge"
-        if key not in load.named:
-            continue
-        measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
-        now = constant(problem.domain.mesh, time)
-        density = expression(problem.domain, load.named[key], x, now, f"load.{i}.{key}")
-        nodal = assembled(compiled(density * test[d] * measure), equilibrium.owned)
-        charges = load.factor(time) * nodal.reshape(-1, bs)[:, d]
-        charge = _sum(problem, charges)
-        magnitude += _sum(problem, np.abs(charges))
-        if load.on is None:
-            body += charge
-        else:
-            given[load.on] = given.get(load.on, 0.0) + charge
+    given: dict[str | None, float] = {}
+    loads = [load for load in problem.body.loads if {"charge", "body_charge"} & load.named.keys()]
+    for on in dict.fromkeys(load.on for load in loads):  # None is the whole body
+        acting = equilibrium.loads_along(equilibrium.space, [on]).at(time)
+        nodal = acting.reshape(-1, bs)[:, d]
+        given[on] = _sum(problem, nodal) / equilibrium.phi_scale
+        magnitude += _sum(problem, np.abs(nodal)) / equilibrium.phi_scale
+    body = -given.pop(None, 0.0)
     passed = _foundation_charges(problem, state)
     magnitude += _sum(problem, np.abs(passed))
-    return ChargeBalance(electrodes, given, _sum(problem, passed), body, magnitude)
+    on_parts = {str(part): charge for part, charge in given.items()}
+    return ChargeBalance(electrodes, on_parts, _sum(problem, passed), body, magnitude)
 
 
 def _foundation_charges(problem: ContactProblem, state: State) -> Array:
