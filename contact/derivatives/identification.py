@@ -39,8 +39,8 @@ TIME = "t"
 #: of a parameter in it.
 UNSEEN, SHARE = 1e-8, 1e-4
 
-#: Bisections for a bound of the accepted values, and relative distance of the start from a bound.
-HALVED, INSIDE = 50, 2e-10
+#: Relative distance of the start from a bound: more than that of SciPy.
+INSIDE = 2e-10
 
 #: Relative changes of parameters and misfit at the end.
 ENOUGH = 1e-10
@@ -112,8 +112,9 @@ def identify(
     parameters
         Keys of the case with a number, ``friction.mu``, in all cases.
     bounds
-        Key -> least and largest value; by default those that the case accepts: a modulus and a
-        coefficient of friction are not negative. A trial that cannot be solved is taken back.
+        Key -> least and largest value; by default 0 is the least where the case accepts no negative
+        number, as of a modulus and a coefficient of friction. A trial that the case does not
+        accept, or that cannot be solved, is taken back.
     level
         Probability of the intervals.
     monitor
@@ -148,7 +149,7 @@ def identify(
     models = [_Model(*pair, comm, monitor) for pair in zip(cases, given, strict=True)]
     first = np.array([number_at(cases[0], key) for key in parameters])
     bounds = bounds or {}
-    limits = [bounds.get(key) or _accepted(cases, key) for key in parameters]
+    limits = [bounds.get(key) or (_least(cases, key), np.inf) for key in parameters]
     count = sum(model.count for model in models)
     enough = f"more than {len(parameters)}, the number of parameters"
     expect("data", f"{count} values", enough, count > len(parameters))
@@ -179,22 +180,22 @@ def identify(
     low, high = np.transpose(limits)
     inside = INSIDE * np.maximum(1.0, np.abs(first))
     begin = np.clip(first, low + inside, np.maximum(high - inside, low + inside))
-    residuals(begin)
-    size = np.linalg.norm(jacobian(begin), axis=0)
-    scale = np.where(first == 0, 1 / np.where(size > 0, size, 1.0), np.abs(first))
+    residuals(begin)  # its errors are the user's
     found = least_squares(
         trial,
         begin,
         jac=jacobian,
         bounds=(low, high),
-        x_scale=scale,
+        x_scale="jac",
         ftol=ENOUGH,
         xtol=ENOUGH,
         gtol=ENOUGH,
     )
+    size = np.maximum(np.abs(first), np.abs(found.x))
+    scale = np.where(size > 0, size, 1.0)
     left = residuals(found.x)
     freedom = left.size - found.x.size
-    covariance, unseen = _covariance(jacobian(found.x), scale, left @ left / freedom)
+    covariance, unseen = _covariance(found.jac, scale, left @ left / freedom)
     deviation = np.sqrt(np.diag(covariance))
     half = student.ppf(0.5 * (1 + level), freedom) * deviation
     size = np.where((deviation > 0) & ~unseen, deviation, 1.0)
@@ -238,35 +239,14 @@ def _covariance(slopes: Array, scale: Array, variance: float) -> tuple[Array, ND
     return covariance, unseen
 
 
-def _accepted(cases: Sequence[Case], key: str) -> tuple[float, float]:
-    """Return the least and the largest value that cases accept at a key."""
-
-    def fits(value: float) -> bool:
-        try:
-            for case in cases:
-                with_number(case, key, value)
-        except InputError:
-            return False
-        return True
-
-    def border(way: float) -> float:
-        inside, outside = here, np.inf
-        for power in range(0, 13, 3):
-            value = here + way * 10.0**power
-            if not fits(value):
-                outside = value
-                break
-            inside = value
-        else:
-            return np.copysign(np.inf, way)
-        for _ in range(HALVED):
-            middle = 0.5 * (inside + outside)
-            inside, outside = (middle, outside) if fits(middle) else (inside, middle)
-        return inside
-
-    here = number_at(cases[0], key)
-    size = 2 * abs(here) or 1.0
-    return border(-size), border(size)
+def _least(cases: Sequence[Case], key: str) -> float:
+    """Return 0 where a case accepts no negative number at a key, else minus infinity."""
+    try:
+        for case in cases:
+            with_number(case, key, -(abs(number_at(case, key)) or 1.0))
+    except InputError:
+        return 0.0
+    return -np.inf
 
 
 class _Model:
