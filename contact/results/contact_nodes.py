@@ -337,15 +337,7 @@ class ContactShare:
 def contact_shares(
     problem: ContactProblem, state: State, status: NDArray[np.str_]
 ) -> dict[str, ContactShare]:
-    """Return the results of each contact, by its name. Collective.
-
-    Parameters
-    ----------
-    problem, state
-        The problem, and its solution.
-    status
-        "open", "stick" or "slip" of each owned contact node, shape (n,).
-    """
+    """Return the results of each contact by its name, with the status of its nodes. Collective."""
     nodes, nodal = problem.nodes, problem.nodal(state)
     pressure = problem.interface.pressure(nodal, state.forces)
     forces = nodes.weight[:, None] * problem.interface.stress(nodal, state.forces)

@@ -103,15 +103,7 @@ class Estimate:
 def estimated(
     problem: ContactProblem, state: State, fields: DerivedFields | None = None
 ) -> Estimate:
-    """Estimate the error of a state. Collective.
-
-    Parameters
-    ----------
-    problem, state
-        The problem, and its unknowns and multipliers.
-    fields
-        The fields of the state, where they are known already.
-    """
+    """Estimate the error of a state, whose fields may be known already. Collective."""
     body, shape = problem.equilibrium, shape_of(problem.domain.mesh)
     if body.degree == 1 and not shape.simplex:
         # Stresses vary in the cell, and are most exact in its middle.
@@ -423,23 +415,10 @@ def _seen(
 def nodal_means(
     domain: Domain, cells: Indices, values: Array, apart: Sequence[str] = ()
 ) -> tuple[Array, NDArray[np.integer]]:
-    """Return means around vertices, (n, components), and which are those of corners. Collective.
+    """Return means around vertices, (n, components), and places of corners, (cells, corners).
 
-    Parameters
-    ----------
-    domain
-        The mesh.
-    cells
-        Owned cells; those around them that are not among them do not count.
-    values
-        At the corners of each of the cells, shape (cells, corners, components); or constant there,
-        shape (cells, components).
-    apart
-        Names of parts inside of the body across which there are no means.
-
-    Returns
-    -------
-    The means, and their places at the corners of the cells, shape (cells, corners).
+    Of some owned cells, values at their corners, (cells, corners, components), or constant there,
+    (cells, components), across no part inside of the body that is `apart`. Collective.
     """
     corners = shape_of(domain.mesh).corners
     dofmap, index_map = _compat.geometry_dofmap(domain.mesh), domain.mesh.geometry.index_map()
@@ -540,11 +519,8 @@ def intervals(rows: Sequence[Mapping[str, float]]) -> Intervals | None:
     Most quantities converge faster, and lie well inside. Residuals of the solutions are added. One
     whose changes are of both signs has not begun to converge, and has none.
 
-    Parameters
-    ----------
-    rows
-        Those of ``adapt.csv``, the finest mesh last, all edges being cut alike from one to the
-        next: where some cells are refined, most of the error of a quantity may be elsewhere.
+    The rows are those of ``adapt.csv``, the finest mesh last, all edges being cut alike: where some
+    cells are refined, most of the error of a quantity may be elsewhere.
     """
     if len(rows) < 3 or not rows[-3]["error"] > rows[-2]["error"] > rows[-1]["error"]:
         return None

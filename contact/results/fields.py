@@ -442,13 +442,8 @@ def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
     """Return the largest share of a body that has unloaded from the plastic range in a step.
 
     Hencky's law is nonlinear elasticity: it unloads along its loading path, as no metal does. Where
-    |dev eps| decreases in the plastic range, its results are no longer those of plasticity.
-    Collective.
-
-    Parameters
-    ----------
-    problem, states
-        The problem, and the states at the ends of all of its steps.
+    |dev eps| decreases in the plastic range, its results are no longer those of plasticity. The
+    states are those at the ends of all steps. Collective.
     """
     body = problem.equilibrium
     laws = [material.law for material in body.body.materials]

@@ -125,15 +125,10 @@ HATS = Basis(lambda shape, at: shape.lagrange(1, at), lambda shape, at: shape.gr
 
 
 class LocalProblems:
-    """The local problems of a body at a state. Collective to make.
+    """The local problems of a body of degree 2 at a state. Collective to make.
 
-    Parameters
-    ----------
-    problem, state
-        The problem, of degree 2, and its state.
-    flux
-        Stress in the basis of Mandel, with D where there is coupling, at the nodes of the owned
-        cells, shape (cells, nodes, 6 or 9).
+    The flux is the stress in the basis of Mandel, with D where there is coupling, at the nodes of
+    the owned cells, shape (cells, nodes, 6 or 9).
     """
 
     def __init__(self, problem: ContactProblem, state: State, flux: Array) -> None:
@@ -232,12 +227,7 @@ class LocalProblems:
     def squares(self, cells: Indices, moduli: Array) -> Array:
         """Return the square of the energy norm of the errors in some of the owned cells.
 
-        Parameters
-        ----------
-        cells
-            The cells.
-        moduli
-            From strains to fluxes, shape (cells, 6 or 9, 6 or 9), or one for all.
+        `moduli`: from strains to fluxes, shape (cells, 6 or 9, 6 or 9), or one for all.
         """
         # Of a material without a field those of a field are zero.
         whole = np.zeros((len(cells), *2 * (9 if self._body.piezoelectric else 6,)))
@@ -351,14 +341,9 @@ def _loads(body: BodyEquilibrium, time: float) -> tuple[Array, Array]:
 
 
 class Sides:
-    """Sums over both sides of facets of values at some of their nodes. Collective to make.
+    """Sums over both sides of facets of values at some nodes of them. Collective to make.
 
-    Parameters
-    ----------
-    body
-        The body.
-    closures
-        Nodes of each facet as nodes of its cell, (facets, m).
+    `closures`: nodes of each facet as nodes of its cell, (facets, m).
     """
 
     def __init__(self, body: BodyEquilibrium, closures: NDArray[np.intp]) -> None:
@@ -407,19 +392,9 @@ class Sides:
 def balancing(body: BodyEquilibrium, residual: Array, unknown: NDArray[np.bool_]) -> Array:
     """Return the fluxes at the nodes of degree 2 of facets that balance cells. Collective.
 
-    Parameters
-    ----------
-    body
-        The body.
-    residual
-        That of the linear functions of the owned cells, (cells, corners, b).
-    unknown
-        Whether the flux through facets of the boundary is unknown, and that through others is not
-        the same on both sides, (cells, facets, b).
-
-    Returns
-    -------
-    Fluxes into the cells, shape (cells, facets, nodes, b).
+    `residual`: of the linear functions of the owned cells, (cells, corners, b). `unknown`: whether
+    the flux through facets of the boundary is unknown, and that through others is not the same on
+    both sides, (cells, facets, b). Fluxes into the cells, (cells, facets, nodes, b).
     """
     shape = shape_of(body.domain.mesh)
     corners, of = shape.facet_corners, geometry_nodes(body.domain)

@@ -464,12 +464,7 @@ def without_heights(
 ) -> Iterator[Remark]:
     """Warn of contact parts without measured heights in front of them. Collective.
 
-    Parameters
-    ----------
-    problem
-        The problem.
-    touched
-        Nodes that are in contact in some step, shape (n,); before a solve all may be.
+    `touched`: nodes that are in contact in some step, shape (n,); before a solve all may be.
     """
     begin = 0
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):

@@ -21,11 +21,7 @@ from contact.methods.report import Outcome, Record
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Balance, balance, dissipated
 from contact.problem.state import State
-from contact.results.contact_nodes import (
-    ContactShare,
-    Solved,
-    contact_shares,
-)
+from contact.results.contact_nodes import ContactShare, Solved, contact_shares
 from contact.results.error_estimate import Estimate, Intervals
 from contact.results.fields import Deformation, DerivedFields, unknowns
 from contact.results.functionals import MaxDisplacement
@@ -68,7 +64,7 @@ class StepRecord:
     row
         The columns of ``steps.csv``.
     enthalpy
-        Where the energy balance of the next step begins, see `problem.energy.Balance`.
+        Where the energy balance of the next step begins, see `problem.residuals.Balance`.
     rounding
         Largest `equilibrium_rounding` of a step so far, see `problem.residuals.Residuals`.
     """
@@ -85,14 +81,9 @@ class StepRecord:
 
 
 class StepRecorder:
-    """Makes the records of one step after the other.
+    """Makes the records of one step after the other, from the last of a run that goes on.
 
-    Parameters
-    ----------
-    problem
-        The problem of the evolution.
-    last
-        The record to go on from; from the reference configuration by default. Collective.
+    Collective.
     """
 
     def __init__(self, problem: ContactProblem, last: StepRecord | None = None) -> None:
@@ -111,8 +102,7 @@ class StepRecorder:
         solution = Solution(problem, state, outcome, [*outcome.records], outcome.counters, "", {})
         solution.energies = energies
         if self._driven is not None:
-            way, force = (find(problem, state) for find in (self._driven.way, self._driven.force))
-            solution.driven = way, force
+            solution.driven = self._driven.way(problem, state), self._driven.force(problem, state)
         row = values_of(STEPS, solution)
         self._rounding = max(self._rounding, outcome.residuals.equilibrium_rounding)
         return StepRecord(state, row, energies.enthalpy, self._rounding)
@@ -218,12 +208,8 @@ class Solution(Solved):
     @property
     def rounding(self) -> float:
         """Forces out of balance that count as rounding; of an evolution the most in a step."""
-        return max(
-            [
-                self.outcome.residuals.equilibrium_rounding,
-                *(step.rounding for step in self.steps[-1:]),
-            ]
-        )
+        own = self.outcome.residuals.equilibrium_rounding
+        return max([own, *(step.rounding for step in self.steps[-1:])])
 
     @property
     def floors(self) -> dict[str, float]:
@@ -407,17 +393,7 @@ class Solution(Solved):
         return charge_balance(self.problem, self.state)
 
     def at_step(self, state: State) -> Solution:
-        """Return the solution at the end of a step, without the records of the whole.
-
-        Parameters
-        ----------
-        state
-            The state at its end.
-
-        Returns
-        -------
-        Problem and state of the step.
-        """
+        """Return the solution at the end of a step, without the records of the whole."""
         problem = self.problem.at(state.time, state.history)
         return Solution(problem, state, self.outcome, self.history, self.counters, self.method, {})
 

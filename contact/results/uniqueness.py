@@ -55,14 +55,8 @@ def uniqueness(
     The factor belongs to these slips: by others the Jacobian may be singular at less.
     Infinity without such a factor, and where nothing is known: with a layer, a
     potential, or a smoothed pressure, and of slips against which the bodies do not deform. NaN with
-    more than `MOST` contact nodes, where it is not looked for. Collective.
-
-    Parameters
-    ----------
-    problem, state
-        The problem and its solution.
-    condensation
-        The body condensed onto its contact nodes, where a method has that already.
+    more than `MOST` contact nodes, where it is not looked for. A method may have the condensed body
+    already. Collective.
     """
     interface = problem.interface
     nodes, friction = interface.nodes, interface.friction
