@@ -24,7 +24,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import stored
 from contact.results import functionals as f
 from contact.results.functionals import Functional
-from contact.results.resultants import rigid_columns
+from contact.results.resultants import part_columns, rigid_columns
 
 SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
 ADAPT = "adapt.csv"
@@ -623,21 +623,25 @@ _RUN = (
         "Displacement of a moving foundation, or of a rigid part, `rigid_x`...; `rigid_rotation` "
         "in degrees. Names end with the part, `rigid_x_top`, of several foundations, and of rigid "
         "parts unless there is one part alone.",
-        lambda r: rigid_columns(r.movements)["moved"], _TABLES, functionals=f.rigid_motions,
+        lambda r: rigid_columns(r.movements, "displacement", "rotation"),
+        _TABLES, functionals=f.rigid_motions,
     ),
     Quantity(
         "rigid_force_AXIS", "force",
         "Force on it, and `rigid_moment`..., with names like the displacement.",
-        lambda r: rigid_columns(r.movements)["acting"], _TABLES, functionals=f.rigid_forces,
+        lambda r: rigid_columns(r.movements, "force", "moment"),
+        _TABLES, functionals=f.rigid_forces,
     ),
     Quantity(
         "potential_PART", "potential", "Potential of an electrode.",
-        lambda r: rigid_columns(r.movements)["potentials"], _TABLES, functionals=f.potentials,
+        lambda r: part_columns(r.movements, "electrodes", "", "potential"),
+        _TABLES, functionals=f.potentials,
     ),
     Quantity(
         "bolt_KEY_PART", "length, force",
         "Of a bolt: `bolt_shortening_shank`, `bolt_force_shank`.",
-        lambda r: rigid_columns(r.movements)["bolts"], _TABLES, functionals=f.bolt_shortenings,
+        lambda r: part_columns(r.movements, "bolts", "bolt_", "shortening", "force"),
+        _TABLES, functionals=f.bolt_shortenings,
     ),
     Quantity(
         "charge_PART", "charge", "Of an electrode; `charge_foundation` through the contact part.",

@@ -370,38 +370,35 @@ def _one_or_more(values: Array) -> Any:
     return float(values[0]) if values.size == 1 else values.tolist()
 
 
-def rigid_columns(moving: Movements) -> dict[str, dict[str, float]]:
-    """Return the columns of rigid bodies and of electrodes, from their `movements`.
-
-    They are `moved` (displacements and rotations), `acting` (forces and moments), `potentials`, and
-    `bolts`. Of several foundations the names have that of the part behind them, and so have
-    those of rigid parts, but where there is one and no foundation moves.
-    """
-    electrodes, bolts, rigid = (moving.get(key, {}) for key in ("electrodes", "bolts", "rigid"))
-    foundations = {"": rigid} if isinstance(rigid.get("displacement"), list) else rigid
-    parts = moving.get("rigid_parts", {})
-    found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}}
-    found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
-    found["bolts"] = {
-        f"bolt_{key}_{part}": bolt[key] for part, bolt in bolts.items() for key in bolt
-    }
-    bodies = [*foundations.values(), *parts.values()]
-    for body, end in zip(bodies, name_ends([*foundations], [*parts]), strict=True):
-        for kind, (key, name) in zip(KINDS, NAMES.items(), strict=True):
-            values = [float(value) for value in np.atleast_1d(body[key])]
-            found[kind] |= zip(columns_of(name, len(values), end), values, strict=True)
-    return found
-
-
-#: Keys of the movement of a rigid body -> the beginnings of their columns, and which of the
-#: `rigid_columns` these are.
+#: Keys of the movement of a rigid body -> the beginnings of their columns.
 NAMES = {
     "displacement": "rigid",
     "rotation": "rigid_rotation",
     "force": "rigid_force",
     "moment": "rigid_moment",
 }
-KINDS = "moved", "moved", "acting", "acting"
+
+
+def rigid_columns(moving: Movements, *keys: str) -> dict[str, float]:
+    """Return the columns of some keys of rigid bodies, from their `movements`.
+
+    Of several foundations the names have that of the part behind them, and so have those of rigid
+    parts, but where there is one and no foundation moves.
+    """
+    rigid, parts = moving.get("rigid", {}), moving.get("rigid_parts", {})
+    foundations = {"": rigid} if isinstance(rigid.get("displacement"), list) else rigid
+    bodies, found = [*foundations.values(), *parts.values()], dict[str, float]()
+    for body, end in zip(bodies, name_ends([*foundations], [*parts]), strict=True):
+        for key in keys:
+            values = [float(value) for value in np.atleast_1d(body[key])]
+            found |= zip(columns_of(NAMES[key], len(values), end), values, strict=True)
+    return found
+
+
+def part_columns(moving: Movements, kind: str, prefix: str, *keys: str) -> dict[str, float]:
+    """Return the columns of some keys of electrodes or bolts, from the `movements`."""
+    parts = moving.get(kind, {}).items()
+    return {f"{prefix}{key}_{part}": values[key] for part, values in parts for key in keys}
 
 
 def name_ends(foundations: Sequence[str], parts: Sequence[str]) -> list[str]:
