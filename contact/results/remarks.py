@@ -216,7 +216,7 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     problem, state, outcome = solution.problem, solution.state, solution.outcome
     body, asked, larger = problem.equilibrium, outcome.allowed.equilibrium, "far larger forces act"
     if solution.rounding > asked:
-        yield f"rounding decides how well forces balance, to {solution.rounding:.1e}: {larger}"
+        yield f"rounding decides how well the forces balance, to {solution.rounding:.1e}: {larger}"
     if not solution.converged:
         return
     residual, loads = residual_forces(problem, state), body.load_norms(state.time)
