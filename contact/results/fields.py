@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import accumulate, chain
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -128,66 +128,38 @@ class Extremes(NamedTuple):
     plastic: float | None
 
 
-class Point:
-    """A point of a body of some material at some unknowns as the quantities see it, in UFL."""
-
-    def __init__(self, body: BodyEquilibrium, material: Material, at: fem.Function) -> None:
-        mesh = body.domain.mesh
-        u, self._phi = body.split(at)
-        u = u if body.cuts is None else u + body.cuts.jump
-        # The nodes may lie on the axis.
-        kinematics = kinematics_of(body.domain, body.element, on_axis=True)
-        self._dim, plane = body.dim, strain(u, kinematics)
-        self._piezo = material.piezo and piezo_with_constants(material.piezo, mesh)
-        law = body.laws.fitted_law(form_law(material, mesh))
-        self.stress = stress(law, plane)
-        if self._piezo is not None:
-            self.stress += coupling_stress(self._piezo, self._phi)
-        #: That of the body: in plane stress with the strain across, which no form sees.
-        self.strain = plane
-        across: Expr | None = None
-        if isinstance(material.law, PlaneStressElastic):
-            gradient = None if self._piezo is None else ufl.grad(self._phi)
-            across = material.law.strain_across(plane, gradient)
-        elif isinstance(material.law, PlaneStressHistory):
-            across = body.laws.fits[ACROSS]
-        if across is not None:
-            self.strain = plane + across * ufl.as_tensor(np.diag([0.0, 0.0, 1.0]).tolist())
-
-    @property
-    def principal_stress(self) -> Expr:
-        """The principal stresses, the largest first."""
-        return principal_values(self.stress)
-
-    @property
-    def von_mises(self) -> Expr:
-        """The von Mises stress."""
-        return von_mises(self.stress)
-
-    @property
-    def dev_strain(self) -> Expr:
-        """The norm of the strain deviator: rounding can make its square slightly negative."""
-        return sqrt(maximum(deviator_squared(self.strain), 0.0))
-
-    @property
-    def electric_displacement(self) -> Expr | None:
-        """D; None for a body without a potential."""
-        if self._piezo is None:
-            return self._nothing
-        found = electric_displacement(self._piezo, self.strain, self._phi)
-        return ufl.as_vector([found[i] for i in range(self._dim)])
-
-    @property
-    def electric_field(self) -> Expr | None:
-        """E = -grad phi, likewise."""
-        if self._piezo is None:
-            return self._nothing
-        return ufl.as_vector([-ufl.grad(self._phi)[i] for i in range(self._dim)])
-
-    @property
-    def _nothing(self) -> Expr | None:
-        """Zeros in a material without coupling."""
-        return None if self._phi is None else ufl.as_vector([0.0] * self._dim)
+def fields_of(body: BodyEquilibrium, material: Material, at: fem.Function) -> dict[str, Any]:
+    """Return the fields of a material at some unknowns in UFL, None for those that it has not."""
+    u, phi = body.split(at)
+    u = u if body.cuts is None else u + body.cuts.jump
+    # The nodes may lie on the axis.
+    eps = strain(u, kinematics_of(body.domain, body.element, on_axis=True))
+    law = body.laws.fitted_law(form_law(material, body.domain.mesh))
+    sigma, across = stress(law, eps), None
+    piezo = material.piezo and piezo_with_constants(material.piezo, body.domain.mesh)
+    if piezo is not None:
+        sigma += coupling_stress(piezo, phi)
+    if isinstance(material.law, PlaneStressElastic):
+        across = material.law.strain_across(eps, None if piezo is None else ufl.grad(phi))
+    elif isinstance(material.law, PlaneStressHistory):
+        across = body.laws.fits[ACROSS]
+    if across is not None:  # no form sees it
+        eps = eps + across * ufl.as_tensor(np.diag([0.0, 0.0, 1.0]).tolist())
+    electric = field = None if phi is None else ufl.as_vector([0.0] * body.dim)
+    if piezo is not None:
+        charge, gradient = electric_displacement(piezo, eps, phi), ufl.grad(phi)
+        electric = ufl.as_vector([charge[i] for i in range(body.dim)])
+        field = ufl.as_vector([-gradient[i] for i in range(body.dim)])
+    return {
+        "stress": sigma,
+        "principal_stress": principal_values(sigma),
+        "von_mises": von_mises(sigma),
+        "strain": eps,
+        # Rounding can make the square slightly negative.
+        "dev_strain": sqrt(maximum(deviator_squared(eps), 0.0)),
+        "electric_displacement": electric,
+        "electric_field": field,
+    }
 
 
 def _usual_points(body: BodyEquilibrium) -> Array:
@@ -217,7 +189,7 @@ class DerivedFields:
         #: Reference points of a cell at which the fields are evaluated.
         self.points = _usual_points(body) if points is None else points
         self.move_to(state)
-        at = Point(body, body.body.materials[0], fem.Function(body.space))
+        at = fields_of(body, body.body.materials[0], fem.Function(body.space))
         self.shapes: dict[str, tuple[int, ...]] = {
             name: expression.ufl_shape for name, expression in values_of(BODY, at).items()
         }
@@ -235,8 +207,7 @@ class DerivedFields:
 
     def _expression(self, material: Material, at: fem.Function) -> Expr:
         """Return all components of a material's fields, one after the other."""
-        point = Point(self.body, material, at)
-        fields = values_of(BODY, point).values()
+        fields = values_of(BODY, fields_of(self.body, material, at)).values()
         every = [*fields, *self._variables.values()]
         return ufl.as_vector([f[i] for f in every for i in np.ndindex(f.ufl_shape)])
 

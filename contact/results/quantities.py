@@ -71,13 +71,11 @@ class Quantity:
     text
         The description, with the sign; `unit` is "length", "stress", ..., empty for none.
     value
-        A function of `solution.Solution`, called on all ranks; in ``history.csv`` of
-        `methods.report.Record`, in ``contact.csv`` and ``contact.vtu`` of
-        `contact_nodes.ContactResult`, in ``fields.vtu`` of `fields.Point`, on master sides of a
-        mapping, of each contact of `contact_nodes.ContactShare`. By default the functional, or the
+        A function of what the file is about, called on all ranks: `Solution`, in ``history.csv`` a
+        `Record`, in ``contact.csv`` and ``contact.vtu`` `ContactResult`, in ``fields.vtu`` and on
+        master sides a mapping, of each contact `ContactShare`. By default the functional, or the
         attribute or entry of the quantity's name. A mapping has several columns, a vector one per
-        component; None is for a quantity that a problem does not have, which has no key, column or
-        field then.
+        component; None is for a quantity that a problem does not have, which has no key then.
     files
         Where it stands; the first has the description.
     component

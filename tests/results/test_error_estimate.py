@@ -24,7 +24,7 @@ from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated, nodal_means, oscillation, sampled
-from contact.results.fields import DerivedFields, Point
+from contact.results.fields import DerivedFields, fields_of
 from contact.results.local_problems import LocalProblems
 from forms.elasticity import isotropic, mandel
 from forms.hencky import Linear, Log
@@ -255,9 +255,9 @@ def test_the_energy_of_a_piezoelectric_body(dim):
     problem = ContactProblem(domain, Body(material, held), Contact("bottom", flat()), degree=2)
     body, start = problem.equilibrium, problem.start()
     x = np.random.default_rng(1).standard_normal(start.x.size)
-    point = Point(body, material, body.function(x))
+    at = fields_of(body, material, body.function(x))
     field = -ufl.grad(body.split(body.function(x))[1])
-    density = ufl.inner(point.stress, point.strain) + ufl.dot(point.electric_displacement, field)
+    density = ufl.inner(at["stress"], at["strain"]) + ufl.dot(at["electric_displacement"], field)
     found = estimated(problem, State(x, start.forces))
     assert found.energy == pytest.approx(fem.assemble_scalar(fem.form(density * domain.dx)))
     assert found.total > 0
