@@ -269,8 +269,8 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     body = -given.pop(None, 0.0)
     passed = _foundation_charges(problem, state)
     magnitude += _sum(problem, np.abs(passed))
-    on_parts = {str(part): charge for part, charge in given.items()}
-    return ChargeBalance(electrodes, on_parts, _sum(problem, passed), body, magnitude)
+    surface = {str(part): charge for part, charge in given.items()}
+    return ChargeBalance(electrodes, surface, _sum(problem, passed), body, magnitude)
 
 
 def _foundation_charges(problem: ContactProblem, state: State) -> Array:
