@@ -71,7 +71,7 @@ class Quantity:
     text
         The description, with the sign; `unit` is "length", "stress", ..., empty for none.
     value
-        A function of what the file is about, called on all ranks: `Solution`, in ``history.csv`` a
+        A function of the subject of a file, called on all ranks: `Solution`, in ``history.csv`` a
         `Record`, in ``contact.csv`` and ``contact.vtu`` `ContactResult`, in ``fields.vtu`` and on
         master sides a mapping, of each contact `ContactShare`. By default the functional, or the
         attribute or entry of the quantity's name. A mapping has several columns, a vector one per
