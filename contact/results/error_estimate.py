@@ -532,11 +532,11 @@ def intervals(rows: Sequence[Mapping[str, float]]) -> Intervals | None:
         sizes[_whole(name)] = max(size, sizes.get(_whole(name), 0.0))
     found: Intervals = {}
     for name in quantities:
-        unknown = max(ROUNDING, *(row["kkt"] for row in last)) * sizes[_whole(name)]
+        uncertainty = max(ROUNDING, *(row["kkt"] for row in last)) * sizes[_whole(name)]
         values = [float(row[name]) for row in last]
         changes = [values[k + 1] - values[k] for k in (0, 1)]
         first, second = (
-            max(abs(changes[k]) - 2 * unknown, 0.0) / (error[k] - error[k + 1]) for k in (0, 1)
+            max(abs(changes[k]) - 2 * uncertainty, 0.0) / (error[k] - error[k + 1]) for k in (0, 1)
         )
         turns = min(first, second) > 0 and changes[0] * changes[1] < 0
         growth = max(second / first, 1.0) if first > 0 else 1.0 if second == 0 else np.inf
@@ -545,7 +545,7 @@ def intervals(rows: Sequence[Mapping[str, float]]) -> Intervals | None:
             found[name] = None
             continue
         change = max(first, second) * (error[1] - error[2])
-        width = SAFETY * change * ratio / (1 - ratio) + unknown
+        width = SAFETY * change * ratio / (1 - ratio) + uncertainty
         found[name] = [values[2] - width, values[2] + width]
     return found
 
