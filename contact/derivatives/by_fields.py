@@ -173,14 +173,8 @@ class _FieldWork:
     ) -> Array:
         """Return the values of the functions of this rank. Collective.
 
-        Parameters
-        ----------
-        state, along
-            State of the stresses, and owned unknowns along which they work.
-        phi_scale
-            Unit of the potential in both.
-        after
-            Weights of the internal variables at the end of the step, added to the work.
+        `phi_scale`: unit of the potential in the state and the unknowns along which stresses work.
+        `after`: weights of the internal variables at the end of the step, added to the work.
         """
         body = self._body
         for into, values in ((body.forms.at, state.x), (self._along, body.local(along))):

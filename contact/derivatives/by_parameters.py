@@ -248,14 +248,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Family:
-    """Problems beside a parameter; the difference quotient is sum factors * values / over.
+    """Problems beside a parameter, by the differences `ways` from it.
 
-    Attributes
-    ----------
-    problems, ways
-        The problems, and the differences of their parameter.
-    factors, over
-        Coefficients of the quotient.
+    The difference quotient is sum factors * values / over.
     """
 
     problems: tuple[ContactProblem, ...]
@@ -272,14 +267,7 @@ class Family:
 def family_of(
     name: str, parameter: Parameter, steps: Sequence[tuple[ContactProblem, State]]
 ) -> Family:
-    """Return the problems beside a parameter. Collective.
-
-    Parameters
-    ----------
-    name, parameter
-        The parameter and its name.
-    steps
-        Problem and state of each step of a solution.
+    """Return the problems beside a parameter, for the steps of a solution. Collective.
 
     Raises
     ------
@@ -500,22 +488,13 @@ def _tangent(
 
 @dataclass(frozen=True)
 class Adjoint:
-    """The adjoint w of a step and quantity.
-
-    Attributes
-    ----------
-    x, conditions
-        w on the owned unknowns and on the contact conditions; see `Linearised.solve_transposed`.
-    along
-        Derivatives by the internal forces on the owned unknowns: -x, plus the weights of a
-        reaction, a sum of such forces.
-    after
-        Derivatives by the history at the end of the step; None for the last step.
-    """
+    """The adjoint w of a step and quantity, as of `Linearised.solve_transposed`."""
 
     x: Array
     conditions: Array
+    #: Derivatives by the internal forces: -x, plus the weights of a reaction, a sum of such forces.
     along: Array
+    #: Derivatives by the history at the end of the step; None for the last step.
     after: History | None
 
 
