@@ -25,8 +25,17 @@ from contact.typing import Array
 #: MUMPS's INFOG(1) for too little workspace, of integers and of numbers.
 TOO_SMALL = (-8, -9)
 
+#: MUMPS's INFOG(1) for too little workspace, memory or limit ICNTL(23).
+OUT_OF_MEMORY = (*TOO_SMALL, -11, -12, -13, -17, -19, -20)
+
 #: MUMPS's ICNTL(14): workspace beyond the estimate, first and largest (percent).
 WORKSPACE, MOST_WORKSPACE = 10, 50_000
+
+#: Ratio of diagonal entries of a coarse operator that is rounding.
+VANISHES = 50 * EPS
+
+#: Most corrections of a solution.
+CORRECTIONS = 3
 
 
 def is_mumps(pc: PETSc.PC) -> bool:
@@ -68,13 +77,6 @@ def mat_solve(solver: PETSc.Mat | PETSc.KSP, sides: Array) -> Array:
     solution.assemble()
     solver.matSolve(given, solution)
     return np.array(solution.getDenseArray())
-
-
-#: MUMPS's INFOG(1) for too little workspace, memory or limit ICNTL(23).
-OUT_OF_MEMORY = (-8, -9, -11, -12, -13, -17, -19, -20)
-
-#: Ratio of diagonal entries of a coarse operator that is rounding.
-VANISHES = 50 * EPS
 
 
 @contextmanager
@@ -146,10 +148,6 @@ def out_of_memory(pc: PETSc.PC) -> bool:
     if pc.getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
         return True
     return is_mumps(pc) and bool(pc.getFactorMatrix().getMumpsInfog(1) in OUT_OF_MEMORY)
-
-
-#: Most corrections of a solution.
-CORRECTIONS = 3
 
 
 @dataclass(frozen=True)

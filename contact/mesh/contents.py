@@ -25,7 +25,7 @@ from contact.mesh.cells import (
     uncollapsed,
 )
 from contact.mesh.domain import BODY, UNLESS
-from contact.mesh.entities import combinations, labels_of
+from contact.mesh.entities import combinations
 from contact.mesh.geometry import determinant, inverse, jacobians
 from contact.typing import Array
 
@@ -282,11 +282,6 @@ class Groups:
     rows: Ints
     labels: npt.NDArray[np.int32]
     sets: tuple[tuple[int, ...], ...]
-
-    @property
-    def labels_of(self) -> dict[str, list[int]]:
-        """The labels of each group by its name."""
-        return labels_of(self.names, self.sets)
 
     def without_rows(self) -> Groups:
         """Return the names alone, for ranks that read nothing."""

@@ -242,14 +242,10 @@ def _on_grid(
         raise GridError(key, given, accepted)
     point = np.atleast_1d(np.asarray(given, dtype=np.float64))
     step = (point - low) / h
-    count = np.rint((high - low) / h)
-    below, above = np.clip(np.floor(step), 0, count), np.clip(np.ceil(step), 0, count)
-    nearest = np.clip(np.rint(step), 0, count)
+    nearest = np.clip(np.rint(step), 0, np.rint((high - low) / h))
     # Relative to the cell size, so that decimal fractions such as 0.1 + 0.2 pass.
     if np.any(np.abs(step - nearest) > 1e-6):
-        i = int(np.argmax(np.abs(step - nearest)))
-        options = sorted({float(low[i] + k * h[i]) for k in (below[i], above[i])})
-        near = ", ".join(f"{v:g}" for v in options)
+        near = ", ".join(f"{v:g}" for v in low + nearest * h)
         raise GridError(key, given, f"positions of the grid on its side (nearest: {near})")
     return low + nearest * h
 

@@ -311,7 +311,7 @@ def _sets(mesh: dmesh.Mesh, dim: int, groups: Groups) -> dict[str, Indices]:
     tags = dmesh.meshtags_from_entities(
         mesh, dim, graph.adjacencylist(vertices), labels.astype(np.int32)
     )
-    return _named(tags, groups.labels_of, mesh)
+    return _named(tags, labels_of(groups.names, groups.sets), mesh)
 
 
 def _named(
