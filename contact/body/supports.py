@@ -382,7 +382,7 @@ class Rollers:
         body: Body,
         unsupported: NDArray[np.bool_],
     ) -> None:
-        self._domain, self._space, self._body = domain, space, body
+        self._domain = domain
         self.each: list[Roller] = []
         self.inclined: Inclined | None = None
         chosen = [(i, fixed) for i, fixed in enumerate(body.fixed) if fixed.normal is not None]
@@ -455,36 +455,21 @@ class Rollers:
 
     def _check(self, given: Sequence[Array], met: Sequence[Array]) -> None:
         """Refuse contradictory displacements at nodes of several supports. Collective."""
-        comm, least = self._domain.comm, ROUNDING * self._domain.size
-        worst = (0.0, 0, 0, np.zeros(0), 0.0, 0.0)
-        for k, (roller, asked, got) in enumerate(zip(self.each, given, met, strict=True)):
-            left = np.abs(asked - got)
-            left -= roller.slack * np.maximum(np.abs(asked), np.abs(got)) + least
-            at = int(left.argmax()) if left.size else 0
-            if left.size and left[at] > worst[0]:
-                place = roller.points[at], float(asked[at]), float(got[at])
-                worst = (float(left[at]), k, int(roller.nodes[at]), *place)
-        every = comm.allgather(worst[0])
-        if max(every) <= 0:
-            return
-        root = int(np.argmax(every))
-        _, k, node, point, asked_there, got_there = comm.bcast(worst, root)
-        beside = []
-        for number, fixed in enumerate(self._body.fixed):
-            facets = self._domain.facets_anywhere(fixed.on)
-            nodes = fem.locate_dofs_topological(self._space, self._domain.dim - 1, facets)
-            there = comm.bcast(bool(np.isin(node, nodes)), root)
-            moves = fixed.normal is not None or bool(fixed.components)
-            beside += [fixed.on] * (moves and there and number != self.each[k].number)
-        number = self.each[k].number
-        names = " and ".join(repr(name) for name in beside) or "the axis"
-        where = ", ".join(f"{x + 0.0:.4g}" for x in np.where(np.abs(point) < least, 0.0, point))
-        raise InputError(
-            f"fixed.{number}.normal: given {asked_there:.4g} along the normal of "
-            f"{self._body.fixed[number].on!r}, and at ({where}) {names} asks for {got_there:.4g}; "
-            "accepted: displacements that agree where parts meet, or parts apart",
-            "roller-values",
-        )
+        least = ROUNDING * self._domain.size
+        for roller, asked, got in zip(self.each, given, met, strict=True):
+            left = np.abs(asked - got) - roller.slack * np.maximum(np.abs(asked), np.abs(got))
+            wrong = left > least
+            rows = np.column_stack([asked, got, roller.points])[wrong][:1]
+            every = np.concatenate(self._domain.comm.allgather(rows))
+            if not every.size:
+                continue
+            where = ", ".join(f"{x:.4g}" for x in every[0, 2:])
+            raise InputError(
+                f"fixed.{roller.number}.normal: given {every[0, 0]:.4g} along the normal, other "
+                f"supports at ({where}) ask for {every[0, 1]:.4g}; accepted: displacements that "
+                "agree where parts meet, or parts apart",
+                "roller-values",
+            )
 
     def forces(self, number: int, nodes: NDArray[np.int32]) -> Array:
         """Return the matrices from residuals at owned nodes to a roller's forces, (n, d, d)."""
