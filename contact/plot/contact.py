@@ -14,15 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from contact.plot.run import Run
-from contact.plot.style import (
-    BLUE,
-    GREY,
-    NARROW,
-    ORANGE,
-    ZONES,
-    page_width,
-    sheet,
-)
+from contact.plot.style import BLUE, GREY, NARROW, ORANGE, ZONES, page_width, sheet
 from contact.results.contact_nodes import Table
 from contact.typing import Array
 
@@ -37,10 +29,10 @@ BESIDE = 3
 
 
 def position(table: Table, run: Run) -> tuple[Array, str, tuple[float, float]]:
-    """Return the positions of nodes along Gamma_3, the coordinate's name, and where Gamma_3 ends.
+    """Return the positions of nodes along Gamma_3, the label of the axis, and where Gamma_3 ends.
 
-    That is the coordinate over which Gamma_3 is a graph, of two that along which it is longer, and
-    the arc length elsewhere.
+    Positions are those on the coordinate over which Gamma_3 is a graph, of two that along which it
+    is longer, and the arc length elsewhere.
     """
     points, outer = np.column_stack([table["x"], table["y"]]), ends(table, run.held)
     extent = np.ptp(points, axis=0)
@@ -48,25 +40,20 @@ def position(table: Table, run: Run) -> tuple[Array, str, tuple[float, float]]:
         steps = np.diff(points[:, axis])
         straight = extent[1 - axis] <= 1e-9 * extent[axis]
         if straight or np.all(steps > 0) or np.all(steps < 0):
-            where, name, borders = points[:, axis], run.axes[axis], outer[:, axis]
+            where, name, borders = points[:, axis], f"${run.axes[axis]}$", outer[:, axis]
+            begin = ""
             break
     else:
         first, last = np.linalg.norm(outer - points[[0, -1]], axis=1)
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        where, name = first + np.concatenate([[0.0], np.cumsum(steps)]), r"\ell"
+        where, name = first + np.concatenate([[0.0], np.cumsum(steps)]), r"$\ell$"
+        begin = f", from ({', '.join(f'{x:.4g}' for x in outer[0] + 0.0)})"
         borders = np.array([0.0, where[-1] + last])
     # A single node has its share.
     room = float(table["weight"].max()) / 2 if np.ptp([*where, *borders]) == 0 else 0.0
     every = np.concatenate([where, borders])
-    return where, name, (float(every.min()) - room, float(every.max()) + room)
-
-
-def along(table: Table, run: Run) -> str:
-    """Return the label of the axis along Gamma_3; an arc length begins at a place."""
-    name = position(table, run)[1]
-    start = ", ".join(f"{x:.4g}" for x in ends(table, run.held)[0] + 0.0)
-    begin = "" if name in run.axes else f", from ({start})"
-    return run.units.label(f"${name}$ along $\\Gamma_3${begin}", "length")
+    label = run.units.label(f"{name} along $\\Gamma_3${begin}", "length")
+    return where, label, (float(every.min()) - room, float(every.max()) + room)
 
 
 def shown(table: Table, run: Run, touching: NDArray[np.bool_]) -> tuple[float, float]:
@@ -154,7 +141,7 @@ def draw_line(run: Run) -> Figure:
 
 def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -> None:
     """Draw one contact: pressure, and below it friction, if there is a second row."""
-    where, _, whole = position(table, run)
+    where, label, whole = position(table, run)
     mark = "o" if len(where) == 1 else ""  # a line of one point is not seen
     bound, tau, units = table["bound"], table["tau"], run.units
     frictional = len(rows) > 1
@@ -162,9 +149,9 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
     seen = table["status"][inside]
     for ax in rows:
         zones(ax, where, whole, table["status"][None], np.array([0.0, 1.0]))
-    for zone, (colour, label) in ZONES.items():
+    for zone, (colour, name) in ZONES.items():
         if np.any(seen == zone):
-            words = label if frictional else TOUCHING.get(zone, "in contact")
+            words = name if frictional else TOUCHING.get(zone, "in contact")
             rows[0].fill_between([], [], color=colour, lw=0, label=words)
     rows[0].plot(where, table["pressure"], color=BLUE, marker=mark, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
@@ -182,7 +169,7 @@ def _draw_rows(rows: Any, table: Table, run: Run, limits: tuple[float, float]) -
         _focus(rows[1], bound[inside], -1.0)
     if run.opposite is not None:
         _draw_opposite(rows[0], table, where, run.opposite, limits)
-    rows[-1].set_xlabel(along(table, run))
+    rows[-1].set_xlabel(label)
     rows[0].set_xlim(limits)
 
 

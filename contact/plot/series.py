@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError, nearest
 from contact.io.folder import write_whole
-from contact.plot.contact import along, patches, position, shown, zones
+from contact.plot.contact import patches, position, shown, zones
 from contact.plot.run import Run
 from contact.plot.style import (
     BLUE,
@@ -146,7 +146,7 @@ def draw_energies(run: Run) -> Figure:
 
 def draw_zones(run: Run) -> Figure:
     """Draw the status of each node at the end of each step, over its position and the time."""
-    where, _, whole = position(run.tables[0], run)
+    where, label, whole = position(run.tables[0], run)
     status = np.array([table["status"] for table in run.tables])
     figure = sheet(0.7)
     ax = figure.subplots()
@@ -154,7 +154,7 @@ def draw_zones(run: Run) -> Figure:
     ax.set_xlim(shown(run.tables[0], run, (status != "open").any(axis=0)))
     frictional = any(np.any(table["bound"] > 0) for table in run.tables)
     ax.legend(handles=patches(frictional), ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
-    ax.set_xlabel(along(run.tables[0], run))
+    ax.set_xlabel(label)
     ax.set_ylabel("time")
     return figure
 
