@@ -10,12 +10,10 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from contact.errors import InputError
@@ -27,6 +25,7 @@ from contact.plot.style import (
     NARROW,
     PAGE,
     Look,
+    colour_bar,
     colour_range,
     fitted,
     named,
@@ -208,21 +207,15 @@ def draw_plane(picture: Picture) -> Figure:
 
 def _bar(figure: Figure, picture: Picture) -> None:
     """Add the bar of the colours, of classes a legend."""
-    colours, axes = ScalarMappable(picture.norm, picture.colours), figure.axes
     if picture.classes:
-        rgba = colours.to_rgba(range(len(picture.classes)))
+        rgba = picture.colours(range(len(picture.classes)))
         handles = [Patch(color=c, label=k) for c, k in zip(rgba, picture.classes, strict=True)]
         columns = 2 if page_width() < NARROW else 4
         figure.legend(
             handles=handles, title=picture.label, ncols=columns, loc="outside lower center"
         )
         return
-    bar = {"location": "bottom", "label": picture.label, "aspect": 40, "shrink": 0.8}
-    made = figure.colorbar(colours, ax=axes, **bar)
-    made.formatter.set_powerlimits((-2, 4))  # long numbers would meet
-    made.locator = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10])
-    text = made.ax.xaxis.get_offset_text()
-    text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the bar
+    colour_bar(figure, figure.axes, picture.norm, picture.colours, picture.label)
 
 
 def _colour(ax: Axes, picture: Picture) -> None:

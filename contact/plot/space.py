@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pyvista
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -19,7 +18,7 @@ from scipy.spatial import KDTree
 
 from contact.plot.foundation import add_foundation, foundation, magnification
 from contact.plot.run import Run, linear, polygons
-from contact.plot.style import BLUE, NARROW, ORANGE, SKY, ZONES, Look, page_width, sheet
+from contact.plot.style import BLUE, NARROW, ORANGE, SKY, ZONES, Look, colour_bar, page_width, sheet
 from contact.results.quantities import STATUS
 from contact.typing import Array
 
@@ -404,8 +403,7 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
     if touching:
         label = run.units.label(r"$-\sigma_\nu$", "stress")
         label += f", peak {norm.vmax:.4g}"
-        bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
-        figure.colorbar(ScalarMappable(norm, "viridis"), ax=[whole, *axes], **bar)
+        colour_bar(figure, [whole, *axes], norm, "viridis", label)
     columns = 2 if narrow else 4
     figure.legend(handles=_legend(run, frictional), ncols=columns, loc="outside lower center")
     return figure

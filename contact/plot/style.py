@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import io
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from contact.model.units import force_of
@@ -162,6 +165,18 @@ def smooth(ax: Axes, mesh: Triangulation, values: Array, norm: Normalize, colour
     look: dict[str, Any] = {"norm": norm, "cmap": colours, "extend": "both"}
     ax.tricontourf(mesh, values, levels, zorder=-1, **look)
     ax.set_rasterization_zorder(0)  # as they are, contours would stay shapes
+
+
+def colour_bar(
+    figure: Figure, axes: Sequence[Axes], norm: Normalize, colours: Any, label: str
+) -> None:
+    """Add a bar of colours below axes."""
+    bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
+    made = figure.colorbar(ScalarMappable(norm, colours), ax=axes, **bar)
+    made.formatter.set_powerlimits((-2, 4))  # long numbers would meet
+    made.locator = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10])
+    text = made.ax.xaxis.get_offset_text()
+    text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the bar
 
 
 def uniform(low: float, high: float) -> bool:
