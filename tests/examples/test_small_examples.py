@@ -5,9 +5,6 @@ import pytest
 from mpi4py import MPI
 
 from scripts.examples import (
-    bar_pressure,
-    cyclic_sensor,
-    electrode_charge,
     fretting,
     own_contact,
     own_material,
@@ -16,15 +13,6 @@ from scripts.examples import (
 )
 
 pytestmark = pytest.mark.parallel(2)
-
-
-def test_bar_pressure(shared_tmp_path, capsys):
-    solution = bar_pressure.main(shared_tmp_path, (32, 8))
-    assert solution.converged
-    MPI.COMM_WORLD.barrier()
-    assert (shared_tmp_path / "pressure.png").stat().st_size > 0
-    if MPI.COMM_WORLD.rank == 0:
-        assert "all residuals <= 1e-08" in capsys.readouterr().out
 
 
 def test_own_material():
@@ -57,12 +45,6 @@ def test_own_contact():
     assert np.allclose(size[slips], bound[slips], rtol=1e-6, atol=0)
 
 
-def test_electrode_charge():
-    charges = electrode_charge.main((16, 8), (5.0, 10.0, 20.0))
-    assert charges[1] == pytest.approx(2 * charges[0], rel=1e-6)
-    assert abs(charges[2]) > 2.02 * abs(charges[1])  # beyond yield
-
-
 def test_refinement(shared_tmp_path):
     errors = refinement.main(shared_tmp_path, (2, 4, 16))
     coarse, fine = np.transpose(list(errors.values()))
@@ -78,12 +60,3 @@ def test_fretting():
     assert force[4.0] == pytest.approx(-force[2.0], rel=0.02)
     assert force[6.0] == pytest.approx(force[2.0], rel=1e-6)
     assert abs(force[3.0]) > 0.1 * force[2.0]  # friction remembers
-
-
-def test_cyclic_sensor(shared_tmp_path):
-    load, charge = cyclic_sensor.main(shared_tmp_path, (16, 8))
-    # The way back is another one, and from then on nearly the same again.
-    ends = np.flatnonzero(np.isclose(load, 1.0))
-    assert charge[ends[1]] == pytest.approx(charge[ends[2]], rel=1e-3)
-    first, back = (k for k in np.flatnonzero(np.isclose(load, 0.5))[:2])
-    assert abs(charge[back] - charge[first]) > 1e-2 * np.ptp(charge)
