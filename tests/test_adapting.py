@@ -202,28 +202,6 @@ def test_new_nodes_of_curved_boundaries_follow_the_curve(generator, off):
         assert np.abs(radii - 1).max() < off
 
 
-def cylinder(**mesh):
-    table = {"generator": "quarter_disc", "radius": 8.0, "size": 0.8, "contact_size": 0.4}
-    return parse_case({
-        "mesh": {**table, "contact_width": 1.5, "growth": 0.2, **mesh},
-        "space": {"degree": 2},
-        "material": {"young": 2000.0, "poisson": 0.3},
-        "fixed": [
-            {"on": "symmetry", "displacement": [0.0, "free"]},
-            {"on": "top", "displacement": ["free", -0.05]},
-        ],
-        **PLANE,
-    })  # fmt: skip
-
-
-def test_the_pressure_of_an_adapted_cylinder_is_that_of_curved_cells():
-    """On the polygon of the first mesh it was twice as large, by an estimated error of .5 %."""
-    adapted = solve(cylinder(adapt={"error": 0.02})).adaptation[-1]
-    # On curved cells of size 0.025.
-    assert adapted["contact_force_y"] == pytest.approx(-23.092, rel=2e-3)
-    assert adapted["max_pressure"] == pytest.approx(63.59, rel=5e-3)
-
-
 def test_a_first_mesh_that_sees_nothing_does_not_reach_the_goal():
     """A circle between two nodes touches none of them, and all estimates are 0."""
     case = changed(mesh__cells=[6, 3], **LINEAR)

@@ -44,24 +44,6 @@ def test_an_amplitude_from_a_file(tmp_path, text):
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ([0.0, 10.0, 0.0, 4.0], ["10 at t = 0.25 lies between steps, which go to 6.667"]),
-        ([0.0, -10.0, 0.0, 4.0], ["-10 at t = 0.25 lies between steps, which go to -6.667"]),
-        ([0.0, 1.0, 2.0, 4.0], []),
-    ],
-)
-def test_peaks_that_no_step_meets_are_told(values, said):
-    """Measured curves have some."""
-    known = changed(evolution={"times": [0.0, 3.0], "steps": [6]}, load__0__amplitude="press")
-    times = [0.0, 0.25, 1.0, 3.0]
-    known["evolution"]["amplitudes"] = {"press": {"time": times, "value": values}}
-    found = parse_case(known).evolution.lost_peaks
-    assert len(found) == len(said)
-    assert all(words in text for words, text in zip(said, found, strict=True))
-
-
-@pytest.mark.parametrize(
     ("text", "words"),
     [
         ("t,f\n", r"\[amplitude-file\]"),

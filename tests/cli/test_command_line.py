@@ -17,10 +17,8 @@ ROOT = Path(__file__).parents[2]
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--set", "material.young"], ["material.young", "no assignment"]),
         (["--set", "material.young=-1"], ["material.young", "-1"]),
         (["--set", "load.3.on=top"], ["load", "3"]),
-        (["--outt", "x"], ["--outt", "--out"]),
         (["--out", ""], ["--out", "no folder"]),
     ],
 )

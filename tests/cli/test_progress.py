@@ -1,7 +1,6 @@
 """What is shown of a run: a table or lines, a bar on a terminal, a log of all."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -9,18 +8,6 @@ import pytest
 from contact.cli.main import main
 from contact.cli.progress import HEAD
 from scripts.cases import CASES
-
-STEPS = ["--set", "mesh.cells=[8,4]", "--set", "evolution.steps=[1,2,1,1]"]
-
-
-def test_an_evolution_has_a_line_a_step(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    log = tmp_path / "run.log"
-    arguments = ["solve", str(CASES / "fretting.toml"), "--out", str(tmp_path / "out"), *STEPS]
-    assert main([*arguments, "--log", str(log)]) == 0
-    shown = capsys.readouterr().err
-    found = re.findall(r"^t = ([\d.]+) of 6: iterations \d+, residual \S+e-\d+$", shown, re.M)
-    assert [float(time) for time in found] == [1.0, 1.5, 2.0, 4.0, 6.0]
-    assert HEAD not in shown and "iteration 1:" in log.read_text()
 
 
 def test_a_static_solve_has_a_line_an_iteration(

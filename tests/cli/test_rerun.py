@@ -1,6 +1,5 @@
 """A run into a folder with results: replaced without a word are those of the same problem alone."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -68,18 +67,6 @@ def test_another_problem_asks(
     assert run(case, "--set", change, "--overwrite") == CONVERGED
     MPI.COMM_WORLD.barrier()
     assert summary.read_bytes() != before
-
-
-def test_the_case_of_results_can_be_run_again(case: Path) -> None:
-    """summary.json holds the case with all defaults."""
-    assert run(case) == CONVERGED
-    MPI.COMM_WORLD.barrier()
-    summary = json.loads((case.parent / "out" / "summary.json").read_text())
-    MPI.COMM_WORLD.barrier()
-    if MPI.COMM_WORLD.rank == 0:
-        case.write_text(summary["case"])
-    MPI.COMM_WORLD.barrier()
-    assert run(case) == CONVERGED
 
 
 @pytest.mark.parametrize("method", ["uzawa", "penalty"])

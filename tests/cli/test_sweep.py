@@ -1,7 +1,6 @@
 """contact sweep: one row a value, resumable, warm-started, over several keys."""
 
 import csv
-import shutil
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,6 @@ from contact.cli.main import main
 from contact.errors import InputError
 from contact.plot.series import read_sweep, sweep_figure
 from contact.sweeping import Axis
-from tests.cli.running import MESH
 from tests.problems.bar import BAR
 
 ROOT = Path(__file__).parents[2]
@@ -100,33 +98,6 @@ def test_bad_input(sweep, capfd, arguments, message):
     assert status == 2
     assert rows == []
     assert message in capfd.readouterr().err
-
-
-@pytest.fixture
-def swept_mesh(sweep, tmp_path):
-    """Return a sweep's options and its mesh file, which has been swept over two values."""
-    mesh = tmp_path / "bar.msh"
-    shutil.copy(ROOT / "meshes" / "fixtures" / "bar.msh", mesh)
-    (tmp_path / "bar.toml").write_text(
-        MESH.format(file=mesh) + '[friction]\nlaw = "coulomb"\nmu = 0.1\n'
-    )
-    status, rows = sweep("--over", "friction.mu=0.1,0.2")
-    assert status == 0 and len(rows) == 2
-    return mesh
-
-
-def test_rows_of_another_mesh_are_not_continued(sweep, swept_mesh, tmp_path, capfd):
-    """Rows of both would stand side by side."""
-    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
-    text = swept_mesh.read_text()
-    swept_mesh.write_text(text.replace("$EndNodes", "$EndNodes ", 1))
-    for over in ("friction.mu=0.1,0.2,0.3", "friction.mu=0.3"):
-        assert sweep("--over", over)[0] == 2
-        message = capfd.readouterr().err
-        assert "the file mesh.file has changed since the row friction.mu=0.1 was" in message
-        assert {path: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
-    swept_mesh.write_text(text)
-    assert sweep("--over", "friction.mu=0.1,0.2,0.3")[0] == 0
 
 
 DAMAGED = {

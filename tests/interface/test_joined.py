@@ -121,19 +121,12 @@ def test_two_electrodes_under_one_body() -> None:
 @pytest.mark.parametrize(
     ("contact", "more", "message"),
     [
-        ([], {}, r"\[value\]"),
         ([{"on": "one"}, {"on": "one"}], {}, r"contact\.1\.on.*\[value\]"),
-        ([{"on": "one"}, {"on": "too"}], {}, r"contact\.1\.on.*\[part-name\]"),
         ([{"on": "one"}, {"on": "bottom"}], {}, r"\[contacts-meet\]"),
         (
             [{"on": "one", "friction": {"mu": 1}}, {"on": "two"}],
             {},
             r"contact\.0\.friction\.mu.*\[value\]",
-        ),
-        (
-            [{"on": name, "friction": coulomb(0.1)} for name in PIECES],
-            {"friction": coulomb(0.2)},
-            r"\[exclusive-keys\]",
         ),
         (
             [

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import contact
-from contact.case.file import load_case, parse_case, to_toml
-from contact.cli.main import main
+from contact.case.file import parse_case
 from contact.library.materials import find, library
 from forms.crystal import isotropic_about_x3, stiffness_tensor, turned
 from tests.problems.messages import message_of
@@ -18,19 +17,6 @@ CASE = {
     ],
     "contact": {"on": "bottom"},
 }
-MINE = """
-[mine]
-class = "6mm"
-c = { c11 = 139.0, c12 = 77.8, c13 = 74.3, c33 = 115.0, c44 = 25.6 }
-e = { e31 = -5.2, e33 = 15.1, e15 = 12.7 }
-permittivity = { "11" = 6.463, "33" = 5.622 }
-d = { d33 = 289.0 }
-temperature = "room"
-condition = "any"
-source = "measured"
-"""
-
-
 #: The same ceramics and crystals in COMSOL's material library: c11, c12, c13, c33, c44 (GPa), e31,
 #: e33, e15 (C/m2), permittivities 11 and 33 over that of empty space; how far they may differ.
 ELSEWHERE = """
@@ -120,18 +106,6 @@ def test_a_material_by_name_is_the_one_by_its_constants():
     si = contact.solve(case(name="PZT-4"))
     assert np.allclose(si.pressure, 1e9 * named.pressure, rtol=1e-8)
     assert np.allclose(si.potential.x.array, 1e9 * named.potential.x.array, rtol=1e-6, atol=1e-2)
-
-
-def test_a_library_of_ones_own(tmp_path, capsys):
-    (tmp_path / "mine.toml").write_text(MINE)
-    path = tmp_path / "case.toml"
-    data = {**CASE, "material": {"name": "mine", "library": "mine.toml"}}
-    path.write_text(to_toml(parse_case(data, tmp_path)))
-    again = load_case(path)
-    assert again.material.entry.source == "measured"
-    assert main(["materials", "mine", "--file", str(tmp_path / "mine.toml")]) == 0
-    text = capsys.readouterr().out
-    assert "d = e s (pC/N)" in text and "291.3" in text and "k33 = 0.69" in text
 
 
 BAD = {

@@ -164,11 +164,8 @@ def test_an_elastic_part_carries_no_field() -> None:
     [
         (materials()[:1], r"\[regions\]"),
         ([*materials()[:1], {"young": 1.0, "poisson": 0.3}], r"material\.1\.on.*\[missing\]"),
-        (materials(second={"on": "lower"}), r"material\.1\.on.*\[value\]"),
         (materials(second={"on": "uper"}), r"\[part-name\]"),
         (materials(second={"on": "upper", "yung": 1}), r"material\.1\.yung.*\[unknown-key\]"),
-        (materials(second={"on": []}), r"material\.1\.on.*\[value\]"),
-        ([], r"\[value\]"),
     ],
 )
 def test_what_is_refused(material, message: str) -> None:

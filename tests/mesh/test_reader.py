@@ -1,6 +1,5 @@
 """Gmsh files: what is read, what is refused, what is ignored."""
 
-import logging
 import re
 from pathlib import Path
 
@@ -10,8 +9,6 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 import meshes
-from contact.case.build import build_problem
-from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.mesh.reader import from_msh
 from tests.problems.sizes import integral, measures
@@ -80,33 +77,6 @@ def test_cells_of_second_order_keep_their_nodes():
 def test_bad_mesh_files_are_refused_on_all_ranks(name):
     with pytest.raises(InputError, match=rf"{name}.*\[{BAD[name]}\]"):
         from_msh(COMM, FIXTURES / "bad" / name)
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("interior.msh", "'top' has 1 interior facet(s); a part must lie on the boundary"),
-        ("stray.msh", "'top' has facets that bound no cell"),
-    ],
-)
-def test_a_group_that_is_no_part_is_ignored_until_it_is_used(name, reason, caplog):
-    with caplog.at_level(logging.INFO, logger="contact"):
-        domain = from_msh(COMM, FIXTURES / name)
-    assert measures(domain) == pytest.approx({"bottom": 1.0})
-    assert len(domain.notes) == 1
-    assert reason in domain.notes[0]
-    assert [reason in message for message in caplog.messages] == [True] * (COMM.rank == 0)
-    with pytest.raises(InputError, match=rf"{name}.*\[part-facets\]"):
-        domain.ds("top")
-    case = {
-        "mesh": {"file": str(FIXTURES / name)},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "bottom", "displacement": [0.0, 0.0]}],
-        "contact": {"on": "top"},
-    }
-    with pytest.raises(InputError, match=rf"{name}.*\[part-facets\]"):
-        build_problem(parse_case(case), COMM)
 
 
 @pytest.mark.parametrize("unit", ["e-200", "e-9", "e150"])

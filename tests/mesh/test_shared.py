@@ -7,7 +7,6 @@ from mpi4py import MPI
 
 from contact import solve
 from contact.cli.main import CONVERGED, main
-from contact.errors import InputError
 from contact.mesh.reader import from_file
 from tests.mesh.test_formats import PLATE, bricks, regions
 from tests.problems.sizes import integral, measures
@@ -134,18 +133,3 @@ def test_a_case_is_solved_on_it_as_on_its_source(tmp_path, capsys):
         found.append(solve(path).contact_force)
     assert found[0] == pytest.approx(found[1], rel=1e-12)
     assert abs(found[0][1]) > 1e-3
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("harm", ["missing", "cut"])
-def test_damaged_shares_are_refused(harm, shared_tmp_path, capsys):
-    _, made = written(shared_tmp_path, "square.msh")
-    heavy = made.with_suffix(".h5")
-    if COMM.rank == 0:
-        data = heavy.read_bytes()
-        heavy.unlink()
-        if harm == "cut":
-            heavy.write_bytes(data[:-100])
-    COMM.barrier()
-    with pytest.raises(InputError, match=r"\[xdmf-files\]"):
-        from_file(COMM, made)

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import meshes
-from contact.mesh.cells import FACES, simplices
+from contact.mesh.cells import FACES
 from contact.mesh.contents import Cells, Contents, Groups, check
 from contact.mesh.reader import from_file
 from tests.problems.sizes import integral, measures
@@ -97,20 +97,6 @@ def test_neighbours_cut_their_faces_alike_whatever_the_numbers(seed):
     facets = np.sort(rows[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
     once, count = np.unique(facets, axis=0, return_counts=True)
     assert sizes(cells.points, once[count == 1]).sum() == pytest.approx(SKIN)
-
-
-@pytest.mark.parametrize("count", [5, 6, 8])
-def test_each_corner_may_be_the_smallest(count):
-    """Of one cell, with its corners in every cyclic order, the pieces fill it."""
-    block = {len(rows[0]): rows[0] for _, rows in stack().blocks}[count]
-    points = stack().points
-    whole = {5: 1 / 6, 6: 1 / 2, 8: 1.0}[count]
-    for turn in range(count):
-        number = np.empty(len(points), dtype=int)
-        number[block] = (np.arange(count) + turn) % count
-        made = simplices(number[block][None], 3)
-        place = points[block[np.argsort(number[block])]]
-        assert sizes(place, made[0]) == pytest.approx(whole / made.shape[1])
 
 
 def write(path, contents: Contents) -> None:

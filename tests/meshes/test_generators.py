@@ -187,33 +187,6 @@ def test_generators_make_other_cells(name, order):
     assert integral(domain) == pytest.approx(volume, rel=least)
 
 
-@pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])
-def test_edges_of_other_cells_have_the_size_that_is_asked_for(cell):
-    name, dim = ("piezo_bar", 2) if cell == "quadrilateral" else ("block", 3)
-    domain = from_generator(MPI.COMM_SELF, name, cell, size=0.2, contact_size=0.2)
-    cells = domain.mesh.topology.index_map(dim).size_local
-    size = (GENERATORS[name][0] / cells) ** (1 / dim)
-    assert 0.5 * 0.2 < size < 1.3 * 0.2
-
-
-PLANES = {
-    "left": (-1, 0, 0),
-    "right": (1, 0, 0),
-    "front": (0, -1, 0),
-    "back": (0, 1, 0),
-    "bottom": (0, 0, -1),
-    "top": (0, 0, 1),
-}
-
-
-def test_faces_of_a_block_have_the_right_names():
-    domain = from_generator(COMM, "block", width=2.0, depth=3.0, size=0.6)
-    for name, normal in PLANES.items():
-        area = integral(domain, part=name)
-        found = [integral(domain, lambda _, nu, i=i: nu[i], name) / area for i in range(3)]
-        assert found == pytest.approx(normal, abs=1e-12)
-
-
 @pytest.mark.core
 @pytest.mark.parametrize("name", ["half_cylinder", "half_space", "sphere"])
 def test_cells_have_positive_volumes(name):

@@ -110,12 +110,6 @@ def test_values(formula, value):
     assert float(expression.ufl(x2)((2.0, 3.0))) == pytest.approx(value)
 
 
-def test_z_is_refused_in_the_plane():
-    for evaluate in (lambda e: e.numpy([[0.0, 0.0]]), lambda e: e.ufl(x2)):
-        with pytest.raises(InputError, match=r"\[formula-variable\]"):
-            evaluate(Expression("x*z"))
-
-
 def test_values_that_are_not_finite_name_the_point():
     with pytest.raises(InputError, match=r"\[not-finite\]"):
         Expression("1/x").numpy([[1.0, 2.0], [0.0, 2.0]])

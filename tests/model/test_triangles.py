@@ -15,7 +15,6 @@ from contact.mesh.domain import from_mesh
 from contact.model.body import Fixed
 from contact.model.contact import Contact
 from contact.model.obstacle import (
-    Level,
     Triangles,
 )
 from contact.model.obstacle.surfaces import read_stl
@@ -97,18 +96,6 @@ def test_a_surface_that_is_inside_out_is_refused():
                 above(lifted(True), direction, press)
     with pytest.raises(InputError, match=r"\[behind\]"):
         above(lifted(True), "foundation")
-
-
-def test_an_overlap_is_less_deep_than_the_shape():
-    """A plate across the body leads the nodes out of its far side from half of its depth on."""
-
-    def plate(thick, x):
-        return np.abs(x[:, 2] - thick / 2 + 0.1) - thick / 2
-
-    deep = above(partial(Level, partial(plate, 1.0)), "axis", press=True)
-    assert deep.gap == pytest.approx(np.full(25, -0.1))
-    with pytest.raises(InputError, match=r"\[inside-out\]"):
-        above(partial(Level, partial(plate, 0.15)), "axis", press=True)
 
 
 @pytest.mark.core

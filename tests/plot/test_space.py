@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from contact.plot.body import picture
-from contact.plot.foundation import foundation
 from contact.plot.run import Run, linear
 from contact.plot.space import (
-    Scene,
     Zone,
     chosen_view,
     contact_figure,
@@ -53,24 +51,6 @@ def test_the_camera_sees_the_contact(side: str) -> None:
     assert found is not None
     view, cut = found
     assert view @ outward > 0.5 and not cut
-
-
-def test_rigid_shapes_are_drawn_where_they_are() -> None:
-    """In front of the contact part, as far as they are near: a ball that is pushed into it."""
-    ball = {"shape": "sphere", "centre": [1.0, 0.5, 1.45], "radius": 0.45}
-    run = pressed("top", fixed=[{"on": "bottom", "displacement": [0.0, 0.0, 0.01]}],
-                  mesh={"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [12, 6, 2]},
-                  contact={"on": "top", "foundation": ball})  # fmt: skip
-    shape = foundation(run, 1.0)
-    distance = np.linalg.norm(shape.points - ball["centre"], axis=1)
-    # The rim is cut between nodes, on chords.
-    assert distance.max() < 0.45 + 1e-6 and distance.min() > 0.42
-    assert np.count_nonzero(abs(distance - 0.45) < 1e-6) > 10
-    assert shape.points[:, 2].min() == pytest.approx(1.0, abs=1e-3)
-    assert 1.15 < shape.points[:, 2].max() < 1.32  # the body is 2 long: gaps up to 0.3
-    assert Scene.of(run).foundation.n_cells == shape.n_cells
-    two = replace(run, table={**run.table, "rigid": np.zeros(len(run.points), dtype=bool)})
-    assert foundation(two, 1.0).n_cells == 0
 
 
 def test_the_peak_is_that_of_all_nodes() -> None:

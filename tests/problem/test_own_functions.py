@@ -21,7 +21,6 @@ from contact import (
     Problem,
     Response,
     Rigid,
-    UserLaw,
     solve,
 )
 from contact.mesh.grid import rectangle
@@ -163,12 +162,3 @@ def test_what_one_rank_alone_meets_is_refused_by_all(place: str) -> None:
                 fails() if last else 0.01 * np.ones(np.shape(x)[0 if place == "shape" else -1])
             )
         )
-
-
-def test_a_modulus_may_return_one_number_for_all_strains() -> None:
-    law = UserLaw(10.0, 0.3, modulus=lambda _: 10.0 / 2.6)
-    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
-    own, linear = (solve(Problem(domain, Body(m, TOP), Contact("bottom"))) for m in (law, LAW))
-    assert own.converged
-    np.testing.assert_allclose(own.contact_force, linear.contact_force, rtol=1e-10, atol=1e-12)
-    assert own.error.energy == pytest.approx(linear.error.energy, rel=1e-8)

@@ -27,40 +27,12 @@ ZERO = constant(0.0, 2)
     ("more", "message"),
     [
         (
-            {"contact": {"on": "upper_bottom", "against": "upper_bottom"}},
-            r"contact\.against.*\[value\]",
-        ),
-        (
             {"contact": {"on": "upper_bottom", "against": "upper_left"}},
             r"contact\.against.*\[pair\]",
         ),
         (
             {"contact": {"on": "upper_bottom", "against": "upper_top"}},
             r"\[pair\]",
-        ),
-        (
-            {"contact": {"on": "upper_bottom", "against": "lower_tip"}},
-            r"contact\.against.*\[part-name\]",
-        ),
-        (
-            {
-                "contact": {
-                    "on": "upper_bottom",
-                    "against": "lower_top",
-                    "foundation": {"shape": "plane", "point": [0, 0], "normal": [0, 1]},
-                }
-            },
-            r"contact\.against.*\[exclusive-keys\]",
-        ),
-        (
-            {
-                "contact": {
-                    "on": "upper_bottom",
-                    "against": "lower_top",
-                    "rigid": {"displacement": [0.0, 0.01]},
-                }
-            },
-            r"contact\.rigid.*\[exclusive-keys\]",
         ),
         (
             {"contact": {"on": "upper_top", "against": "lower_top"}, "load": []},
@@ -74,15 +46,6 @@ ZERO = constant(0.0, 2)
                 ]
             },
             r"\[contact-cycle\]",
-        ),
-        (
-            {
-                "fixed": [
-                    {"on": "lower_bottom", "displacement": [0.0, 0.0]},
-                    {"on": "upper_bottom", "displacement": ["free", 0.0]},
-                ]
-            },
-            r"contact\.against.*\[pair\]",
         ),
         (
             {

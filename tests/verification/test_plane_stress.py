@@ -288,14 +288,6 @@ def test_no_strain_without_stress_across_is_no_solution():
             },
             r"\[plane-stress\]",
         ),
-        (
-            {
-                "mesh": {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [2, 2, 2]},
-                "load": [],
-                "fixed": [{"on": "left", "displacement": [0, 0, 0]}],
-            },
-            r"\[value\]",
-        ),
     ],
 )
 def test_what_is_refused(data, words):
