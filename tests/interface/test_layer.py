@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from contact import InputError
 from contact import solve as solve_case
-from contact.methods.options import OPTIONS
+from contact.methods.options import OPTIONS, NewtonOptions
 from contact.model.foundation import Layer
 from contact.problem.problem import ContactProblem
 from forms.laws import (
