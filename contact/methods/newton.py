@@ -56,9 +56,15 @@ from contact.methods.options import NewtonOptions
 from contact.methods.report import Monitor, Outcome, Record, Recorder
 from contact.methods.semismooth import Iteration, SemismoothNewton
 from contact.methods.unconstrained_modes import UnconstrainedModes
-from contact.problem.condensed import Condensation, CondensedProblem, condensable, condensation_pays
+from contact.problem.condensed import (
+    AnyProblem,
+    Condensation,
+    CondensedProblem,
+    condensable,
+    condensation_pays,
+)
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Problem, State
+from contact.problem.state import State
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
@@ -181,7 +187,7 @@ class Newton:
         self._begin()
 
     def _newton_step(
-        self, problem: Problem, options: NewtonOptions, counters: Counters
+        self, problem: AnyProblem, options: NewtonOptions, counters: Counters
     ) -> NewtonStep:
         underconstrained = not self._modes.constrained_undeformed
         return NewtonStep(problem, options, self._parameters, counters, underconstrained)

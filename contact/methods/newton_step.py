@@ -27,8 +27,9 @@ from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.options import NewtonOptions
+from contact.problem.condensed import AnyProblem
 from contact.problem.residuals import Residuals, residual_forces
-from contact.problem.state import Problem, State
+from contact.problem.state import State
 from contact.typing import Array
 
 #: Forcing term of inexact Newton. One by the residuals (Eisenstat and Walker) would ask for more
@@ -67,7 +68,7 @@ class NewtonStep:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: AnyProblem,
         options: NewtonOptions,
         parameters: ComplementarityParameters,
         counters: Counters,
@@ -112,7 +113,7 @@ class NewtonStep:
             )
         return self._operator
 
-    def assemble(self, problem: Problem, state: State, blocks: Array) -> None:
+    def assemble(self, problem: AnyProblem, state: State, blocks: Array) -> None:
         """Assemble the operator with nodal blocks and those of layer and current. Collective."""
         interface, body = problem.interface, problem.equilibrium
         if interface.layer.active:
@@ -121,7 +122,7 @@ class NewtonStep:
         weighted = interface.weighted(blocks, state.x)
         self.operator.update("secant", state, weighted, constant=body.linear)
 
-    def without_contact(self, problem: Problem, state: State) -> State:
+    def without_contact(self, problem: AnyProblem, state: State) -> State:
         """Return the state after one linear solve with all nodes open. Collective."""
         nodes, body = problem.interface.nodes, problem.equilibrium
         free = State(state.x, Multipliers.zero(nodes), state.time, state.history)
@@ -132,7 +133,7 @@ class NewtonStep:
 
     def __call__(
         self,
-        problem: Problem,
+        problem: AnyProblem,
         state: State,
         tangent: bool,
         reached: Residuals,

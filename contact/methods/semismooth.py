@@ -15,13 +15,14 @@ from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import PROGRESS, Best, Outcome, Record, Recorder, Stagnation
 from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.problem.condensed import AnyProblem
 from contact.problem.residuals import (
     Residuals,
     evaluate_forces,
     residual_forces,
     undeformed_equilibrium,
 )
-from contact.problem.state import Problem, State
+from contact.problem.state import State
 from contact.ranks import summed
 from contact.typing import Array
 
@@ -57,7 +58,7 @@ class SemismoothNewton:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: AnyProblem,
         options: NewtonOptions,
         step: NewtonStep,
         modes: UnconstrainedModes,
@@ -78,7 +79,7 @@ class SemismoothNewton:
         self.at = state
         self.best.see(state, residuals.significant)
 
-    def on(self, problem: Problem) -> SemismoothNewton:
+    def on(self, problem: AnyProblem) -> SemismoothNewton:
         """Return the method on a problem with another interface, with the same operator."""
         other = SemismoothNewton(problem, self.options, self.step, self.modes, self.recorder)
         other.reserved = self.reserved
@@ -246,7 +247,7 @@ class Iteration:
         return undeformed, self.outcome()
 
 
-def _node_counts(state: State, problem: Problem) -> tuple[int, int, int] | None:
+def _node_counts(state: State, problem: AnyProblem) -> tuple[int, int, int] | None:
     """Return the numbers of open, stick and slip nodes; None without an active set. Collective."""
     if state.active_set is None:
         return None
@@ -254,7 +255,7 @@ def _node_counts(state: State, problem: Problem) -> tuple[int, int, int] | None:
     return interface.node_counts(interface.nodes.apply(state.x), state.active_set)
 
 
-def _overestimates_stiffness(problem: Problem, c: float, state: State) -> bool:
+def _overestimates_stiffness(problem: AnyProblem, c: float, state: State) -> bool:
     """Tell whether c times the penetration of a first state is far above all loads. Collective."""
     interface = problem.interface
     penetration = np.maximum(-interface.normal_gap(interface.nodes.apply(state.x)), 0.0)

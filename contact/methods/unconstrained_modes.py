@@ -30,7 +30,7 @@ from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import component_sums
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.methods.report import Outcome
-from contact.problem.condensed import CondensedProblem
+from contact.problem.condensed import AnyProblem, CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.rigid_modes import (
@@ -40,7 +40,7 @@ from contact.problem.rigid_modes import (
     null_space,
     sliding_mode,
 )
-from contact.problem.state import Problem, State
+from contact.problem.state import State
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 
@@ -185,7 +185,7 @@ class UnconstrainedModes:
         moved[nodes.nodes, : nodes.dim] = found.columns @ found.amounts
         return replace(state, x=state.x - moved.ravel())
 
-    def free_motion(self, problem: Problem, state: State) -> RigidMotion | None:
+    def free_motion(self, problem: AnyProblem, state: State) -> RigidMotion | None:
         """Return the unconstrained modes at a solution, of the whole or condensed problem.
 
         None without any. Collective.
@@ -227,7 +227,7 @@ class UnconstrainedModes:
             amounts = _least_distance(products, wanted, cone, -room)
         return RigidMotion(whole, moved, wanted, amounts, depth, limited)
 
-    def unconstrained_at(self, problem: Problem, state: State) -> bool:
+    def unconstrained_at(self, problem: AnyProblem, state: State) -> bool:
         """Tell whether a rigid-body mode has become unconstrained at a solution. Collective.
 
         With friction there may be another solution, at which it is constrained.
@@ -308,12 +308,12 @@ def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -
     return np.asarray(wanted - size * back @ residual[:-1] / residual[-1])
 
 
-def all_loads(problem: Problem) -> float:
+def all_loads(problem: AnyProblem) -> float:
     """Return the sum of |load| over the unknowns, at zero displacement. Collective."""
     return float(_loads(problem).sum())
 
 
-def _loads(problem: Problem) -> Array:
+def _loads(problem: AnyProblem) -> Array:
     """Return this sum for each connected component, shape (k,). Collective."""
     body, of = problem.equilibrium, problem.equilibrium.component_norms
     residual = residual_forces(problem, problem.start())

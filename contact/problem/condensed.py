@@ -7,6 +7,7 @@ its own, solved in small dense steps.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from mpi4py import MPI
@@ -169,6 +170,10 @@ class CondensedProblem:
         """Return the dense operator, with blocks at all nodes."""
         body = self.equilibrium
         return DenseOperator(body.comm, body.free, body.stiffness, counters, body.inclined)
+
+
+#: A contact problem of a whole body or of a condensed one: methods take either.
+AnyProblem: TypeAlias = ContactProblem | CondensedProblem
 
 
 def at_kept_nodes(interface: Interface) -> Interface:

@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 from contact.interface.complementarity import interface_residuals, worst
 from contact.interface.interface import Interface
 from contact.interface.multipliers import constraint_active
+from contact.problem.condensed import AnyProblem
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Problem, State
+from contact.problem.state import State
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -114,7 +115,7 @@ class Residuals:
 
 
 def residual_forces(
-    problem: Problem,
+    problem: AnyProblem,
     state: State,
     secant_at: Array | None = None,
     internal: Array | None = None,
@@ -151,7 +152,7 @@ def _random_signs(size: int) -> Array:
 
 
 def force_rounding(
-    problem: Problem, state: State, internal: Array, perturbed: _Perturbed | None = None
+    problem: AnyProblem, state: State, internal: Array, perturbed: _Perturbed | None = None
 ) -> Array:
     """Return norms of the rounding errors of forces and charges, by component. Collective.
 
@@ -165,7 +166,7 @@ def force_rounding(
     return MARGIN * EPS / PERTURBATION * body.norms(body.unbalanced(change))
 
 
-def _perturbed(problem: Problem, state: State) -> _Perturbed:
+def _perturbed(problem: AnyProblem, state: State) -> _Perturbed:
     """Return perturbed unknowns, and the internal forces there. Collective."""
     body, own = problem.equilibrium, problem.equilibrium.owned_part(state.x)
     # Global unknowns, behind those of the nodes, have the same sign on all ranks.
@@ -181,7 +182,7 @@ def _as_pressures(interface: Interface, forces: Array) -> Array:
     return forces * np.sqrt(np.divide(count, area, out=np.zeros_like(area), where=area > 0))
 
 
-def residual_as_pressures(problem: Problem, state: State, residual: Array) -> float:
+def residual_as_pressures(problem: AnyProblem, state: State, residual: Array) -> float:
     """Return the residual forces as pressures, over the contact pressures. Collective."""
     body, interface = problem.equilibrium, problem.interface
     left = body.norms(body.unbalanced(residual))[0]
@@ -201,13 +202,13 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())
 
 
-def evaluate(problem: Problem, state: State) -> Residuals:
+def evaluate(problem: AnyProblem, state: State) -> Residuals:
     """Return the residuals of a state; NaN where numbers overflow. Collective."""
     return evaluate_forces(problem, state)[0]
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def evaluate_forces(problem: Problem, state: State) -> tuple[Residuals, Array]:
+def evaluate_forces(problem: AnyProblem, state: State) -> tuple[Residuals, Array]:
     """Return the residuals of a state, and the internal forces there. Collective."""
     body, interface = problem.equilibrium, problem.interface
     loads = body.load_norms(state.time)
@@ -377,7 +378,7 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
     return Balance(done, enthalpy - charged, dissipation, flow, enthalpy, state.x, given, internal)
 
 
-def undeformed_equilibrium(problem: Problem, tolerance: float) -> tuple[State, Residuals] | None:
+def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> tuple[State, Residuals] | None:
     """Return zero displacement and its residuals if it is in equilibrium, else None. Collective.
 
     Residuals are relative to the forces that act: approaching a state without forces, none becomes

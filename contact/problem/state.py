@@ -1,20 +1,15 @@
-"""The state of a contact problem, a frozen value; its scales, and the protocols of a problem."""
+"""The state of a contact problem, a frozen value, and the scales of a problem."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
-from mpi4py import MPI
 
-from contact.body.equilibrium import ComponentNorms
-from contact.history import History, LinearisationPoint
+from contact.history import History
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.interface import Interface
 from contact.interface.multipliers import ActiveSet, Multipliers
-from contact.linear.operator import Counters, Operator
 from contact.typing import Array
 
 
@@ -110,111 +105,3 @@ class Scales:
         c = self.augmentation
         nodal = c**2 * self.height / self.plane_modulus
         return ComplementarityParameters(c, nodal, gamma * max(c, nodal))
-
-
-class Equilibrium(Protocol):
-    """Equilibrium of a body: nodal forces at given unknowns, without a state of its own.
-
-    Implemented by the whole body (`contact.body.equilibrium`) and by the body condensed onto its
-    contact nodes (`contact.problem.condensed`).
-    """
-
-    @property
-    def comm(self) -> MPI.Intracomm:
-        """Communicator."""
-
-    @property
-    def dim(self) -> int:
-        """Number of displacement components of a node."""
-
-    @property
-    def block_size(self) -> int:
-        """Number of unknowns of a node."""
-
-    @property
-    def owned(self) -> int:
-        """Number of unknowns that this rank owns."""
-
-    @property
-    def linear(self) -> bool:
-        """Whether the operator is the same at all unknowns."""
-
-    @property
-    def symmetric(self) -> bool:
-        """Whether its tangent is a symmetric matrix."""
-
-    @property
-    def component_norms(self) -> ComponentNorms:
-        """Norms of forces and charges of each connected component."""
-
-    @property
-    def rounding_limit(self) -> float:
-        """Largest residual that is accepted as rounding, over all forces of a field."""
-
-    def rest(self) -> Array:
-        """Return the local unknowns of the reference configuration: zeros."""
-
-    def prescribe(self, x: Array, time: float = 1.0) -> Array:
-        """Return unknowns with the prescribed values of a time. Collective."""
-
-    def owned_part(self, x: Array) -> Array:
-        """Return the owned unknowns of local ones, the global ones behind them."""
-
-    def moved(self, x: Array, increment: Array) -> Array:
-        """Return unknowns plus an increment of the owned ones. Collective."""
-
-    def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
-        """Return the owned nodal forces of the stresses at a state. Collective."""
-
-    def external(self, time: float = 1.0) -> Array:
-        """Return the owned nodal loads at a time. Collective."""
-
-    def unbalanced(self, forces: Array) -> Array:
-        """Return the forces on free unknowns, which vanish in equilibrium. Collective."""
-
-    def reactions(self, forces: Array) -> Array:
-        """Return the forces on fixed unknowns: reactions of the supports."""
-
-    def norms(self, values: Array) -> Array:
-        """Return norms of owned forces and charges, by connected component. Collective."""
-
-    def load_norms(self, time: float = 1.0) -> Array:
-        """Return the `norms` of the loads at a time. Collective."""
-
-    def exchanged(self, state: LinearisationPoint) -> Array:
-        """Return the `norms` of the piezoelectric coupling forces and charges. Collective."""
-
-    def norm(self, values: Array) -> float:
-        """Return the Euclidean norm of owned values. Collective."""
-
-
-class Problem(Protocol):
-    """A body and its interface."""
-
-    @property
-    def equilibrium(self) -> Equilibrium:
-        """The body."""
-
-    @property
-    def interface(self) -> Interface:
-        """Gamma_3 with its laws."""
-
-    @property
-    def scales(self) -> Scales:
-        """Sizes of the body and its stiffness."""
-
-    @property
-    def time(self) -> float:
-        """Time of its loads and prescribed values; 1 for a static problem."""
-
-    def start(self, time: float | None = None) -> State:
-        """Return the zero initial guess, with the prescribed values of the problem's time.
-
-        Or of another time.
-        """
-
-    def with_laws(self, interface: Interface) -> Problem:
-        """Return the problem with another interface on the same contact nodes."""
-
-    def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> Operator:
-        """Return the operator of its linear systems: bulk matrix plus blocks at contact nodes."""

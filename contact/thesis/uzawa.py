@@ -38,8 +38,9 @@ from contact.linear.multigrid import TOLERANCE
 from contact.linear.operator import Operator
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import Stagnation
+from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
-from contact.problem.state import Problem, State
+from contact.problem.state import State
 from contact.ranks import summed
 from contact.tolerances import ROUNDING
 from contact.typing import Array
@@ -310,7 +311,7 @@ class _Projection:
         return ResidualMinimiser(inner, project, derivative, depth)
 
 
-def _residual(problem: Problem, state: State, secant_at: Array, layer: bool) -> Array:
+def _residual(problem: ContactProblem, state: State, secant_at: Array, layer: bool) -> Array:
     """Return the owned residual without multipliers and implicit layer. Collective."""
     interface, nodes = problem.interface, problem.interface.nodes
     residual, unknown = residual_forces(problem, state, secant_at), state.forces.vectors(nodes)
@@ -322,7 +323,7 @@ def _residual(problem: Problem, state: State, secant_at: Array, layer: bool) -> 
 
 
 def uzawa_block_relaxation(
-    problem: Problem,
+    problem: ContactProblem,
     state: State,
     operator: Operator,
     bound: Array,
