@@ -63,8 +63,8 @@ def gap_gradient(solution: Solution, quantity: str | Functional) -> Array:
     >>> points = solution.problem.nodes.points  # doctest: +SKIP
     """
     path, asked = LoadPath(solution), _one(solution, quantity)
-    law = solution.problem.interface.layer
-    if law.compliance is not None or law.follows_gap:
+    law = solution.problem.interface.foundation
+    if law.layer is not None or law.follows_gap:
         raise InputError(
             "gap_gradient: the layer or charge depends on the gap; accepted: neither",
             "no-derivative",

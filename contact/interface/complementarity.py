@@ -243,7 +243,7 @@ def linearise(
         by_pressure = interface.friction.by_pressure(total, length)
         bound_shift = -by_pressure * parameters.gamma * np.where(closed, normal_gap, 0.0)
         rate[:, :d] += by_pressure[:, None] * slope
-        rate += by_pressure[:, None] * interface.layer.pressure_gradient(nodal)
+        rate += by_pressure[:, None] * interface.foundation.pressure_gradient(nodal)
         friction[slips] += (bound_shift[:, None] * e)[slips]
         blocks[slips, :d, :] += e[slips, :, None] * rate[slips, None, :]
         blocks[slips, :d, :d] += sliding[slips]

@@ -27,7 +27,7 @@ from contact.arguments import (
     sampled,
 )
 from contact.errors import InputError
-from contact.interface.law import Grouped
+from contact.interface.foundation import Grouped
 from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes, Geometry
 from contact.linear.layout import times

@@ -9,8 +9,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.interface.foundation import FoundationLaw
 from contact.interface.friction import NodalFriction
-from contact.interface.law import InterfaceLaw
 from contact.interface.multipliers import ActiveSet, Multipliers, SlipHistory, constraint_active
 from contact.interface.nodes import ContactNodes
 from contact.mesh.entities import component_sums
@@ -48,8 +48,8 @@ class Interface:
     gap
         Of the unilateral constraint, shape (n,): that of the nodes, or infinite where none acts, as
         behind a layer without a rigid part, and at nodes outside of a working set.
-    layer
-        Layer and current.
+    foundation
+        Layer and current of the foundation.
     friction
         Friction.
     constrained
@@ -70,9 +70,9 @@ class Interface:
 
     nodes: ContactNodes
     gap: Array
-    layer: InterfaceLaw
+    foundation: FoundationLaw
     friction: NodalFriction
-    constrained: InterfaceLaw | None
+    constrained: FoundationLaw | None
     c_0: float
     diameter: float
     elongation: float
@@ -94,7 +94,7 @@ class Interface:
         """Return the interface at the end of a step, with the slip history before it."""
         return replace(
             self,
-            layer=self.layer.at(time),
+            foundation=self.foundation.at(time),
             friction=replace(self.friction, history=history),
             constrained=None if self.constrained is None else self.constrained.at(time),
         )
@@ -141,7 +141,7 @@ class Interface:
 
     def pressure(self, nodal: Array, multipliers: Multipliers) -> Array:
         """Return -sigma_nu, the multiplier and the layer's pressure, shape (n,)."""
-        return multipliers.pressure + self.layer.pressure(nodal)
+        return multipliers.pressure + self.foundation.pressure(nodal)
 
     def bound(self, nodal: Array, multipliers: Multipliers) -> Array:
         """Return the friction bound s, shape (n,). Collective."""
@@ -177,7 +177,7 @@ class Interface:
 
     def node_counts(self, nodal: Array, active: ActiveSet) -> tuple[int, int, int]:
         """Return the numbers of open, stick and slip nodes; layer contact is closed. Collective."""
-        closed = active.closed | (self.layer.pressure(nodal) > 0)
+        closed = active.closed | (self.foundation.pressure(nodal) > 0)
         sticks = closed & active.sticks
         local = [np.count_nonzero(nodes) for nodes in (~closed, sticks, closed & ~sticks)]
         opened, stick, slip = (int(count) for count in summed(self.comm, local))
@@ -194,10 +194,10 @@ class Interface:
 
     def acting(
         self, x: Array, multipliers: Multipliers
-    ) -> Iterator[tuple[InterfaceLaw, Array, Array]]:
+    ) -> Iterator[tuple[FoundationLaw, Array, Array]]:
         """Yield law, unknowns and pressures of contact, then constrained nodes. Collective."""
         nodal = self.nodes.apply(x)
-        yield self.layer, nodal, self.pressure(nodal, multipliers)
+        yield self.foundation, nodal, self.pressure(nodal, multipliers)
         if self.constrained is not None:
             nodal = self.constrained.nodes.apply(x)
             yield self.constrained, nodal, self.constrained.resting(nodal)

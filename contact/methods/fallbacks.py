@@ -297,11 +297,11 @@ def _in_the_conductivity(
     where the node leaves: the active set cycles. With little of it contact is nearly uncoupled.
     """
     interface = problem.interface
-    if interface.layer.conductor is None:
+    if interface.foundation.conductor is None:
         return None
 
     def solve(part: float, state: State) -> tuple[State, Outcome]:
-        less = replace(interface, layer=interface.layer.conducting(part))
+        less = replace(interface, foundation=interface.foundation.conducting(part))
         method = newton if part == 1.0 else newton.on(problem.with_laws(less))
         return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
 

@@ -107,7 +107,9 @@ class NewtonStep:
         """The operator of the linear systems."""
         if self._operator is None:
             interface, body = self._problem.interface, self._problem.equilibrium
-            asymmetric = interface.friction.acts or interface.layer.active or not body.symmetric
+            asymmetric = (
+                interface.friction.acts or interface.foundation.active or not body.symmetric
+            )
             self._operator = self._problem.operator(
                 symmetric=not asymmetric, counters=self._counters, kind=self.options.linear
             )
@@ -116,9 +118,11 @@ class NewtonStep:
     def assemble(self, problem: AnyProblem, state: State, blocks: Array) -> None:
         """Assemble the operator with nodal blocks and those of layer and current. Collective."""
         interface, body = problem.interface, problem.equilibrium
-        if interface.layer.active:
+        if interface.foundation.active:
             nodal = interface.nodes.apply(state.x)
-            blocks = blocks + interface.layer.block(nodal, interface.pressure(nodal, state.forces))
+            blocks = blocks + interface.foundation.block(
+                nodal, interface.pressure(nodal, state.forces)
+            )
         weighted = interface.weighted(blocks, state.x)
         self.operator.update("secant", state, weighted, constant=body.linear)
 
@@ -200,7 +204,7 @@ class NewtonStep:
         vectors = contact.multipliers.vectors(nodes) + change[:, : interface.dim]
         forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
         pressed = nodes.normal_component(np.einsum("nij,nj->ni", layer, moved))
-        known = interface.layer.pressure(nodal) + shift + pressed
+        known = interface.foundation.pressure(nodal) + shift + pressed
         # Far motions leave nodes of a rigid part off it by rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
         return replace(
@@ -211,7 +215,7 @@ class NewtonStep:
         self, interface: Interface, nodal: Array, contact: LinearisedContact, reached: float
     ) -> Array | float:
         """Return the derivative of the current, with that of psi(u_nu - rho) or psi frozen."""
-        law = interface.layer
+        law = interface.foundation
         if not law.active:
             return 0.0
         follow = contact.unchanged
@@ -232,8 +236,8 @@ def linearised_layer(
     As for the active set, the point of linearisation is that of the law with the sum p + c u_nu:
     about the displacement alone, a layer stiffer than the body cycles between its regimes.
     """
-    law, nodes, c = interface.layer, interface.nodes, parameters.c
-    graph = law.normal_law(nodal)
+    law, nodes, c = interface.foundation, interface.nodes, parameters.c
+    graph = law.normal_graph(nodal)
     if graph is None:
         return law.pressure_block(nodal, full), np.zeros(nodal.shape[0])
     u_n, layer = nodes.normal_component(nodal), law.pressure(nodal)

@@ -14,7 +14,7 @@ from scipy import linalg
 from contact.arguments import check_range
 from contact.body.loads import to_blame
 from contact.errors import InputError
-from contact.interface.law import InterfaceLaw
+from contact.interface.foundation import FoundationLaw
 from contact.model.fields import values_at
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
@@ -311,7 +311,7 @@ def _flows(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return through which contact nodes current flows or could; and the nodes with supports."""
     interface = problem.interface
-    law, held = interface.layer, interface.constrained
+    law, held = interface.foundation, interface.constrained
     if state is None:
         return _conducts(law, interface.diameter), _conducts(held, interface.diameter)
     found = [
@@ -321,7 +321,7 @@ def _flows(
     return found[0], found[1] if held is not None else np.zeros(0, dtype=bool)
 
 
-def _conducts(law: InterfaceLaw | None, deep: float) -> NDArray[np.bool_]:
+def _conducts(law: FoundationLaw | None, deep: float) -> NDArray[np.bool_]:
     """Return which nodes conduct deep inside the foundation."""
     closed = np.ones(0 if law is None else law.nodes.nodes.size, dtype=bool)
     if law is None or law.conductor is None:

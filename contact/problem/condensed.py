@@ -188,8 +188,8 @@ def at_kept_nodes(interface: Interface) -> Interface:
     nodes, constrained = kept(interface.nodes, first), interface.constrained
     if constrained is not None:
         constrained = replace(constrained, nodes=kept(constrained.nodes, others))
-    law = replace(interface.layer, nodes=nodes)
-    return replace(interface, nodes=nodes, layer=law, constrained=constrained)
+    law = replace(interface.foundation, nodes=nodes)
+    return replace(interface, nodes=nodes, foundation=law, constrained=constrained)
 
 
 class Condensation:

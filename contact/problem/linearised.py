@@ -148,7 +148,7 @@ class Linearised:
         self.active = active_set(problem, state)
         interface, nodes, nodal = problem.interface, problem.nodes, problem.nodal(state)
         self._pressure = interface.pressure(nodal, state.forces)
-        law = interface.layer.block(nodal, self._pressure, full=True)
+        law = interface.foundation.block(nodal, self._pressure, full=True)
         self._conditions(nodal)
         regular = self._by_force.copy()
         normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
@@ -185,7 +185,7 @@ class Linearised:
             total, smooth = friction.history.accumulated + length, friction.smooth(self._pressure)
             rate = np.asarray(friction.law.by_pressure(total, smooth), dtype=float)
             self._rate = np.broadcast_to(rate, length.shape) * (smooth > 0)
-        self._layer = interface.layer.pressure_gradient(nodal)
+        self._layer = interface.foundation.pressure_gradient(nodal)
         local = self._rate * friction.local
         self._by_jump = np.zeros((length.size, d, nodes.block_size))
         self._by_jump[:, :, :d] = np.where(closed, interface.c_0 * normal, 0.0)

@@ -20,14 +20,14 @@ from contact.body.internal_variables import VARIABLES
 from contact.body.materials import young_behind
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
-from contact.interface.friction import joined_friction
-from contact.interface.interface import Interface
-from contact.interface.law import (
-    InterfaceLaw,
+from contact.interface.foundation import (
+    FoundationLaw,
     joined_conductors,
     joined_constrained,
     joined_layers,
 )
+from contact.interface.friction import joined_friction
+from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes, Geometry, joined_nodes
 from contact.interface.pairing import PairPlacement, find_pair
@@ -277,7 +277,7 @@ class ContactProblem:
         young = max(min(young_behind(*where, side) for side in both) for both in sides)
         stiffness = young / self.domain.size
         conductors = [contact.conductor for contact in self.contacts]
-        law = InterfaceLaw(
+        law = FoundationLaw(
             nodes,
             joined_layers([contact.compliant_layer for contact in self.contacts], geometries),
             joined_conductors(conductors, [geometry.nodes for geometry in geometries]),

@@ -129,7 +129,7 @@ class Solved:
         interface, nodal = self.problem.interface, self.nodal
         rounding = interface.negligible(nodal, self.pressure)
         active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
-        layer = interface.layer.pressure(nodal) > rounding
+        layer = interface.foundation.pressure(nodal) > rounding
         touches = active.closed | layer
         sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")
@@ -262,7 +262,7 @@ def contact_result(solved: Solved) -> ContactResult:
     }
     if problem.piezoelectric:
         own["potential"] = problem.equilibrium.phi_scale * solved.nodal[:, -1]
-        own["charge"] = problem.interface.layer.charge(solved.nodal, solved.pressure)
+        own["charge"] = problem.interface.foundation.charge(solved.nodal, solved.pressure)
     own = {name: nodes.gather(values) for name, values in own.items()}
     order = _by_position(problem, nodes.gather(nodes.points))
     if problem.dim == 2:

@@ -139,7 +139,7 @@ class ContactForce:
         turn = np.where(_of_contact(problem, self.contact), self._turn(problem), 0.0)
         by_force = np.zeros_like(nodes.normal)
         by_force[:, self.axis] = turn * nodes.weight
-        layer = problem.interface.layer.pressure_gradient(problem.nodal(state))
+        layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
         nodes.transpose((turn * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x)
         return by_x, by_force
@@ -186,7 +186,7 @@ class MaxPressure(Largest):
         """Return the derivatives. Collective."""
         nodes = problem.nodes
         at = _largest(problem, self.values(problem, state))
-        layer = problem.interface.layer.pressure_gradient(problem.nodal(state))
+        layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
         nodes.transpose(at[:, None] * layer, by_x)
         return by_x, at[:, None] * nodes.normal
@@ -266,7 +266,7 @@ class Reaction:
         seen = nodes.apply(body.local(weights))
         by_force = nodes.weight[:, None] * seen[:, : nodes.dim]
         for law, nodal, pressure in interface.acting(state.x, state.forces):
-            block = law.block(nodal, pressure, full=law is interface.layer)
+            block = law.block(nodal, pressure, full=law is interface.foundation)
             there = law.nodes.apply(body.local(weights))
             law.nodes.transpose(
                 law.nodes.weight[:, None] * np.einsum("nji,nj->ni", block, there), by_x
@@ -289,7 +289,7 @@ class FoundationCharge:
         """Return the derivatives. Collective."""
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
         for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
-            full = law is problem.interface.layer
+            full = law is problem.interface.foundation
             slope = -law.charge_block(nodal, pressure, full)[:, -1] / law.phi_scale
             law.nodes.transpose(law.nodes.weight[:, None] * slope, by_x)
         return by_x, np.zeros_like(problem.nodes.normal)

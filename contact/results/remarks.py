@@ -308,7 +308,7 @@ def unstable_charge(solution: Solution) -> Iterator[str]:
     delta |phi - phi_F| (e/C) Bi/(1 + Bi) exceeds 1: several solutions may then exist.
     """
     problem, width = solution.problem, solution.conduction_ramp
-    piezo, scales, conductor = problem.body.piezo, problem.scales, problem.interface.layer.conductor
+    piezo, scales, conductor = problem.body.piezo, problem.scales, problem.interface.foundation.conductor
     if width is None or piezo is None or conductor is None or conductor.psi.k_e == 0:
         return
     potential = problem.equilibrium.phi_scale * solution.nodal[:, -1]
@@ -384,7 +384,7 @@ def resolution(solution: Solution) -> Iterator[Remark]:
 def charge_resolution(solution: Solution) -> Iterator[Remark]:
     """Warn of a charge that rises in front of the closed gap within less than two elements."""
     problem, width = solution.problem, solution.conduction_ramp
-    conductor, spacing = problem.interface.layer.conductor, problem.scales.spacing
+    conductor, spacing = problem.interface.foundation.conductor, problem.scales.spacing
     if width is None or conductor is None or conductor.psi.k_e == 0 or not problem.piezoelectric:
         return
     if width < 2 * spacing:

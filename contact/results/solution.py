@@ -407,7 +407,7 @@ class Solution(Solved):
     @property
     def conduction_ramp(self) -> float | None:
         """How far in front of the closed gap the foundation conducts, 1/delta (length)."""
-        conductor = self.problem.interface.layer.conductor
+        conductor = self.problem.interface.foundation.conductor
         return 1 / conductor.psi.delta if conductor and conductor.psi.follows_gap else None
 
     @cached_property

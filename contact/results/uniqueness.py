@@ -60,7 +60,7 @@ def uniqueness(
     """
     interface = problem.interface
     nodes, friction = interface.nodes, interface.friction
-    known = friction.acts and friction.local and not interface.layer.active
+    known = friction.acts and friction.local and not interface.foundation.active
     known = known and not problem.piezoelectric and interface.coupled.size == nodes.nodes.size
     if not known or nodes.size == 0:
         return np.inf, False

@@ -220,7 +220,7 @@ class FixedPoint(OuterLoop):
             self.state, first = start, 1
             self._secant_at = start.x if linearised_at is None else linearised_at
             nodal, pressure = interface.nodes.apply(start.x), start.forces.pressure
-            if interface.layer.normal_law(nodal) is not None:
+            if interface.foundation.normal_graph(nodal) is not None:
                 pressure = interface.pressure(nodal, start.forces)
             self._z = np.column_stack([pressure, start.forces.friction])
             self.bound = interface.bound(nodal, start.forces)
@@ -242,7 +242,7 @@ class FixedPoint(OuterLoop):
             self._z = self._about(0.0, friction)
         state, nodal = self.state, interface.nodes.apply(self.state.x)
         blocks = augmentation(interface.nodes, self.r, friction)
-        if interface.layer.active:
+        if interface.foundation.active:
             blocks = blocks + self._current_block(nodal, interface.pressure(nodal, state.forces))
         # At zero strain the tangent is the secant.
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
@@ -270,7 +270,7 @@ class FixedPoint(OuterLoop):
 
     def _current_block(self, nodal: Array, pressure: Array) -> Array:
         """Linearise the charge, near the solution with the derivative of psi by the gap."""
-        law = self.problem.interface.layer
+        law = self.problem.interface.foundation
         if not law.follows_gap or not self._gap_derivative(self._residual):
             return law.charge_block(nodal, pressure)
         if self.operator.symmetric:

@@ -180,7 +180,7 @@ class PenalisedProblem:
         name = "penalty_snes_linesearch_type"
         default = not given.hasName(name)
         if default:
-            layer = problem.interface.layer.compliance
+            layer = problem.interface.foundation.layer
             given[name] = "basic" if symmetric and (layer is None or layer.lagged) else "bt"
         try:
             with petsc_options("penalty_"):
@@ -233,9 +233,9 @@ class PenalisedProblem:
         self._state = state
         self._assembled = body.linear
         pressure = interface.pressure(nodal, state.forces)
-        self._response = interface.layer.force(nodal, pressure)
-        self._current_block = interface.layer.charge_block(nodal, pressure)
-        self._layer = interface.layer.normal_law(nodal)
+        self._response = interface.foundation.force(nodal, pressure)
+        self._current_block = interface.foundation.charge_block(nodal, pressure)
+        self._layer = interface.foundation.normal_graph(nodal)
         if self._layer is not None:
             # Of the new iterate, as [.]^+, but for h_nu.
             self._response[:, : body.dim] = 0.0

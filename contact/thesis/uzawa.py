@@ -30,8 +30,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.complementarity import disc_derivative, interface_residuals, project_disc
+from contact.interface.foundation import NormalGraph
 from contact.interface.interface import Interface
-from contact.interface.law import NormalLaw
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear.multigrid import TOLERANCE
@@ -267,7 +267,7 @@ class _Projection:
     gap: Array
     r: float
     bound: Array
-    law: NormalLaw | None
+    law: NormalGraph | None
     origin: Array
 
     def __call__(self, z: Array) -> Array:
@@ -316,7 +316,7 @@ def _residual(problem: ContactProblem, state: State, secant_at: Array, layer: bo
     interface, nodes = problem.interface, problem.interface.nodes
     residual, unknown = residual_forces(problem, state, secant_at), state.forces.vectors(nodes)
     if layer:
-        pressure = interface.layer.pressure(nodes.apply(state.x))
+        pressure = interface.foundation.pressure(nodes.apply(state.x))
         unknown += pressure[:, None] * nodes.normal
     nodes.transpose(-nodes.weight[:, None] * unknown, residual)
     return residual
@@ -360,7 +360,7 @@ def uzawa_block_relaxation(
     """
     interface, nodes = problem.interface, problem.interface.nodes
     at, own = nodes.apply(state.x), problem.equilibrium.owned_part(state.x)
-    law = interface.layer.normal_law(at)
+    law = interface.foundation.normal_graph(at)
     constant = -_residual(problem, state, secant_at, law is not None)
     origin = r * split(interface, at, friction)
     project = _Projection(nodes, interface.gap, r, bound, law, origin)

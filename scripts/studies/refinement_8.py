@@ -86,7 +86,7 @@ def measured(solution: Solution) -> dict[str, object]:
     closed = touching[order] > 0
     charges = charge_balance(problem, solution.state)
     phi = problem.equilibrium.phi_scale * solution.nodal[:, -1]
-    conductor = problem.interface.layer.conductor
+    conductor = problem.interface.foundation.conductor
     return {
         "1/delta": np.nan if conductor is None else 1 / conductor.psi.delta,
         "max p": nodes.maximum(solution.pressure),

@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from contact import Solution, build_problem, load_case
 from contact.interface.complementarity import project_disc
-from contact.interface.law import NormalLaw
+from contact.interface.foundation import NormalGraph
 from contact.plot.body import Picture, draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.results.contact_nodes import Table, contact_table, tangent_of
@@ -48,7 +48,9 @@ SHORTEST_ARROW = 0.02
 def normal_graph(p_nu: Compliance, touch: float, gap: float, stiffness: float) -> tuple[Array, ...]:
     """Return u_nu and -sigma_nu as the Uzawa block relaxation projects onto the law (r = 1)."""
     z = np.linspace(-1.0, 2.0, 601)
-    law = NormalLaw(p_nu, np.full_like(z, stiffness), np.full_like(z, touch), np.full_like(z, gap))
+    law = NormalGraph(
+        p_nu, np.full_like(z, stiffness), np.full_like(z, touch), np.full_like(z, gap)
+    )
     pressure = law.pressure(z, 1.0)
     return z - pressure, pressure
 

@@ -203,7 +203,7 @@ def linear_iterations(problem: ContactProblem) -> int:
     interface, state = problem.interface, problem.start()
     nodal = problem.nodal(state)
     blocks = augmentation(problem.nodes, problem.scales.augmentation, problem.frictional)
-    blocks = blocks + interface.layer.charge_block(nodal, np.ones(len(nodal)))
+    blocks = blocks + interface.foundation.charge_block(nodal, np.ones(len(nodal)))
     operator = SparseOperator(problem.equilibrium, interface.coupled, kind="iterative")
     operator.update("secant", state, interface.weighted(blocks, state.x))
     operator.solve(-residual_forces(problem, state))

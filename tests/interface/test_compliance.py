@@ -41,7 +41,9 @@ def check_solution(column: LayerColumn, loop: FixedPoint | Newton) -> None:
     problem = loop.problem
     nodal = problem.nodal(loop.state)
     assert np.abs(problem.nodes.normal_component(nodal) - u_n).max() < 1e-10
-    assert np.abs(problem.interface.layer.pressure(nodal) - layer).max() < 1e-10 * max(layer, 1)
+    assert np.abs(problem.interface.foundation.pressure(nodal) - layer).max() < 1e-10 * max(
+        layer, 1
+    )
     assert np.abs(loop.state.forces.pressure - rest).max() < 1e-10 * max(layer + rest, 1)
     if column.piezo:
         assert np.abs(problem.equilibrium.phi_scale * nodal[:, -1] - potential).max() < 1e-10
@@ -162,7 +164,7 @@ def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, r
     nodal = problem.nodal(loop.state)
     assert problem.nodes.size > 0
     assert np.abs(problem.nodes.normal_component(nodal) - depth).max() < 1e-10
-    assert np.abs(problem.interface.layer.pressure(nodal) - share).max() < 1e-10
+    assert np.abs(problem.interface.foundation.pressure(nodal) - share).max() < 1e-10
     assert np.abs(loop.state.forces.pressure - (pressure - share)).max() < 1e-10
     assert np.abs(loop.state.forces.friction[:, 0] - mu * pressure).max() < 1e-10
     assert np.abs(nodal[:, 0] - slip).max() < 1e-10
@@ -182,7 +184,7 @@ def test_ranks_agree_on_a_layer_in_space(comm):
     for ranks in (comm, MPI.COMM_SELF):
         loop = solve(problem(ranks), tolerance=1e-11)
         nodal, nodes = loop.problem.nodal(loop.state), loop.problem.nodes
-        layer = loop.problem.interface.layer.pressure(nodal)
+        layer = loop.problem.interface.foundation.pressure(nodal)
         found.append(
             [
                 nodes.maximum(np.linalg.norm(nodal, axis=1)),

@@ -10,7 +10,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.interface.law import InterfaceLaw
+from contact.interface.foundation import FoundationLaw
 from contact.interface.nodes import ContactNodes
 from contact.model.foundation import Conductor, Layer
 from forms.foundation import compliance, electric_contact
@@ -51,9 +51,9 @@ def test_a_part_of_the_conductivity_is_that_of_a_smaller_k_e():
     nodes, x = random_nodes(50, 2, 3, rng), rng.standard_normal((50, 3))
     pressure = rng.uniform(-1.0, 1.0, 50)
 
-    def foundation(k_e: float) -> InterfaceLaw:
+    def foundation(k_e: float) -> FoundationLaw:
         conductor = Conductor(ShiftedConductivity(k_e, 2.0), 1.5, Truncation(1.0))
-        return InterfaceLaw(nodes, None, conductor, 1.7, 1.0)
+        return FoundationLaw(nodes, None, conductor, 1.7, 1.0)
 
     less, small = foundation(4.0).conducting(0.25), foundation(1.0)
     assert np.abs(less.charge(x, pressure)).max() > 0.1
@@ -68,7 +68,7 @@ def test_jacobian_is_the_derivative_of_the_force(dim, psi):
     rng = np.random.default_rng(3)
     nodes = random_nodes(200, dim, dim + 1, rng)
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 2.0, 3.0))
-    law = InterfaceLaw(nodes, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
+    law = FoundationLaw(nodes, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
     x = rng.standard_normal((200, dim + 1))
     pressure = law.pressure(x) - 100.0  # no node presses on the rigid part
     jacobian = law.block(x, pressure, full=True)
@@ -88,7 +88,7 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
     nodes = random_nodes(50, 2, 3, rng)
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0))
     conductor = Conductor(ShiftedConductivity(0.7, 0.0), 1.5)
-    law = InterfaceLaw(nodes, layer, conductor, 1.7, 1.0)
+    law = FoundationLaw(nodes, layer, conductor, 1.7, 1.0)
     x = rng.standard_normal((50, 3))
     block = law.block(x, np.zeros(50))
     assert np.allclose(block, block.transpose(0, 2, 1), rtol=1e-14)
@@ -100,7 +100,7 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
 def test_what_rounding_leaves_of_a_multiplier_conducts_nothing():
     """A body that hung free was said to have a known potential, after 1e-19 of a pressure."""
     nodes = random_nodes(3, 2, 3, np.random.default_rng(5))
-    law = InterfaceLaw(nodes, None, Conductor(PerfectConductivity(0.7), 1.5), 1.0, 1.0)
+    law = FoundationLaw(nodes, None, Conductor(PerfectConductivity(0.7), 1.5), 1.0, 1.0)
     # Open, pressed, and deep in but without a pressure: the constraint is about to press there.
     depth = nodes.gap + np.array([-0.5, 0.0, 0.1])
     x = np.column_stack([depth[:, None] * nodes.normal, np.zeros(3)])
@@ -123,7 +123,7 @@ def test_the_forms_j_1_and_l_are_the_nodal_force_and_charge():
     j_1 = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
     psi, phi_l = ShiftedConductivity(column.k_e, column.delta), Truncation(np.inf)
     current = electric_contact(u, phi, xi, nu, psi, phi_l, column.gap, column.phi_f)
-    nodes, law, nodal = problem.nodes, problem.interface.layer, problem.nodal(state)
+    nodes, law, nodal = problem.nodes, problem.interface.foundation, problem.nodal(state)
     pressure = law.pressure(nodal)
     at_nodes = np.zeros((2, *nodal.shape))
     at_nodes[0, :, :2] = pressure[:, None] * nodes.normal

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contact.interface.complementarity import disc_derivative, project_disc, project_half_line
-from contact.interface.law import NormalLaw
+from contact.interface.foundation import NormalGraph
 from contact.thesis.uzawa import ResidualMinimiser, _Projection
 from forms.laws import Compliance
 
@@ -76,7 +76,7 @@ def test_several_points_are_projected_as_one_after_the_other(nodes, layer):
     """Ranks without contact nodes too."""
     rng = np.random.default_rng(1)
     gap = np.full(nodes, 0.5)
-    law = NormalLaw(Compliance(2.0), np.ones(nodes), 0 * gap, gap) if layer else None
+    law = NormalGraph(Compliance(2.0), np.ones(nodes), 0 * gap, gap) if layer else None
     project = _Projection(None, gap, 3.0, np.full(nodes, 0.4), law, np.zeros((nodes, 3)))
     points = rng.normal(size=(5, nodes, 3))
     found = project(points)

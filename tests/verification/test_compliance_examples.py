@@ -188,7 +188,7 @@ def test_other_friction_laws_on_a_layer(law):
     slips = solution.status == "slip"
     assert np.any(slips)
     # The bound holds the layer's part of the pressure too.
-    layer = problem.interface.layer.pressure(solution.nodal)
+    layer = problem.interface.foundation.pressure(solution.nodal)
     total = solution.forces.pressure + layer
     slip = np.linalg.norm(solution.slip, axis=1)
     bound = 0.5 if law == "tresca" else laws[law].mu(slip) * total
@@ -264,7 +264,7 @@ def test_the_default_ramp_has_a_mesh_limit():
     A warning says where the mesh does not resolve the ramp.
     """
     runs = {cells: solved("8-4", cells, NEWTON) for cells in (48, 96, 192)}
-    deltas = [run.problem.interface.layer.conductor.psi.delta for run in runs.values()]
+    deltas = [run.problem.interface.foundation.conductor.psi.delta for run in runs.values()]
     assert deltas == pytest.approx([1 / 0.3] * 3, rel=1e-12)
     forces = [run.contact_force[1] for run in runs.values()]
     assert np.ptp(forces) < 2e-3 * abs(forces[-1])

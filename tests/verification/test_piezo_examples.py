@@ -150,7 +150,7 @@ def first_solve(problem, symmetric=True, compare=True):
     interface, state = problem.interface, problem.start()
     nodal = problem.nodal(state)
     blocks = augmentation(problem.nodes, problem.scales.augmentation, problem.frictional)
-    blocks = blocks + interface.layer.charge_block(nodal, np.ones(nodal.shape[0]))
+    blocks = blocks + interface.foundation.charge_block(nodal, np.ones(nodal.shape[0]))
     blocks = interface.weighted(blocks, state.x)
     found = []
     for kind in ("lu", "iterative") if compare else ("iterative",):

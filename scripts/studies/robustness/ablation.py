@@ -110,7 +110,7 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
 
     def plain(interface: Any, nodal: Any, state: Any, of: Any, full: bool) -> Any:
         forces = replace(state.forces, pressure=0.0 * state.forces.pressure)
-        about = replace(state, forces=forces, layer_pressure=interface.layer.pressure(nodal))
+        about = replace(state, forces=forces, layer_pressure=interface.foundation.pressure(nodal))
         return old(interface, nodal, about, of, full)
 
     return plain

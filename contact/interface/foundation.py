@@ -1,11 +1,11 @@
-"""The interface law: layer and charge, beside the unilateral constraint and friction.
+"""The law of the foundation: layer and charge, beside the unilateral constraint and friction.
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
 node by node. Newton's method takes `force` and its full derivative.
 
 The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer with the
-unilateral constraint, as the one monotone graph `NormalLaw` of Figure 1.6, and the current
+unilateral constraint, as the one monotone graph `NormalGraph` of Figure 1.6, and the current
 through `charge_block` in the operator. A linearised layer would not do there: a column that
 is stiff enough cycles for ever between the slopes of an open and of a saturated layer.
 
@@ -40,7 +40,7 @@ from forms.laws import (
 
 
 @dataclass(frozen=True)
-class NormalLaw:
+class NormalGraph:
     """-sigma_nu as a graph of u_nu (Figure 1.6): free, compliant layer, rigid part.
 
     Attributes
@@ -109,14 +109,14 @@ TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
-class InterfaceLaw:
+class FoundationLaw:
     """Layer and conductor at the contact nodes; potentials come divided by `phi_scale`.
 
     `c_0` (stress/length) weighs penetrations against pressures.
     """
 
     nodes: ContactNodes
-    compliance: Layer | None
+    layer: Layer | None
     conductor: Conductor | None
     phi_scale: float
     c_0: float
@@ -124,7 +124,7 @@ class InterfaceLaw:
     @property
     def active(self) -> bool:
         """Whether there is a layer or a conductor."""
-        return self.compliance is not None or self.conductor is not None
+        return self.layer is not None or self.conductor is not None
 
     @property
     def follows_gap(self) -> bool:
@@ -137,37 +137,37 @@ class InterfaceLaw:
     @property
     def constrained_gap(self) -> Array:
         """Gap of the unilateral constraint, (n,): infinite where there is no rigid part."""
-        rigid = self.compliance is None or np.isfinite(self.compliance.thickness)
+        rigid = self.layer is None or np.isfinite(self.layer.thickness)
         return np.where(rigid, self.nodes.gap, np.inf)
 
     @property
     def touch(self) -> Array:
         """The gap rho_0 of the layer's first touch, shape (n,)."""
-        assert self.compliance is not None
-        depth = self.compliance.thickness
+        assert self.layer is not None
+        depth = self.layer.thickness
         return self.nodes.gap - np.where(np.isfinite(depth), depth, 0.0)
 
-    def at(self, time: float) -> InterfaceLaw:
+    def at(self, time: float) -> FoundationLaw:
         """Return the foundation at a time."""
         if self.conductor is None:
             return self
         return replace(self, conductor=self.conductor.at(time))
 
-    def conducting(self, share: float) -> InterfaceLaw:
+    def conducting(self, share: float) -> FoundationLaw:
         """Return the foundation with a part of its conductivity."""
         assert self.conductor is not None
         return replace(self, conductor=replace(self.conductor, share=share))
 
-    def normal_law(self, x: Array) -> NormalLaw | None:
+    def normal_graph(self, x: Array) -> NormalGraph | None:
         """Return the layer and the constraint as one graph, h_nu frozen at the nodal unknowns.
 
         None where there is no layer, or where it is lagged and thus a given force.
         """
-        if self.compliance is None or self.compliance.lagged:
+        if self.layer is None or self.layer.lagged:
             return None
-        stiffness = np.broadcast_to(self.compliance.h_nu(self._difference(x)), x.shape[:1])
+        stiffness = np.broadcast_to(self.layer.h_nu(self._difference(x)), x.shape[:1])
         gap = self.constrained_gap
-        return NormalLaw(self.compliance.p_nu, stiffness, self.touch, gap)
+        return NormalGraph(self.layer.p_nu, stiffness, self.touch, gap)
 
     def _difference(self, x: Array) -> Array:
         """Return phi - phi_F at the nodes; 0 for a body without potential."""
@@ -182,10 +182,10 @@ class InterfaceLaw:
 
     def pressure(self, x: Array) -> Array:
         """Return the pressure of the layer at nodal unknowns of shape (n, block size)."""
-        if self.compliance is None:
+        if self.layer is None:
             return np.zeros(x.shape[0])
-        stiffness = self.compliance.h_nu(self._difference(x))
-        return np.asarray(stiffness * self.compliance.p_nu(self._layer_penetration(x)), dtype=float)
+        stiffness = self.layer.h_nu(self._difference(x))
+        return np.asarray(stiffness * self.layer.p_nu(self._layer_penetration(x)), dtype=float)
 
     def _layer_penetration(self, x: Array) -> Array:
         """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""
@@ -230,14 +230,14 @@ class InterfaceLaw:
     def pressure_gradient(self, x: Array) -> Array:
         """Return the derivative of `pressure` by the nodal unknowns, (n, block size)."""
         total = np.zeros((x.shape[0], self.nodes.block_size))
-        if self.compliance is None:
+        if self.layer is None:
             return total
         depth, difference = self._layer_penetration(x), self._difference(x)
         inside = self.nodes.normal_component(x) < self.constrained_gap
-        slope = self.compliance.h_nu(difference) * self.compliance.p_nu.derivative(depth) * inside
+        slope = self.layer.h_nu(difference) * self.layer.p_nu.derivative(depth) * inside
         total[:, : self.nodes.dim] = slope[:, None] * self.nodes.normal
         if self.nodes.block_size > self.nodes.dim:
-            growth = self.compliance.h_nu.derivative(difference) * self.compliance.p_nu(depth)
+            growth = self.layer.h_nu.derivative(difference) * self.layer.p_nu(depth)
             total[:, -1] = self.phi_scale * growth
         return total
 
@@ -285,7 +285,7 @@ class InterfaceLaw:
         lagged layer and current too.
         """
         total = self.charge_block(x, pressure, full)
-        if self.compliance is not None and (full or not self.compliance.lagged):
+        if self.layer is not None and (full or not self.layer.lagged):
             total += self.pressure_block(x, full)
         return total
 
@@ -431,8 +431,11 @@ def joined_conductors(
 
 
 def joined_constrained(
-    given: Sequence[Conductor | None], geometries: Sequence[Geometry], law: InterfaceLaw, begin: int
-) -> InterfaceLaw | None:
+    given: Sequence[Conductor | None],
+    geometries: Sequence[Geometry],
+    law: FoundationLaw,
+    begin: int,
+) -> FoundationLaw | None:
     """Return the law at the constrained nodes of all contacts; None without conductors.
 
     Parameters
@@ -455,7 +458,7 @@ def joined_constrained(
         coupling = law.nodes.coupling.at(nodes.nodes.astype(np.int64) + begin)
         nodes = replace(nodes, coupling=coupling)
     conductor = joined_conductors([own for _, own in there], pieces)
-    return replace(law, nodes=nodes, compliance=None, conductor=conductor)
+    return replace(law, nodes=nodes, layer=None, conductor=conductor)
 
 
 def _alike(lagged: Sequence[bool]) -> bool:
