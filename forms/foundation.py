@@ -20,11 +20,6 @@ from forms.ops import Value, positive_part, sqrt
 Law: TypeAlias = Callable[[Value], Value]
 
 
-def contact_multiplier(pressure: Value, r: Value, u_n: Value, gap: Value) -> Value:
-    """Return (lambda_c + r (u_nu - rho))^+, equation (3.43)."""
-    return positive_part(pressure + r * (u_n - gap))
-
-
 def penalty_pressure(u_n: Value, gap: Value, eps: Value) -> Value:
     """Return [u_nu - rho]^+ / eps, the pressure of the penalised problem, (4.32)."""
     return positive_part(u_n - gap) / eps

@@ -55,31 +55,6 @@ def project_disc(z: Array, radius: Array) -> Array:
     return z * scale[..., None]
 
 
-def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
-    """Return the derivatives of `project_disc` along directions.
-
-    Parameters
-    ----------
-    z, radius
-        Vectors, shape (n, d), and radii, shape (n,).
-    directions
-        Shape (n, d, k).
-
-    Returns
-    -------
-    Shape (n, d, k); on the rim that of the inside.
-    """
-    length = np.linalg.norm(z, axis=1)
-    beyond = length > radius
-    unit = z[beyond] / length[beyond, None]
-    outside = directions[beyond]
-    radial = np.einsum("ni,nik->nk", unit, outside)
-    outside = outside - unit[:, :, None] * radial[:, None, :]
-    result = directions.copy()
-    result[beyond] = (radius[beyond] / length[beyond])[:, None, None] * outside
-    return result
-
-
 def interface_residuals(
     interface: Interface,
     nodal: Array,

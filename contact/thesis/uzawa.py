@@ -29,7 +29,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact.interface.complementarity import disc_derivative, interface_residuals, project_disc
+from contact.interface.complementarity import (
+    interface_residuals,
+    project_disc,
+    project_half_line,
+)
 from contact.interface.foundation import NormalGraph
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
@@ -44,7 +48,6 @@ from contact.problem.state import State
 from contact.ranks import summed
 from contact.tolerances import ROUNDING
 from contact.typing import Array
-from forms.foundation import contact_multiplier
 
 #: Trial lengths: of a Gauss-Newton step, between two points, beyond the last one.
 DAMPED = 0.5 ** np.arange(5)
@@ -246,6 +249,31 @@ class Relaxed:
     stalled: bool = False
 
 
+def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
+    """Return the derivatives of `project_disc` along directions.
+
+    Parameters
+    ----------
+    z, radius
+        Vectors, shape (n, d), and radii, shape (n,).
+    directions
+        Shape (n, d, k).
+
+    Returns
+    -------
+    Shape (n, d, k); on the rim that of the inside.
+    """
+    length = np.linalg.norm(z, axis=1)
+    beyond = length > radius
+    unit = z[beyond] / length[beyond, None]
+    outside = directions[beyond]
+    radial = np.einsum("ni,nik->nk", unit, outside)
+    outside = outside - unit[:, :, None] * radial[:, None, :]
+    result = directions.copy()
+    result[beyond] = (radius[beyond] / length[beyond])[:, None, None] * outside
+    return result
+
+
 @dataclass
 class _Projection:
     """Steps 2 and 3, from z, shape (..., n, 1 + d), to the multipliers: (3.43) and the disc.
@@ -274,7 +302,7 @@ class _Projection:
         """Return the new multipliers."""
         z = z + self.origin
         if self.law is None:
-            pressure = np.asarray(contact_multiplier(z[..., 0], self.r, 0.0, self.gap))
+            pressure = project_half_line(z[..., 0] - self.r * self.gap)
         else:
             # Laws of users take one value per node.
             rows = z[..., 0].reshape(math.prod(z.shape[:-2]), z.shape[-2])

@@ -13,13 +13,12 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from contact import Solution, build_problem, load_case
-from contact.interface.complementarity import project_disc
+from contact.interface.complementarity import project_disc, project_half_line
 from contact.interface.foundation import NormalGraph
 from contact.plot.body import Picture, draw_plane, picture
 from contact.plot.contact import draw_line
 from contact.results.contact_nodes import Table, contact_table, tangent_of
 from contact.typing import Array
-from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity
 from scripts.cases import CASES
 from scripts.reporting import (
@@ -58,7 +57,7 @@ def normal_graph(p_nu: Compliance, touch: float, gap: float, stiffness: float) -
 def signorini_graph(gap: float) -> tuple[Array, ...]:
     """Return u_nu and -sigma_nu of Signorini's law as (3.43) projects onto it (r = 1)."""
     z = np.linspace(-1.0, 2.0, 601)
-    pressure = contact_multiplier(z, 1.0, 0.0, gap)
+    pressure = project_half_line(z - gap)
     return z - pressure, pressure
 
 

@@ -124,11 +124,6 @@ def test_penalty_forms(problem, x):
 
 
 @pytest.mark.core
-def test_contact_multiplier():
-    pressure = forms.contact_multiplier(np.array([1.0, 0.0, 0.0]), 2.0, np.array([0.5, -1, 1]), 0.5)
-    assert pressure.tolist() == [1.0, 0.0, 1.0]
-
-
 @pytest.mark.core
 def test_plane():
     plane = Plane((0.0, -1.0), (0.0, 2.0))

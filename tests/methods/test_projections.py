@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from contact.interface.complementarity import disc_derivative, project_disc, project_half_line
+from contact.interface.complementarity import project_disc, project_half_line
 from contact.interface.foundation import NormalGraph
-from contact.thesis.uzawa import ResidualMinimiser, _Projection
+from contact.thesis.uzawa import ResidualMinimiser, _Projection, disc_derivative
 from forms.laws import Compliance
 
 
