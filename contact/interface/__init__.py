@@ -13,7 +13,7 @@ all laws together
 friction
     `friction`, with the coefficients of `forms.laws`, and the non-local operator R.
 layer and current
-    `foundation.FoundationLaw`; `foundation.NormalGraph` is normal compliance with the rigid part behind it.
+    `foundation.FoundationLaw`; `NormalGraph` is the layer with the rigid part behind it.
 jump, lumped surface mass
     `nodes.ContactNodes`, of both kinds of contact; `nodes.Geometry` of one contact.
 contact forces, slip history

@@ -124,7 +124,6 @@ def test_penalty_forms(problem, x):
 
 
 @pytest.mark.core
-@pytest.mark.core
 def test_plane():
     plane = Plane((0.0, -1.0), (0.0, 2.0))
     points = np.array([[0.3, 0.5], [2.0, -1.0]])
