@@ -1,22 +1,9 @@
-"""The fallbacks of the semismooth Newton method, and their order.
+"""The fallbacks of the semismooth Newton method, in their order (`fall_back`).
 
-Where Newton's steps have ended without convergence the state with all nodes open is tried, by one
-linear solve, where the supports constrain all rigid-body modes, and from there contact at one node
-more in turn (`working_set`). If neither is a solution these follow, in this order:
-
-1. where friction has to constrain a rigid-body mode, proximal points: an elastic bed about the last
-   iterate, which becomes softer (`proximal_points`);
-2. on a condensed body with a conducting foundation, continuation in its conductivity
-   (`continuation`);
-3. on a condensed body with a rigid-body mode that the supports do not constrain, a rigid motion to
-   a state with all nodes open (`unconstrained_modes`);
-4. a primal-dual interior point on the same operator, which finds the active sets, with the friction
-   bound updated outside, and Newton's last steps from there (`interior_point`). A fallback is also
-   tried where Newton's method has converged to a solution at which a rigid-body mode has become
-   unconstrained, although friction could constrain it;
-5. steps on the condensed body, where it has too many contact nodes for these to pay.
-
-The notes of the history name the first four. A condensed contact problem has 1 to 4 of its own.
+Where Newton's steps have ended without convergence, they are tried in turn from the zero initial
+guess. A condensed contact problem has all but the last of its own. The notes of the history name
+them. They are also tried where Newton's method has converged to a solution at which a rigid-body
+mode has become unconstrained, although friction could constrain it.
 
 References
 ----------
@@ -34,7 +21,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,9 +38,6 @@ from contact.ranks import summed
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
-
-#: Solver of the whole problem from an initial guess: steps on the condensed body.
-LastFallback: TypeAlias = Callable[[State], tuple[State, Outcome]]
 
 #: Notes of steps in the history.
 WORKING_SET, CONTINUATION, PROXIMAL_POINT = "working set", "continuation", "proximal point"
@@ -80,10 +63,7 @@ NEARLY_BALANCED = 0.03
 
 
 def solve_contact(
-    newton: SemismoothNewton,
-    state: State,
-    linearised_at: Array | None = None,
-    last: LastFallback | None = None,
+    newton: SemismoothNewton, state: State, linearised_at: Array | None = None
 ) -> tuple[State, Outcome]:
     """Solve a problem by the semismooth Newton method and its fallbacks. Collective.
 
@@ -93,107 +73,111 @@ def solve_contact(
         The method on the problem.
     state, linearised_at
         Initial guess, and unknowns of the first secant.
-    last
-        The last fallback; None for none.
     """
     state, outcome = newton.iterate(state, linearised_at, give_up=True)
     if outcome.converged and newton.modes.unconstrained_at(newton.problem, state):
-        found = fall_back(newton, state, outcome, None, last)
+        found = fall_back(newton, state, outcome)
         return found if found[1].converged else (state, outcome)
-    return with_fallbacks(newton, state, outcome, last)
+    return with_fallbacks(newton, state, outcome)
 
 
 def with_fallbacks(
-    newton: SemismoothNewton, state: State, outcome: Outcome, last: LastFallback | None = None
+    newton: SemismoothNewton, state: State, outcome: Outcome
 ) -> tuple[State, Outcome]:
     """Return the end of an iteration, of a fallback, or the best iterate of all. Collective."""
     if outcome.converged or outcome.overloaded:
         return state, outcome
-    without_contact = None
-    if newton.modes.constrained_by_supports:
-        # Active sets may cycle on contact forces that are rounding. Where contact has to constrain
-        # a mode, friction may have another solution than the one with all nodes open.
-        found, without_contact = from_open(newton)
-        if found is not None:
-            return found
-    state, outcome = fall_back(newton, state, outcome, without_contact, last)
+    state, outcome = fall_back(newton, state, outcome)
     if not (outcome.converged or outcome.overloaded) and newton.best.found is not None:
         state = newton.best.found
         outcome = replace(outcome, residuals=evaluate(newton.problem, state))
     return state, outcome
 
 
-def from_open(
-    newton: SemismoothNewton,
-) -> tuple[tuple[State, Outcome] | None, State | None]:
-    """Return a solution with all nodes open or by a working set, and the state without contact.
-
-    None where the linear system is singular, or without such a solution. Collective.
-    """
-    problem, best = newton.problem, newton.best.found
-    try:
-        state = newton.step.without_contact(problem, problem.start() if best is None else best)
-    except SingularError:  # the potential may be floating without contact
-        newton.step.renew()
-        return None, None
-    allowed = newton.options.allowed
-    residuals = evaluate(problem, state)
-    if not residuals.excess(allowed):
-        return (state, Outcome(residuals, allowed)), state
-    found = working_set(newton, state)
-    if found is not None:
-        residuals = evaluate(problem, found)
-        newton.see(found, residuals)
-        if (outcome := Outcome(residuals, allowed)).converged:
-            return (found, outcome), state
-    return None, state
-
-
-def fall_back(
-    newton: SemismoothNewton,
-    state: State,
-    outcome: Outcome,
-    without_contact: State | None,
-    last: LastFallback | None,
-) -> tuple[State, Outcome]:
-    """Try the fallbacks in turn, from the zero initial guess. Collective."""
-    problem, singular = newton.problem, None
-    by_friction = problem.interface.friction.acts and not newton.modes.constrained_by_supports
-    if isinstance(problem, CondensedProblem):
-        found = _in_the_conductivity(newton, problem) or _separated(newton, problem, outcome)
-        if found is not None:
-            return found
-    if by_friction and newton.steps_left > 0:
-        found = proximal_points(newton)
-        if found is not None:
-            return found
-    if newton.steps_left > 0:
-        logger.info("%s; going on with an interior point", outcome.ended)
-        # Half of the steps are for the condensed body.
-        newton.reserved = 0 if last is None else (newton.steps_left + 1) // 2
+def fall_back(newton: SemismoothNewton, state: State, outcome: Outcome) -> tuple[State, Outcome]:
+    """Try the fallbacks in turn until one converges. Collective."""
+    singular = None
+    for fallback in (
+        all_open_or_working_set,
+        conductivity_continuation,
+        rigid_motion,
+        proximal_points,
+        interior_points,
+        condensed_body,
+    ):
         try:
-            state, outcome = interior_point(newton, without_contact)
+            found = fallback(newton, outcome)
         except SingularError as error:
             newton.step.renew()
             singular = error
-        newton.reserved = 0
-    if last is not None and not (outcome.converged or outcome.overloaded) and newton.steps_left > 0:
-        logger.info("%s; going on with the condensed body", outcome.ended)
-        found = last(problem.start())
-        # The reason of the interior point says more, unless no steps are left.
-        if found[1].converged or newton.steps_left <= 0:
+            continue
+        if found is not None:
             state, outcome = found
+            if outcome.converged or outcome.overloaded:
+                return found
     # A nonlinear material may be singular at the strains of a step alone.
-    if singular is not None and problem.equilibrium.linear and not outcome.converged:
+    if singular is not None and newton.problem.equilibrium.linear and not outcome.converged:
         raise singular
     return state, outcome
 
 
-def _separated(
-    newton: SemismoothNewton, problem: CondensedProblem, outcome: Outcome
+def all_open_or_working_set(
+    newton: SemismoothNewton, outcome: Outcome
 ) -> tuple[State, Outcome] | None:
-    """Return a solution with all nodes open after a rigid motion, if any. Collective."""
+    """Return a solution with all nodes open, by one linear solve, or by a working set, if any.
+
+    Where the supports constrain all rigid-body modes: else friction may have another solution.
+    Active sets may cycle on contact forces that are rounding.
+    """
+    if not newton.modes.constrained_by_supports:
+        return None
+    problem, best, allowed = newton.problem, newton.best.found, newton.options.allowed
+    try:
+        state = newton.step.without_contact(problem, problem.start() if best is None else best)
+    except SingularError:  # the potential may be floating without contact
+        newton.step.renew()
+        return None
+    newton.without_contact = state
+    residuals = evaluate(problem, state)
+    if not residuals.excess(allowed):
+        return state, Outcome(residuals, allowed)
+    found = working_set(newton, state)
+    if found is None:
+        return None
+    residuals = evaluate(problem, found)
+    newton.see(found, residuals)
+    return None if residuals.excess(allowed) else (found, Outcome(residuals, allowed))
+
+
+def interior_points(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Outcome] | None:
+    """Return the end of the interior-point method (`interior_point`) and Newton's last steps."""
+    if newton.steps_left <= 0:
+        return None
+    logger.info("%s; going on with an interior point", outcome.ended)
+    # Half of the steps are for the condensed body.
+    newton.reserved = 0 if newton.condensed is None else (newton.steps_left + 1) // 2
+    try:
+        return interior_point(newton, newton.without_contact)
+    finally:
+        newton.reserved = 0
+
+
+def condensed_body(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Outcome] | None:
+    """Return the end of steps on the condensed body, which has too many nodes for these to pay."""
+    if newton.condensed is None or newton.steps_left <= 0:
+        return None
+    logger.info("%s; going on with the condensed body", outcome.ended)
+    found = newton.condensed(newton.problem.start(), None)
+    # The reason of the interior point says more, unless no steps are left.
+    return found if found[1].converged or newton.steps_left <= 0 else None
+
+
+def rigid_motion(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Outcome] | None:
+    """Return a solution of a condensed body with all nodes open after a rigid motion, if any."""
+    problem = newton.problem
     if outcome.converged or newton.modes.constrained_by_supports:
+        return None
+    if not isinstance(problem, CondensedProblem):
         return None
     state = newton.modes.separated(
         problem, newton.step.operator, newton.step.parameters.nodal_stiffness
@@ -288,16 +272,16 @@ def continuation(
     return None
 
 
-def _in_the_conductivity(
-    newton: SemismoothNewton, problem: CondensedProblem
+def conductivity_continuation(
+    newton: SemismoothNewton, outcome: Outcome
 ) -> tuple[State, Outcome] | None:
-    """Solve by continuation in the conductivity k_e of the foundation; None on failure. Collective.
+    """Solve a condensed body by continuation in the conductivity k_e of the foundation, if any.
 
     A foundation of high conductivity fixes the potential of a node that comes near, and releases it
     where the node leaves: the active set cycles. With little of it contact is nearly uncoupled.
     """
-    interface = problem.interface
-    if interface.foundation.conductor is None:
+    problem, interface = newton.problem, newton.problem.interface
+    if not isinstance(problem, CondensedProblem) or interface.foundation.conductor is None:
         return None
 
     def solve(part: float, state: State) -> tuple[State, Outcome]:
@@ -308,8 +292,8 @@ def _in_the_conductivity(
     return continuation(solve, problem.start())
 
 
-def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
-    """Solve by a proximal-point method; None on failure. Collective.
+def proximal_points(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Outcome] | None:
+    """Solve by a proximal-point method where friction has to constrain a rigid-body mode, if any.
 
     For belts, arched leaves, wedges: bodies with a mode that friction alone constrains. The
     friction of the pressures of an iterate may not balance the loads, and the body slides off. An
@@ -318,6 +302,10 @@ def proximal_points(newton: SemismoothNewton) -> tuple[State, Outcome] | None:
     bears little, Newton's method takes the last steps without it.
     """
     problem, interface = newton.problem, newton.problem.interface
+    if not interface.friction.acts or newton.modes.constrained_by_supports:
+        return None
+    if newton.steps_left <= 0:
+        return None
     nodes, state = interface.nodes, problem.start()
     stiffness = PROXIMAL_STIFFNESS * newton.step.parameters.c
     least, in_vain = np.inf, 0

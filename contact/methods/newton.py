@@ -171,8 +171,8 @@ class Newton:
         self._parameters = problem.scales.complementarity_parameters(options.gamma)
         self._modes = UnconstrainedModes(problem)
         self._step = self._newton_step(problem, options, self.counters)
-        self._condensable = options.condense and condensable(problem, options.linear)
-        self._condense_first = options.condense and condensation_pays(problem, options.linear)
+        self._condenses = options.condense and condensable(problem, options.linear)
+        self._pays = self._condenses and condensation_pays(problem, options.linear)
         self._chord = Chord(options.tolerance, MOST_STEPS if options.keep != "never" else 0.0)
         #: The condensed body; None before the first condensed step.
         self.condensation: Condensation | None = None
@@ -184,17 +184,16 @@ class Newton:
         self.recorder = Recorder(self.monitor)
         if self.condensation is not None:
             self.condensation.set_load_step(problem)
-        self._begin()
+        last = self._condensed_steps if self._condenses and not self._pays else None
+        self.whole = SemismoothNewton(
+            problem, self.options, self._step, self._modes, self.recorder, last
+        )
 
     def _newton_step(
         self, problem: AnyProblem, options: NewtonOptions, counters: Counters
     ) -> NewtonStep:
         underconstrained = not self._modes.constrained_undeformed
         return NewtonStep(problem, options, self._parameters, counters, underconstrained)
-
-    def _begin(self) -> None:
-        whole = self.problem, self.options, self._step, self._modes, self.recorder
-        self.whole = SemismoothNewton(*whole)
 
     @property
     def history(self) -> list[Record]:
@@ -210,27 +209,24 @@ class Newton:
         self, start: State | None = None, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence or the limit; the best iterate on failure; see `Method`."""
-        self._begin()
+        whole, problem, body = self.whole, self.problem, self.problem.equilibrium
         self.recorder.begin = time.perf_counter()
         if self.options.keep != "across":
             self._chord.drop()
-        whole, body = self.whole, self.problem.equilibrium
-        state = whole.at if start is None else whole.started(start)
+        begin = problem.start() if start is None else whole.started(start)
         if body.linear:
             linearised_at = None
         elif start is None:
             linearised_at = body.rest()
-        whole.at = state
-        if self._condense_first:
-            begin = state
-            state, outcome = self._condensed_steps(state, linearised_at)
+        whole.begin(begin)
+        if self._pays:
+            state, outcome = self._condensed_steps(begin, linearised_at)
             if not (outcome.converged or outcome.overloaded or whole.steps_left <= 0):
                 logger.info("%s; going on with the whole body", outcome.ended)
                 state, outcome = whole.iterate(state, linearised_at if state is begin else None)
             state, outcome = with_fallbacks(whole, state, outcome)
         else:
-            last = self._condensed_steps if self._condensable else None
-            state, outcome = solve_contact(whole, state, linearised_at, last)
+            state, outcome = solve_contact(whole, begin, linearised_at)
         whole.at = state
         return state, outcome
 

@@ -6,6 +6,7 @@ the iteration.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -47,11 +48,14 @@ class SemismoothNewton:
         Rigid-body modes of the whole problem.
     recorder
         Recorder of the steps.
+    condensed
+        Solver of the same problem on the condensed body, from an initial guess and the unknowns of
+        the first secant: the last fallback; None for none.
 
     Attributes
     ----------
-    at, best
-        Last iterate, and iterate of least residual.
+    at, best, without_contact
+        Last iterate, iterate of least residual, and the state with all nodes open if it is known.
     reserved
         Steps of the limit that are reserved for the condensed body.
     """
@@ -63,11 +67,17 @@ class SemismoothNewton:
         step: NewtonStep,
         modes: UnconstrainedModes,
         recorder: Recorder,
+        condensed: Callable[[State, Array | None], tuple[State, Outcome]] | None = None,
     ) -> None:
         self.problem, self.options, self.step = problem, options, step
-        self.modes, self.recorder = modes, recorder
-        self.at, self.reserved = problem.start(), 0
+        self.modes, self.recorder, self.condensed = modes, recorder, condensed
+        self.begin(problem.start())
+
+    def begin(self, state: State) -> None:
+        """Begin a solve from an initial guess."""
+        self.at, self.reserved = state, 0
         self.best: Best[State] = Best()
+        self.without_contact: State | None = None
 
     @property
     def steps_left(self) -> int:

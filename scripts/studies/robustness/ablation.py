@@ -290,11 +290,17 @@ DEVICES = (
     Device("limit analysis of the friction bound", (UnconstrainedModes.overloaded,), "Drucker 1954",
            ((UnconstrainedModes, "overloaded", lambda *_: False),), (), _own("wall")),
     Device("rigid motion to a state without contact", (UnconstrainedModes.separated,),
+<<<<<<< HEAD
            "Lawson and Hanson 1974", ((fallbacks, "_separated", _nothing),), (), _pads),
+=======
+           "Lawson and Hanson 1974", ((fallbacks, "rigid_motion", _nothing),), (), _pads),
+    Device("sticking start where friction alone restrains", (UnconstrainedModes.stuck_bound,), "-",
+           ((UnconstrainedModes, "stuck_bound", _nothing),), (), _own("dragged-strip")),
+>>>>>>> 8a98e229 (newton: the fallbacks as one list of functions, the method on the whole body made once a load step)
     Device("proximal points", (fallbacks.proximal_points,), "Rockafellar 1976",
            ((fallbacks, "proximal_points", _nothing),), (), _belt),
     Device("continuation in the conductivity", (fallbacks.continuation,), "Allgower and Georg 2003",
-           ((fallbacks, "_in_the_conductivity", _nothing),)),
+           ((fallbacks, "conductivity_continuation", _nothing),)),
     Device("estimate of the stiffness from the first step",
            (semismooth._overestimates_stiffness,), "-",
            ((semismooth, "_overestimates_stiffness", lambda *_: False),), (), _own("stop")),
@@ -318,8 +324,8 @@ DEVICES = (
            ((semismooth.Iteration, "_loss_of_contact", _nothing),), (),
            _own("two-blocks-unloaded")),
     Device("working set of contact nodes, from all open",
-           (fallbacks.from_open, fallbacks.working_set), "Goldfarb and Idnani 1983",
-           ((fallbacks, "from_open", lambda _: (None, None)),), (), _own("stop")),
+           (fallbacks.all_open_or_working_set, fallbacks.working_set), "Goldfarb and Idnani 1983",
+           ((fallbacks, "all_open_or_working_set", _nothing),), (), _own("stop")),
 )  # fmt: skip
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
