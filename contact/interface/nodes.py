@@ -97,7 +97,7 @@ class ContactNodes:
     block_size
         Unknowns a node: d, or d + 1 with the potential.
     motion
-        Motion R of the foundation by the m global unknowns (`contact.body.global_unknowns`) (R),
+        Motion R of the foundation by the m global unknowns (`contact.body.global_unknowns`),
         shape (n, block_size, m); None without these.
     cut
         Largest depth in the foundation of a node on a straight facet of a curved part; the gap of

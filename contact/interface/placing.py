@@ -40,6 +40,8 @@ class Candidates:
     ----------
     nodes, weight
         As in `ContactNodes`, whatever is fixed there.
+    places
+        Current positions of the nodes, shape (n, d) (length).
     facing
         Cosine between the contact direction and the body's normal, shape (n,).
     front
@@ -63,6 +65,7 @@ class Candidates:
 
     nodes: NDArray[np.int32]
     weight: Array
+    places: Array
     facing: Array
     front: Array
     chord_penetration: Array
@@ -130,6 +133,7 @@ def candidates(
     return Candidates(
         nodes,
         weight,
+        points,
         np.einsum("ni,ni->n", direction, normal),
         front,
         ROUNDED * body.domain.size + 1.1 * chord_penetration,  # the direction may be a little aside
@@ -214,7 +218,9 @@ class FoundationPlacement:
             body.block_size,
             cut if cut > ROUNDED * body.domain.size else 0.0,
             body.domain.revolved,
-            body.global_unknowns.of_foundation(points, body.block_size, self.part),
+            body.global_unknowns.of_foundation(
+                found.places[self.contact], body.block_size, self.part
+            ),
         )
         if self.constrained is None:
             return Geometry(nodes, found.mixing)

@@ -10,6 +10,7 @@ from contact.methods.options import OPTIONS
 from contact.model.body import Fixed
 from contact.model.contact import Contact
 from contact.model.obstacle import GapFunction, Sphere
+from contact.model.rigid import Motion
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.blocks import Blocks
@@ -119,6 +120,26 @@ def test_in_front_of_a_ball(dim, degree) -> None:
     found = displaced(on_a_ball(domain, degree), motion)
     move(domain, motion)
     check_alike(found, *on_a_ball(domain, degree).geometries)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("motion", [shifted, turned], ids=lambda motion: motion.__name__)
+def test_moment_arms_on_a_moving_foundation_are_those_of_the_place(motion) -> None:
+    """A force f on the body acts with x cross -f on the foundation, at the place x of its node."""
+    domain, centre = Blocks(2, 3, 4).domain(COMM), np.array([0.5, -3.0])
+    ball = Sphere(centre=(0.5, -3.0), radius=2.5)
+    moving = Motion(displacement=[0.0, 0.0], rotation="free", moment=0.0, centre=list(centre))
+    body = Body(Linear(1.0, 0.3), [Fixed("top", [constant(0.0, 2)] * 2)])
+    problem = ContactProblem(domain, body, Contact("bottom", ball, rigid=moving))
+    nodes = displaced(problem, motion).nodes
+    (member,) = problem.equilibrium.global_unknowns.members
+    force = np.random.default_rng(nodes.size).standard_normal(nodes.normal.shape)
+    into = np.zeros_like(problem.equilibrium.rest())
+    nodes.transpose(force, into)
+    arm = motion(nodes.points) - centre
+    moment = COMM.allreduce(float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum()))
+    assert abs(moment) > 0.1
+    assert into[-1] / member.units[-1] == pytest.approx(-moment, rel=1e-12)
 
 
 @pytest.mark.core
