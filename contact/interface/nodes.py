@@ -7,7 +7,7 @@ follow each other in the arrays of all: the interface knows no number of contact
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -300,21 +300,8 @@ def _carried(
 
 def side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
     """Return the nodes of several contacts as one array."""
-
-    def every(values: Callable[[ContactNodes], Any]) -> Any:
-        return np.concatenate([values(nodes) for nodes in pieces])
-
     first = pieces[0]
-    return replace(
-        first,
-        nodes=every(lambda nodes: nodes.nodes),
-        points=every(lambda nodes: nodes.points),
-        weight=every(lambda nodes: nodes.weight),
-        normal=every(lambda nodes: nodes.normal),
-        admissible_normal=every(lambda nodes: nodes.admissible_normal),
-        tangent=every(lambda nodes: nodes.tangent),
-        gap=every(lambda nodes: nodes.gap),
-        deviation=every(lambda nodes: nodes.deviation),
-        motion=None if first.motion is None else every(lambda nodes: nodes.motion),
-        cut=max(nodes.cut for nodes in pieces),
-    )
+    names = ["nodes", "points", "weight", "normal", "admissible_normal", "tangent", "gap"]
+    names += ["deviation"] if first.motion is None else ["deviation", "motion"]
+    arrays = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in names}
+    return replace(first, cut=max(piece.cut for piece in pieces), **arrays)
