@@ -15,7 +15,6 @@ Laws of several contacts are `Grouped` into one law, each acting on its own node
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -23,7 +22,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.arguments import naming, real
 from contact.errors import InputError
 from contact.interface.multipliers import constraint_active
 from contact.interface.nodes import ContactNodes, Geometry, side_by_side
@@ -303,28 +301,24 @@ class Grouped:
         The law of each group.
     bounds
         Where the groups begin on this rank, and the number of all nodes.
-    label
-        Name in messages of a law that may be the user's own, and fail or return no numbers.
     """
 
     laws: tuple[Any, ...]
     bounds: tuple[int, ...]
-    label: str = ""
 
     @staticmethod
-    def of(laws: Iterable[Any], nodes: Sequence[ContactNodes], label: str = "") -> Any:
+    def of(laws: Iterable[Any], nodes: Sequence[ContactNodes]) -> Any:
         """Return one law of the kind of given ones, those of the nodes of each contact."""
         ends = np.cumsum([0, *(piece.nodes.size for piece in nodes)])
-        return Grouped(tuple(laws), tuple(int(end) for end in ends), label)
+        return Grouped(tuple(laws), tuple(int(end) for end in ends))
 
-    def _at_nodes(self, value: Callable[..., Any], *given: Array, method: str = "") -> Array:
+    def _at_nodes(self, value: Callable[..., Any], *given: Array) -> Array:
         """Return the values of each law at its own nodes: `value` of the law and its arguments."""
-        parts, label = [], f"{self.label}: {method}" if self.label and method else self.label
+        parts = []
         for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
-            with naming(label) if label else nullcontext():
-                values = value(law, *(argument[begin:end] for argument in given))
-                parts.append(real(values, (end - begin,), "one number for each node"))
-        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+            values = value(law, *(argument[begin:end] for argument in given))
+            parts.append(np.broadcast_to(np.asarray(values, dtype=float), (end - begin,)))
+        return np.concatenate(parts)
 
     def __call__(self, *given: Any) -> Any:
         """Return s(|u_tau|, p), p_nu, h_nu, phi_L, or the smoothed pressure R p."""
@@ -332,19 +326,15 @@ class Grouped:
 
     def derivative(self, s: Any) -> Any:
         """Return the derivative of a law of one argument."""
-        return self._at_nodes(lambda law, s: law.derivative(s), s, method="derivative")
+        return self._at_nodes(lambda law, s: law.derivative(s), s)
 
     def by_slip(self, slip: Any, pressure: Any) -> Any:
         """Return the derivative of a friction law by the slip."""
-        return self._at_nodes(
-            lambda law, slip, p: law.by_slip(slip, p), slip, pressure, method="by_slip"
-        )
+        return self._at_nodes(lambda law, slip, p: law.by_slip(slip, p), slip, pressure)
 
     def by_pressure(self, slip: Any, pressure: Any) -> Any:
         """Return the derivative of a friction law by the pressure."""
-        return self._at_nodes(
-            lambda law, slip, p: law.by_pressure(slip, p), slip, pressure, method="by_pressure"
-        )
+        return self._at_nodes(lambda law, slip, p: law.by_pressure(slip, p), slip, pressure)
 
     def transposed(self, values: Array) -> Array:
         """Return the transpose of R on nodal values."""
@@ -352,11 +342,11 @@ class Grouped:
 
     def at(self, s: Any, pressed: Any, loaded: Any) -> Any:
         """Return the conductivity psi."""
-        return self._at_nodes(lambda psi, *own: psi.at(*own), s, pressed, loaded, method="at")
+        return self._at_nodes(lambda psi, *own: psi.at(*own), s, pressed, loaded)
 
     def gap_slope(self, s: Any, pressed: Any) -> Any:
         """Return the derivative of psi by the gap."""
-        return self._at_nodes(lambda psi, *own: psi.gap_slope(*own), s, pressed, method="gap_slope")
+        return self._at_nodes(lambda psi, *own: psi.gap_slope(*own), s, pressed)
 
     @property
     def maximum(self) -> float:
@@ -401,8 +391,8 @@ def joined_layers(given: Sequence[Layer | None], geometries: Sequence[Geometry])
     pieces, layers = [geometry.nodes for geometry in geometries], [own or NO_LAYER for own in given]
     return Layer(
         np.repeat([own.thickness for own in layers], [piece.nodes.size for piece in pieces]),
-        Grouped.of((own.p_nu for own in layers), pieces, "layer: p_nu"),
-        Grouped.of((own.h_nu for own in layers), pieces, "layer: h_nu"),
+        Grouped.of((own.p_nu for own in layers), pieces),
+        Grouped.of((own.h_nu for own in layers), pieces),
         _alike([own.lagged for own in given if own is not None]),
     )
 
@@ -422,9 +412,9 @@ def joined_conductors(
 
     moving = any(own.phi_f_at is not None for own in conductors)
     return Conductor(
-        Grouped.of((own.psi for own in conductors), pieces, "Conductor: psi"),
+        Grouped.of((own.psi for own in conductors), pieces),
         np.repeat([own.phi_f for own in conductors], sizes),
-        Grouped.of((own.phi_l for own in conductors), pieces, "Conductor: phi_l"),
+        Grouped.of((own.phi_l for own in conductors), pieces),
         _alike([own.lagged for own in given if own is not None]),
         phi_f if moving else None,
     )

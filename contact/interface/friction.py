@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -46,20 +46,6 @@ from forms.laws import (
 
 #: Angles at which omega is taken on a ring; it is smooth.
 ANGLES = 32
-
-
-class Smoother(Protocol):
-    """R at all contact nodes, of one part or of several."""
-
-    @property
-    def radius(self) -> float:
-        """The largest radius (length)."""
-
-    def __call__(self, values: Array) -> Array:
-        """Return R applied to nodal values, shape (n,). Collective."""
-
-    def transposed(self, values: Array) -> Array:
-        """Return R^T applied to nodal values, shape (n,). Collective."""
 
 
 class Smoothing:
@@ -251,13 +237,13 @@ class NodalFriction:
     law
         The friction bound, for all nodes at once; None without friction.
     smoothing
-        The operator R.
+        The operator R (`Smoothing`) of each contact.
     history
         The slip before the step.
     """
 
     law: FrictionLaw | None
-    smoothing: Smoother
+    smoothing: Grouped
     history: SlipHistory
 
     @property
@@ -318,6 +304,5 @@ def joined_friction(
     laws, law = [law_at(given, own) for given, own in pairs], None
     if any(laws):
         every = [NO_FRICTION if own is None else own for own in laws]
-        user = any(hasattr(given.mu, "by_slip") for given in frictions)
-        law = Grouped.of(every, pieces, "Friction: law" if user else "Friction: mu")
+        law = Grouped.of(every, pieces)
     return NodalFriction(law, smoothing, SlipHistory.rest(nodes))

@@ -10,7 +10,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeAlias, TypeVar, runtime_checkable
+from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -69,14 +69,6 @@ class Record:
 Monitor: TypeAlias = Callable[[Record], None]
 
 
-@runtime_checkable
-class Poll(Protocol):
-    """A monitor that can stop the solve within an outer iteration too."""
-
-    def poll(self) -> None:
-        """Raise on all ranks to end the solve. Collective."""
-
-
 @dataclass
 class Recorder:
     """Keeps the records of a solve, logs them at a level, and calls the monitor with each."""
@@ -116,9 +108,10 @@ class Recorder:
             self.monitor(record)
 
     def poll(self) -> None:
-        """Let the monitor end the solve within an outer iteration. Collective."""
-        if isinstance(self.monitor, Poll):
-            self.monitor.poll()
+        """Let a monitor with `poll` end the solve within an outer iteration. Collective."""
+        poll = getattr(self.monitor, "poll", None)
+        if poll is not None:
+            poll()
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,5 @@
 """Rigid-body modes that the supports do not constrain: by contact, by friction alone, by nothing.
 
-A mode that friction alone constrains makes the linear systems of fixed points singular at zero
-displacement, where no pressure gives a friction bound: the nodes that touch first get a bound at
-which they stick (`UnconstrainedModes.stuck_bound`).
-
 Solutions with an unconstrained mode differ by a rigid motion: the one of least displacements in L2
 is taken (`with_least_displacements`).
 
@@ -21,16 +17,15 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Operator
 from contact.mesh.cells import rule, shape_of
-from contact.mesh.entities import component_sums
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.methods.report import Outcome
-from contact.problem.condensed import AnyProblem, CondensedProblem
+from contact.problem.condensed import AnyProblem, CondensedBody, CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.rigid_modes import (
@@ -41,14 +36,12 @@ from contact.problem.rigid_modes import (
     sliding_mode,
 )
 from contact.problem.state import State
+from contact.ranks import summed
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 
 #: Note of a rigid motion to a state with all nodes open.
 RIGID_MOTION = "rigid motion"
-
-#: Friction bound of a sticking node, as a force over all loads.
-STUCK = 10.0
 
 
 @dataclass(frozen=True)
@@ -110,40 +103,11 @@ class UnconstrainedModes:
         grams = [group.constraints(friction, touching) for group in groups(self.problem)]
         return all(null_space(gram).size == 0 for gram in grams)
 
-    def stuck_bound(self) -> Array | None:
-        """Return friction bounds above all loads, shape (n,) (stress); None if not needed.
-
-        That is where supports and frictionless contact balance all loads. Collective.
-        """
-        problem = self.problem
-        weight = problem.interface.nodes.weight
-        if not problem.frictional:
-            return None
-        if not (self.friction_alone or self.overloaded(np.zeros_like(weight))):
-            return None
-        loads = _loads(problem)
-        borne, total = float(loads[_without_supports(problem)].sum()), float(loads.sum())
-        # Loads on bodies with supports count where there are no others.
-        bound = STUCK * (borne if borne > EPS * total else total)
-        return np.where(self._nearest(), bound / weight, 0.0)
-
     def overloaded(self, bound: Array) -> bool:
         """Tell whether the loads are more than friction bounds (n,) balance. Collective."""
         friction, time = self.problem.nodes.weight * bound, self.problem.time
         found = [sliding_mode(group, time, friction) for group in self._unsupported]
         return any(mode is not None for mode in found)
-
-    def _nearest(self) -> NDArray[np.bool_]:
-        """Return which nodes of each unsupported body touch first, shape (n,). Collective."""
-        # At others, whose tangents are inclined, friction could bear a body without pressure.
-        interface, rest = self.problem.interface, self.problem.start()
-        normal_gap = interface.normal_gap(interface.nodes.apply(rest.x))
-        found = np.zeros(normal_gap.size, dtype=bool)
-        for group in self._unsupported:
-            moved = np.abs(group.normal).sum(axis=1) + np.abs(group.tangential).sum(axis=(1, 2))
-            own = np.where(moved > 0, normal_gap, np.inf)
-            found |= own <= NEGLIGIBLE * interface.diameter - interface.nodes.maximum(-own)
-        return found
 
     @cached_property
     def _unsupported(self) -> list[Group]:
@@ -310,23 +274,11 @@ def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -
 
 def all_loads(problem: AnyProblem) -> float:
     """Return the sum of |load| over the unknowns, at zero displacement. Collective."""
-    return float(_loads(problem).sum())
+    body = problem.equilibrium
+    return sum_of_forces(body, body.unbalanced(residual_forces(problem, problem.start())))
 
 
-def _loads(problem: AnyProblem) -> Array:
-    """Return this sum for each connected component, shape (k,). Collective."""
-    body, of = problem.equilibrium, problem.equilibrium.component_norms
-    residual = residual_forces(problem, problem.start())
-    forces = np.abs(body.unbalanced(residual)) * of.mechanical
-    own = np.repeat(of.component, body.block_size)
-    found = component_sums(body.comm, own, forces[: body.owned], of.count)
-    return found + np.bincount(of.behind, forces[body.owned :], of.count)
-
-
-def _without_supports(problem: ContactProblem) -> NDArray[np.bool_]:
-    """Return which connected components have no support, shape (k,). Collective."""
-    body, of = problem.equilibrium, problem.equilibrium.component_norms
-    supported = np.any(~body.unsupported[:, : body.dim], axis=1).astype(float)
-    if body.layout.inclined is not None:
-        supported[body.layout.inclined.nodes] = 1.0
-    return component_sums(problem.comm, of.component, supported, of.count) == 0
+def sum_of_forces(body: BodyEquilibrium | CondensedBody, forces: Array) -> float:
+    """Return the sum of |force| over the unknowns, of owned values. Collective."""
+    on_nodes, on_global = np.split(np.abs(forces) * body.component_norms.mechanical, [body.owned])
+    return float(summed(body.comm, on_nodes.sum())) + float(on_global.sum())

@@ -28,7 +28,7 @@ from contact.linear.operator import Counters, Operator
 from contact.methods.newton_step import ConductivityDerivative
 from contact.methods.options import FixedPointOptions, LoopOptions
 from contact.methods.report import Best, Monitor, Outcome, Record, Recorder, Stagnation
-from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads, sum_of_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate, undeformed_equilibrium
 from contact.problem.state import State
@@ -169,6 +169,9 @@ class OuterLoop(ABC):
         return Outcome(residuals, self.options.allowed, ended, criterion=criterion)
 
 
+#: First friction bound where friction has to balance loads, as a force over all loads.
+STUCK = 10.0
+
 #: Stagnation limit where the Uzawa block relaxation stagnates too.
 STALLED = 3
 
@@ -177,6 +180,19 @@ FROZEN = (
     " though each frozen problem is solved: the frozen terms (friction bound, conducting nodes, "
     "material) cycle"
 )
+
+
+def sticking_bound(problem: ContactProblem) -> Array | None:
+    """Return friction bounds above all loads, shape (n,) (stress), for the first problem.
+
+    None where supports and frictionless contact balance all loads. Collective.
+    """
+    modes, weight = UnconstrainedModes(problem), problem.nodes.weight
+    if not (problem.frictional and (modes.friction_alone or modes.overloaded(0 * weight))):
+        return None
+    # What prescribed displacements strain friction need not bear.
+    loads = sum_of_forces(problem.equilibrium, problem.equilibrium.external(problem.time))
+    return np.asarray(STUCK * (loads or all_loads(problem)) / weight, dtype=float)
 
 
 @dataclass
@@ -210,7 +226,7 @@ class FixedPoint(OuterLoop):
         if start is None:
             # Secant at zero strain: prescribed values so far strain only the elements beside them.
             self.state, self._secant_at = problem.start(), problem.equilibrium.rest()
-            stuck = UnconstrainedModes(problem).stuck_bound()
+            stuck = sticking_bound(problem)
             # Iteration 0 is the frictionless problem of the thesis: none with a bound that is
             # updated in the relaxation, or with a mode that friction alone constrains.
             first = 0 if frictional and not self.options.single_loop and stuck is None else 1

@@ -25,8 +25,7 @@ from scripts.benchmarks.bench_one import (
 )
 
 #: Phase -> the end of the file's name, and the function. None of them calls another one, but that a
-#: factorisation for a Schur complement is a set-up too. Without condensation the steps on the whole
-#: body are those of `solve_contact`, which is left out.
+#: factorisation for a Schur complement is a set-up too.
 PHASES = {
     "assembly of matrices": ("body/equilibrium.py", "assemble"),
     "set-up of multigrid, factorisation": ("~", "<method 'setUp' of 'petsc4py.PETSc.KSP' objects>"),

@@ -106,7 +106,7 @@ def test_what_rounding_leaves_of_a_multiplier_conducts_nothing():
     x = np.column_stack([depth[:, None] * nodes.normal, np.zeros(3)])
     charge = law.charge(x, np.array([1e-19, 0.1, 0.0]))
     assert charge == pytest.approx([0.0, -0.7 * 1.5, -0.7 * 1.5], abs=0)
-    layered = replace(law, compliance=Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0)))
+    layered = replace(law, layer=Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0)))
     x = np.column_stack([(nodes.gap - 0.1)[:, None] * nodes.normal, np.zeros(3)])
     assert layered.charge(x, layered.pressure(x)) == pytest.approx([-0.7 * 1.5] * 3)
 

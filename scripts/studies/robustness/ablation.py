@@ -290,13 +290,7 @@ DEVICES = (
     Device("limit analysis of the friction bound", (UnconstrainedModes.overloaded,), "Drucker 1954",
            ((UnconstrainedModes, "overloaded", lambda *_: False),), (), _own("wall")),
     Device("rigid motion to a state without contact", (UnconstrainedModes.separated,),
-<<<<<<< HEAD
-           "Lawson and Hanson 1974", ((fallbacks, "_separated", _nothing),), (), _pads),
-=======
            "Lawson and Hanson 1974", ((fallbacks, "rigid_motion", _nothing),), (), _pads),
-    Device("sticking start where friction alone restrains", (UnconstrainedModes.stuck_bound,), "-",
-           ((UnconstrainedModes, "stuck_bound", _nothing),), (), _own("dragged-strip")),
->>>>>>> 8a98e229 (newton: the fallbacks as one list of functions, the method on the whole body made once a load step)
     Device("proximal points", (fallbacks.proximal_points,), "Rockafellar 1976",
            ((fallbacks, "proximal_points", _nothing),), (), _belt),
     Device("continuation in the conductivity", (fallbacks.continuation,), "Allgower and Georg 2003",
