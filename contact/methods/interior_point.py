@@ -319,7 +319,7 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
         a rigid-body mode or the potential.
     """
     problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
-    bound = np.zeros(interface.nodes.weight.size)
+    bound: Array = np.zeros(interface.nodes.weight.size)
     aside: tuple[State, Outcome] | None = None
     for _ in range(UPDATES):
         method = InteriorPoint(newton, bound, begin)

@@ -422,8 +422,8 @@ def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
     def found() -> Array | None:
         bears = bound > NEGLIGIBLE * scale / bound.size
         along = [unit_vectors(of[bears]) for of in sideways]
-        own = np.asarray(bound[bears] / scale, dtype=float)
-        mode = _most_power(work / scale, normal, tangential[bears], own, along)
+        each, own = (np.asarray(of / scale, dtype=float) for of in (work, bound[bears]))
+        mode = _most_power(each, normal, tangential[bears], own, along)
         return None if mode is None else np.asarray(free @ mode)
 
     return on_root(problem.comm, found)
