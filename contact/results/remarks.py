@@ -308,7 +308,8 @@ def unstable_charge(solution: Solution) -> Iterator[str]:
     delta |phi - phi_F| (e/C) Bi/(1 + Bi) exceeds 1: several solutions may then exist.
     """
     problem, width = solution.problem, solution.conduction_ramp
-    piezo, scales, conductor = problem.body.piezo, problem.scales, problem.interface.foundation.conductor
+    piezo, scales = problem.body.piezo, problem.scales
+    conductor = problem.interface.foundation.conductor
     if width is None or piezo is None or conductor is None or conductor.psi.k_e == 0:
         return
     potential = problem.equilibrium.phi_scale * solution.nodal[:, -1]
