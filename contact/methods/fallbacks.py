@@ -56,7 +56,7 @@ PROXIMAL_STIFFNESS, SOFTER, STIFFER = 1e-2, 0.2, 4.0
 
 #: Ratio of the residual without the bed to the least so far that counts as progress, and most
 #: problems in succession without it: friction cannot hold the body then.
-NEARER, IN_VAIN = 0.9, 16
+NEARER, STAGNANT_PROBLEMS = 0.9, 16
 
 #: Residual without the bed below which Newton's last steps are tried.
 NEARLY_BALANCED = 0.03
@@ -308,9 +308,9 @@ def proximal_points(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, 
         return None
     nodes, state = interface.nodes, problem.start()
     stiffness = PROXIMAL_STIFFNESS * newton.step.parameters.c
-    least, in_vain = np.inf, 0
-    while in_vain < IN_VAIN:
-        in_vain += 1
+    least, stagnant = np.inf, 0
+    while stagnant < STAGNANT_PROBLEMS:
+        stagnant += 1
         term = Proximal(stiffness, nodes.tangential_component(nodes.apply(state.x)))
         method = newton.on(problem.with_laws(replace(interface, proximal=term)))
         try:
@@ -322,7 +322,7 @@ def proximal_points(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, 
             state, stiffness = balanced, SOFTER * stiffness
             residual = evaluate(problem, state).significant
             if residual < NEARER * least:
-                least, in_vain = residual, 0
+                least, stagnant = residual, 0
             if residual <= NEARLY_BALANCED:
                 found = newton.iterate(newton.started(state), note=PROXIMAL_POINT)
                 if found[1].converged:
