@@ -190,7 +190,7 @@ def sticking_bound(problem: ContactProblem) -> Array | None:
     modes, weight = UnconstrainedModes(problem), problem.nodes.weight
     if not (problem.frictional and (modes.friction_alone or modes.overloaded(0 * weight))):
         return None
-    # What prescribed displacements strain friction need not bear.
+    # Friction need not bear the forces of prescribed displacements.
     loads = sum_of_forces(problem.equilibrium, problem.equilibrium.external(problem.time))
     return np.asarray(STUCK * (loads or all_loads(problem)) / weight, dtype=float)
 

@@ -3,7 +3,7 @@
 `python3 -m scripts.studies.held_by_friction [--out DIR] [--coarse]`, on one rank. Belts around
 60 to 300 degrees of a drum are pulled with up to 5 % less than exp(mu theta) allows, arched leaves,
 one or two on each other, are pressed between two plates, strips that lie on a plane are pulled
-with up to 99 % of their friction, clips grip a bar, rings a shaft (bodies of revolution), and
+with up to 99 % of their friction, clips embrace a bar, rings a shaft (bodies of revolution), and
 blocks hang between two jaws (3-D). The table says how many are solved, by which fallback, in how
 many linear solves; all are drawn with a fixed seed.
 """
