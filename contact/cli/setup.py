@@ -142,7 +142,8 @@ def _draw_plane(figure: Figure, boundary: Array, parts: list[Part], surface: Arr
     ax = figure.subplots()
     ax.add_collection(LineCollection(list(boundary), colors="0.4", lw=0.6))
     for k, part in enumerate(parts):
-        lines = LineCollection(list(part[1]), colors=f"C{k}", lw=2.5, label=part[0])
+        wide = 2.0 + 6.0 * (1 - k / len(parts))  # parts in one place are seen beside each other
+        lines = LineCollection(list(part[1]), colors=f"C{k}", lw=wide, label=part[0])
         ax.add_collection(lines)
         start, step = _arrows(part, boundary)
         if start.size:
