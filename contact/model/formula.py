@@ -9,17 +9,12 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache, reduce
 from types import CodeType
 from typing import TYPE_CHECKING, Any
 
-import basix.ufl
 import numpy as np
-import ufl
 from numpy.typing import ArrayLike, NDArray
-from ufl.constantvalue import ScalarValue, Zero
-from ufl.corealg.traversal import traverse_unique_terminals
 
 from contact.arguments import OfTime, Returned
 from contact.errors import InputError, counted, shown
@@ -36,12 +31,9 @@ ACCEPTED = (
     "min, max, where(condition, a, b)"
 )
 
-#: Longest formula (characters) and deepest nesting: far beyond any load, and small enough for
-#: every recursion over the tree, in Python's compiler and in UFL.
+#: Longest formula (characters) and deepest nesting, which every recursion over it bears.
 MAX_LENGTH = 1000
 MAX_DEPTH = 100
-
-NOT_FINITE = "a constant in it is not finite; accepted: finite numbers"
 
 #: The coordinates and the time.
 VARIABLES = ("x", "y", "z", "t")
@@ -104,6 +96,8 @@ class Expression:
     ----------
     source
         A finite number or a formula in x, y, z and t.
+    time
+        The time of a formula in t: a number, or a constant of a form.
 
     Raises
     ------
@@ -111,19 +105,13 @@ class Expression:
         If the source is anything else; the message names the source and the accepted ones.
     """
 
-    def __init__(self, source: float | str) -> None:
-        self.source = source
+    def __init__(self, source: float | str, time: float | fem.Constant | None = None) -> None:
+        if isinstance(source, bool) or not isinstance(source, int | float | str):
+            raise InputError(f"{source!r} is neither a number nor a formula", "formula")
+        self.source = source if isinstance(source, str) else _finite(source, source)
+        self.time = time
         if isinstance(source, str):
             _read(source)
-            return
-        if isinstance(source, bool) or not isinstance(source, int | float):
-            raise InputError(f"{source!r} is neither a number nor a formula", "formula")
-        try:
-            self.source = _finite(source)
-        except InputError:
-            raise InputError(
-                f"{shown(source)} is not finite; accepted: finite numbers", "not-finite"
-            ) from None
 
     @property
     def names(self) -> frozenset[str]:
@@ -133,34 +121,26 @@ class Expression:
     @property
     def is_constant(self) -> bool:
         """True if the value is the same everywhere at all times."""
-        return not isinstance(self.source, str) or _read(self.source)[2] is not None
+        return not self.names
 
     @property
     def value(self) -> float:
         """The value of a constant expression; of others a ValueError."""
-        value = _read(self.source)[2] if isinstance(self.source, str) else self.source
-        if value is None:
+        if self.names:
             raise ValueError(f"{self} depends on the coordinates or the time")
-        return value
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether it is nothing."""
-        return self.is_constant and self.value == 0
+        return _read(self.source)[2] if isinstance(self.source, str) else self.source
 
     def number(self, time: float) -> float:
         """Return the value of an expression that depends on the time alone."""
-        return float(self.numpy(np.zeros((1, 3)), time)[0])
+        return float(Expression(self.source, time).numpy(np.zeros((1, 3)))[0])
 
-    def numpy(self, points: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
+    def numpy(self, points: ArrayLike) -> NDArray[np.float64]:
         """Evaluate at points.
 
         Parameters
         ----------
         points
             Coordinates, shape (n, 2) or (n, 3).
-        time
-            The time, for a formula in t.
 
         Returns
         -------
@@ -172,9 +152,9 @@ class Expression:
             If a value is not finite or its square overflows, or z is used in 2-D.
         """
         points = np.asarray(points, dtype=np.float64)
-        # An array, since numbers are taken for constants of the formula.
-        moment = None if time is None else np.full(1, time, dtype=np.float64)
-        result = self._evaluate(points.T, points.shape[1], moment)
+        # An array: NumPy's numbers divide by 0, Python's do not.
+        time = None if self.time is None else np.full(1, self.time, dtype=np.float64)
+        result = self._evaluate(points.T, points.shape[1], time)
         values = np.array(np.broadcast_to(result, points.shape[:1]), dtype=np.float64)
         bad = np.flatnonzero(~(np.abs(values) <= HUGE))
         if bad.size:
@@ -190,15 +170,14 @@ class Expression:
             )
         return values
 
-    def ufl(self, x: Expr, time: float | fem.Constant | None = None) -> Expr:
-        """Return the scalar UFL expression at ``x``, a vector of length 2 or 3, and a time."""
+    def ufl(self, x: Expr) -> Expr:
+        """Return the scalar UFL expression at ``x``, a vector of length 2 or 3."""
         (dimension,) = x.ufl_shape
-        return ops.symbolic(self._evaluate(x, dimension, time))
+        return ops.symbolic(self._evaluate(x, dimension, self.time))
 
     def _evaluate(self, x: Any, dimension: int, time: Any) -> Any:
-        if self.is_constant:
+        if not isinstance(self.source, str) or self.is_constant:
             return self.value
-        assert isinstance(self.source, str)
         if dimension < 3 and "z" in self.names:
             raise InputError(
                 f"{self} uses z in a plane problem; accepted there: x and y", "formula-variable"
@@ -209,8 +188,7 @@ class Expression:
             )
         coordinates = (x[i] for i in range(dimension))
         variables = dict(zip(VARIABLES, coordinates, strict=False)) | {"t": time}
-        with np.errstate(all="ignore"):
-            return eval(_read(self.source)[0], _NAMES, variables)
+        return _value(self.source, _read(self.source)[0], variables)
 
     def __repr__(self) -> str:
         """Return the call that makes this expression."""
@@ -221,37 +199,21 @@ class Expression:
         return shown(self.source)
 
     def __eq__(self, other: object) -> bool:
-        """Compare the sources."""
-        return isinstance(other, Expression) and self.source == other.source
+        """Compare sources and times."""
+        own = isinstance(other, Expression)
+        return own and (self.source, self.time) == (other.source, other.time)
 
     def __hash__(self) -> int:
         """Hash the source."""
         return hash(self.source)
 
 
-@dataclass(frozen=True)
-class AtTime:
-    """A formula in t as a function of position: at a number, or a constant of a form."""
-
-    expression: Expression
-    time: float | fem.Constant
-
-    def ufl(self, x: Expr) -> Expr:
-        """Return the formula as a UFL expression of the coordinates."""
-        return self.expression.ufl(x, self.time)
-
-    def numpy(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the values at points of shape (n, d)."""
-        assert isinstance(self.time, float)
-        return self.expression.numpy(points, self.time)
-
-
 class InTime(Expression):
     """A formula in t as a function of position and time."""
 
-    def at(self, time: float | fem.Constant) -> AtTime:
+    def at(self, time: float | fem.Constant) -> Expression:
         """Return the function of position at a time."""
-        return AtTime(self, time)
+        return Expression(self.source, time)
 
 
 def of_time(given: Any) -> Any:
@@ -274,13 +236,8 @@ def as_number(given: Expression | OfTime, unit: float = 1.0) -> float | OfTime:
 
 
 @lru_cache(maxsize=1000)
-def _read(source: str) -> tuple[CodeType, frozenset[str], float | None]:
-    """Return the code of a formula, the names of its variables, and the value of a constant."""
-    if len(source) > MAX_LENGTH:
-        raise InputError(
-            f"{shown(source)} has {len(source)} characters; accepted: at most {MAX_LENGTH}",
-            "long-formula",
-        )
+def _read(source: str) -> tuple[CodeType, frozenset[str], float]:
+    """Return the code of a formula, the names of its variables, and its value at ones."""
     try:
         body = ast.parse(source.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -291,37 +248,37 @@ def _read(source: str) -> tuple[CodeType, frozenset[str], float | None]:
     level: list[ast.AST] = [body]
     for _ in range(MAX_DEPTH):
         level = [child for node in level for child in ast.iter_child_nodes(node)]
-    if level:
-        raise InputError(
-            f"{shown(source)} is nested too deeply; accepted: {MAX_DEPTH} levels", "long-formula"
-        )
+    if level or len(source) > MAX_LENGTH:
+        accepted = f"{MAX_LENGTH} characters, and {MAX_DEPTH} levels of nesting"
+        raise InputError(f"{shown(source)} is too long; accepted: {accepted}", "long-formula")
     try:
         tree = ast.fix_missing_locations(ast.Expression(_translated(body)))
-        code = compile(tree, "formula", "eval")
-        # UFL evaluates the constant parts, 1/(0*x) too.
-        symbol = ufl.Constant(ufl.Mesh(basix.ufl.element("P", "tetrahedron", 1, shape=(3,))))
-        with np.errstate(all="ignore"):
-            found = ufl.as_ufl(eval(code, _NAMES, dict.fromkeys(VARIABLES, symbol)))
-        for part in traverse_unique_terminals(found):
-            if isinstance(part, ScalarValue):
-                _finite(part.value())
     except InputError as error:
         raise error.within(f"{shown(source)}: ") from None
-    except (ValueError, ArithmeticError):
-        raise InputError(f"{shown(source)}: {NOT_FINITE}", "not-finite") from None
-    if isinstance(found, ScalarValue | Zero):
-        return code, frozenset(), float(found)
-    names = {node.id for node in ast.walk(body) if isinstance(node, ast.Name)}
-    return code, frozenset(names & {*VARIABLES}), None
+    code = compile(tree, "formula", "eval")
+    names = {node.id for node in ast.walk(body) if isinstance(node, ast.Name)} & {*VARIABLES}
+    # Python's numbers in it raise errors where they have no value.
+    value = _value(source, code, dict.fromkeys(VARIABLES, np.ones(1)))
+    return code, frozenset(names), np.nan if names else _finite(value, source)
 
 
-def _finite(value: Any) -> float:
+def _value(source: str, code: CodeType, variables: Mapping[str, Any]) -> Any:
+    """Return the value of a formula, of NumPy arrays or of UFL."""
+    try:
+        with np.errstate(all="ignore"):
+            return eval(code, _NAMES, {**variables})
+    except (ArithmeticError, ValueError):
+        return _finite(math.nan, source)
+
+
+def _finite(value: Any, source: object) -> float:
+    """Return a finite number, or raise an InputError."""
     try:
         number = float(value)
     except (OverflowError, TypeError):  # a whole number of many digits, a complex one
         number = math.inf
     if not math.isfinite(number):
-        raise InputError(NOT_FINITE, "not-finite")
+        raise InputError(f"{shown(source)} is not finite; accepted: finite numbers", "not-finite")
     return number
 
 
@@ -329,7 +286,7 @@ def _translated(node: ast.expr) -> ast.expr:
     """Return an accepted node with floats for numbers, and calls for comparisons."""
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
-            return ast.Constant(_finite(value))
+            return ast.Constant(_finite(value, value))
         case ast.Name(id=name):
             if name in (*VARIABLES, "pi"):
                 return node
