@@ -1,26 +1,90 @@
-"""Types of settings with their bounds, and the accepted values in words.
-
-A class of options is a frozen dataclass that states each setting once: name, type with bounds and
-default in its field, the meaning under "Attributes" in its docstring. Python makes it unchecked;
-the case file checks the bounds, and has its messages and its reference page from the same place.
-"""
+"""Types of settings with their bounds, and the accepted values in words."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 from annotated_types import Ge, Gt, Le, Len, Lt, Predicate
+from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler
+from pydantic.json_schema import SkipJsonSchema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from contact.errors import shown
 from contact.tolerances import PRECISION
+
+
+class Words(str):
+    """Words for a message, as against a text given in the case file."""
+
+
+#: Stands for the given value of a key that is missing.
+MISSING = Words("missing")
+
+
+def fault(key: str, given: Any, accepted: str, identifier: str = "") -> PydanticCustomError:
+    """Return an error for a validator to raise.
+
+    Parameters
+    ----------
+    key
+        Dotted path below the model that raises it.
+    given
+        The given value of the case file, or words inside `Words`.
+    accepted
+        The accepted values, in words.
+    identifier
+        See `InputError`; by default that of a missing key, or of a wrong value.
+    """
+    identifier = identifier or ("missing" if given is MISSING else "value")
+    words = given if isinstance(given, Words) else f"given {shown(given)}"
+    context = {"key": key, "given": words, "accepted": accepted, "identifier": identifier}
+    return PydanticCustomError("fault", "fault", context)
+
+
+One = TypeVar("One")
+
+#: Types of errors whose words are complete: `fault`, and an InputError.
+COMPLETE = ("fault", "value_error")
+
+
+def keys_in(location: tuple[int | str, ...]) -> list[str]:
+    """Return the keys of a location of pydantic's, without its tags of unions (`:list`)."""
+    return [str(key) for key in location if not str(key).startswith((":", "["))]
 
 
 @dataclass(frozen=True)
 class Accepted:
-    """The accepted values of a type in words."""
+    """The accepted values of a type in words, which its errors then have.
+
+    Attributes
+    ----------
+    text
+        The words.
+    key
+        Of kinds of tables the key that tells them apart.
+    """
 
     text: str
+    key: str = ""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """Wrap the validation of the type."""
+        return core_schema.no_info_wrap_validator_function(self._check, handler(source))
+
+    def _check(self, given: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+        try:
+            return handler(given)
+        except ValidationError as error:
+            for one in error.errors(include_url=False):
+                if keys_in(one["loc"]) or one["type"] in COMPLETE:
+                    raise  # of a value inside
+            inner = isinstance(given, Mapping) and self.key in given
+            raise fault(
+                *((self.key, given[self.key]) if inner else ("", given)), self.text
+            ) from None
 
 
 @dataclass(frozen=True)
@@ -55,15 +119,8 @@ class ReadWith:
         return f"{self.key} = {' or '.join(map(json.dumps, values))}"
 
 
-@dataclass(frozen=True)
-class Internal:
-    """Mark of a setting for Python alone, not in the case file."""
-
-
-@dataclass(frozen=True)
-class Required:
-    """Marks a setting that the case file requires, where Python has another one for it."""
-
+#: A setting for Python alone, not in the case file.
+Internal: TypeAlias = Annotated[One, Field(exclude=True), SkipJsonSchema()]
 
 #: Mark of a list with one number a dimension.
 SPATIAL = "spatial"

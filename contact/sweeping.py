@@ -363,7 +363,7 @@ class _Runner:
     def _settings(self, case: Case) -> Options:
         """Return the method's options: the factorisation of a case may serve the next one."""
         if self._warm and isinstance(case.solver, NewtonOptions):
-            return replace(case.solver, keep="across")
+            return case.solver.model_copy(update={"keep": "across"})
         return case.solver
 
     def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:

@@ -56,7 +56,7 @@ def page() -> str:
     described = {key: list(sections_of(f.annotation).values()) for key, f in keys_of(Case).items()}
     top = [section for sections in described.values() for section in sections]
     for key, sections in described.items():
-        if any(is_dataclass(section) for section in sections):
+        if key in ("solver", "output"):
             lines += _options(key, sections)
             continue
         for section in sections:
@@ -77,11 +77,11 @@ def _describe(key: str, section: type, elsewhere: Collection[type]) -> Iterator[
         Sections that have a place of their own.
     """
     text = re.split(r"\n\n(?:Attributes|Parameters)\n", inspect.getdoc(section) or "")[0]
+    name, kinds = kinds_of([section])
     if is_dataclass(section):
-        name, kinds = kinds_of([section])
-        if not kinds:
-            return
         heading = f"`{key} = {{ {name} = {shown(*kinds)}, ... }}`"
+    elif not text.startswith("`"):
+        return
     else:
         heading, text = text.split(": ", 1)
     yield from ("", f"## {heading}", "", text[0].upper() + text[1:], "", *_rows(section))

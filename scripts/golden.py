@@ -21,7 +21,6 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import replace
 from fnmatch import fnmatchcase
 from multiprocessing import get_context
 from pathlib import Path
@@ -86,7 +85,7 @@ def measured(solution: Solution) -> dict[str, Value]:
     comm = solution.problem.comm
     with tempfile.TemporaryDirectory() as place:
         folder = comm.bcast(place)
-        solution.output = replace(solution.output, fields="none")
+        solution.output = solution.output.model_copy(update={"fields": "none"})
         write_outputs(solution, folder)
         files = comm.bcast(_read(Path(folder)) if comm.rank == 0 else None)
     summary, nodes, steps = files

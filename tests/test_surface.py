@@ -103,8 +103,8 @@ def found_untyped(name: str, made: Any) -> set[str]:
         for argument in inspect.signature(function).parameters.values():
             if argument.annotation is inspect.Parameter.empty and argument.name != "self":
                 assert argument.name == "cls", f"{name}{label}: {argument.name} without a type"
-        # That of a dataclass has the types of its fields, which stand in several modules.
-        if function.__code__.co_filename != "<string>":
+        # That of a dataclass, or a section, has the types of its fields, which are looked at below.
+        if not function.__code__.co_filename.endswith(("<string>", "model/section.py")):
             found |= {
                 f"{name}{label}: {argument}"
                 for argument in untyped(function.__annotations__, function.__module__)

@@ -12,10 +12,10 @@ from contact.mesh.domain import meet, members
 from contact.model.body import ZERO
 from contact.model.fields import CONSTANT
 from contact.model.formula import Expression
-from contact.model.messages import Words, fault, listed
+from contact.model.messages import listed
 from contact.model.section import AMPLITUDE, PART, as_given, walk
 from contact.model.units import SYSTEMS, System, system_named
-from contact.settings import SPATIAL
+from contact.settings import MISSING, SPATIAL, Words, fault
 from contact.tolerances import HUGE
 
 #: `contact.case.file.Case`, which calls these checks.
@@ -210,7 +210,7 @@ def _check_regions(case: Case) -> None:
     seen: dict[str, str] = {}
     for path, material in case.materials:
         if material.on is None and len(case.materials) > 1:
-            raise fault(f"{path}.on", Words("missing"), "regions for each of several materials")
+            raise fault(f"{path}.on", MISSING, "regions for each of several materials")
         for name in material.on or ():
             if seen.setdefault(name, path) != path:
                 raise fault(f"{path}.on", name, f"regions that {seen[name]} does not have")

@@ -18,11 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Discriminator,
     Field,
-    PlainSerializer,
     PrivateAttr,
     Tag,
     ValidationError,
@@ -33,7 +31,7 @@ from pydantic_core import PydanticCustomError
 from contact.case.checks import check_mesh, check_sections
 from contact.case.mesh import Mesh, cut_about_axis
 from contact.errors import InputError, clipped
-from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
+from contact.methods.options import OPTIONS, NewtonOptions, Options
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.evolution import Evolution
@@ -41,16 +39,13 @@ from contact.model.fields import CONSTANT, Amplitude, Ramp, steady
 from contact.model.foundation import Electric
 from contact.model.friction import Friction
 from contact.model.material import Material
-from contact.model.messages import describe, describe_fault, fault, keys_of, path_of, shown
+from contact.model.messages import describe, describe_fault, either, shown
 from contact.model.rigid import Motion, Rigid
 from contact.model.section import (
-    FromTable,
     OneOrSome,
     Section,
     Text,
     as_tuple,
-    check_conditions,
-    without_effect,
 )
 from contact.model.units import NAMES, SYSTEMS, system_named
 from contact.results.options import OutputOptions, Units
@@ -81,22 +76,7 @@ DEFAULT = NewtonOptions()
 
 def _method_of(given: Any) -> str:
     method = given.get("method", DEFAULT.method) if isinstance(given, Mapping) else None
-    return str(getattr(given, "method", method))
-
-
-def _check_options(options: Options) -> Options:
-    check_conditions(options)
-    if isinstance(options, FixedPointOptions) and options.inner_tolerance is not None:
-        if options.inner_tolerance > options.tolerance:
-            accepted = f"at most tolerance = {options.tolerance:g}"
-            raise fault("inner_tolerance", options.inner_tolerance, accepted)
-    return options
-
-
-def _read_by(options: Options) -> dict[str, Any]:
-    of: type = type(options)
-    keys = (key for key in keys_of(of) if key not in without_effect(options))
-    return {key: getattr(options, key) for key in keys if getattr(options, key) is not None}
+    return f":{getattr(given, 'method', method)}"
 
 
 #: `[solver]`: the options of one method, by its name: one of those that `OPTIONS` lists.
@@ -104,11 +84,9 @@ if TYPE_CHECKING:
     Solver: TypeAlias = Options
 else:
     Solver = Annotated[
-        reduce(or_, (Annotated[kind, FromTable, Tag(name)] for name, kind in OPTIONS.items())),
+        reduce(or_, (Annotated[kind, Tag(f":{name}")] for name, kind in OPTIONS.items())),
         Discriminator(_method_of),
-        AfterValidator(_check_options),
-        PlainSerializer(_read_by),
-        Accepted("a table"),
+        Accepted(f"a table with method = {either(map(shown, OPTIONS))}", "method"),
     ]
 
 
@@ -137,7 +115,6 @@ def _labels(given: Any) -> Any:
 #: `[case] units`: labels, or the name of a system, whose labels they then are.
 Labels: TypeAlias = Annotated[
     Units,
-    FromTable,
     BeforeValidator(_labels),
     Accepted(f"{NAMES}, or a table {{ length, stress, potential, charge }} of names"),
 ]
@@ -188,7 +165,7 @@ class Case(Section):
     """Load steps: `[evolution]`. Absent: one static step."""
     solver: Solver = DEFAULT
     """Method and tolerances: `[solver]`."""
-    output: Annotated[OutputOptions, FromTable] = OutputOptions()
+    output: OutputOptions = OutputOptions()
     """Files of results: `[output]`."""
 
     _source: str = PrivateAttr("case")
@@ -370,7 +347,7 @@ def parse_case(
     try:
         case = Case.model_validate(data, context={"folder": folder})
     except ValidationError as error:
-        raise describe(error, Case, source) from None
+        raise describe(error, source) from None
     file = case.mesh.file
     if file is not None and not Path(file).is_file():
         raise InputError(
@@ -419,7 +396,7 @@ def override(data: dict[str, Any], text: str, source: str) -> None:
     place: Any = data
     for i, key in enumerate((*parents, last)):
         if not isinstance(place, dict | list):
-            words = f"{path_of(parents[:i])} is {shown(place)}, no table"
+            words = f"{clipped('.'.join(parents[:i]))} is {shown(place)}, no table"
             raise _refusal(source, path, f"{words}; accepted: keys of tables")
         at: Any = key if isinstance(place, dict) else _index(place, key, parents[:i], path, source)
         if i == len(parents):
@@ -445,7 +422,7 @@ def _index(place: list[Any], key: str, above: list[str], path: str, source: str)
     number = key.isascii() and key.isdigit() and len(key) <= LONGEST_INDEX
     if not number or int(key) >= len(place):
         accepted = f"0 to {len(place) - 1}" if len(place) > 1 else "0" if place else "none"
-        words = f"{path_of(above)} has no entry {clipped(key)}; accepted: {accepted}"
+        words = f"{clipped('.'.join(above))} has no entry {clipped(key)}; accepted: {accepted}"
         raise _refusal(source, path, words)
     return int(key)
 

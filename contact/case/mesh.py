@@ -25,7 +25,7 @@ from contact.mesh.reader import from_file, from_generator
 from contact.mesh.transfer import check_adaptable, refined
 from contact.methods.signals import killed_on_signal
 from contact.model.formula import Expression
-from contact.model.messages import UNKNOWN, Words, fault
+from contact.model.messages import unknown
 from contact.model.section import (
     Axis,
     Either,
@@ -39,7 +39,7 @@ from contact.model.section import (
     as_tuple,
 )
 from contact.ranks import on_all_ranks
-from contact.settings import Accepted, Count, Number, Positive
+from contact.settings import MISSING, Accepted, Count, Number, Positive, Words, fault
 from contact.typing import Array
 from meshes.grading import memory
 
@@ -263,7 +263,7 @@ class Mesh(Section):
             raise fault(f"parameters.{key}", value, "parameters of another generator only")
         for key in ("size", "cells"):
             if getattr(self, key) is None:
-                raise fault(key, Words("missing"), f"a list of {self.dimension} numbers")
+                raise fault(key, MISSING, f"a list of {self.dimension} numbers")
         try:
             self.check_grid()
         except grid.GridError as error:
@@ -403,7 +403,7 @@ def _check_parameters(name: str, parameters: Mapping[str, Any]) -> None:
     accepted = meshes.parameters(name)
     for key, value in parameters.items():
         if key not in accepted:
-            raise fault(key, UNKNOWN, ", ".join((*COMMON, *accepted)))
+            raise unknown(key, (*COMMON, *accepted))
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number or not 0 < value < np.inf:
             raise fault(key, value, "a number > 0")

@@ -285,7 +285,7 @@ class Newton:
     def _on_contact_nodes(self, problem: CondensedProblem, tolerance: float) -> SemismoothNewton:
         """Return the semismooth Newton method on a condensed problem."""
         # Each stage has a limit of its own.
-        options = replace(self.options, tolerance=tolerance, max_outer=sys.maxsize)
+        options = self.options.model_copy(update={"tolerance": tolerance, "max_outer": sys.maxsize})
         step = self._newton_step(problem, options, Counters())
         recorder = Recorder(lambda _: self.recorder.poll(), logging.DEBUG)
         return SemismoothNewton(problem, options, step, self._modes, recorder)

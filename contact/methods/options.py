@@ -3,46 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from annotated_types import Ge, Gt, Le, Lt
+from pydantic import Discriminator, Tag, model_validator
 
-from contact.errors import InputError
+from contact.model.section import Described
 from contact.problem.residuals import Residuals
-from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
+from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance, fault
 from contact.tolerances import LARGEST_VIOLATION, PRECISION
 
 
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """Options of all methods.
-
-    Attributes
-    ----------
-    method
-        Name of the method.
-    tolerance
-        Tolerance on each KKT residual (relative); of `penalty`, on the equilibrium of the
-        penalised problem.
-    max_outer
-        Most outer iterations; of `newton`, most steps in all its stages together.
-    linear
-        Linear solver: `auto` chooses by size, and for `uzawa`, which solves with one matrix
-        hundreds of times, `lu` as long as there is memory for it.
-    """
+class Options(Described):
+    """Options of all methods."""
 
     method: str
+    """Name of the method."""
     tolerance: Tolerance = 1e-8
+    """Tolerance on each KKT residual (relative); of `penalty`, on the equilibrium of the
+    penalised problem."""
     max_outer: Count = 200
+    """Most outer iterations; of `newton`, most steps in all its stages together."""
     linear: Literal["auto", "lu", "iterative"] = "auto"
-
-    def __post_init__(self) -> None:
-        """Refuse a tolerance outside (0, 1)."""
-        if not (isinstance(self.tolerance, float | int) and 0 < self.tolerance < 1):
-            raise InputError(
-                f"tolerance: given {self.tolerance!r}; accepted: between 0 and 1", "value"
-            )
+    """Linear solver: `auto` chooses by size, and for `uzawa`, which solves with one matrix
+    hundreds of times, `lu` as long as there is memory for it."""
 
     @property
     def allowed(self) -> Residuals:
@@ -50,61 +34,42 @@ class Options:
         return Residuals(self.tolerance, self.tolerance, self.tolerance)
 
 
-@dataclass(frozen=True, kw_only=True)
 class LoopOptions(Options):
-    """Options of methods with an inner and an outer loop.
-
-    Attributes
-    ----------
-    stopping
-        `residual`: the KKT residuals end the loops. `thesis`: the rules on the change between
-        iterations end them, (3.45) and (3.46), with a potential (5.38) and (6.40), with `penalty`
-        (4.38); phi is measured in the unit sqrt(mu_1/beta), where the thesis adds the numbers of
-        u and phi. The residuals decide `converged` in any case.
-    eps_fp
-        Tolerance of (3.46), outer loop.
-    max_inner
-        Most inner iterations in an outer one.
-    material_step
-        Linearisation of the material: `secant` (Kacanov; Algorithms as printed), `tangent`, or
-        `auto`: secant first, tangent below a residual of 1e-2 until it is twice the least one.
-        The tangent of `penalty` is implicit in friction too.
-    """
+    """Options of methods with an inner and an outer loop."""
 
     stopping: Literal["residual", "thesis"] = "residual"
+    """`residual`: the KKT residuals end the loops. `thesis`: the rules on the change between
+    iterations end them, (3.45) and (3.46), with a potential (5.38) and (6.40), with `penalty`
+    (4.38); phi is measured in the unit sqrt(mu_1/beta), where the thesis adds the numbers of u
+    and phi. The residuals decide `converged` in any case."""
     eps_fp: Annotated[Tolerance, ReadWith("stopping", "thesis")] = 1e-5
+    """Tolerance of (3.46), outer loop."""
     max_inner: Count = 5000
+    """Most inner iterations in an outer one."""
     material_step: Literal["secant", "tangent", "auto"] = "auto"
+    """Linearisation of the material: `secant` (Kacanov; Algorithms as printed), `tangent`, or
+    `auto`: secant first, tangent below a residual of 1e-2 until it is twice the least one. The
+    tangent of `penalty` is implicit in friction too."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class FixedPointOptions(LoopOptions):
-    """Algorithms 1, 2 and 4 to 9: a fixed point over Uzawa block relaxation.
-
-    Attributes
-    ----------
-    eps
-        Tolerance of (3.45), inner loop.
-    inner_tolerance
-        Tolerance of the inner loop. Default: a tenth of `tolerance`.
-    r
-        Augmentation parameter of the Uzawa block relaxation (force/volume). `auto` fits a block;
-        for a slender body no r does.
-    acceleration
-        Acceleration of the Uzawa block relaxation.
-    depth
-        Number of earlier solves that `anderson` uses.
-    relaxation
-        Relaxation of the multiplier's step; above 1: over-relaxation.
-    single_loop
-        `true`: the friction bound is updated in the Uzawa block relaxation itself.
-    """
+    """Algorithms 1, 2 and 4 to 9: a fixed point over Uzawa block relaxation."""
 
     method: Literal["uzawa"] = "uzawa"
+    """Name of the method."""
     eps: Annotated[Tolerance, ReadWith("stopping", "thesis")] = 1e-5
+    """Tolerance of (3.45), inner loop."""
     inner_tolerance: Annotated[Tolerance | None, ReadWith("stopping", "residual")] = None
-    r: Annotated[Literal["auto"] | Positive, Accepted('"auto" or a number > 0')] = "auto"
+    """Tolerance of the inner loop. Default: a tenth of `tolerance`."""
+    r: Annotated[
+        Annotated[Literal["auto"], Tag(":text")] | Annotated[Positive, Tag(":number")],
+        Discriminator(lambda given: ":text" if isinstance(given, str) else ":number"),
+        Accepted('"auto" or a number > 0'),
+    ] = "auto"
+    """Augmentation parameter of the Uzawa block relaxation (force/volume). `auto` fits a block;
+    for a slender body no r does."""
     acceleration: Literal["anderson", "none"] = "anderson"
+    """Acceleration of the Uzawa block relaxation."""
     depth: Annotated[
         int,
         Ge(1),
@@ -112,6 +77,7 @@ class FixedPointOptions(LoopOptions):
         Accepted("a whole number from 1 to 100"),
         ReadWith("acceleration", "anderson"),
     ] = 30
+    """Number of earlier solves that `anderson` uses."""
     relaxation: Annotated[
         float,
         Gt(0),
@@ -119,7 +85,16 @@ class FixedPointOptions(LoopOptions):
         Accepted("a number between 0 and 2, both excluded"),
         ReadWith("acceleration", "none"),
     ] = 1.0
+    """Relaxation of the multiplier's step; above 1: over-relaxation."""
     single_loop: Switch = False
+    """`true`: the friction bound is updated in the Uzawa block relaxation itself."""
+
+    @model_validator(mode="after")
+    def _check_inner(self) -> Self:
+        if self.inner_tolerance is not None and self.inner_tolerance > self.tolerance:
+            accepted = f"at most tolerance = {self.tolerance:g}"
+            raise fault("inner_tolerance", self.inner_tolerance, accepted)
+        return self
 
     @property
     def inner(self) -> float:
@@ -127,23 +102,17 @@ class FixedPointOptions(LoopOptions):
         return self.inner_tolerance or max(self.tolerance / 10, PRECISION)
 
 
-@dataclass(frozen=True, kw_only=True)
 class PenaltyOptions(LoopOptions):
-    """Algorithm 3, the penalty method.
-
-    Attributes
-    ----------
-    eps_contact
-        1/eps_contact is the stiffness of the contact (force/length^3). Default: 0.01 h/E, h the
-        spacing of the contact nodes.
-    eps_slip
-        Slip length of the regularised friction. Default: the number `eps_contact` where that is
-        given, as in the thesis, else a hundredth of the displacement that the loads give.
-    """
+    """Algorithm 3, the penalty method."""
 
     method: Literal["penalty"] = "penalty"
+    """Name of the method."""
     eps_contact: Positive | None = None
+    """1/eps_contact is the stiffness of the contact (force/length^3). Default: 0.01 h/E, h the
+    spacing of the contact nodes."""
     eps_slip: Positive | None = None
+    """Slip length of the regularised friction. Default: the number `eps_contact` where that is
+    given, as in the thesis, else a hundredth of the displacement that the loads give."""
 
     @property
     def allowed(self) -> Residuals:
@@ -151,54 +120,42 @@ class PenaltyOptions(LoopOptions):
         return Residuals(self.tolerance, LARGEST_VIOLATION, LARGEST_VIOLATION)
 
 
-@dataclass(frozen=True, kw_only=True)
 class NewtonOptions(Options):
-    """Semismooth Newton.
-
-    Attributes
-    ----------
-    nested
-        `true`: solve on coarser meshes first and start from there. Default: where that saves time
-        and there are coarser meshes: from 40000 unknowns on in 3-D with multigrid, and in 2-D where
-        a body is not condensed onto its contact nodes, as slender ones; from 100000 on in 2-D
-        where a nonlinear one is.
-    nested_levels
-        Number of meshes, the finest one included. Default: all that save time.
-    max_iterations
-        Number of steps allowed in each stage.
-    gamma
-        Augmentation parameter: stiffness of the eliminated constraints over that of the body.
-    stagnation_limit
-        Steps without progress after which the stage is given up.
-    softening
-        Part of a node's own stiffness that a falling friction coefficient may take away. Infinity
-        for the exact derivative: from nearby, it also leads to solutions on the falling part of
-        the law, which are unstable.
-    condense
-        Whether to condense the linearised body onto the contact nodes where that pays: one
-        step then solves the whole contact problem for a linear body.
-    keep
-        Whether to keep the factorisation of a condensed body while that costs less than new ones:
-        within a solve, which then does not depend on those before, or across solves too.
-    """
+    """Semismooth Newton."""
 
     method: Literal["newton"] = "newton"
+    """Name of the method."""
     nested: Switch | None = None
+    """`true`: solve on coarser meshes first and start from there. Default: where that saves
+    time and there are coarser meshes: from 40000 unknowns on in 3-D with multigrid, and in 2-D
+    where a body is not condensed onto its contact nodes, as slender ones; from 100000 on in 2-D
+    where a nonlinear one is."""
     nested_levels: Annotated[
         Annotated[int, Ge(2), Le(20), Accepted("a whole number from 2 to 20")] | None,
         ReadWith("nested", True),
     ] = None
-    max_iterations: Annotated[int, Internal()] = 60
-    gamma: Annotated[float, Internal()] = 1e4
-    stagnation_limit: Annotated[int, Internal()] = 12
-    softening: Annotated[float, Internal()] = 0.25
-    condense: Annotated[bool, Internal()] = True
-    keep: Annotated[Literal["never", "within", "across"], Internal()] = "within"
+    """Number of meshes, the finest one included. Default: all that save time."""
+    max_iterations: Internal[int] = 60
+    """Number of steps allowed in each stage."""
+    gamma: Internal[float] = 1e4
+    """Augmentation parameter: stiffness of the eliminated constraints over that of the body."""
+    stagnation_limit: Internal[int] = 12
+    """Steps without progress after which the stage is given up."""
+    softening: Internal[float] = 0.25
+    """Part of a node's own stiffness that a falling friction coefficient may take away.
+    Infinity for the exact derivative: from nearby, it also leads to solutions on the falling
+    part of the law, which are unstable."""
+    condense: Internal[bool] = True
+    """Whether to condense the linearised body onto the contact nodes where that pays: one step
+    then solves the whole contact problem for a linear body."""
+    keep: Internal[Literal["never", "within", "across"]] = "within"
+    """Whether to keep the factorisation of a condensed body while that costs less than new
+    ones: within a solve, which then does not depend on those before, or across solves too."""
 
 
 #: Name of a method -> its options.
 OPTIONS: Mapping[str, type[Options]] = {
-    options.method: options for options in (FixedPointOptions, PenaltyOptions, NewtonOptions)
+    kind().method: kind for kind in (FixedPointOptions, PenaltyOptions, NewtonOptions)
 }
 
 
@@ -207,5 +164,5 @@ AnyOptions = TypeVar("AnyOptions", bound=Options)
 
 def with_method(options: Options, method: type[AnyOptions], **changes: Any) -> AnyOptions:
     """Return the options of a method with the settings that it shares with given ones."""
-    shared = {f.name for f in fields(method)} & {f.name for f in fields(options)} - {"method"}
+    shared = method.model_fields.keys() & type(options).model_fields.keys() - {"method"}
     return method(**{key: getattr(options, key) for key in shared} | changes)

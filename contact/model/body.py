@@ -23,7 +23,6 @@ from contact.model.fields import (
     knows_time,
 )
 from contact.model.formula import Expression
-from contact.model.messages import Words, fault
 from contact.model.section import (
     Described,
     FactorOfTime,
@@ -37,7 +36,7 @@ from contact.model.section import (
     Values,
     as_given,
 )
-from contact.settings import SPATIAL, Accepted, Switch
+from contact.settings import MISSING, SPATIAL, Accepted, Switch, Words, fault
 
 #: For scripts that are older than the meaning of the word.
 CHANGED = (
@@ -106,7 +105,7 @@ class Fixed(Described):
             accepted = f"one of {' and '.join(one)}, and for more another entry"
             raise fault(one[0], as_given(getattr(self, one[0])), accepted, "one-condition")
         if all(value is None for value in self.given.values()):
-            given = as_given(self.displacement) or Words("missing")
+            given = as_given(self.displacement) or MISSING
             accepted = "a component that is fixed, normal, symmetry or a potential"
             raise fault("displacement", given, accepted, "supports")
         return self
@@ -167,7 +166,7 @@ class Elastic(Described):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.stiffness is None and self.normal is None:
-            raise fault("stiffness", Words("missing"), "stiffness, normal, or both", "elastic")
+            raise fault("stiffness", MISSING, "stiffness, normal, or both", "elastic")
         return self
 
 
@@ -255,7 +254,7 @@ class Load(Described):
                 raise fault(key, Words(f"given {place}"), accepted, "exclusive-keys")
         if not self.named:
             accepted = f"at least one of {', '.join(right)}"
-            raise fault(right[0], Words("missing"), accepted, "load-values")
+            raise fault(right[0], MISSING, accepted, "load-values")
         return self
 
     @property

@@ -16,7 +16,7 @@ from contact.model.fields import Static
 from contact.model.formula import Expression
 from contact.model.foundation import Conductor, Electric, Layer
 from contact.model.friction import Friction
-from contact.model.messages import Words, fault
+from contact.model.messages import either, shown
 from contact.model.obstacle import (
     Cone,
     Cylinder,
@@ -33,7 +33,16 @@ from contact.model.obstacle import (
 )
 from contact.model.rigid import Motion
 from contact.model.section import Described, Direction, FromTable, Own, Part, StaticValue
-from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
+from contact.settings import (
+    MISSING,
+    Accepted,
+    NonNegative,
+    Positive,
+    ReadWith,
+    Switch,
+    Words,
+    fault,
+)
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
 
@@ -44,25 +53,26 @@ SHAPES = (Plane, Sphere, Cylinder, Cone, Paraboloid, Punch, Level, Heights, Tria
 def _kind(given: Any) -> Any:
     """Return the name of a shape; "own" for a user's."""
     if isinstance(given, Mapping):
-        return given.get("shape")
+        return f":{given.get('shape')}"
     if isinstance(given, SHAPES):
-        return given.shape
-    return "own" if hasattr(given, "measure") else None
+        return f":{given.shape}"
+    return ":own" if hasattr(given, "measure") else None
 
 
 #: A table, by the name of its shape, or an object with `measure`.
 Foundation: TypeAlias = Annotated[
-    Annotated[Plane, FromTable, Tag("plane")]
-    | Annotated[Sphere, FromTable, Tag("sphere")]
-    | Annotated[Cylinder, FromTable, Tag("cylinder")]
-    | Annotated[Cone, FromTable, Tag("cone")]
-    | Annotated[Paraboloid, FromTable, Tag("paraboloid")]
-    | Annotated[Punch, FromTable, Tag("punch")]
-    | Annotated[Level, FromTable, Tag("distance")]
-    | Annotated[Heights, FromTable, Tag("heights")]
-    | Annotated[Triangles, FromTable, Tag("surface")]
-    | Annotated[Obstacle, Own(), Tag("own")],
+    Annotated[Plane, FromTable, Tag(":plane")]
+    | Annotated[Sphere, FromTable, Tag(":sphere")]
+    | Annotated[Cylinder, FromTable, Tag(":cylinder")]
+    | Annotated[Cone, FromTable, Tag(":cone")]
+    | Annotated[Paraboloid, FromTable, Tag(":paraboloid")]
+    | Annotated[Punch, FromTable, Tag(":punch")]
+    | Annotated[Level, FromTable, Tag(":distance")]
+    | Annotated[Heights, FromTable, Tag(":heights")]
+    | Annotated[Triangles, FromTable, Tag(":surface")]
+    | Annotated[Obstacle, Own(), Tag(":own")],
     Discriminator(_kind),
+    Accepted(f"a table with shape = {either(shown(kind.shape) for kind in SHAPES)}", "shape"),
 ]
 
 #: Of the layer; the thesis does not give its constants (section 8.1.2).
@@ -116,9 +126,9 @@ class Contact(Described):
     rigid: Motion | None = None
     """Motion of the foundation: `[contact.rigid]`. Absent: it is fixed."""
     layer: Annotated[
-        Annotated[float, Field(ge=0, allow_inf_nan=True), Tag("number")]
-        | Annotated[Layer | None, Own(), Tag("own")],
-        Discriminator(lambda given: "own" if isinstance(given, Layer | None) else "number"),
+        Annotated[float, Field(ge=0, allow_inf_nan=True), Tag(":number")]
+        | Annotated[Layer | None, Own(), Tag(":own")],
+        Discriminator(lambda given: ":own" if isinstance(given, Layer | None) else ":number"),
         COMPLIANT,
         Accepted("a number >= 0, or inf"),
         WithJsonSchema({"type": INFINITE, "minimum": 0}),
@@ -148,8 +158,8 @@ class Contact(Described):
     """Friction on this part. Default: that of `[friction]`."""
     electric: (
         Annotated[
-            Annotated[Electric, Tag("table")] | Annotated[Conductor, Own(), Tag("own")],
-            Discriminator(lambda given: "own" if isinstance(given, Conductor) else "table"),
+            Annotated[Electric, Tag(":table")] | Annotated[Conductor, Own(), Tag(":own")],
+            Discriminator(lambda given: ":own" if isinstance(given, Conductor) else ":table"),
             Accepted("a table"),
         ]
         | None
@@ -233,7 +243,7 @@ class Contact(Described):
             raise fault("against", self.against, "another part than `on`")
         if (self.axis is None) != (self.direction != "axis"):
             accepted = 'a vector with direction = "axis", and with that alone'
-            raise fault("axis", Words("missing") if self.axis is None else self.axis, accepted)
+            raise fault("axis", MISSING if self.axis is None else self.axis, accepted)
         if self.direction != "foundation" and not isinstance(shape, Shape | None):
             raise fault("direction", self.direction, "that of a Shape; others have their own")
         if self.foundation is None and self.axis is not None:

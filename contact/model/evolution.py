@@ -11,9 +11,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from contact.errors import InputError
-from contact.model.messages import Words, fault
 from contact.model.section import Described, File, Text, as_tuple
-from contact.settings import Accepted, Count, Number
+from contact.settings import MISSING, Accepted, Count, Number, Words, fault
 
 #: Share of an amplitude's range from which on an extreme value that no step meets is told.
 LOST = 0.02
@@ -67,7 +66,7 @@ class Amplitude(Described):
             return self
         for key in ("time", "value"):
             if getattr(self, key) is None:
-                raise fault(key, Words("missing"), f"{key}, or file with times and values")
+                raise fault(key, MISSING, f"{key}, or file with times and values")
         times, values = self.points
         _check_increasing("time", times)
         if len(values) != len(times):

@@ -200,8 +200,9 @@ class Expression:
 
     def __eq__(self, other: object) -> bool:
         """Compare sources and times."""
-        own = isinstance(other, Expression)
-        return own and (self.source, self.time) == (other.source, other.time)
+        if not isinstance(other, Expression):
+            return NotImplemented
+        return (self.source, self.time) == (other.source, other.time)
 
     def __hash__(self) -> int:
         """Hash the source."""

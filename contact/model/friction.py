@@ -59,19 +59,19 @@ def _own(given: Any) -> Any:
 
 def _kind(given: Any) -> str:
     if isinstance(given, Mapping | MuLaw):
-        return str(given.get("law") if isinstance(given, Mapping) else given.law)
+        return f":{given.get('law') if isinstance(given, Mapping) else given.law}"
     # One that lacks something is no function of position.
     named = ("maximum", "lipschitz", "derivative", "by_slip", "by_pressure")
-    return "own" if any(hasattr(given, name) for name in named) else "formula"
+    return ":own" if any(hasattr(given, name) for name in named) else ":formula"
 
 
 #: A coefficient of friction. A further law is a subclass of `MuLaw`, and a line here.
 Mu: TypeAlias = Annotated[
-    Annotated[NonNegativeValue, Tag("formula")]
-    | Annotated[SlipLaw, Tag("slip")]
-    | Annotated[FrictionCoefficient | FrictionLaw, Own(), AfterValidator(_own), Tag("own")],
+    Annotated[NonNegativeValue, Tag(":formula")]
+    | Annotated[SlipLaw, Tag(":slip")]
+    | Annotated[FrictionCoefficient | FrictionLaw, Own(), AfterValidator(_own), Tag(":own")],
     Discriminator(_kind),
-    Accepted('a number >= 0 or a formula, or a table with law = "slip"'),
+    Accepted('a number >= 0 or a formula, or a table with law = "slip"', "law"),
 ]
 
 

@@ -17,10 +17,19 @@ from contact.arguments import expect, is_law, several
 from contact.errors import InputError
 from contact.library.materials import PACKAGED, Entry, find
 from contact.model import fields
-from contact.model.messages import Words, describe, fault, shown
+from contact.model.messages import describe, shown
 from contact.model.section import Axis, Described, Either, File, Names, Own, Section, Text, as_tuple
 from contact.model.units import System, SystemOfUnits, UnitSystem, system_named
-from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
+from contact.settings import (
+    MISSING,
+    Accepted,
+    NonNegative,
+    Number,
+    Positive,
+    ReadWith,
+    Words,
+    fault,
+)
 from contact.typing import Array, TableValue
 from forms import j2
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis
@@ -42,9 +51,13 @@ POSITIVE = "a symmetric, positive definite matrix"
 
 def matrix(rows: int, columns: int) -> Any:
     """Return the kind of a matrix as a list of rows."""
-    row = Annotated[tuple[Number, ...], Field(min_length=columns, max_length=columns), as_tuple]
-    words = Accepted(f"a list of {rows} rows of {columns} numbers")
-    return Annotated[tuple[row, ...], Field(min_length=rows, max_length=rows), as_tuple, words]
+
+    def several(one: Any, count: int, words: str) -> Any:
+        bounds = Field(min_length=count, max_length=count)
+        return Annotated[tuple[one, ...], bounds, as_tuple, Accepted(words)]
+
+    row = several(Number, columns, f"a list of {columns} numbers")
+    return several(row, rows, f"a list of {rows} rows of {columns} numbers")
 
 
 def either_way(section: Section, short: tuple[str, ...], full: tuple[str, ...]) -> None:
@@ -132,16 +145,16 @@ class BackStress(Section):
 
 #: The hardening of `j2`.
 Hardening: TypeAlias = Annotated[
-    Annotated[NonNegative, Tag("number")]
-    | Annotated[Saturation, Tag("table")]
-    | Annotated[tuple[Annotated[tuple[Number, Number], as_tuple], ...], as_tuple, Tag("points")],
+    Annotated[NonNegative, Tag(":number")]
+    | Annotated[Saturation, Tag(":table")]
+    | Annotated[tuple[Annotated[tuple[Number, Number], as_tuple], ...], as_tuple, Tag(":points")],
     Discriminator(
         lambda given: (
-            "points"
+            ":points"
             if isinstance(given, list | tuple | np.ndarray)
-            else "table"
+            else ":table"
             if isinstance(given, Mapping | Section)
-            else "number"
+            else ":number"
         )
     ),
     Accepted(
@@ -201,8 +214,8 @@ class Material(Described):
     package."""
     kind: Annotated[
         Annotated[
-            Annotated[LawName, Tag("name")] | Annotated[Law, Own(), Tag("own")],
-            Discriminator(lambda given: "own" if is_law(given) else "name"),
+            Annotated[LawName, Tag(":name")] | Annotated[Law, Own(), Tag(":own")],
+            Discriminator(lambda given: ":own" if is_law(given) else ":name"),
         ]
         | None,
         Field(alias="law"),
@@ -252,8 +265,8 @@ class Material(Described):
     """Kinematic hardening: Prager's modulus, uniaxial stress over plastic strain."""
     coupling: Annotated[
         Annotated[
-            Annotated[Piezo, Tag("table")] | Annotated[PiezoTensors, Own(), Tag("own")],
-            Discriminator(lambda given: "own" if isinstance(given, PiezoTensors) else "table"),
+            Annotated[Piezo, Tag(":table")] | Annotated[PiezoTensors, Own(), Tag(":own")],
+            Discriminator(lambda given: ":own" if isinstance(given, PiezoTensors) else ":table"),
         ]
         | None,
         Field(alias="piezo"),
@@ -413,7 +426,7 @@ class Material(Described):
 
     def _check_log(self) -> None:
         if self.yield_strain is None:
-            raise fault("yield_strain", Words("missing"), 'a number > 0 with law = "log"')
+            raise fault("yield_strain", MISSING, 'a number > 0 with law = "log"')
         assert self.young is not None and self.poisson is not None  # required
         _, mu1 = moduli(self.young, self.poisson)
         if self.g_min > mu1:
@@ -425,7 +438,7 @@ class Material(Described):
         points, given = self.hardening, self.yield_stress
         first = points[0][1] if isinstance(points, tuple) else None
         if given is None and first is None:
-            raise fault("yield_stress", Words("missing"), 'a number > 0 with law = "j2"')
+            raise fault("yield_stress", MISSING, 'a number > 0 with law = "j2"')
         if given is not None and first is not None and given != first:
             raise fault("yield_stress", given, f"that of the first point of hardening, {first:g}")
         try:
@@ -574,7 +587,7 @@ def make_material(dim: int, **keys: TableValue | Array) -> Material:
     try:
         section = Material.model_validate(keys)
     except ValidationError as error:
-        raise describe(error, Material, "make_material") from None
+        raise describe(error, "make_material") from None
     key, axis = section.axis
     accepted = "an angle from x in degrees" if dim == 2 else f"a vector of {dim} numbers"
     expect(f"make_material: {key}", axis, accepted, axis is None or np.ndim(axis) == dim - 2)

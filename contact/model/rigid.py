@@ -13,7 +13,6 @@ from contact.arguments import OfTime, expect
 from contact.model.body import ZERO
 from contact.model.fields import Amplitude, GivenAmplitude, GivenTimed, amplitude_of
 from contact.model.formula import Expression, as_number
-from contact.model.messages import Words, fault
 from contact.model.section import (
     Described,
     Either,
@@ -25,7 +24,7 @@ from contact.model.section import (
     Vector,
     as_given,
 )
-from contact.settings import SPATIAL, Accepted
+from contact.settings import MISSING, SPATIAL, Accepted, fault
 from contact.typing import Array
 
 #: A component as it is given.
@@ -115,7 +114,7 @@ class Motion(Described):
         if 2 in {len(vector) for vector in vectors if vector is not None}:
             self.check_dimension(2)
         if self.centre is None and any(turn != ZERO for turn in self.turns):
-            raise fault("centre", Words("missing"), "a point about which it turns")
+            raise fault("centre", MISSING, "a point about which it turns")
         return self
 
     @property

@@ -9,8 +9,8 @@ from __future__ import annotations
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import is_dataclass
-from functools import cache
+from dataclasses import field, fields, is_dataclass
+from functools import cache, partial, wraps
 from pathlib import Path
 from typing import (
     Annotated,
@@ -21,6 +21,7 @@ from typing import (
     TypeAlias,
     TypeVar,
     cast,
+    dataclass_transform,
     get_args,
     get_origin,
 )
@@ -46,29 +47,38 @@ from pydantic import (
 from pydantic import (
     Field as Bounds,
 )
+from pydantic.dataclasses import dataclass as pydantic_dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, PydanticOmit, core_schema
 from ufl.core.expr import Expr
 
 from contact import settings
 from contact.arguments import OfTime
-from contact.errors import InputError
+from contact.errors import InputError, shown
 from contact.mesh.domain import PART_ACCEPTED, part_name
-from contact.model.fields import Amplitude, Field, GivenAmplitude, Moving, field, own_amplitude
+from contact.model.fields import Amplitude, Field, GivenAmplitude, Moving, own_amplitude
+from contact.model.fields import field as given_field
 from contact.model.formula import Expression, of_time
-from contact.model.messages import (
-    Words,
-    accepted_by,
-    describe,
-    fault,
-    fields_of,
-    keys_of,
-    shown,
-)
-from contact.settings import SPATIAL, Accepted, Number, ReadWith
+from contact.model.messages import accepted_by, describe, keys_of, table_fields, unknown
+from contact.settings import MISSING, SPATIAL, Accepted, Number, ReadWith, fault
 from contact.typing import Array
 
-Table = TypeVar("Table")
+Kind = TypeVar("Kind")
+
+
+#: Checks of values that are read: no unknown keys, NaN, infinity, or values of a similar type.
+CONFIG = ConfigDict(
+    extra="forbid",
+    strict=True,
+    allow_inf_nan=False,
+    arbitrary_types_allowed=True,  # objects of Python
+    populate_by_name=True,
+    validate_default=False,
+    use_attribute_docstrings=True,
+)
+
+#: The context of a description that is made in Python, where values may be objects.
+IN_PYTHON = {"python": True}
 
 
 class Section(BaseModel):
@@ -80,21 +90,29 @@ class Section(BaseModel):
 
     model_config = ConfigDict(
         frozen=True,
-        extra="forbid",
-        strict=True,
-        allow_inf_nan=False,
-        arbitrary_types_allowed=True,  # objects of Python
-        validate_default=False,
-        use_attribute_docstrings=True,
         defer_build=True,  # the case's own is all that reads; each would take milliseconds
+        **CONFIG,
     )
 
     #: Unknown keys that a user may look for here, each with a hint to its place.
     hints: ClassVar[Mapping[str, str]] = {}
 
+    @model_validator(mode="before")
+    @classmethod
+    def _read_keys(cls, given: Any, info: ValidationInfo) -> Any:
+        return given if info.context == IN_PYTHON else with_known_keys(cls, given)
+
     @model_validator(mode="after")
     def _check_conditions(self) -> Self:
-        return check_conditions(self)
+        for key, info, needs in conditions(type(self)):
+            value, other = value_of(self, key), value_of(self, needs.key)
+            if not needs.met(other):
+                if value != info.default:
+                    raise fault(key, as_given(value), f"{key} with {needs}")
+            elif needs.required and value is None:
+                accepted = accepted_by(info.annotation, info.metadata)
+                raise fault(key, MISSING, f"{accepted} with {needs.key} = {shown(other)}")
+        return self
 
     def __copy__(self) -> Self:
         """Return a copy without cached properties, which those of an update would not be."""
@@ -105,16 +123,11 @@ class Section(BaseModel):
 
     @model_serializer(mode="wrap")
     def _write(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        unread, keys = (
-            without_effect(self),
-            {n: f.alias or n for n, f in fields_of(type(self)).items()},
-        )
+        of = type(self)
+        keys = {name: field.alias or name for name, field in of.model_fields.items()}
+        unread = {k for k, _, needs in conditions(of) if not needs.met(value_of(self, needs.key))}
         written = {keys.get(name, name): value for name, value in handler(self).items()}
         return {key: value for key, value in written.items() if key not in unread}
-
-
-#: The context of a description that is made in Python, where values may be objects.
-IN_PYTHON = {"python": True}
 
 
 class Described(Section):
@@ -127,13 +140,8 @@ class Described(Section):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
-        """Enter the keys under "Parameters" in the docstring, in the order of the arguments."""
-        said = {key: field.description or "" for key, field in keys_of(cls).items()}
-        own = [key for key in inspect.signature(cls.__init__).parameters if key in said] or [*said]
-        lines = [line for key in own for line in (key, textwrap.indent(said[key], "    "))]
-        text, _, examples = inspect.cleandoc(cls.__doc__ or "").partition("\n\nExamples\n")
-        parts = [text, "\n".join(["Parameters", "----------", *lines])]
-        cls.__doc__ = "\n\n".join([*parts, *([f"Examples\n{examples}"] if examples else [])])
+        """Enter the keys in the docstring, in the order of the arguments."""
+        document(cls)
 
     def __init__(self, **given: Any) -> None:
         try:
@@ -141,14 +149,74 @@ class Described(Section):
                 given, self_instance=self, context=IN_PYTHON
             )
         except ValidationError as error:
-            raise describe(
-                error, type(self), called(type(self).__name__, given.get("on"))
-            ) from None
+            raise describe(error, called(type(self).__name__, given.get("on"))) from None
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(Bounds, field))
+def described(**options: Any) -> Callable[[type[Kind]], type[Kind]]:
+    """Return a decorator for a frozen dataclass that is made in Python or read from a table.
+
+    Its base may be a dataclass that knows nothing of tables, from which users derive theirs.
+    """
+
+    def decorate(cls: type[Kind]) -> type[Kind]:
+        made: Any = pydantic_dataclass(frozen=True, config=CONFIG, **options)(cls)
+        init = made.__init__
+        names = [field.name for field in fields(made) if not field.kw_only]
+
+        @wraps(init)
+        def __init__(self: Any, *given: Any, **named: Any) -> None:
+            try:
+                # By their names, which messages have.
+                init(self, *given[len(names) :], **dict(zip(names, given)), **named)  # noqa: B905
+            except ValidationError as error:
+                raise describe(error, cls.__name__) from None
+
+        made.__init__ = __init__
+        document(made)
+        return cast(type[Kind], made)
+
+    return decorate
+
+
+class FromTable:
+    """Lets pydantic read such a dataclass from a table, with the keys of the case file alone."""
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Check the keys; strictness, which the fields have, would take instances alone here."""
+        schema = handler.resolve_ref_schema(handler(source)) | {"strict": False}
+        return core_schema.no_info_before_validator_function(
+            partial(with_known_keys, source), schema
+        )
+
+
+def document(cls: Any) -> None:
+    """Enter the keys of a table under "Parameters" in its docstring, in the order of `__init__`."""
+    said = {key: field.description or "" for key, field in keys_of(cls).items()}
+    own = [key for key in inspect.signature(cls.__init__).parameters if key in said] or [*said]
+    lines = [line for key in own for line in (key, textwrap.indent(said[key], "    "))]
+    text, _, examples = inspect.cleandoc(cls.__doc__ or "").partition("\n\nExamples\n")
+    parts = [text, "\n".join(["Parameters", "----------", *lines])]
+    cls.__doc__ = "\n\n".join([*parts, *([f"Examples\n{examples}"] if examples else [])])
 
 
 def called(title: Any, on: Any) -> str:
     """Return the name of a description in messages."""
     return f"{title} on {on!r}" if on else str(title)
+
+
+def with_known_keys(of: Any, given: Any) -> Any:
+    """Return a table, if it has no unknown key, and all that are required."""
+    if isinstance(given, Mapping):
+        known = keys_of(of)
+        for key in given:
+            if key not in known:
+                raise unknown(key, known, getattr(of, "hints", {}).get(key, ""))
+        for key, info in known.items():
+            if info.is_required() and key not in given:
+                raise fault(key, MISSING, accepted_by(info.annotation, info.metadata))
+    return given
 
 
 @cache
@@ -162,30 +230,10 @@ def conditions(of: type) -> tuple[tuple[str, FieldInfo, ReadWith], ...]:
     )
 
 
-def without_effect(table: Any) -> set[str]:
-    """Return the keys of a table that are not read, given the others."""
-    of: Any = type(table)
-    return {key for key, _, needs in conditions(of) if not needs.met(value_of(table, needs.key))}
-
-
-def value_of(table: Any, key: str) -> Any:
+def value_of(table: BaseModel, key: str) -> Any:
     """Return the value of a key, whose attribute may have another name."""
-    of: Any = type(table)
-    return getattr(table, next(n for n, f in fields_of(of).items() if key in (n, f.alias)))
-
-
-def check_conditions(table: Table) -> Table:
-    """Return a table, if no key is without effect and none is missing."""
-    of: Any = type(table)
-    for key, info, needs in conditions(of):
-        value, other = value_of(table, key), value_of(table, needs.key)
-        if not needs.met(other):
-            if value != info.default:
-                raise fault(key, as_given(value), f"{key} with {needs}")
-        elif needs.required and value is None:
-            accepted = accepted_by(info.annotation, info.metadata)
-            raise fault(key, Words("missing"), f"{accepted} with {needs.key} = {shown(other)}")
-    return table
+    names = {field.alias or name: name for name, field in type(table).model_fields.items()}
+    return getattr(table, names[key])
 
 
 class Own:
@@ -198,33 +246,6 @@ class Own:
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         """Leave it out."""
         raise PydanticOmit
-
-
-class FromTable:
-    """Lets pydantic read a frozen dataclass from a table, with all the checks of a section."""
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> core_schema.CoreSchema:
-        """Make the schema of the dataclass accept tables, without the fields for Python alone."""
-        schema = handler.resolve_ref_schema(handler(source))
-        # Strictness, which the fields are to have, would take instances alone here.
-        schema["strict"] = False
-        inner = schema["schema"]
-        while "fields" not in inner:
-            inner = inner["schema"]
-        known = fields_of(source)
-        inner["fields"] = [entry for entry in inner["fields"] if entry["name"] in known]
-        for entry in inner["fields"]:
-            if known[entry["name"]].is_required() and entry["schema"]["type"] == "default":
-                entry["schema"] = entry["schema"]["schema"]
-        return core_schema.no_info_before_validator_function(_with_tuples, schema)
-
-
-def _with_tuples(given: Any) -> Any:
-    # TOML has lists, and strict fields take tuples alone.
-    if not isinstance(given, Mapping):
-        return given
-    return {key: tuple(v) if isinstance(v, list) else v for key, v in given.items()}
 
 
 def walk(
@@ -256,7 +277,7 @@ def _marked(of: Any) -> tuple[tuple[str, str, tuple[Any, ...]], ...]:
     """Return the fields of a kind of table, their keys, and the marks of their types."""
     return tuple(
         (name, field.alias or name, (*field.metadata, *_marks(field.annotation)))
-        for name, field in fields_of(of).items()
+        for name, field in table_fields(of).items()
     )
 
 
@@ -272,6 +293,8 @@ def as_given(value: Any) -> Any:
     """Return a value of the case as a message shows it."""
     if isinstance(value, tuple):
         return [as_given(entry) for entry in value]
+    if isinstance(value, BaseModel):
+        return value.model_dump()
     return value.source if isinstance(value, Expression) else value
 
 
@@ -292,10 +315,14 @@ def _expression(given: Any) -> Expression:
     return given if isinstance(given, Expression) else Expression(given)
 
 
+def _expression_or_function(given: Any) -> Any:
+    return given if callable(given) else _expression(given)
+
+
 def _value(given: Any) -> Field | Moving:
     """Return a given function of position and time; of a case file a number or a formula."""
     plain = given is None or isinstance(given, bool | int | float | str | list | Mapping)
-    return cast(Field | Moving, field(Expression(given) if plain else given))
+    return cast(Field | Moving, given_field(Expression(given) if plain else given))
 
 
 def _static(given: Field | Moving, info: ValidationInfo) -> Field | Moving:
@@ -370,9 +397,9 @@ def _part(given: Any) -> str:
         raise PydanticCustomError("part", "part") from None
 
 
-#: Tell a list, "many", from a single value, "one".
+#: Tells a list from a single value.
 one_or_many = Discriminator(
-    lambda given: "many" if isinstance(given, list | tuple | np.ndarray) else "one"
+    lambda given: ":many" if isinstance(given, list | tuple | np.ndarray) else ":one"
 )
 
 
@@ -403,7 +430,7 @@ FewTimed: TypeAlias = Annotated[
 ]
 Some: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=1), as_tuple]
 Either: TypeAlias = Annotated[
-    Annotated[One, Tag("one")] | Annotated[Many, Tag("many")], one_or_many
+    Annotated[One, Tag(":one")] | Annotated[Many, Tag(":many")], one_or_many
 ]
 OneOrSome: TypeAlias = Either[One, Some[One]]
 
@@ -462,7 +489,7 @@ Formula: TypeAlias = Annotated[
 #: The same; in Python a function of points of shape (n, d) too.
 FormulaOrFunction: TypeAlias = Annotated[
     Expression | Callable[[Array], Array] | str,
-    PlainValidator(_expression),
+    PlainValidator(_expression_or_function),
     _as_source,
     Accepted("a number or a formula"),
     WithJsonSchema(_FORMULA),

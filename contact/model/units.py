@@ -11,9 +11,9 @@ from typing import Annotated, Self, TypeAlias
 from annotated_types import Predicate
 from pydantic import Discriminator, Tag, WithJsonSchema, model_validator
 
-from contact.model.messages import either, fault, shown
+from contact.model.messages import either, shown
 from contact.model.section import Section, Text
-from contact.settings import Accepted
+from contact.settings import Accepted, fault
 
 #: Prefixes of SI; the first one of a factor makes the names of units that follow.
 PREFIXES = {
@@ -150,8 +150,8 @@ class UnitSystem(Section):
 
 
 SystemOfUnits: TypeAlias = Annotated[
-    Annotated[str, Predicate(SYSTEMS.__contains__), WithJsonSchema(BY_NAME), Tag("name")]
-    | Annotated[UnitSystem, Tag("table")],
-    Discriminator(lambda given: "table" if isinstance(given, Mapping | Section) else "name"),
+    Annotated[str, Predicate(SYSTEMS.__contains__), WithJsonSchema(BY_NAME), Tag(":name")]
+    | Annotated[UnitSystem, Tag(":table")],
+    Discriminator(lambda given: ":table" if isinstance(given, Mapping | Section) else ":name"),
     Accepted(f"{NAMES}, or a table {{ length, force, potential }}"),
 ]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 from contact import Case, build_problem, load_case, solve
@@ -49,7 +48,7 @@ def measured(case: Case) -> dict[str, Any]:
     begin = time.process_time()
     settings, start = case.solver, None
     if isinstance(settings, NewtonOptions) and settings.nested:
-        settings, start = replace(settings, nested=None), nested_start(case, problem)
+        settings, start = settings.model_copy(update={"nested": None}), nested_start(case, problem)
     solution = solve(problem, settings, start=start)
     counters = solution.counters
     return {

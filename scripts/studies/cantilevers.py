@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -107,7 +106,7 @@ def compare(
         "bare": float(np.median([one_linear_solve(problem)[0] for _ in range(TIMES)])),
         "free": median(lambda: solve(free, far.solver)),
     }
-    cold = replace(near.solver, nested=False)
+    cold = near.solver.model_copy(update={"nested": False})
     run = median(lambda: solve(far, cold))
     runs = {"run": median(lambda: solve(near)), "run from zero": median(lambda: solve(near, cold))}
     return {

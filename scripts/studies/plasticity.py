@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -409,7 +408,7 @@ def cost(report: Report, coarse: bool) -> None:
     for degree, cells in ((2, 8),) if coarse else ((2, 24), (1, 64)):
         mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [2 * cells, cells]}
         for words, keep in (("few (chord steps)", "within"), ("each iteration", "never")):
-            settings, hencky_takes = replace(NewtonOptions(), keep=keep), np.nan
+            settings, hencky_takes = NewtonOptions(keep=keep), np.nan
             for name, parameters in HARDENINGS.items():
                 given, law = ("j2", None) if parameters else ("linear", hencky(4e3))
                 more = {"material": {**STEEL, **parameters}} if parameters else {}

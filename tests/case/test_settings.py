@@ -24,9 +24,9 @@ def test_every_key_is_described():
 def test_the_settings_of_a_method_are_its_options(method):
     solver = parse_case(changed(solver={"method": method})).solver
     assert solver == OPTIONS[method]()
-    given = OPTIONS[method](tolerance=1e-18)  # not looked at, in Python
+    given = OPTIONS[method](tolerance=1e-12)
     assert parse_case(changed(solver=given)).solver is given
-    assert with_method(given, NewtonOptions) == NewtonOptions(tolerance=1e-18)
+    assert with_method(given, NewtonOptions) == NewtonOptions(tolerance=1e-12)
 
 
 def test_the_resolved_case_holds_what_the_method_reads():

@@ -108,7 +108,7 @@ WRONG = {
     "a normal in space": on(Plane((0, 0), (0, 0, 1))),
     "a centre in space": on(Sphere((0, 0, -5), 5.0)),
     "an axis in space": on(Cylinder((0, -5), (0, 0, 1), 5.0)),
-    "no normal": on(Plane((0, 0), (0, 0))),
+    "no normal": lambda: Plane((0, 0), (0, 0)),
     "no direction": on(Plane((0, 0), (0, 1), direction="axis")),
     "a direction": lambda: Plane((0, 0), (0, 1), direction="up"),
     "a radius": lambda: Sphere((0, 0), "1"),  # type: ignore[arg-type]
@@ -117,7 +117,6 @@ WRONG = {
     "an edge in words": lambda: Punch((0, 0), (0, 1), 1.0, "a"),
     "an edge": lambda: Punch((0, 0), (0, 1), 1.0, 2.0),
     "a distance": on(Level(lambda x: x[1])),
-    "a number as distance": lambda: Level(1.0),  # type: ignore[arg-type]
     "a layer": on(layer="thick"),
     "half a layer": on(layer=lambda: Layer(0.1)),
     "friction": on(friction=0.3),

@@ -200,7 +200,7 @@ def solve(problem: ContactProblem, tolerance: float = 1e-10, **options) -> Fixed
 
 
 def attempt(problem: ContactProblem, **options) -> tuple[FixedPoint, Outcome]:
-    loop = FixedPoint(problem, FixedPointOptions(**options))
+    loop = FixedPoint(problem, FixedPointOptions().model_copy(update=options))  # unchecked
     return loop, loop.solve()[1]
 
 

@@ -1,7 +1,5 @@
 """Degree 2 in space: all nodes of Gamma_3 carry positive areas and forces, vertices too."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -95,7 +93,7 @@ def test_current_through_nodes_that_are_held(comm, method):
     held = problem.interface.constrained
     assert held is not None
     assert comm.allreduce(held.nodes.nodes.size) > 0
-    solution = solve(problem, replace(method, tolerance=1e-10))
+    solution = solve(problem, method.model_copy(update={"tolerance": 1e-10}))
     assert solution.converged
     _, bottom = column.solution()
     found = potential(problem, solution.state)

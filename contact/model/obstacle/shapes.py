@@ -9,7 +9,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from numbers import Real
 from typing import Annotated, ClassVar, Literal, Protocol
 
 import numpy as np
@@ -17,13 +16,13 @@ from annotated_types import Gt, Lt
 from mpi4py import MPI
 from pydantic import Field
 
-from contact.arguments import LEAST, OFF, SHARE, SMOOTH, STEP, expect, fill, naming, real
+from contact.arguments import LEAST, OFF, SHARE, SMOOTH, STEP, expect, naming, real
 from contact.errors import InputError
 from contact.model.fields import Static, static
 from contact.model.formula import Expression
-from contact.model.section import FormulaOrFunction
+from contact.model.section import Direction, FormulaOrFunction, Vector, described
 from contact.ranks import on_all_ranks
-from contact.settings import Accepted, Direction, Internal, NonNegative, Positive, Switch, Vector
+from contact.settings import Accepted, Internal, NonNegative, Positive, Switch, fault
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -81,8 +80,8 @@ class Shape(ABC):
         Name of the shape, by which the case file selects it.
     """
 
-    direction: Annotated[str, Internal()] = "foundation"
-    along: Annotated[tuple[float, ...], Internal()] = ()
+    direction: Internal[Literal["foundation", "body", "axis"]] = "foundation"
+    along: Internal[tuple[float, ...]] = ()
 
     is_shape = True
 
@@ -91,13 +90,11 @@ class Shape(ABC):
     only: ClassVar[int | None] = None
 
     def __post_init__(self) -> None:
-        """Refuse a radius that is none, and directions that are not known."""
-        name, radius = type(self).__name__, getattr(self, "radius", 1.0)
-        number = isinstance(radius, int | float | np.number)
-        expect(f"{name}: radius", radius, "a length > 0", number and radius > 0)
+        """Refuse a direction that is not known."""
         directions = ("foundation", "body", "axis")
         accepted = ", ".join(f'"{direction}"' for direction in directions)
-        expect(f"{name}: direction", self.direction, accepted, self.direction in directions)
+        name = f"{type(self).__name__}: direction"
+        expect(name, self.direction, accepted, self.direction in directions)
 
     def check(self, dim: int) -> None:
         """Refuse a shape of another dimension than space, and directions without length.
@@ -299,21 +296,16 @@ def measured(
     return found
 
 
-@dataclass(frozen=True)
+@described()
 class Plane(Shape):
-    """A half space: the foundation lies below the plane through `point`.
-
-    Attributes
-    ----------
-    point
-        A point of the plane.
-    normal
-        Normal towards the body, of any length.
-    """
+    """A half space: the foundation lies below the plane through `point`."""
 
     point: Vector
+    """A point of the plane."""
     normal: Direction
+    """Normal towards the body, of any length."""
     shape: Literal["plane"] = field(default="plane", kw_only=True)
+    """Name of the shape, by which the case file selects it."""
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""
@@ -322,24 +314,18 @@ class Plane(Shape):
         return distance, np.broadcast_to(normal, points.shape).copy()
 
 
-@dataclass(frozen=True)
+@described()
 class Sphere(Shape):
-    """A rigid ball (`inside` false), or the outside of a ball that holds the body (true).
-
-    Attributes
-    ----------
-    centre
-        Centre.
-    radius
-        Radius.
-    inside
-        Whether the body lies inside the sphere.
-    """
+    """A rigid ball (`inside` false), or the outside of a ball that holds the body (true)."""
 
     centre: Vector
+    """Centre."""
     radius: Positive
+    """Radius."""
     inside: Switch = False
+    """Whether the body lies inside the sphere."""
     shape: Literal["sphere"] = field(default="sphere", kw_only=True)
+    """Name of the shape, by which the case file selects it."""
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""
@@ -382,29 +368,23 @@ class AboutAxis(Shape):
         return distance, outwards[:, None] * away + upwards[:, None] * unit
 
 
-@dataclass(frozen=True)
+@described()
 class Cylinder(AboutAxis):
     """A rigid cylinder without ends (`inside` false), or the bore that holds the body (true).
 
     In 2-D the axis lies in the plane: a strip, or about the axis of a body of revolution a shaft.
-
-    Attributes
-    ----------
-    point
-        A point of its axis.
-    axis
-        Its axis, of any length and either sense.
-    radius
-        Radius.
-    inside
-        Whether the body lies in the bore.
     """
 
     point: Vector
+    """A point of its axis."""
     axis: Direction
+    """Its axis, of any length and either sense."""
     radius: Positive
+    """Radius."""
     inside: Switch = False
+    """Whether the body lies in the bore."""
     shape: Literal["cylinder"] = field(default="cylinder", kw_only=True)
+    """Name of the shape, by which the case file selects it."""
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals; NaN on the axis itself."""
@@ -413,33 +393,20 @@ class Cylinder(AboutAxis):
         return inward * (radius - self.radius), 0.0 * known, known
 
 
-@dataclass(frozen=True)
+@described()
 class Cone(AboutAxis):
-    """A rigid cone without end; in 2-D a wedge.
-
-    Attributes
-    ----------
-    apex
-        Its tip.
-    axis
-        From the tip into the cone, of any length.
-    half_angle
-        Between the axis and the side (degrees).
-    """
+    """A rigid cone without end; in 2-D a wedge."""
 
     apex: Vector
+    """Its tip."""
     axis: Direction
+    """From the tip into the cone, of any length."""
     half_angle: Annotated[
         float, Gt(0), Lt(90), Accepted("an angle between 0 and 90 degrees, both excluded")
     ]
+    """Between the axis and the side (degrees)."""
     shape: Literal["cone"] = field(default="cone", kw_only=True)
-
-    def __post_init__(self) -> None:
-        """Refuse an angle that is none of a cone."""
-        super().__post_init__()
-        angle = self.half_angle
-        fits = isinstance(angle, Real) and 0 < angle < 90
-        expect("Cone: half_angle", angle, "degrees between 0 and 90", fits)
+    """Name of the shape, by which the case file selects it."""
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals; those of the tip where it is nearest."""
@@ -457,24 +424,18 @@ class Cone(AboutAxis):
         )
 
 
-@dataclass(frozen=True)
+@described()
 class Paraboloid(AboutAxis):
-    """A rigid paraboloid, h >= r^2/(2 R) at the height h and the distance r; in 2-D a parabola.
-
-    Attributes
-    ----------
-    apex
-        Its tip.
-    axis
-        From the tip into the paraboloid, of any length.
-    radius
-        Radius of curvature R at the tip.
-    """
+    """A rigid paraboloid, h >= r^2/(2 R) at the height h and the distance r; in 2-D a parabola."""
 
     apex: Vector
+    """Its tip."""
     axis: Direction
+    """From the tip into the paraboloid, of any length."""
     radius: Positive
+    """Radius of curvature R at the tip."""
     shape: Literal["paraboloid"] = field(default="paraboloid", kw_only=True)
+    """Name of the shape, by which the case file selects it."""
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals, by the cubic equation of the nearest point.
@@ -497,33 +458,28 @@ class Paraboloid(AboutAxis):
         return distance, -1 / length, s / big / length
 
 
-@dataclass(frozen=True)
+@described()
 class Punch(AboutAxis):
-    """A rigid cylinder with a flat face; in 2-D a rectangle.
-
-    Attributes
-    ----------
-    centre
-        Centre of the face.
-    axis
-        From the face into the punch, of any length.
-    radius
-        Radius of the punch.
-    edge_radius
-        Radius by which its edge is rounded, at most that of the punch; 0: sharp.
-    """
+    """A rigid cylinder with a flat face; in 2-D a rectangle."""
 
     centre: Vector
+    """Centre of the face."""
     axis: Direction
+    """From the face into the punch, of any length."""
     radius: Positive
+    """Radius of the punch."""
     edge_radius: NonNegative = 0.0
+    """Radius by which its edge is rounded, at most that of the punch; 0: sharp."""
     shape: Literal["punch"] = field(default="punch", kw_only=True)
+    """Name of the shape, by which the case file selects it."""
 
     def __post_init__(self) -> None:
         """Refuse an edge that is rounder than the punch."""
         super().__post_init__()
-        fits = isinstance(self.edge_radius, Real) and 0 <= self.edge_radius <= self.radius
-        expect("Punch: edge_radius", self.edge_radius, "a length from 0 to the radius", fits)
+        if self.edge_radius > self.radius:
+            raise fault(
+                "edge_radius", self.edge_radius, f"a number from 0 to radius = {self.radius:g}"
+            )
 
     def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals: those of a smaller punch, less the edge radius."""
@@ -543,28 +499,15 @@ class Punch(AboutAxis):
 LEVEL_STEP = EPS ** (1 / 3)
 
 
-@dataclass(frozen=True)
+@described()
 class Level(Shape):
-    """A rigid body where a function is negative: a formula, or one of points of shape (n, d).
-
-    Attributes
-    ----------
-    function
-        Signed distance, positive outside. Where its slope is not 1 it is divided by that, which is
-        exact on the surface, and nearly so close to it.
-    """
+    """A rigid body where a function is negative: a formula, or one of points of shape (n, d)."""
 
     function: Annotated[FormulaOrFunction, Field(alias="distance")]
+    """Signed distance, positive outside. Where its slope is not 1 it is divided by that, which
+    is exact on the surface, and nearly so close to it."""
     shape: Literal["distance"] = field(default="distance", kw_only=True)
-
-    def __post_init__(self) -> None:
-        """Refuse an object that is no function."""
-        super().__post_init__()
-        if isinstance(self.function, str):
-            fill(self, function=Expression(self.function))
-        words = "a formula, or a function of points of shape (n, d)"
-        fits = isinstance(self.function, Expression) or callable(self.function)
-        expect("Level: function", self.function, words, fits)
+    """Name of the shape, by which the case file selects it."""
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals; NaN where the function has no slope."""

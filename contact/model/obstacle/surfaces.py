@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,13 +16,13 @@ from contact.arguments import expect, naming, one_of
 from contact.errors import InputError
 from contact.model.data import read_data
 from contact.model.obstacle.shapes import Shape
-from contact.model.section import File
-from contact.settings import Accepted, Internal, Number, Positive, Required, Switch
+from contact.model.section import File, as_given, as_tuple, described
+from contact.settings import MISSING, Accepted, Internal, Number, Positive, Switch, fault
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 
-@dataclass(frozen=True, eq=False)
+@described(eq=False)
 class Heights(Shape):
     """A body below, or above, heights along the last axis, smooth between them (cubic splines).
 
@@ -30,50 +30,45 @@ class Heights(Shape):
     contact there is told (`output.foundations`). Distances are those along the last axis times the
     cosine of the slope: exact on the surface, and nearly so close to it; along an axis or the
     body's normals gaps are exact.
-
-    Attributes
-    ----------
-    places
-        Coordinates of the points along the other axes, ascending: shape (n,) in the plane, and
-        (n,), (m,) in 3-D.
-    heights
-        Shape (n,), or (n, m). Instead of both a file:
-    file
-        CSV file with a row of names and the columns x, y (3-D: x, y, z, at all points of a grid);
-        or a NumPy array of heights, an image for instance. Relative to the case file. A warning
-        tells the share of the contact that lies beyond them, or in a hole.
-    spacing
-        Distances of the points of an array: along its first axis, which is x, and in 3-D along its
-        second, y. Required for an array.
-    origin
-        Place of the first point of an array. Default: zeros.
-    above
-        Whether the rigid body lies above the heights, and the elastic one below.
     """
 
-    places: Annotated[tuple[Array, ...], Internal()] = ()
-    heights: Annotated[Array | None, Internal()] = None
+    places: Internal[Annotated[tuple[Array, ...], as_tuple]] = ()
+    """Coordinates of the points along the other axes, ascending: shape (n,) in the plane, and
+    (n,), (m,) in 3-D."""
+    heights: Internal[Array | None] = None
+    """Shape (n,), or (n, m). Instead of both a file:"""
     above: Switch = False
+    """Whether the rigid body lies above the heights, and the elastic one below."""
     file: Annotated[
-        File | None, Accepted("a CSV file, or a .npy file with an array of heights"), Required()
+        File | None, Accepted("a CSV file, or a .npy file with an array of heights")
     ] = None
+    """CSV file with a row of names and the columns x, y (3-D: x, y, z, at all points of a
+    grid); or a NumPy array of heights, an image for instance. Relative to the case file. A
+    warning tells the share of the contact that lies beyond them, or in a hole."""
     spacing: Annotated[
-        tuple[Positive, ...] | None, Accepted("distances > 0, one per direction of the array")
+        Annotated[tuple[Positive, ...], as_tuple] | None,
+        Accepted("distances > 0, one per direction of the array"),
     ] = None
+    """Distances of the points of an array: along its first axis, which is x, and in 3-D along
+    its second, y. Required for an array."""
     origin: Annotated[
-        tuple[Number, ...] | None, Accepted("numbers, one per direction of the array")
+        Annotated[tuple[Number, ...], as_tuple] | None,
+        Accepted("numbers, one per direction of the array"),
     ] = None
+    """Place of the first point of an array. Default: zeros."""
     shape: Literal["heights"] = field(default="heights", kw_only=True)
+    """Name of the shape, by which the case file selects it."""
 
     def __post_init__(self) -> None:
         """Refuse heights that are given in no way, or in two; and those that are no grid."""
         super().__post_init__()
-        given = one_of("Heights", heights=self.heights, file=self.file)
-        expect("Heights: file", None, "a file, or places and heights", given is not None)
+        if one_of("Heights", heights=self.heights, file=self.file) is None:
+            raise fault("file", MISSING, "a file, or in Python places and heights")
         for key in ("spacing", "origin"):
             accepted = "that of a .npy file alone: the rows of a CSV file have their places"
             fits = getattr(self, key) is None or (self.file or "").endswith(".npy")
-            expect(f"Heights: {key}", getattr(self, key), accepted, fits)
+            if not fits:
+                raise fault(key, as_given(getattr(self, key)), accepted)
         if self.heights is not None:
             self._check(self.places, self.heights)
 
@@ -211,32 +206,28 @@ def _columns(file: str) -> tuple[tuple[Array, ...], Array]:
     return places, heights[order].reshape(shape)
 
 
-@dataclass(frozen=True, eq=False)
+@described(eq=False)
 class Triangles(Shape):
     """A surface of triangles whose normals point towards the body; closed or not.
 
     The sign of the distance is that of the side of an angle-weighted pseudonormal (Baerentzen and
     Aanaes, IEEE Trans. Vis. Comput. Graph. 11 (2005) 243).
-
-    Attributes
-    ----------
-    corners
-        Shape (m, 3, 3), none degenerate. Or a file:
-    file
-        STL file, binary or text, its normals towards the body. Relative to the case file.
     """
 
     only = 3
 
-    corners: Annotated[Array | None, Internal()] = None
-    file: Annotated[File | None, Accepted("an STL file"), Required()] = None
+    corners: Internal[Array | None] = None
+    """Shape (m, 3, 3), none degenerate. Or a file:"""
+    file: Annotated[File | None, Accepted("an STL file")] = None
+    """STL file, binary or text, its normals towards the body. Relative to the case file."""
     shape: Literal["surface"] = field(default="surface", kw_only=True)
+    """Name of the shape, by which the case file selects it."""
 
     def __post_init__(self) -> None:
         """Refuse a surface that is given in no way, or in two."""
         super().__post_init__()
-        given = one_of("Triangles", corners=self.corners, file=self.file)
-        expect("Triangles: file", None, "an STL file, or corners", given is not None)
+        if one_of("Triangles", corners=self.corners, file=self.file) is None:
+            raise fault("file", MISSING, "an STL file, or in Python corners")
 
     @cached_property
     def triangles(self) -> Array:

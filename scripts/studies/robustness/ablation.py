@@ -93,7 +93,7 @@ class Device:
         with ExitStack() as stack:
             for owner, name, value in self.changes:
                 stack.enter_context(patch.object(owner, name, value))
-            yield replace(NewtonOptions(), **dict(self.options))
+            yield NewtonOptions(**dict(self.options))
 
 
 def _nothing(*_: Any, **__: Any) -> None:
@@ -366,7 +366,7 @@ def run(case: Case, options: NewtonOptions) -> tuple[Solution, float]:
     given = {name: getattr(case.solver, name) for name in ("tolerance", "linear")}
     if options.nested is None:
         given["nested"] = getattr(case.solver, "nested", None)
-    solution = solve(case, replace(options, **given))
+    solution = solve(case, options.model_copy(update=given))
     return solution, time.process_time() - begin
 
 
