@@ -133,7 +133,8 @@ def review(solution: Solution) -> None:
         "several-solutions": several_solutions(solution),
         "two-bodies": chain(bodies.sides(solution), bodies.apart(problem)),
         "supports": meeting_supports(problem, times),
-        "unresisted-motion": chain(bodies.unresisted_motions(solution), bodies.not_held(solution)),
+        "unresisted-motion": bodies.unresisted_motions(solution),
+        "not-held": bodies.not_held(solution),
     }.items():
         for text in remarks:
             listed = solution.notes if isinstance(text, Note) else solution.warnings

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -25,6 +25,7 @@ from forms.laws import (
     ConstantCoefficient,
     PotentialFactor,
 )
+from forms.ops import positive_part
 from tests.problems.compliance import PIEZO_REGIMES, REGIMES, LayerColumn
 from tests.problems.mechanics import affine_vector, flat, leaning_block, solve
 
@@ -196,3 +197,32 @@ def test_ranks_agree_on_a_layer_in_space(comm):
     shared, alone = np.array(found)
     assert np.all(alone[:3] > 0)
     assert np.abs(shared - alone).max() < 1e-8 * np.abs(alone).max()
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """A user's law: p_nu(s) = [s]^+^2."""
+
+    def __call__(self, s):
+        return positive_part(s) ** 2
+
+    def derivative(self, s):
+        return 2 * positive_part(s)
+
+
+@dataclass(frozen=True)
+class Softening:
+    """A user's stiffness: h_nu(s) = 900 / (1 + s^2/8)."""
+
+    def __call__(self, s):
+        return 900.0 / (1 + s**2 / 8)
+
+    def derivative(self, s):
+        return -900.0 * s / 4 / (1 + s**2 / 8) ** 2
+
+
+@pytest.mark.parametrize("push", [0.05, 0.3, 2.0])
+@pytest.mark.parametrize("piezo", [False, True])
+def test_laws_of_the_user(push, piezo):
+    column = LayerColumn(push, piezo, Quadratic(), Softening(), k_e=0.3)
+    assert check_column(column) == {0.05: "open", 0.3: "linear", 2.0: "rigid"}[push]

@@ -4,19 +4,22 @@ import ctypes
 import json
 import os
 import shutil
+import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from contact.io.folder import LOCK
+from contact.io.folder import LOCK, STAGE, settle
 from tests.problems.processes import (
     BAR,
     RANKS,
     SMALL,
     command,
     environment,
+    processes,
     served,
 )
 
@@ -116,3 +119,38 @@ def test_a_mesh_from_elsewhere_executes_nothing(ranks: int, tmp_path: Path) -> N
     (message,) = messages(done.stderr)
     assert "no Gmsh .msh file" in message
     assert not mark.exists()
+
+
+@RANKS
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_signals_while_writing_leave_one_of_the_runs_whole(
+    ranks: int, kind: signal.Signals, good: Path, tmp_path: Path
+) -> None:
+    """They are sent from when the first new file is there; every process ends."""
+    out = tmp_path / "out"
+    for delay in (0.0, 0.05)[ranks - 1 :]:
+        shutil.rmtree(out, ignore_errors=True)
+        shutil.copytree(good, out)
+        process = subprocess.Popen(
+            solving(out, "--plot", ranks=ranks), env=environment(), start_new_session=True,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        end = time.monotonic() + 60
+        while not (out / STAGE).exists() and process.poll() is None and time.monotonic() < end:
+            time.sleep(0.002)
+        assert process.poll() is None  # else no signal meets it
+        time.sleep(delay)
+        process.send_signal(kind)
+        process.wait(timeout=60)
+        end = time.monotonic() + 60
+        while left_of(process.pid) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert not left_of(process.pid)
+        settle(out)
+        assert same(out, good) or whole(out)
+
+
+def left_of(session: int) -> list[str]:
+    """Return the names of the processes of a session."""
+    return [process.name for process in processes() if process.session == session]

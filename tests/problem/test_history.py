@@ -280,3 +280,17 @@ def test_a_material_that_softens_too_far_ends_the_steps(held, traction, steps, c
     solution = solve(given, law=Softening(YOUNG, POISSON), comm=MPI.COMM_SELF)
     assert not solution.converged and len(solution.steps) >= 1
     assert "the stiffness is singular at that displacement" in solution.outcome.reason
+
+
+@pytest.mark.parallel(2)
+def test_the_error_of_a_law_on_one_rank_ends_the_others():
+    """They waited for it for ever."""
+    law = Other(
+        YOUNG,
+        POISSON,
+        changed=lambda r: r if np.abs(r.stress).max() < 1e-3 else 1 / 0,
+        everywhere=False,
+    )
+    problem = build_problem(case(cells=2, stages=1), MPI.COMM_WORLD, law=law)
+    with pytest.raises(InputError, match=r"^Other: respond: the function raises ZeroDivisionError"):
+        next(evolve(problem, [1.0]))
