@@ -157,6 +157,16 @@ def test_a_bound_is_0_where_the_case_accepts_nothing_below():
     assert _least([case()], "fixed.1.displacement.0") == -np.inf
 
 
+@pytest.mark.parametrize("start", [0.6, 0.0])
+def test_a_search_stays_with_numbers_that_the_case_accepts(start):
+    # Forces of a block without friction: the best coefficient would be below 0 with this noise.
+    data = with_columns(with_number(case(), "friction.mu", 0.0), COLUMNS)
+    size = np.abs(data["contact_force_y"]).max()
+    data["contact_force_x"] = -0.01 * size * np.array([0, 1, 1, 1, 1, 1, -1, -1])[: data["t"].size]
+    found = identify(with_number(case(), "friction.mu", start), data, ["friction.mu"], comm=SELF)
+    assert 0 <= found.parameters["friction.mu"] < 0.05
+
+
 def test_columns_of_supports_and_energies_can_be_fitted():
     columns = ["reaction_x_top", "reaction_y_top", "driven_force_x", "energy", "dissipation"]
     data = with_columns(case(), columns)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import signal
 from pathlib import Path
 
@@ -189,3 +190,44 @@ def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number,
     for one, two in zip(rows_of(tmp_path / "whole"), rows_of(out), strict=True):
         for name in one.keys() - {"linear_solves", "factorizations", "kkt"}:
             assert float(two[name]) == pytest.approx(float(one[name]), rel=1e-9, abs=1e-12)
+
+
+def test_read_steps_gives_the_states(tmp_path):
+    solution = solve_and_keep(steps_case(), None, SELF, tmp_path)
+    for one, two in zip(solution.steps, read_steps(tmp_path, solution.problem), strict=True):
+        assert one.state.near(two.state)
+
+
+MESHES = Path(__file__).parents[2] / "meshes" / "fixtures"
+
+
+SQUARE = """
+[mesh]
+file = "{mesh}"
+[material]
+young = 1.0
+poisson = 0.3
+[[fixed]]
+on = "top"
+displacement = ["0", "-0.001*t"]
+[contact]
+on = "bottom"
+[evolution]
+times = [0.0, 1.0]
+steps = [3]
+"""
+
+
+def test_another_mesh_file_is_not_continued(tmp_path, ended, capfd):
+    """Of the same nodes."""
+    out, case, mesh = tmp_path / "out", tmp_path / "case.toml", tmp_path / "square.msh"
+    shutil.copy(MESHES / "square.msh", mesh)
+    case.write_text(SQUARE.format(mesh=mesh))
+    heal = ended(1)
+    with pytest.raises(Killed):
+        on_the_line("solve", case, "--out", out)
+    heal()
+    mesh.write_text(mesh.read_text() + "\n")
+    assert on_the_line("solve", "--restart", out) == 2
+    words = "the file mesh.file has changed since the checkpoints were written"
+    assert words in capfd.readouterr().err

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from contact import parse_case, solve, write_outputs
 from contact.case.build import build_problem
 from contact.plot.run import read_grid
+from contact.results.resultants import rigid_columns
 from contact.solving import evolve
 from tests.problems.bar import changed
 from tests.problems.piezo import COUPLING, PERMITTIVITY
@@ -187,3 +188,13 @@ def test_rigid_parts_and_reactions_have_columns():
         assert row["rigid_y"] < 0 and row["rigid_rotation"] != 0
         balance = row["rigid_force_x"] + row["reaction_x_left"] - row["contact_force_x"]
         assert abs(balance) < 1e-10
+
+
+def test_several_rigid_parts_are_told_apart_by_their_names():
+    moving = {"displacement": [0.0, -0.1], "rotation": 0.0, "force": [1.0, 2.0], "moment": 0.5}
+    several = {"rigid_parts": {"top": moving, "left": moving}}
+    columns = rigid_columns(several, "displacement", "force")
+    assert columns["rigid_y_top"] == columns["rigid_y_left"] == -0.1
+    assert columns["rigid_force_x_top"] == 1.0
+    both = rigid_columns({"rigid": moving, "rigid_parts": {"top": moving}}, "displacement")
+    assert {"rigid_x", "rigid_x_top"} <= {*both}
