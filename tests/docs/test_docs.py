@@ -11,6 +11,20 @@ from pathlib import Path
 import pytest
 
 import contact
+from contact import refining
+from contact.linear import multigrid
+from contact.methods import (
+    fallbacks,
+    interior_point,
+    load_stepping,
+    newton,
+    newton_step,
+    semismooth,
+)
+from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.problem import condensed
+from contact.thesis import fixed_point, penalty, uzawa
+from contact.tolerances import LARGEST_VIOLATION
 from scripts import command_page
 from scripts.reporting import text
 from scripts.thesis import results_page
@@ -187,3 +201,68 @@ def test_files_that_pages_name_are_there() -> None:
     named = {name for page in pages for name in re.findall(pattern, page.read_text())}
     missing = [name for name in sorted(named) if not (ROOT / name).exists()]
     assert len(named) > 20 and not [name for name in missing if "NAME" not in name]
+
+
+def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
+    page = (DOCS / "algorithms.md").read_text()
+    options = NewtonOptions()
+    said = {
+        f"after [{options.stagnation_limit}] steps in which": semismooth.PROGRESS == 0.5,
+        f"after [{options.max_iterations}] steps;": True,
+        "is [10³] times all loads": semismooth.OVERESTIMATE == 1e3,
+        "limited to [1/4] κ": options.softening == 0.25,
+        "10^4 \\max(c, \\kappa)": options.gamma == 1e4,
+        "below [1/10] of the\n   largest one": newton_step.SMALL == 0.1,
+        "the forcing term [10⁻²]": newton_step.FORCING == 1e-2,
+        "each three steps": newton_step.STAGNANT == 3,
+        "[10^{-2}]\\,\\kappa$ is added": newton_step.REGULARISATION == 1e-2,
+        "tolerance is [10⁻³] of the": newton.CONTACT_PART == 1e-3,
+        "has not fallen to [1/20]": newton.UNSOLVED == 0.05,
+        "below a residual of [0.05]": newton.RADIUS == 0.05,
+        f"within [{newton.MOST_STEPS:g}] steps": True,
+        f"at most [{interior_point.LIMIT}] times": True,
+        f"at most [{interior_point.UPDATES}] times": True,
+        "below [10⁻¹⁰] of the work": interior_point.CLOSED == 1e-10,
+        f"[{interior_point.SHORTEST} to {interior_point.LONGEST}] of the way": True,
+        "with k = [10⁻²] c": fallbacks.PROXIMAL_STIFFNESS == 1e-2,
+        f"are at most [{fallbacks.NEARLY_BALANCED}]": True,
+        f"Multiply k by [{fallbacks.SOFTER}]": True,
+        f"multiply k by [{fallbacks.STIFFER:g}] until": True,
+        f"after [{fallbacks.STAGNANT_PROBLEMS}] problems in succession": True,
+        f"to [{fallbacks.NEARER}] of its least value": True,
+        "the part [10⁻⁹]": fallbacks.FIRST_PART == 1e-9,
+        "by [10³]": fallbacks.FACTOR == 1e3,
+        f"down to [{fallbacks.LEAST_FACTOR}]": True,
+        f"over [{FixedPointOptions().depth}] solves": True,
+        f"up to [{load_stepping.HALVINGS}] times": True,
+        f"by the factor\n   [{load_stepping.FARTHEST:g}]": True,
+        f"k is at most [{condensed.LARGEST}]": True,
+        f"at most [{multigrid.DIRECT:,}] unknowns": True,
+        f"in 3-D from [{multigrid.LARGE[3, False]:,}] unknowns": True,
+        f"a potential from [{multigrid.LARGE[3, True]:,}] on": True,
+        f"in 2-D from [{multigrid.LARGE[2, False]:,}] on": True,
+        f"k is at most [{condensed.ALWAYS}]": True,
+        f"less than [{condensed.DENSE_IS_FASTER:g}] sparse ones": True,
+        "is more than [half] of that before": fallbacks.PROGRESS == 0.5,
+        "is [10⁻⁴] f b²/d": interior_point.SHARE == 1e-4,
+        f"is [{interior_point.SHARE_UNSUPPORTED}] of that of the loads": True,
+        "below\n   [10⁻⁴]": interior_point.FORCING == 1e-4,
+        f"stagnation limit [{fallbacks.CONTINUATION_LIMIT}]": True,
+        f"after [{uzawa.STAGNATION_LIMIT}] iterations": True,
+        "by [1 %]": uzawa.PROGRESS == 0.99,
+        f"after [{fixed_point.FixedPoint.stagnation[0]}] iterations": True,
+        f"after [{penalty.Penalty.stagnation[0]}] iterations that do not reduce its": True,
+        f"more than [{LARGEST_VIOLATION}] the run": penalty.Penalty.stagnation[1] == 0.99,
+        "by [10 %]": fixed_point.FixedPoint.stagnation[1] == 0.9,
+        f"by more than [{LARGEST_VIOLATION}] of the largest displacement": True,
+        "Below a residual of [10⁻²]": fixed_point.NEAR == 1e-2,
+        "the residual is below [10⁻²], friction": fixed_point.NEAR == 1e-2,
+        "to [10⁻³], and each": refining.COARSE_TOLERANCE == 1e-3,
+        f"from [{refining.MANY['whole']:,}] unknowns on": True,
+        f"[{refining.MANY['condensed']:,}] on": True,
+    }
+    assert [words for words, holds in said.items() if words not in page or not holds] == []
+    rows = [found.span() for words in said for found in re.finditer(re.escape(words), page)]
+    for number in re.finditer(r"\[[\d.,/⁰¹²³⁴⁵⁶⁷⁸⁹⁻ %to]+\](?!\()", page):
+        begin, end = number.span()
+        assert any(a <= begin and end <= b for a, b in rows), f"{number[0]} at {begin} has no row"
