@@ -130,6 +130,11 @@ class Expression:
             raise ValueError(f"{self} depends on the coordinates or the time")
         return _read(self.source)[2] if isinstance(self.source, str) else self.source
 
+    @property
+    def is_zero(self) -> bool:
+        """Whether it is nothing."""
+        return self.is_constant and self.value == 0
+
     def number(self, time: float) -> float:
         """Return the value of an expression that depends on the time alone."""
         return float(Expression(self.source, time).numpy(np.zeros((1, 3)))[0])
