@@ -43,7 +43,7 @@ from mpi4py import MPI
 from contact.errors import InputError, SingularError
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import unit_vectors
-from contact.methods.report import Outcome
+from contact.methods.report import PROGRESS, Outcome
 from contact.methods.semismooth import SemismoothNewton
 from contact.methods.unconstrained_modes import all_loads
 from contact.problem.residuals import evaluate, evaluate_forces, residual_forces
@@ -321,6 +321,7 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
     problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
     bound: Array = np.zeros(interface.nodes.weight.size)
     aside: tuple[State, Outcome] | None = None
+    best = 1.0
     for _ in range(UPDATES):
         method = InteriorPoint(newton, bound, begin)
         outcome, state = method.iterate(), method.state
@@ -336,6 +337,10 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
             return last, outcome
         if newton.steps_left <= 0:
             break
+        # Pressures of Newton's last steps if these have made progress, else of the interior point.
+        if aside is None and outcome.residuals.significant < PROGRESS * best:
+            state = last
+        best = min(best, outcome.residuals.significant)
         nodal = interface.nodes.apply(state.x)
         bound = interface.bound(nodal, state.forces)
         # With all nodes open the next bound is zero, and the solution the same.

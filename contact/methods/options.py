@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from annotated_types import Ge, Gt, Le, Lt
-from pydantic import Discriminator, Tag, model_validator
+from pydantic import AllowInfNan, Discriminator, Tag, model_validator
 
 from contact.model.section import Described
 from contact.problem.residuals import Residuals
@@ -141,7 +141,7 @@ class NewtonOptions(Options):
     """Augmentation parameter: stiffness of the eliminated constraints over that of the body."""
     stagnation_limit: Internal[int] = 12
     """Steps without progress after which the stage is given up."""
-    softening: Internal[float] = 0.25
+    softening: Internal[Annotated[float, AllowInfNan()]] = 0.25
     """Part of a node's own stiffness that a falling friction coefficient may take away.
     Infinity for the exact derivative: from nearby, it also leads to solutions on the falling
     part of the law, which are unstable."""

@@ -222,6 +222,12 @@ def _belt() -> Case:
     return parse_case(tables, source="belt")
 
 
+def _wedge() -> Case:
+    """Return a wedge whose bounds cycle between those of two interior points."""
+    (problem,) = problems("bodies", "wedges-41", folder=Path(tempfile.mkdtemp()))
+    return problem.case
+
+
 def _pads() -> Case:
     """Return two pads between a base and a lid that presses them and is lifted off."""
     bodies = Bodies(np.random.default_rng(1))
@@ -287,10 +293,14 @@ DEVICES = (
            ((fallbacks, "interior_point", _no_fallback),)),
     Device("updates of the friction bound", (), "Haslinger 1983",
            ((interior_point, "UPDATES", 1),)),
+    Device("friction bound of Newton's last steps", (), "-",
+           ((interior_point, "PROGRESS", 0.0),), (), _wedge),
     Device("limit analysis of the friction bound", (UnconstrainedModes.overloaded,), "Drucker 1954",
            ((UnconstrainedModes, "overloaded", lambda *_: False),), (), _own("wall")),
     Device("rigid motion to a state without contact", (UnconstrainedModes.separated,),
            "Lawson and Hanson 1974", ((fallbacks, "rigid_motion", _nothing),), (), _pads),
+    Device("steps on the condensed body at last", (fallbacks.condensed_body,), "Guyan 1965",
+           ((fallbacks, "condensed_body", _nothing),)),
     Device("proximal points", (fallbacks.proximal_points,), "Rockafellar 1976",
            ((fallbacks, "proximal_points", _nothing),), (), _belt),
     Device("continuation in the conductivity", (fallbacks.continuation,), "Allgower and Georg 2003",
