@@ -368,10 +368,10 @@ class _Runner:
 
     def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:
         counted, ends = replace(method.counters), self._ends
-        start = linearised_at = None
+        start = secant_at = None
         if ends:
-            start, linearised_at = predicted(problem, ends)
-        state, outcome = solve_step(problem, method, start, linearised_at)
+            start, secant_at = predicted(problem, ends)
+        state, outcome = solve_step(problem, method, start, secant_at)
         if start is not None and not outcome.converged and not outcome.signal:
             state, outcome = solve_step(problem, method, None)
         self._ends = [*ends[-1:], (problem, state)] if outcome.converged else []

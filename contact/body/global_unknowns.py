@@ -1,6 +1,6 @@
 """Global unknowns q: rigid motions, potentials of electrodes, shortenings of bolts.
 
-A rigid body moves by u = R q, R = [I, -(x - x_c) x]; an electrode has one potential. Each
+A rigid body moves by u = N_q q, N_q = [I, -(x - x_c) x]; an electrode has one potential. Each
 component of q is given, or free under a given force, moment or charge. Nodes of a rigid part or of
 an electrode are tied to q. A moving foundation ties no nodes: it changes gaps alone
 (`contact.interface.nodes`).
@@ -89,7 +89,7 @@ class Member:
         return np.where(self.free, forces * self.units, 0.0)
 
     def motion(self, points: Array, block_size: int) -> Array:
-        """Return R at points of shape (n, d): shape (n, block size, its unknowns)."""
+        """Return N_q at points of shape (n, d): shape (n, block size, its unknowns)."""
         n, d = points.shape
         columns = np.zeros((n, block_size, self.units.size))
         if isinstance(self.description, Electrode):
@@ -113,7 +113,7 @@ class GlobalUnknowns:
     free
         Mask of the unknowns without given values, shape (m,).
     ties
-        R at the tied owned unknowns, shape (owned, m).
+        N_q at the tied owned unknowns, shape (owned, m).
     tied
         Mask of the tied unknowns of owned nodes, shape (nodes, block size).
     """
@@ -149,7 +149,7 @@ class GlobalUnknowns:
     def of_foundation(
         self, points: Array, block_size: int, part: str | None = None
     ) -> Array | None:
-        """Return R of the foundation in front of a part at points, (n, block size, m).
+        """Return N_q of the foundation in front of a part at points, (n, block size, m).
 
         Zero where it is fixed, and without a part; None without any q.
         """
@@ -171,13 +171,13 @@ class GlobalUnknowns:
         return np.concatenate([np.zeros(0), *(member.forces(time) for member in self.members)])
 
     def gathered(self, forces: Array) -> Array:
-        """Return the forces on q of those on owned unknowns: R^T f, shape (m,). Collective."""
+        """Return the forces on q of those on owned unknowns: N_q^T f, shape (m,). Collective."""
         if not self.tying:
             return np.zeros(self.size)
         return summed(self.comm, self.ties.T @ forces)
 
     def with_foundations(self, nodes: NDArray[np.int32], motion: Array) -> sparse.csr_array:
-        """Return R at tied nodes, and as given, (n, b, m), at contact nodes, shape (owned, m)."""
+        """Return N_q at tied nodes, and as given, (n, b, m), at contact nodes, shape (owned, m)."""
         there = _rows(nodes, motion, slice(0, self.size), self.ties.shape)
         return (self.ties + there).tocsr()
 
@@ -242,7 +242,7 @@ def _tie(
     tied: NDArray[np.bool_],
     size: int,
 ) -> sparse.csr_array:
-    """Return the rows of R of a rigid part or an electrode, and mark them as tied. Collective."""
+    """Return the rows of N_q of a rigid part or an electrode, and mark them as tied. Collective."""
     d, key = domain.dim, f"{member.description.name} on {member.description.on!r}"
     domain.mesh.topology.create_connectivity(d - 1, d)
     nodes = fem.locate_dofs_topological(space, d - 1, domain.facets_anywhere(member.description.on))
@@ -279,7 +279,7 @@ def _tie(
 def _rows(
     nodes: NDArray[np.int32], motion: Array, columns: slice, shape: tuple[int, int]
 ) -> sparse.csr_array:
-    """Return R at nodes, (n, block size, columns), as rows of a matrix of all unknowns."""
+    """Return N_q at nodes, (n, block size, columns), as rows of a matrix of all unknowns."""
     dofs = nodes[:, None] * motion.shape[1] + np.arange(motion.shape[1])
     every = np.broadcast_arrays(dofs[:, :, None], np.arange(columns.start, columns.stop))
     places = tuple(numbers.ravel() for numbers in every)

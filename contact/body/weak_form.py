@@ -3,12 +3,13 @@
 The unknowns x = (u, phi) of a body under given loads satisfy, for all test functions z = (v, xi)
 that vanish where displacements and potentials are prescribed,
 
-    R(x; z) = internal_forces + elastic_supports
-            + body_forces + tractions + pressures + charges = contact forces.
+    r(x; z) = internal_forces + elastic_supports + body_forces + tractions + pressures + charges
+            = -int_Gamma_3 ((lambda_c + p_l) v_nu + lambda_f . v_tau - (D.nu) xi),
 
-That is (10) of docs/theory.md, and (5.26) of the thesis, without a potential (3.9): the test
-function of the potential is negated, so that the derivative of R is symmetric. Loads are negative
-terms: R = <F(x), z> - <f, z>. Stresses are those of `forms`; contact is `contact.interface`.
+with the pressure p_l of a layer. The first line is of this module, the second of
+`contact.interface`. That is (10) of docs/theory.md, and (5.26) of the thesis, without a potential
+(3.9): the test function of the potential is negated, so that the derivative of r is symmetric.
+Loads are negative terms: r = <F(x), z> - <f, z>. Stresses are those of `forms`.
 
 Measures, fields and laws in UFL are made by `contact.body.materials` and `contact.body.loads`;
 `contact.body.assembly` compiles the terms.
@@ -74,7 +75,7 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True)
 class WeakForm:
-    """The residual R(x; z) of one body.
+    """The residual r(x; z) of one body, without contact.
 
     Attributes
     ----------
@@ -94,7 +95,7 @@ class WeakForm:
     def residual(
         self, x: Fields, z: Fields, secant_at: Expr | None = None, history_at: Expr | None = None
     ) -> list[Term]:
-        """Return the terms of R(x; z), of each material, support and load one.
+        """Return the terms of r(x; z), of each material, support and load one.
 
         Parameters
         ----------

@@ -189,7 +189,7 @@ def _check_contacts(case: Case) -> None:
         if contact.against is not None and electric is not None and electric.phi_f != ZERO:
             accepted = "0, or none, with against: the other body has a potential of its own"
             raise fault(f"{key}.phi_f", electric.phi_f.source, accepted)
-        # Newton's method linearises layer and current; it has no previous outer iteration.
+        # Newton's method linearises layer and charge; it has no previous outer iteration.
         for place, section in ((path, contact), (key, electric)):
             if section is not None and section.lagged and case.solver.method == "newton":
                 accepted = 'lagged with solver.method = "uzawa" or "penalty"'

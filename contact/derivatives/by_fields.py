@@ -1,6 +1,6 @@
 """Gradients of results by fields: the gap along a surface, a constant of a material in the body.
 
-One adjoint gives the derivatives by all values of a field, as dR/dm of each is local: that of a gap
+One adjoint gives the derivatives by all values of a field, as dG/dm of each is local: that of a gap
 is known node by node, that of a constant of a material is the central difference of the work of the
 stresses along the adjoint, tested with the functions of the field.
 """

@@ -1,13 +1,13 @@
 """Derivatives of results by parameters, through contact and friction.
 
 At a solution the consistent Newton matrix J gives them: with z the unknowns and contact forces, h
-the history at the beginning of a step, and R(z, h; m) = 0 the equations of its active set,
+the history at the beginning of a step, and G(z, h; m) = 0 the equations of its active set,
 
-    dz/dm = -J^-1 (dR/dm + dR/dh dh/dm)                              (tangent),
-    dQ/dm = dQ/dm|_z - w . dR/dm,    J^T w = (dQ/dz)^T               (adjoint),
+    dz/dm = -J^-1 (dG/dm + dG/dh dh/dm)                              (tangent),
+    dQ/dm = dQ/dm|_z - w . dG/dm,    J^T w = (dQ/dz)^T               (adjoint),
 
 one back-substitution per parameter and step, or per quantity and step. The tangent is carried
-forwards through the steps of an evolution with the history, the adjoint backwards. dR/dm is a
+forwards through the steps of an evolution with the history, the adjoint backwards. dG/dm is a
 central difference of residuals at the fixed solution (semi-analytical sensitivities), so that any
 number of a case may be the parameter, sizes of the mesh too. The free unknowns are fixed; tied
 ones, and moments about the centre of a rigid part, are those of the other parameter.
@@ -417,7 +417,7 @@ def _sum(history: History, factor: float, change: History) -> History:
 
 
 def _explicit(family: Family, state: State, linearised: Linearised) -> tuple[Equations, _Sides]:
-    """Return dR/dm at fixed z and h, and the problems and states of the difference. Collective."""
+    """Return dG/dm at fixed z and h, and the problems and states of the difference. Collective."""
     sides = [at(problem, state) for problem in family.problems]
     found = [equations(*side, linearised.active) for side in sides]
     change = Equations(

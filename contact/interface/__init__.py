@@ -12,7 +12,7 @@ all laws together
     `interface.Interface`: normal gap, slip, pressure, friction bound, forces on the body.
 friction
     `friction`, with the coefficients of `forms.laws`, and the non-local operator R.
-layer and current
+layer and charge
     `foundation.FoundationLaw`; `NormalGraph` is the layer with the rigid part behind it.
 jump, lumped surface mass
     `nodes.ContactNodes`, of both kinds of contact; `nodes.Geometry` of one contact.

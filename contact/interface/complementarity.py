@@ -187,8 +187,8 @@ def linearise(
         active = ActiveSet.without_slip(normal_gap <= 1e-12 * interface.diameter, frictional)
     else:
         lam = at_bound(before, lam, slip, bound)
-        known = Multipliers(p, lam)
-        active = interface.active_set(nodal, known, bound, c).stopped(before, lam, slip)
+        raised = Multipliers(p, lam)
+        active = interface.active_set(nodal, raised, bound, c).stopped(before, lam, slip)
     trial = lam + c * slip
     norm = np.linalg.norm(trial, axis=1)
     closed, sticks, slips = active.closed, active.sticks, active.slips

@@ -5,7 +5,7 @@ conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30
 node by node. Newton's method takes `force` and its full derivative.
 
 The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer with the
-unilateral constraint, as the one monotone graph `NormalGraph` of Figure 1.6, and the current
+unilateral constraint, as the one monotone graph `NormalGraph` of Figure 1.6, and the charge
 through `charge_block` in the operator. A linearised layer would not do there: a column that
 is stiff enough cycles for ever between the slopes of an open and of a saturated layer.
 
@@ -133,7 +133,7 @@ class FoundationLaw:
         return conductor.psi.follows_gap
 
     @property
-    def constrained_gap(self) -> Array:
+    def signorini_gap(self) -> Array:
         """Gap of the unilateral constraint, (n,): infinite where there is no rigid part."""
         rigid = self.layer is None or np.isfinite(self.layer.thickness)
         return np.where(rigid, self.nodes.gap, np.inf)
@@ -164,7 +164,7 @@ class FoundationLaw:
         if self.layer is None or self.layer.lagged:
             return None
         stiffness = np.broadcast_to(self.layer.h_nu(self._difference(x)), x.shape[:1])
-        gap = self.constrained_gap
+        gap = self.signorini_gap
         return NormalGraph(self.layer.p_nu, stiffness, self.touch, gap)
 
     def _difference(self, x: Array) -> Array:
@@ -188,7 +188,7 @@ class FoundationLaw:
     def _layer_penetration(self, x: Array) -> Array:
         """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""
         # An iterate may go beyond the rigid part; the excess pressure belongs to the multiplier.
-        return np.minimum(self.nodes.normal_component(x), self.constrained_gap) - self.touch
+        return np.minimum(self.nodes.normal_component(x), self.signorini_gap) - self.touch
 
     def charge(self, x: Array, pressure: Array) -> Array:
         """Return D.nu = psi phi_L(phi - phi_F) at the nodes; nodes with `pressure` are closed."""
@@ -206,7 +206,7 @@ class FoundationLaw:
         return np.asarray(self.conductor.share * psi)
 
     def resting(self, x: Array) -> Array:
-        """Return rounding pressures, by which constrained nodes that touch conduct, shape (n,)."""
+        """Return rounding pressures, by which fixed nodes that touch conduct, shape (n,)."""
         reach = np.abs(self.nodes.gap) + np.linalg.norm(x[:, : self.nodes.dim], axis=1)
         return np.maximum(1e-12 * self.c_0 * reach, TINY)
 
@@ -214,7 +214,7 @@ class FoundationLaw:
         """Return where the rigid part presses, shape (n,)."""
         # u_nu = rho holds to the tolerance of the inner loop, which a steep ramp makes a thousand
         # times larger; so large a multiplier at an open node is no pressure.
-        normal_gap = self.constrained_gap - self.nodes.normal_component(x)
+        normal_gap = self.signorini_gap - self.nodes.normal_component(x)
         return constraint_active(pressure - self.pressure(x), normal_gap, self.c_0)
 
     def force(self, x: Array, pressure: Array) -> Array:
@@ -231,7 +231,7 @@ class FoundationLaw:
         if self.layer is None:
             return total
         depth, difference = self._layer_penetration(x), self._difference(x)
-        inside = self.nodes.normal_component(x) < self.constrained_gap
+        inside = self.nodes.normal_component(x) < self.signorini_gap
         slope = self.layer.h_nu(difference) * self.layer.p_nu.derivative(depth) * inside
         total[:, : self.nodes.dim] = slope[:, None] * self.nodes.normal
         if self.nodes.block_size > self.nodes.dim:
@@ -260,7 +260,7 @@ class FoundationLaw:
             Nodal unknowns and pressures.
         full
             With the derivative of psi by the gap, not symmetric. Else psi is frozen, and a lagged
-            current has no derivative, as in the fixed point.
+            charge has no derivative, as in the fixed point.
         """
         d, bs = self.nodes.dim, self.nodes.block_size
         total = np.zeros((x.shape[0], bs, bs))
@@ -280,7 +280,7 @@ class FoundationLaw:
         """Return the derivative of `force`, shape (n, block size, block size).
 
         Without the derivatives of h_nu and psi, and thus symmetric, unless `full`; then that of a
-        lagged layer and current too.
+        lagged layer and charge too.
         """
         total = self.charge_block(x, pressure, full)
         if self.layer is not None and (full or not self.layer.lagged):
@@ -379,7 +379,7 @@ class Grouped:
         return any(law.follows_gap for law in self.laws)
 
 
-#: Laws of an obstacle without layer or current.
+#: Laws of an obstacle without layer or charge.
 NO_LAYER = Layer(0.0, Compliance(np.inf), PotentialFactor(0.0))
 NO_CONDUCTOR = Conductor(PerfectConductivity(0.0), 0.0, Truncation(np.inf))
 
@@ -420,13 +420,13 @@ def joined_conductors(
     )
 
 
-def joined_constrained(
+def joined_fixed_conducting(
     given: Sequence[Conductor | None],
     geometries: Sequence[Geometry],
     law: FoundationLaw,
     begin: int,
 ) -> FoundationLaw | None:
-    """Return the law at the constrained nodes of all contacts; None without conductors.
+    """Return the law at the fixed conducting nodes of all contacts; None without conductors.
 
     Parameters
     ----------
@@ -436,9 +436,9 @@ def joined_constrained(
         Global number of the first node of this rank.
     """
     there = [
-        (geometry.constrained, own)
+        (geometry.fixed_conducting, own)
         for geometry, own in zip(geometries, given, strict=True)
-        if geometry.constrained is not None
+        if geometry.fixed_conducting is not None
     ]
     if not there:
         return None

@@ -1,6 +1,6 @@
 """Friction on Gamma_3: its bound at the contact nodes, (1.36)-(1.38), and the non-local operator R.
 
-R is a mollifier along Gamma_3, section 1.4.3 of the thesis.
+R is the mollifier along Gamma_3 of section 1.4.3 of the thesis.
 """
 
 from __future__ import annotations
@@ -261,7 +261,7 @@ class NodalFriction:
         return self.history.accumulated + slip
 
     def bound(self, pressure: Array, slip: Array) -> Array:
-        """Return s, mu |R p| by Coulomb's law, shape (n,). Collective."""
+        """Return s, mu max(R p, 0) by Coulomb's law, shape (n,). Collective."""
         if self.law is None:
             return np.zeros_like(slip)
         return np.asarray(self.law(self._accumulated(slip), self.smooth(pressure)), dtype=float)
@@ -286,7 +286,7 @@ class NodalFriction:
         )
 
     def smooth(self, pressure: Array) -> Array:
-        """Return |R p|, shape (n,). Collective."""
+        """Return max(R p, 0), shape (n,): of an iterate R p may be negative. Collective."""
         return np.maximum(self.smoothing(pressure), 0.0)
 
 

@@ -1,4 +1,8 @@
-"""Gamma_3 with all its laws, node by node: nothing here knows the body behind."""
+"""Gamma_3 with all its laws, node by node.
+
+Of the body behind it has the constants c_0, diameter, elongation and connected components alone: no
+mesh, no space, no stiffness.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +41,7 @@ class Proximal:
 
 @dataclass(frozen=True)
 class Interface:
-    """Unilateral contact, friction, layer and current at the owned contact nodes.
+    """Unilateral contact, friction, layer and surface charge at the owned contact nodes.
 
     Nodal unknowns have shape (n, block size): displacement, then scaled potential.
 
@@ -46,14 +50,14 @@ class Interface:
     nodes
         The contact nodes.
     gap
-        Of the unilateral constraint, shape (n,): that of the nodes, or infinite where none acts, as
+        rho of the unilateral constraint, shape (n,): that of the nodes, or infinite without one, as
         behind a layer without a rigid part, and at nodes outside of a working set.
     foundation
-        Layer and current of the foundation.
+        Layer and surface charge D.nu of the foundation.
     friction
         Friction.
-    constrained
-        Current through nodes without a free displacement, but with a free potential, or None.
+    fixed_conducting
+        The charge at nodes without a free displacement, but with a free potential, or None.
     c_0
         Complementarity parameter c_0 = E/diameter (stress/length), E behind Gamma_3.
     diameter
@@ -72,7 +76,7 @@ class Interface:
     gap: Array
     foundation: FoundationLaw
     friction: NodalFriction
-    constrained: FoundationLaw | None
+    fixed_conducting: FoundationLaw | None
     c_0: float
     diameter: float
     elongation: float
@@ -96,7 +100,9 @@ class Interface:
             self,
             foundation=self.foundation.at(time),
             friction=replace(self.friction, history=history),
-            constrained=None if self.constrained is None else self.constrained.at(time),
+            fixed_conducting=None
+            if self.fixed_conducting is None
+            else self.fixed_conducting.at(time),
         )
 
     def norms(self, values: Array) -> Array:
@@ -140,7 +146,7 @@ class Interface:
         return np.linalg.norm(self.slip(nodal), axis=1)
 
     def pressure(self, nodal: Array, multipliers: Multipliers) -> Array:
-        """Return -sigma_nu, the multiplier and the layer's pressure, shape (n,)."""
+        """Return -sigma_nu = lambda_c + p_l, p_l the layer's pressure, shape (n,)."""
         return multipliers.pressure + self.foundation.pressure(nodal)
 
     def bound(self, nodal: Array, multipliers: Multipliers) -> Array:
@@ -195,15 +201,15 @@ class Interface:
     def acting(
         self, x: Array, multipliers: Multipliers
     ) -> Iterator[tuple[FoundationLaw, Array, Array]]:
-        """Yield law, unknowns and pressures of contact, then constrained nodes. Collective."""
+        """Yield law, unknowns and pressures of contact, then fixed conducting nodes. Collective."""
         nodal = self.nodes.apply(x)
         yield self.foundation, nodal, self.pressure(nodal, multipliers)
-        if self.constrained is not None:
-            nodal = self.constrained.nodes.apply(x)
-            yield self.constrained, nodal, self.constrained.resting(nodal)
+        if self.fixed_conducting is not None:
+            nodal = self.fixed_conducting.nodes.apply(x)
+            yield self.fixed_conducting, nodal, self.fixed_conducting.resting(nodal)
 
     def add_forces(self, residual: Array, x: Array, multipliers: Multipliers) -> None:
-        """Add the contact forces and the current at local unknowns to owned values."""
+        """Add the contact forces and the charge at local unknowns to owned values."""
         nodes = self.nodes
         nodes.transpose(nodes.weight[:, None] * multipliers.vectors(nodes), residual)
         for law, nodal, pressure in self.acting(x, multipliers):
@@ -212,10 +218,10 @@ class Interface:
             away = nodes.tangential_component(nodes.apply(x)) - self.proximal.about
             nodes.transpose(self.proximal.stiffness * nodes.weight[:, None] * away, residual)
 
-    def add_current(
+    def add_charge(
         self, residual: Array, x: Array, change: Array, multipliers: Multipliers
     ) -> None:
-        """Add the change of the current with local unknowns, psi frozen, to owned values."""
+        """Add the change of the charge with local unknowns, psi frozen, to owned values."""
         for law, nodal, pressure in self.acting(x, multipliers):
             block = law.charge_block(nodal, pressure)
             density = np.einsum("nij,nj->ni", block, law.nodes.apply(change))
@@ -223,10 +229,10 @@ class Interface:
 
     @property
     def coupled(self) -> NDArray[np.int32]:
-        """Nodes at which the operator has blocks: contact nodes, then constrained ones."""
-        if self.constrained is None:
+        """Nodes at which the operator has blocks: contact nodes, then fixed conducting ones."""
+        if self.fixed_conducting is None:
             return self.nodes.nodes
-        return np.concatenate([self.nodes.nodes, self.constrained.nodes.nodes])
+        return np.concatenate([self.nodes.nodes, self.fixed_conducting.nodes.nodes])
 
     def weighted(self, blocks: Array, x: Array) -> Array:
         """Return the blocks of the operator at `coupled`: those of the contact nodes, times weight.
@@ -242,9 +248,9 @@ class Interface:
             blocks = blocks.copy()
             blocks[:, : self.dim, : self.dim] += self.proximal.stiffness * self.nodes.tangent
         weighted = self.nodes.weight[:, None, None] * blocks
-        if self.constrained is None:
+        if self.fixed_conducting is None:
             return weighted
-        there = self.constrained.nodes
+        there = self.fixed_conducting.nodes
         nodal = there.apply(x)
-        block = self.constrained.charge_block(nodal, self.constrained.resting(nodal))
+        block = self.fixed_conducting.charge_block(nodal, self.fixed_conducting.resting(nodal))
         return np.concatenate([weighted, there.weight[:, None, None] * block])

@@ -19,7 +19,7 @@ from scipy import sparse
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
-from contact.interface.mortar.lumping import Mixing
+from contact.interface.mortar.lumping import JumpRows
 from contact.interface.mortar.operator import CouplingOperator, coupling_operator
 from contact.linear.layout import Inclined, projectors
 from contact.ranks import largest, summed
@@ -82,13 +82,14 @@ class ContactNodes:
     normal
         Contact direction, a unit vector out of the body, shape (n, d).
     admissible_normal
-        The least unconstrained displacement of normal component 1, shape (n, d): the normal, but
-        where supports constrain a node aslant to it.
+        nu_a = P nu/|P nu|^2, shape (n, d), P being the projector onto the free directions: the
+        least free displacement with nu_a . nu = 1; nu unless supports hold the node aslant to it.
     tangent
-        Projector onto the directions of slip and friction, shape (n, d, d): the tangential ones,
-        prescribed displacements included; but for those that supports constrain aslant to the
-        contact direction, or while the other side moves along them: no unknown is the jump there,
-        as on a plane of symmetry, and the supports bear the friction.
+        P_tau, the projector onto the directions of slip and friction, shape (n, d, d). Where P nu
+        is nu, and supports alone prescribe the other jumps: I - nu (x) nu, which prescribed
+        displacements belong to. Else, where supports hold the node aslant to nu, or while the
+        other side moves along them: P - P nu (x) P nu/|P nu|^2. The other jumps are no unknowns
+        there, as on a plane of symmetry, and the supports bear the friction.
     gap
         Distance to the foundation along the contact direction, shape (n,); infinite at nodes that
         face nothing.
@@ -97,7 +98,7 @@ class ContactNodes:
     block_size
         Unknowns a node: d, or d + 1 with the potential.
     motion
-        Motion R of the foundation by the m global unknowns (`contact.body.global_unknowns`),
+        Motion N_q of the foundation by the m global unknowns (`contact.body.global_unknowns`),
         shape (n, block_size, m); None without these.
     cut
         Largest depth in the foundation of a node on a straight facet of a curved part; the gap of
@@ -108,8 +109,8 @@ class ContactNodes:
         Motion of the nodes with the global unknowns at a constant jump, as `motion`; along
         constrained directions the `admissible_normal` takes it up.
     coupling
-        Operator of jumps that are sums over nodes, between bodies and on quadratic triangles, or
-        None.
+        Operator of the jumps that are sums over nodes (`JumpRows`), or None: between bodies, on
+        quadratic triangles, and beside the axis of revolution.
     """
 
     comm: MPI.Comm
@@ -209,14 +210,14 @@ class Geometry:
         D and M of their jumps; None where jumps are nodal values.
     covered
         Share of each node's area that faces the other body, shape (n,); None before a foundation.
-    constrained
-        Nodes that cannot move, but through which current flows; None without.
+    fixed_conducting
+        Nodes that cannot move, but carry charge; None without.
     """
 
     nodes: ContactNodes
-    jumps: Mixing | None
+    jumps: JumpRows | None
     covered: Array | None = None
-    constrained: ContactNodes | None = None
+    fixed_conducting: ContactNodes | None = None
 
 
 def joined_nodes(

@@ -16,7 +16,7 @@ from contact.arguments import naming
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.supports import APART
 from contact.errors import InputError, counted
-from contact.interface.mortar.lumping import Lumping, Mixing
+from contact.interface.mortar.lumping import JumpRows, Lumping
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, Geometry, contact_directions
 from contact.mesh.domain import Domain
@@ -59,8 +59,8 @@ class Candidates:
         are on the surface.
     owners
         The owners of the nodes.
-    mixing
-        The jumps, where these are no nodal values.
+    jumps
+        Rows of the jumps; None where these are the nodal values.
     """
 
     nodes: NDArray[np.int32]
@@ -74,18 +74,18 @@ class Candidates:
     gap: Array
     unknown: Array
     owners: Owners
-    mixing: Mixing | None
+    jumps: JumpRows | None
 
     def of_jumps(self, gap: Array) -> Array:
         """Return the gaps of the jumps, given those at the nodes. Collective.
 
         Next to infinite gaps these are no numbers.
         """
-        if self.mixing is None:
+        if self.jumps is None:
             return gap
         with np.errstate(invalid="ignore"):
-            mixed = self.mixing.apply(self.owners, gap[:, None] * self.direction)
-            return np.asarray(np.einsum("nd,nd->n", self.direction, mixed))
+            jumps = self.jumps.apply(self.owners, gap[:, None] * self.direction)
+            return np.asarray(np.einsum("nd,nd->n", self.direction, jumps))
 
 
 def candidates(
@@ -142,7 +142,7 @@ def candidates(
         curved,
         unknown,
         facets.owners,
-        lumped.mixing,
+        lumped.jumps,
     )
 
 
@@ -176,8 +176,8 @@ class FoundationPlacement:
         Name of the contact in messages.
     press
         Whether overlaps in the reference configuration are interferences.
-    contact, constrained
-        Which nodes of the part are contact nodes, and which conduct but cannot move, shape (n,).
+    contact, fixed_conducting
+        Which nodes of the part are contact nodes, and which cannot move but conduct, shape (n,).
     """
 
     body: BodyEquilibrium
@@ -187,7 +187,7 @@ class FoundationPlacement:
     key: str
     press: bool
     contact: NDArray[np.bool_]
-    constrained: NDArray[np.bool_] | None
+    fixed_conducting: NDArray[np.bool_] | None
 
     def at(self, displacement: Array) -> Geometry:
         """Return the geometry at a displacement of the owned nodes, shape (nodes, d). Collective.
@@ -222,10 +222,10 @@ class FoundationPlacement:
                 found.places[self.contact], body.block_size, self.part
             ),
         )
-        if self.constrained is None:
-            return Geometry(nodes, found.mixing)
-        own, there = self.constrained, found.nodes[self.constrained]
-        constrained = replace(
+        if self.fixed_conducting is None:
+            return Geometry(nodes, found.jumps)
+        own, there = self.fixed_conducting, found.nodes[self.fixed_conducting]
+        fixed_conducting = replace(
             nodes,
             nodes=there,
             points=body.space.tabulate_dof_coordinates()[there, : body.dim],
@@ -237,7 +237,7 @@ class FoundationPlacement:
             deviation=found.unknown[own],
             motion=None,
         )
-        return Geometry(nodes, found.mixing, constrained=constrained)
+        return Geometry(nodes, found.jumps, fixed_conducting=fixed_conducting)
 
 
 def find_nodes(
@@ -265,7 +265,7 @@ def find_nodes(
     press
         Whether a shape may cut the body in the reference configuration.
     conducts
-        Whether current flows, through nodes that cannot move too.
+        Whether the foundation conducts: then nodes that cannot move carry charge too.
 
     Returns
     -------
@@ -314,11 +314,13 @@ def find_nodes(
             f"{key}.on: part {part!r} has no node that is free to move towards the foundation",
             "held-part",
         )
-    constrained = None
+    fixed_conducting = None
     if conducts:
-        constrained = ~chosen & body.free[found.nodes, -1] & meets & bears
-        _check_charged(body, part, found.nodes, constrained, key)
-    placement = FoundationPlacement(body, part, facets, obstacle, key, press, chosen, constrained)
+        fixed_conducting = ~chosen & body.free[found.nodes, -1] & meets & bears
+        _check_charged(body, part, found.nodes, fixed_conducting, key)
+    placement = FoundationPlacement(
+        body, part, facets, obstacle, key, press, chosen, fixed_conducting
+    )
     return placement, placement.geometry(found)
 
 
@@ -326,10 +328,10 @@ def _check_charged(
     body: BodyEquilibrium,
     part: str,
     nodes: NDArray[np.int32],
-    constrained: NDArray[np.bool_],
+    fixed_conducting: NDArray[np.bool_],
     key: str,
 ) -> None:
-    """Refuse charge at nodes of electrodes, or at constrained ones of a moving part. Collective."""
+    """Refuse charge at nodes of electrodes, or at fixed ones of a moving part. Collective."""
     taken = bool(body.global_unknowns.tied[nodes, -1].any())
     if body.comm.allreduce(taken, op=MPI.LOR):
         raise InputError(
@@ -337,7 +339,7 @@ def _check_charged(
             "electrode of unknown potential; accepted: parts apart, or an insulated foundation",
             "rigid-part",
         )
-    some = body.comm.allreduce(bool(constrained.any()), op=MPI.LOR)
+    some = body.comm.allreduce(bool(fixed_conducting.any()), op=MPI.LOR)
     if some and body.global_unknowns.member(part) is not None:
         raise InputError(
             f"{key}.rigid: supports hold nodes of part {part!r}, which carry charge as "

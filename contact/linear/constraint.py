@@ -3,17 +3,22 @@
 In the increments of a solve d is 0: prescribed values are in x already. y has as many nodal
 unknowns as x, and m global ones q behind them,
 
-    x = Q (y^ + R q).
+    x = Q (y^ + N_q q),     C = [Q, Q N_q].
 
 Q makes mortar jumps the unknowns of slave nodes, so that contact laws are blocks at single nodes of
-y^. The columns of R are rigid motions and potentials of electrodes: tied nodes, which follow q,
+y^. The columns of N_q are rigid motions and potentials of electrodes: tied nodes, which follow q,
 have no y^, and at contact nodes in front of a moving foundation y^ is the displacement relative to
 it.
 
-Q^T K Q is computed by PtAP. R would fill the rows of all tied nodes: q borders the system instead,
-[[K, K R], [R^T K, R^T K R]]. A factorisation solves for the columns of K R together with the
-right-hand side; for an iterative solver q is eliminated, a low-rank update of K that keeps its
-preconditioner. After an inexact solve q is corrected: its rows are met to rounding.
+K^ = Q^T K Q is computed by PtAP. N_q would fill the rows of all tied nodes: q borders the system
+instead,
+
+    [[K^, K^ N_q], [N_q^T K^, N_q^T K^ N_q]],
+
+with the border B = K^ N_q and the corner E = N_q^T K^ N_q. A factorisation solves for the columns
+of B together with the right-hand side; for an iterative solver q is eliminated, a low-rank update
+of K^ that keeps its preconditioner. After an inexact solve q is corrected: its rows are met to
+rounding.
 
 Right-hand sides and solutions have the values of q, the same on all ranks, behind the owned ones.
 """
@@ -143,7 +148,7 @@ class Constraint:
     change
         Q; None for the identity.
     motions
-        R, shape (owned, m); zero rows at fixed unknowns.
+        N_q, shape (owned, m); zero rows at fixed unknowns.
     free
         Which of q are free, shape (m,).
     """
@@ -161,7 +166,7 @@ class Constraint:
         self._inverse = None if change is None else change.inverse
 
     def gathered(self, forces: Array) -> Array:
-        """Return R^T f of owned forces, shape (owned,) or (owned, k). Collective."""
+        """Return N_q^T f of owned forces, shape (owned,) or (owned, k). Collective."""
         return summed(self.layout.comm, self.motions.T @ forces)
 
     def expand(self, y: Array) -> Array:
@@ -201,7 +206,8 @@ class ConstrainedBulk:
     Attributes
     ----------
     columns, corner
-        K R and R^T K R of the last matrix, shapes (owned, m) and (m, m).
+        B = K^ N_q and E = N_q^T K^ N_q of the last matrix, with the terms of bolts; shapes
+        (owned, m) and (m, m).
     """
 
     def __init__(self, bulk: Bulk, constraint: Constraint, rest: LinearisationPoint) -> None:
@@ -240,7 +246,7 @@ class ConstrainedBulk:
         self.corner = self.constraint.gathered(self.columns)
         border = self._bulk.border(kind)
         if border is not None:
-            # Rows of tied nodes count by R alone.
+            # Rows of tied nodes count by N_q alone.
             own = [times(self.constraint.matrix, c, transposed=True) for c in border[0].T]
             added = np.stack(own, axis=1)
             across = self.constraint.gathered(added)
@@ -256,9 +262,9 @@ class ConstrainedBulk:
 
 
 class BorderedSolve:
-    """Block elimination of the q of [[A, B], [B^T, C]] (y, q) = (f, g), given A^-1 B. Collective.
+    """Block elimination of q from K^ y^ + B q = f, B^T y^ + E q = g. Collective.
 
-    The Schur complement S = C - B^T A^-1 B is inverted where anything resists q; the rest of q is
+    The Schur complement S = E - B^T inv(K^) B is inverted where anything resists q; the rest of q is
     0, and `regular` false.
 
     Parameters
@@ -266,9 +272,9 @@ class BorderedSolve:
     comm
         Communicator.
     columns, corner
-        B, shape (owned, m), and C, shape (m, m).
+        B, shape (owned, m), and E, shape (m, m).
     responses
-        A^-1 B, shape (owned, m).
+        inv(K^) B, shape (owned, m).
     """
 
     def __init__(
@@ -281,7 +287,7 @@ class BorderedSolve:
         self.inverse = np.asarray((right[resists].T / size[resists]) @ left[:, resists].T)
 
     def solve(self, first: Array, forces: Array) -> tuple[Array, Array]:
-        """Return y and q from A^-1 f and g. Collective."""
+        """Return y^ and q from inv(K^) f and g. Collective."""
         q = self.inverse @ (forces - summed(self._comm, self.columns.T @ first))
         return first - self.responses @ q, q
 
@@ -423,7 +429,7 @@ class ConstrainedOperator:
         return (self._nodes[:, None] * size + np.arange(size)).ravel()
 
     def _pushed(self, blocks: Array) -> tuple[Array, Array]:
-        """Return R at the nodes with blocks, and the blocks times it, (dofs, free) both."""
+        """Return N_q at the nodes with blocks, and the blocks times it, (dofs, free) both."""
         n, size, free = self._nodes.size, self._bulk.layout.block_size, self._free
         motion = self._constraint.motions[self._dofs][:, free].toarray()
         nodal = motion.reshape(n, size, free.size)

@@ -1,6 +1,6 @@
 """Linear operators: a bulk matrix plus small dense blocks at contact nodes, factorised once.
 
-The blocks are the augmentation r I of Algorithm 2, a compliant layer, a current, or Newton's
+The blocks are the augmentation r I of Algorithm 2, a compliant layer, a charge, or Newton's
 linearised contact laws.
 
 With a potential the operator [[K, E^T], [E, -L]] is indefinite. With L the permittivity's
@@ -152,7 +152,7 @@ class Bulk(Protocol):
         """Assemble the "secant", the "tangent" or its "symmetric" part. Collective."""
 
     def border(self, kind: str) -> tuple[Array, Array] | None:
-        """Return the derivatives by q of the forces on x and q beyond K R, if any. Collective."""
+        """Return the derivatives by q of the forces on x and q beyond K N_q, if any. Collective."""
 
 
 @dataclass

@@ -63,7 +63,7 @@ NEARLY_BALANCED = 0.03
 
 
 def solve_contact(
-    newton: SemismoothNewton, state: State, linearised_at: Array | None = None
+    newton: SemismoothNewton, state: State, secant_at: Array | None = None
 ) -> tuple[State, Outcome]:
     """Solve a problem by the semismooth Newton method and its fallbacks. Collective.
 
@@ -71,10 +71,10 @@ def solve_contact(
     ----------
     newton
         The method on the problem.
-    state, linearised_at
+    state, secant_at
         Initial guess, and unknowns of the first secant.
     """
-    state, outcome = newton.iterate(state, linearised_at, give_up=True)
+    state, outcome = newton.iterate(state, secant_at, give_up=True)
     if outcome.converged and newton.modes.unconstrained_at(newton.problem, state):
         found = fall_back(newton, state, outcome)
         return found if found[1].converged else (state, outcome)

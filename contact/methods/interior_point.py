@@ -6,7 +6,7 @@ gamma. So it runs on whole bodies and condensed ones alike, on any number of ran
 
 1. The first friction bound is zero.
 2. A step of the interior point is Mehrotra's predictor and corrector with the scaling of Nesterov
-   and Todd (`Cones`), both with one matrix. Every step linearises layer and current, and the
+   and Todd (`Cones`), both with one matrix. Every step linearises layer and charge, and the
    material by its secant.
 3. With a closed duality gap the active set is known. From there, or where rounding ends the steps
    before, Newton's method takes the last steps.

@@ -56,7 +56,7 @@ class Method(Protocol):
         """Take another load step of the same problem; factorisations remain, records start anew."""
 
     def solve(
-        self, start: State | None = None, linearised_at: Array | None = None
+        self, start: State | None = None, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence or a limit. Collective.
 
@@ -64,7 +64,7 @@ class Method(Protocol):
         ----------
         start
             Initial guess; zero by default.
-        linearised_at
+        secant_at
             Unknowns of the first secant of the material; those of the start by default. Prescribed
             values that have changed strain the elements beside them alone.
 
@@ -163,19 +163,19 @@ class LoadStepping:
             outcome = Outcome(UNKNOWN, self.method.options.allowed, released)
             return evaluated(problem, problem.start() if last is None else last, outcome)
         self.method.set_load_step(problem)
-        start = linearised_at = None
+        start = secant_at = None
         if last is not None:
             ends = [(problem, state) for state in (before, last) if state is not None]
-            start, linearised_at = predicted(problem, ends)
+            start, secant_at = predicted(problem, ends)
         self._modes.problem = problem
-        return solve_step(problem, self.method, start, linearised_at, self._modes)
+        return solve_step(problem, self.method, start, secant_at, self._modes)
 
 
 def solve_step(
     problem: ContactProblem,
     method: Method,
     start: State | None,
-    linearised_at: Array | None = None,
+    secant_at: Array | None = None,
     modes: UnconstrainedModes | None = None,
 ) -> tuple[State, Outcome]:
     """Solve by a method, and evaluate the residuals from scratch. Collective.
@@ -184,7 +184,7 @@ def solve_step(
     """
     counted = replace(method.counters)
     try:
-        state, outcome = method.solve(start, linearised_at)
+        state, outcome = method.solve(start, secant_at)
     except Interrupted as interrupt:
         state = method.state
         outcome = Outcome(UNKNOWN, UNKNOWN, str(interrupt), interrupt.number)

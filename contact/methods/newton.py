@@ -1,10 +1,11 @@
 """Semismooth Newton method, a primal-dual active set strategy: the default solver.
 
-1. Complementarity functions p - max(0, p + c (u_nu - rho)) and lambda - proj(lambda + c u_tau)
-   state contact and friction at each node. Their arguments define the active set: which nodes are
-   open, stick or slip (`contact.interface.multipliers`). On it each has a generalised derivative
+1. Complementarity functions p - max(0, p + c (u_nu - rho)) and lambda - proj_s(lambda + c u_tau),
+   (17) of docs/algorithms.md, state contact and friction at each node; rho is the gap of the
+   constraint (`Interface.gap`). Their arguments define the active set: which nodes are open, stick
+   or slip (`contact.interface.multipliers`). On it each has a generalised derivative
    (`contact.interface.complementarity`).
-2. A step linearises material, contact, friction, layer and current together (`newton_step`). The
+2. A step linearises material, contact, friction, layer and charge together (`newton_step`). The
    multipliers are eliminated node by node with the augmentation parameter gamma, so that one
    linear system in the unknowns of the body is left: with gamma far above the stiffness of the
    body its solution nearly meets u_nu = rho where a node touches, and u_tau = 0 where it sticks.
@@ -115,7 +116,7 @@ class Chord:
         self._reached = np.inf
 
     def choose(
-        self, state: State, reached: float, linearised_at: Array | None = None
+        self, state: State, reached: float, secant_at: Array | None = None
     ) -> tuple[State, bool]:
         """Return the iterate to step from, and whether the step is a chord step.
 
@@ -124,14 +125,14 @@ class Chord:
         state, reached
             Last iterate and its residual. Where a chord step has raised it, the one before is
             taken.
-        linearised_at
+        secant_at
             Unknowns of the secant; None for those of the state.
         """
         before, last = self._before, self._reached
         if not self._factorised or self._most_steps <= 0:
             keep = False
         elif before is None:
-            keep = state.active_set is not None and linearised_at is None
+            keep = state.active_set is not None and secant_at is None
         elif reached >= last and self._keeps:
             state, reached, keep = before, last, False
         else:
@@ -206,7 +207,7 @@ class Newton:
         return self.whole.at
 
     def solve(
-        self, start: State | None = None, linearised_at: Array | None = None
+        self, start: State | None = None, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence or the limit; the best iterate on failure; see `Method`."""
         whole, problem, body = self.whole, self.problem, self.problem.equilibrium
@@ -215,23 +216,23 @@ class Newton:
             self._chord.drop()
         begin = problem.start() if start is None else whole.started(start)
         if body.linear:
-            linearised_at = None
+            secant_at = None
         elif start is None:
-            linearised_at = body.rest()
+            secant_at = body.rest()
         whole.begin(begin)
         if self._pays:
-            state, outcome = self._condensed_steps(begin, linearised_at)
+            state, outcome = self._condensed_steps(begin, secant_at)
             if not (outcome.converged or outcome.overloaded or whole.steps_left <= 0):
                 logger.info("%s; going on with the whole body", outcome.ended)
-                state, outcome = whole.iterate(state, linearised_at if state is begin else None)
+                state, outcome = whole.iterate(state, secant_at if state is begin else None)
             state, outcome = with_fallbacks(whole, state, outcome)
         else:
-            state, outcome = solve_contact(whole, begin, linearised_at)
+            state, outcome = solve_contact(whole, begin, secant_at)
         whole.at = state
         return state, outcome
 
     def _condensed_steps(
-        self, state: State, linearised_at: Array | None = None
+        self, state: State, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate over the material; contact is solved on the Schur complement. Collective."""
         if self.condensation is None:
@@ -241,14 +242,14 @@ class Newton:
         if loop.starts_converged:
             return state, loop.outcome()
         chord.begin()
-        tangent = state.active_set is not None and linearised_at is None and not body.linear
+        tangent = state.active_set is not None and secant_at is None and not body.linear
         for _ in range(min(options.max_iterations, self.whole.steps_left)):
             previous, previous_residuals = state, loop.residuals
             largest = previous_residuals.significant
-            state, keep = chord.choose(state, largest, linearised_at)
-            known = loop.internal if state is previous and linearised_at is None else None
+            state, keep = chord.choose(state, largest, secant_at)
+            internal = loop.internal if state is previous and secant_at is None else None
             kind = "tangent" if tangent else "secant"
-            condensed = self.condensation.linearise(kind, state, keep, linearised_at, known)
+            condensed = self.condensation.linearise(kind, state, keep, secant_at, internal)
             if condensed is None:
                 return previous, loop.outcome(NOT_CONDENSED)
             # Inexact Newton: no more digits than the linearised material has.
@@ -265,7 +266,7 @@ class Newton:
                 return previous, loop.outcome(NOT_CONDENSED)
             increment = self.condensation.expand(condensed, end.x)
             state = replace(end, x=body.moved(state.x, increment), history=state.history)
-            linearised_at = None
+            secant_at = None
             if not body.linear:
                 chord.note_factorisation()
             loop.evaluate(state)

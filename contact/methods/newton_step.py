@@ -1,4 +1,4 @@
-"""One step of Newton's method: material, contact, friction, layer and current linearised together.
+"""One step of Newton's method: material, contact, friction, layer and charge linearised together.
 
 Multipliers are eliminated node by node (`contact.interface.complementarity.linearise`): the linear
 systems keep the size and pattern of the elastic ones. Iterative solvers stop at a forcing term
@@ -94,10 +94,10 @@ class NewtonStep:
         """Drop the operator: MUMPS does not recover from a failed factorisation."""
         self._kind, self._operator = "", None
 
-    def _forcing_term(self, reached: float) -> float:
+    def _forcing_term(self, residual: float) -> float:
         """Return the forcing term of a step from the residual before it."""
-        self._stagnant = 0 if reached < self._nearest else self._stagnant + 1
-        self._nearest = min(self._nearest, reached)
+        self._stagnant = 0 if residual < self._nearest else self._stagnant + 1
+        self._nearest = min(self._nearest, residual)
         if self._stagnant >= STAGNANT:
             self._stagnant, self._forcing = 0, max(self._forcing * FORCING, self.options.tolerance)
         return self._forcing
@@ -116,7 +116,7 @@ class NewtonStep:
         return self._operator
 
     def assemble(self, problem: AnyProblem, state: State, blocks: Array) -> None:
-        """Assemble the operator with nodal blocks and those of layer and current. Collective."""
+        """Assemble the operator with nodal blocks and those of layer and charge. Collective."""
         interface, body = problem.interface, problem.equilibrium
         if interface.foundation.active:
             nodal = interface.nodes.apply(state.x)
@@ -140,12 +140,12 @@ class NewtonStep:
         problem: AnyProblem,
         state: State,
         tangent: bool,
-        reached: Residuals,
-        linearised_at: Array | None = None,
-        internal: Array | None = None,
+        residuals: Residuals,
+        secant_at: Array | None = None,
+        internal_forces: Array | None = None,
         exact: bool = False,
     ) -> State | None:
-        """Return the next iterate; None if the matrix is singular. Collective.
+        """Return the next iterate; None if the matrix is singular there. Collective.
 
         Parameters
         ----------
@@ -153,14 +153,20 @@ class NewtonStep:
             The problem and the iterate.
         tangent
             Whether to take the tangent of the material, or its secant.
-        reached
+        residuals
             Residuals of the iterate.
-        linearised_at
-            Unknowns of the secant; those of the state by default.
-        internal
-            Internal forces of the state, if known.
+        secant_at
+            Unknowns at which the secant modulus is taken; those of the state by default.
+        internal_forces
+            F_int of the state, if computed before.
         exact
             Whether iterative solvers go to their own tolerance, without the forcing term.
+
+        Raises
+        ------
+        SingularError
+            If the matrix is singular and another iterate does not help: with a linear body, or in
+            the first step of an underconstrained one.
         """
         interface = problem.interface
         body, nodes = problem.equilibrium, interface.nodes
@@ -174,24 +180,24 @@ class NewtonStep:
             softening=self.options.softening,
         )
         layer, shift = linearised_layer(interface, nodal, state, self.parameters, contact.unchanged)
-        current = self._current(interface, nodal, contact, reached.significant)
-        blocks = contact.blocks + layer + current
+        charge = self._charge(interface, nodal, contact, residuals.significant)
+        blocks = contact.blocks + layer + charge
         kind, last = "tangent" if tangent else "secant", self._kind
-        remains = kind == last and reached.equilibrium < SMALL * reached.significant
+        remains = kind == last and residuals.equilibrium < SMALL * residuals.significant
         if self._underconstrained and not contact.unchanged:
             stiffness = (
-                REGULARISATION * min(reached.significant, 1.0) * self.parameters.nodal_stiffness
+                REGULARISATION * min(residuals.significant, 1.0) * self.parameters.nodal_stiffness
             )
             along = nodes.normal[:, :, None] * nodes.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + nodes.tangent)
         blocks = interface.weighted(blocks, state.x)
-        at = state if linearised_at is None else replace(state, x=linearised_at)
+        at = state if secant_at is None else replace(state, x=secant_at)
         self.operator.update(kind, at, blocks, constant=body.linear or remains)
         self._kind = kind
         here = replace(state, forces=contact.multipliers)
-        residual = residual_forces(problem, here, linearised_at, internal)
+        residual = residual_forces(problem, here, secant_at, internal_forces)
         nodes.transpose((nodes.weight * shift)[:, None] * nodes.normal, residual)
-        forcing = None if exact else self._forcing_term(reached.significant)
+        forcing = None if exact else self._forcing_term(residuals.significant)
         try:
             increment = self.operator.solve(-residual, forcing)
         except SingularError:
@@ -204,23 +210,27 @@ class NewtonStep:
         vectors = contact.multipliers.vectors(nodes) + change[:, : interface.dim]
         forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
         pressed = nodes.normal_component(np.einsum("nij,nj->ni", layer, moved))
-        known = interface.foundation.pressure(nodal) + shift + pressed
+        layer_pressure = interface.foundation.pressure(nodal) + shift + pressed
         # Far motions leave nodes of a rigid part off it by rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
         return replace(
-            state, x=x, forces=forces, active_set=contact.active_set, layer_pressure=known
+            state,
+            x=x,
+            forces=forces,
+            active_set=contact.active_set,
+            layer_pressure=layer_pressure,
         )
 
-    def _current(
-        self, interface: Interface, nodal: Array, contact: LinearisedContact, reached: float
+    def _charge(
+        self, interface: Interface, nodal: Array, contact: LinearisedContact, residual: float
     ) -> Array | float:
-        """Return the derivative of the current, with that of psi(u_nu - rho) or psi frozen."""
+        """Return the derivative of the charge, with that of psi(u_nu - rho) or psi frozen."""
         law = interface.foundation
         if not law.active:
             return 0.0
         follow = contact.unchanged
         if law.follows_gap:
-            follow = self.conductivity_derivative(reached, follow)
+            follow = self.conductivity_derivative(residual, follow)
         return law.charge_block(nodal, interface.pressure(nodal, contact.multipliers), follow)
 
 
@@ -241,13 +251,13 @@ def linearised_layer(
     if graph is None:
         return law.pressure_block(nodal, full), np.zeros(nodal.shape[0])
     u_n, layer = nodes.normal_component(nodal), law.pressure(nodal)
-    known = layer if state.layer_pressure is None else state.layer_pressure
-    place = graph.displacement(state.forces.pressure + known + c * u_n, c)
-    linearised_at = nodal.copy()
-    linearised_at[:, : interface.dim] += (place - u_n)[:, None] * nodes.normal
-    block = law.pressure_block(linearised_at, full)
-    back = nodes.normal_component(np.einsum("nij,nj->ni", block, nodal - linearised_at))
-    return block, law.pressure(linearised_at) + back - layer
+    last = layer if state.layer_pressure is None else state.layer_pressure
+    place = graph.displacement(state.forces.pressure + last + c * u_n, c)
+    on_graph = nodal.copy()
+    on_graph[:, : interface.dim] += (place - u_n)[:, None] * nodes.normal
+    block = law.pressure_block(on_graph, full)
+    back = nodes.normal_component(np.einsum("nij,nj->ni", block, nodal - on_graph))
+    return block, law.pressure(on_graph) + back - layer
 
 
 @dataclass

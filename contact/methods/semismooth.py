@@ -110,7 +110,7 @@ class SemismoothNewton:
     def iterate(
         self,
         state: State,
-        linearised_at: Array | None = None,
+        secant_at: Array | None = None,
         note: str = "",
         stagnation_limit: int | None = None,
         give_up: bool = False,
@@ -122,7 +122,7 @@ class SemismoothNewton:
         ----------
         state
             Initial guess.
-        linearised_at
+        secant_at
             Unknowns of the first secant; those of the state by default.
         note
             Note of the steps in their records.
@@ -140,14 +140,14 @@ class SemismoothNewton:
             return state, loop.outcome()
         step.begin()
         # At zero strain the secant is the tangent; an initial guess with an active set is near.
-        tangent = state.active_set is not None and linearised_at is None and not linear
+        tangent = state.active_set is not None and secant_at is None and not linear
         for _ in range(min(options.max_iterations, self.steps_left)):
             previous, previous_residuals = state, loop.residuals
-            known = loop.internal if linearised_at is None else None
-            taken = step(problem, state, tangent, previous_residuals, linearised_at, known, exact)
+            internal = loop.internal if secant_at is None else None
+            taken = step(problem, state, tangent, previous_residuals, secant_at, internal, exact)
             if taken is None:
                 return state, loop.outcome(step.fault)
-            state, linearised_at = taken, None
+            state, secant_at = taken, None
             loop.evaluate(state)
             worse = step.conductivity_derivative.worsened(loop.residuals.significant)
             loop.record(state, "tangent" * tangent, "rejected" * worse)

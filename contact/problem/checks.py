@@ -263,12 +263,12 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     problem
         The problem.
     state
-        A solution; without one, contact and current may be anywhere.
+        A solution; without one, contact and charge may be anywhere.
 
     Raises
     ------
     InputError
-        If a potential is neither prescribed nor determined by a current to a foundation or to
+        If a potential is neither prescribed nor determined by the charge of a foundation or of
         another component; electrodes join components.
     """
     if not problem.piezoelectric:
@@ -285,8 +285,8 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     locally = [body.local(column) for column in columns.T]
     flows, among_held = _flows(problem, state)
     rows.append(np.column_stack([problem.nodes.apply(x)[flows, -1] for x in locally]))
-    if interface.constrained is not None:
-        nodes = interface.constrained.nodes
+    if interface.fixed_conducting is not None:
+        nodes = interface.fixed_conducting.nodes
         rows.append(np.column_stack([nodes.apply(x)[among_held, -1] for x in locally]))
     gram = sum(problem.comm.allreduce(part.T @ part, op=MPI.SUM) for part in rows)
     floating = null_space(gram / max(np.trace(gram), 1.0))
@@ -309,9 +309,9 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
 def _flows(
     problem: ContactProblem, state: State | None
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return through which contact nodes current flows or could; and the nodes with supports."""
+    """Return which contact nodes, and which fixed ones, carry charge, or could without a state."""
     interface = problem.interface
-    law, held = interface.foundation, interface.constrained
+    law, held = interface.foundation, interface.fixed_conducting
     if state is None:
         return _conducts(law, interface.diameter), _conducts(held, interface.diameter)
     found = [

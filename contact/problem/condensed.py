@@ -185,11 +185,11 @@ def at_kept_nodes(interface: Interface) -> Interface:
         """Return nodes of other numbers, whose unknowns are the jumps."""
         return replace(nodes, nodes=positions, motion=None, carried=None, coupling=None)
 
-    nodes, constrained = kept(interface.nodes, first), interface.constrained
-    if constrained is not None:
-        constrained = replace(constrained, nodes=kept(constrained.nodes, others))
+    nodes, fixed_conducting = kept(interface.nodes, first), interface.fixed_conducting
+    if fixed_conducting is not None:
+        fixed_conducting = replace(fixed_conducting, nodes=kept(fixed_conducting.nodes, others))
     law = replace(interface.foundation, nodes=nodes)
-    return replace(interface, nodes=nodes, foundation=law, constrained=constrained)
+    return replace(interface, nodes=nodes, foundation=law, fixed_conducting=fixed_conducting)
 
 
 class Condensation:
@@ -235,8 +235,8 @@ class Condensation:
         kind: str,
         state: State,
         keep: bool = False,
-        linearised_at: Array | None = None,
-        internal: Array | None = None,
+        secant_at: Array | None = None,
+        internal_forces: Array | None = None,
     ) -> CondensedProblem | None:
         """Linearise at a state of the whole problem, and condense. Collective.
 
@@ -246,10 +246,10 @@ class Condensation:
             "secant" or "tangent", and the state.
         keep
             Whether to keep the last factorisation (chord step).
-        linearised_at
-            Unknowns of the secant; those of the state by default.
-        internal
-            Internal forces of the state, if known.
+        secant_at
+            Unknowns at which the secant modulus is taken; those of the state by default.
+        internal_forces
+            F_int of the state, if computed before.
 
         Returns
         -------
@@ -265,12 +265,10 @@ class Condensation:
         if not 0 < self._schur.size <= min(LARGEST, body.layout.unknowns - 1):
             return None
         if not self._kind or not (keep or (body.linear and kind == self._kind)):
-            self._factorise(
-                kind, state if linearised_at is None else replace(state, x=linearised_at)
-            )
-        if internal is None:
-            internal = body.internal_forces(state, linearised_at)
-        residual = internal - body.external(state.time)
+            self._factorise(kind, state if secant_at is None else replace(state, x=secant_at))
+        if internal_forces is None:
+            internal_forces = body.internal_forces(state, secant_at)
+        residual = internal_forces - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
         if not self._regular:
             return None

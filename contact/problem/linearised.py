@@ -1,22 +1,23 @@
 """The equations of a contact problem linearised at a solution, and their transpose.
 
-At a solution whose active set does not change nearby, the unknowns x and the contact forces f of
-the nodes satisfy smooth equations,
+At a solution whose active set does not change nearby, the unknowns x and the contact forces
+lambda = lambda_c nu + lambda_f of the nodes (f in the code) satisfy smooth equations,
 
-    F(x) + J^T W f = 0,     c(J x, f) = 0,
+    F(x) - f + T^T W lambda = 0,     C(T x, lambda) = 0,
 
-equilibrium and, node by node, one vector condition: f = 0 (open), gap - u_nu = 0 (in contact),
-u_tau = 0 (stick), lambda = s u_tau/|u_tau| (slip). `Linearised` solves with their derivative
-[[K, J^T W], [C_u J, C_f]] and with its transpose. f is condensed node by node, with gamma as in
-Newton's method; the remainder that gamma leaves in c is corrected by further back-substitutions
+equilibrium and, node by node, one vector condition: lambda = 0 (open), gap - u_nu = 0 (in contact),
+u_tau = 0 (stick), lambda_f = s u_tau/|u_tau| (slip). Layer and charge, functions of T x, are in F.
+`Linearised` solves with their derivative, the Jacobian J = [[K, T^T W], [C_u T, C_f]], and with its
+transpose. lambda is condensed node by node, with gamma as in
+Newton's method; the remainder that gamma leaves in C is corrected by further back-substitutions
 with the same factorisation (augmented Lagrangian iterations), and so is the coupling of the nodes
 by a smoothed pressure.
 
-In an evolution a step ends with x and the history h' = H(x, h), and its equations R(x, f, h) = 0
-have the history h at its beginning. The tangent goes forwards, dh' = dH/dx dx + dH/dh dh, and dR/dh
-dh is part of the equations of dx. The adjoint goes backwards: given the derivatives g of a quantity
-by h', those by x are (dH/dx)^T g, and those by h are (dH/dh)^T g - (dR/dh)^T w, with the adjoint w
-of the step.
+In an evolution a step ends with x and the history h' = H(x, h), and its equations
+G(x, lambda, h) = 0 have the history h at its beginning. The tangent goes forwards,
+dh' = dH/dx dx + dH/dh dh, and dG/dh dh is part of the equations of dx. The adjoint goes backwards:
+given the derivatives g of a quantity by h', those by x are (dH/dx)^T g, and those by h are
+(dH/dh)^T g - (dG/dh)^T w, with the adjoint w of the step.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class Equations:
         On the owned free unknowns, global ones behind them.
     conditions
         At the contact nodes, shape (n, d): stresses, or gaps and slips times the interface's
-        `stiffness`.
+        c_0.
     """
 
     forces: Array
@@ -313,7 +314,7 @@ def commit_along(linearised: Linearised, x: Array, change: History) -> History:
 
 
 def before_along(linearised: Linearised, change: History) -> Equations:
-    """Return dR/dh dh. Collective."""
+    """Return dG/dh dh. Collective."""
     problem, state = linearised.problem, linearised.state
     slip, variables = _parts(change)
     conditions = linearised.by_length * slip.accumulated[:, None]
@@ -342,7 +343,7 @@ def commit_transposed(problem: ContactProblem, state: State, after: History) -> 
 def before_transposed(
     linearised: Linearised, along: Array, conditions: Array, after: History | None
 ) -> History:
-    """Return (dH/dh)^T g - (dR/dh)^T w. Collective.
+    """Return (dH/dh)^T g - (dG/dh)^T w. Collective.
 
     Parameters
     ----------

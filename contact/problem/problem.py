@@ -23,7 +23,7 @@ from contact.history import CONTACT_NODES, History, InternalVariables, Part
 from contact.interface.foundation import (
     FoundationLaw,
     joined_conductors,
-    joined_constrained,
+    joined_fixed_conducting,
     joined_layers,
 )
 from contact.interface.friction import joined_friction
@@ -288,10 +288,12 @@ class ContactProblem:
         facets = [self.domain.facets(contact.on) for contact in self.contacts]
         return Interface(
             nodes,
-            law.constrained_gap,
+            law.signorini_gap,
             law,
             joined_friction(frictions, geometries, nodes),
-            joined_constrained(conductors, geometries, law, body.layout.index_map.local_range[0]),
+            joined_fixed_conducting(
+                conductors, geometries, law, body.layout.index_map.local_range[0]
+            ),
             stiffness,
             self.domain.size,
             max(elongation(self.domain.mesh, own) for own in facets),

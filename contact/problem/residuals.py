@@ -120,9 +120,10 @@ def residual_forces(
     secant_at: Array | None = None,
     internal: Array | None = None,
 ) -> Array:
-    """Return R = F(x) - loads + contact and foundation forces, on the owned unknowns. Collective.
+    """Return G(x, lambda) = F(x) - f + T^T W lambda on the owned unknowns. Collective.
 
-    At fixed unknowns R is minus the reactions of the supports.
+    The residual r of the body with contact: lambda includes layer and charge, as in (15) of
+    docs/residuals.md. At fixed unknowns G is minus the reactions of the supports.
 
     Parameters
     ----------
@@ -162,7 +163,7 @@ def force_rounding(
     """
     body, (moved, there) = problem.equilibrium, perturbed or _perturbed(problem, state)
     change = there - internal
-    problem.interface.add_current(change, state.x, moved - state.x, state.forces)
+    problem.interface.add_charge(change, state.x, moved - state.x, state.forces)
     return MARGIN * EPS / PERTURBATION * body.norms(body.unbalanced(change))
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from contact.errors import InputError, counted
-from contact.interface.mortar.lumping import Lumping, Mixing
+from contact.interface.mortar.lumping import JumpRows, Lumping
 from contact.interface.mortar.surface import surface_of
 from contact.interface.multipliers import Multipliers
 from contact.mesh.cells import Shape, shape_of
@@ -474,14 +474,14 @@ def opposite_surface(solution: Solved) -> Grid | None:
     return Grid(fields.pop("points"), cells, shape_of(problem.domain.mesh).facet, fields)
 
 
-def _acting(owners: Owners, jumps: Mixing, lumped: Lumping, forces: Array) -> Array:
+def _acting(owners: Owners, jumps: JumpRows, lumped: Lumping, forces: Array) -> Array:
     """Return the stresses on nodes of the other side, (m, k), of forces at contact nodes."""
     # Of all ranks, on nodes of this one. Collective.
     on_nodes: Array = np.zeros((lumped.nodes.size, forces.shape[1]))
     nodes, sums = owners.sums(jumps.masters, jumps.M.T @ forces)
     on_nodes[np.searchsorted(lumped.nodes, nodes)] = sums
-    if lumped.mixing is not None:
-        on_nodes = lumped.mixing.on_coefficients(owners, on_nodes)
+    if lumped.jumps is not None:
+        on_nodes = lumped.jumps.on_coefficients(owners, on_nodes)
     weight = lumped.weight
     area, count = owners.comm.allreduce(np.array([weight.sum(), weight.size]))
     some = weight > LEAST_AREA * area / count

@@ -9,10 +9,10 @@ Method `uzawa` has Algorithms 1, 4, 6 and 8, which differ in the frozen terms:
 - Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
 - Algorithm 4, Problem (P~V): also psi, or all of the charge l where it is lagged.
 - Algorithm 6, Problem (PV2): also h_nu, or all of the layer's force j_1 where it is lagged.
-- Algorithm 8, Problem (PV1): as Algorithm 6 without friction and current.
+- Algorithm 8, Problem (PV1): as Algorithm 6 without friction and charge.
 
 Their inner Algorithms 2, 5, 7 and 9 are `uzawa.uzawa_block_relaxation`, with another
-`Interface.law` each.
+`Interface.foundation` each.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ class FixedPoint(OuterLoop):
         return self.problem.operator(symmetric=symmetric, counters=self.counters, kind=kind)
 
     def solve(
-        self, start: State | None = None, linearised_at: Array | None = None
+        self, start: State | None = None, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit; see `Method`. Collective."""
         self._stalled, self._residual = False, np.inf
@@ -234,7 +234,7 @@ class FixedPoint(OuterLoop):
             self.bound = np.zeros(interface.nodes.gap.size) if stuck is None else stuck
         else:
             self.state, first = start, 1
-            self._secant_at = start.x if linearised_at is None else linearised_at
+            self._secant_at = start.x if secant_at is None else secant_at
             nodal, pressure = interface.nodes.apply(start.x), start.forces.pressure
             if interface.foundation.normal_graph(nodal) is not None:
                 pressure = interface.pressure(nodal, start.forces)

@@ -372,7 +372,7 @@ class Penalty(OuterLoop):
             solver.set_load_step(problem, self._eps)
 
     def solve(
-        self, start: State | None = None, linearised_at: Array | None = None
+        self, start: State | None = None, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit; see `Method`. Collective.
 

@@ -157,7 +157,7 @@ def test_areas_of_shares(kind):
         np.testing.assert_allclose(
             getattr(found, name), getattr(whole, name)[own], rtol=0, atol=1e-15
         )
-    if whole.mixing is not None:
+    if whole.jumps is not None:
         values = np.random.default_rng(8).normal(size=(len(x), 2))
-        expected = whole.mixing.apply(side.owners, values)[own]
-        np.testing.assert_allclose(found.mixing.apply(owners, values[own]), expected, atol=1e-14)
+        expected = whole.jumps.apply(side.owners, values)[own]
+        np.testing.assert_allclose(found.jumps.apply(owners, values[own]), expected, atol=1e-14)

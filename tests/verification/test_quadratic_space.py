@@ -90,7 +90,7 @@ def test_current_through_nodes_that_are_held(comm, method):
     """Closed form 3 with all sides held: the rim of Gamma_3 cannot move, but conducts."""
     column = Column(k_e=2.0, phi_f=32.0)
     problem = column.problem(comm, 3, degree=2, degrees=30.0)
-    held = problem.interface.constrained
+    held = problem.interface.fixed_conducting
     assert held is not None
     assert comm.allreduce(held.nodes.nodes.size) > 0
     solution = solve(problem, method.model_copy(update={"tolerance": 1e-10}))

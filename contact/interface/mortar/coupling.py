@@ -6,12 +6,14 @@ the slave node j is then
 
     j_j = (D u)_j - sum_l M_jl u_l,     M_jl = int Phi_j (N_l o Pi) / int N~_j,
 
-D being the identity, but for quadratic triangles, where N~ = A N (`dual_basis_transformation`)
-and D is made of the inverse of A^T. Constants pass: rows of D and of M have the sum 1. (Popp and
-others have D and M without the division by int N~_j.)
+with D_jk = int Phi_j N_k / int N~_j: the identity; A^-T on quadratic triangles, where N~ = A N
+(`dual_basis_transformation`). Slave nodes without multiplier, as at crosspoints, leave their
+functions to other nodes (`ModifiedDualBasis`): the rows of D of these contain them too. Constants
+pass: rows of D and of M have the sum 1. (Popp and others have D and M without the division by
+int N~_j.)
 
 `integrate` has these integrals over the facets of one rank, `couple` their sums at the rank of each
-node. Functions of nodes without multiplier go to other nodes (`ModifiedDualBasis`).
+node.
 
 References
 ----------
@@ -30,7 +32,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from contact.interface.mortar.lumping import Mixing, integrals
+from contact.interface.mortar.lumping import JumpRows, integrals
 from contact.interface.mortar.search import Opposite, nearest_named
 from contact.interface.mortar.segments import Points, common_points
 from contact.interface.mortar.surface import Surface, dual_basis_transformation
@@ -252,7 +254,7 @@ LEAST_COVERED = 1e-3
 
 
 @dataclass(frozen=True)
-class Coupling(Mixing):
+class Coupling(JumpRows):
     """The jump of two surfaces at the slave nodes of this rank that carry a multiplier.
 
     Attributes

@@ -37,8 +37,16 @@ def _integrated(surface: Surface) -> tuple[Array, Array, Array]:
 
 
 @dataclass(frozen=True)
-class Mixing:
-    """Jumps that are sums over nodes, D u - M u; rows are divided by the areas of their nodes.
+class JumpRows:
+    """Rows of T = [D, -M]: the jumps (T u)_j = sum_k D_jk u_k - sum_l M_jl u_l.
+
+        D_jk = w_j^-1 int Phi_j N_k,    M_jl = w_j^-1 int Phi_j N_l o Pi,
+
+    with the area w_j of the node and the dual functions Phi_j of the multiplier: rows of D and of M
+    have the sum 1. The literature has both without w_j^-1; with its diagonal D this M is D^-1 M.
+    D is A^-T on quadratic triangles, and the identity on other facets, but in the rows of nodes
+    that carry functions of neighbours without multiplier: of crosspoints (`ModifiedDualBasis`), or
+    of nodes on the axis of revolution (`Lumping.without_axis`).
 
     Rows are nodes that this rank owns in ascending order of their global numbers.
 
@@ -47,10 +55,10 @@ class Mixing:
     nodes
         Global numbers of the nodes that carry a multiplier, shape (n,).
     slaves, D
-        Global numbers of the nodes of their side, of whatever ranks, shape (s,), and D, shape
+        Global numbers of the nodes u_k of their side, of whatever ranks, shape (s,), and D, shape
         (n, s).
     masters, M
-        Those of the other body, shape (m,), and M, shape (n, m); none before a rigid foundation.
+        Those u_l of the other body, shape (m,), and M, (n, m); none before a rigid foundation.
     """
 
     nodes: NDArray[np.int64]
@@ -62,10 +70,10 @@ class Mixing:
     @staticmethod
     def one_sided(
         nodes: NDArray[np.int64], slaves: NDArray[np.int64], matrix: sparse.csr_array
-    ) -> Mixing:
+    ) -> JumpRows:
         """Return the jumps D u of nodes in front of a rigid foundation."""
         none = sparse.csr_array((nodes.size, 0))
-        return Mixing(nodes, slaves, matrix, np.zeros(0, dtype=np.int64), none)
+        return JumpRows(nodes, slaves, matrix, np.zeros(0, dtype=np.int64), none)
 
     def apply(self, owners: Owners, values: Array) -> Array:
         """Return D times nodal values, shape (n, m). Collective.
@@ -113,8 +121,8 @@ class Lumping:
         From the nodes to the curved surface that the facets approximate, shape (n, d) (length).
     least
         The least height of that surface above the nodes, shape (n,) (length).
-    mixing
-        The jumps that belong to the weights; None where they are the nodal values.
+    jumps
+        Rows of the jumps that belong to the weights; None where these are the nodal values.
     """
 
     nodes: NDArray[np.int64]
@@ -122,7 +130,7 @@ class Lumping:
     normal: Array
     deviation: Array
     least: Array
-    mixing: Mixing | None
+    jumps: JumpRows | None
 
     @staticmethod
     def of(surface: Surface) -> Lumping:
@@ -149,7 +157,7 @@ class Lumping:
             total, [1, 1 + d, 1 + 2 * d, 2 + 2 * d], axis=1
         )
         deviation, least = deviation / often, (least / often)[:, 0]
-        change, mixing = dual_basis_transformation(surface.shape, surface.degree), None
+        change, jumps = dual_basis_transformation(surface.shape, surface.degree), None
         if not np.array_equal(change, np.eye(len(change))):
             both = np.broadcast_arrays(surface.nodes[:, :, None], surface.nodes[:, None, :])
             values = np.broadcast_to(np.linalg.inv(change.T), both[0].shape)
@@ -157,8 +165,8 @@ class Lumping:
             # Facets that share nodes say the same of them: any of them may be heard.
             _, first = np.unique(np.column_stack(entries[:2]), axis=0, return_index=True)
             row, column, value = entries[0][first], entries[1][first], entries[2][first]
-            mixing = Mixing.one_sided(nodes, *sparse_rows(nodes, (row, column, value)))
-        return Lumping(nodes, weight[:, 0], normal, deviation, least, mixing)
+            jumps = JumpRows.one_sided(nodes, *sparse_rows(nodes, (row, column, value)))
+        return Lumping(nodes, weight[:, 0], normal, deviation, least, jumps)
 
     def without_axis(self, surface: Surface) -> Lumping:
         """Return the areas without multiplier on the axis of revolution.
@@ -185,7 +193,7 @@ class Lumping:
             np.concatenate([np.ones(alone.size), *(weights / total[:, None]).T]),
         )
         return replace(
-            self, weight=weight, mixing=Mixing.one_sided(nodes, *sparse_rows(nodes, entries))
+            self, weight=weight, jumps=JumpRows.one_sided(nodes, *sparse_rows(nodes, entries))
         )
 
 

@@ -1,7 +1,8 @@
 """The mortar coupling operator T: jumps that are sums over nodes, of any rank.
 
-Between bodies, and on quadratic triangles in front of a rigid foundation. Each rank has the rows of
-its own contact nodes.
+Between bodies (master nodes, and slave nodes without multiplier beside crosspoints); in front of a
+rigid foundation on quadratic triangles, and beside the axis of revolution. Each rank has the rows
+of its own contact nodes.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.errors import InputError
-from contact.interface.mortar.lumping import Mixing
+from contact.interface.mortar.lumping import JumpRows
 from contact.linear.constraint import BasisChange
 from contact.mesh.owners import Halo, Owners
 from contact.typing import Array
@@ -78,7 +79,7 @@ class CouplingOperator:
 def coupling_operator(
     comm: MPI.Intracomm,
     index_map: IndexMap,
-    given: Sequence[Mixing],
+    given: Sequence[JumpRows],
     nodes: tuple[NDArray[np.int32], Array],
     free: NDArray[np.bool_],
 ) -> CouplingOperator | None:
