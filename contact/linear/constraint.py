@@ -264,8 +264,8 @@ class ConstrainedBulk:
 class BorderedSolve:
     """Block elimination of q from K^ y^ + B q = f, B^T y^ + E q = g. Collective.
 
-    The Schur complement S = E - B^T inv(K^) B is inverted where anything resists q; the rest of q is
-    0, and `regular` false.
+    The Schur complement S = E - B^T inv(K^) B is inverted where anything resists q; the rest of q
+    is 0, and `regular` false.
 
     Parameters
     ----------
