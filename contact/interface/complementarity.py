@@ -2,15 +2,20 @@
 
 With projections onto the admissible forces, a half line and a disc, the laws are equations,
 
-    p - max(0, p - c (gap - u_nu)) = 0,     lambda_f - proj_s(lambda_f + c u_tau) = 0,
+    p - max(0, p + c (u_nu - rho)) = 0,     lambda_f - proj_s(lambda_f + c u_tau) = 0,
 
-with the initial gap (rho in the pages) and the normal gap g_N = gap - u_nu.
-Their pieces are those of the active set (`ActiveSet`). `interface_residuals`
-evaluates them; `linearise` takes a step of the semismooth Newton method on them, node by node.
-There a node in contact pushes with p - gamma (gap - u_nu), a sticking one with
-lambda_f + gamma u_tau, a slipping one with its friction bound along the slip: with gamma far above
-the stiffness of the body these are the linearised conditions u_nu = gap and u_tau = 0, and their
-residuals fall by that ratio in every step.
+(17) of docs/algorithms.md, with the gap rho of the constraint (`Interface.gap`) and the normal gap
+g_N = rho - u_nu. Their pieces are those of the active set (18) (`ActiveSet`). `interface_residuals`
+evaluates them. `linearise` linearises them node by node for a step of the semismooth Newton method:
+
+    p+ = p + gamma (u_nu+ - rho)               closed, (19a); 0 where open
+    lambda_f+ = lambda_f + gamma u_tau+        stick, (19b)
+    lambda_f+ = s+ e + theta Q u_tau+          slip, (19c), with the linearised bound s+ (19d)
+
+These are lambda+ = lambda^0 + B T dx (19) with the increment dx of the step, the `multipliers`
+lambda^0 at dx = 0 and the `blocks` B of `LinearisedContact`. With gamma far above the stiffness of
+the body (19a) and (19b) are nearly u_nu = rho and u_tau = 0, and their residuals fall by that
+ratio in every step.
 
 References
 ----------
@@ -64,7 +69,8 @@ def interface_residuals(
 ) -> tuple[Array, Array]:
     """Return the relative contact and friction residuals and their floors, (2,). Collective.
 
-    The `worst` of the connected components, each relative to its pressures.
+    The `worst` of the connected components, each relative to max(|p|, 1e-4 c_0 |g|), norms in
+    L2(Gamma_3): g is |g_N|, at most the displacement of the node and the diameter.
 
     Parameters
     ----------
@@ -135,14 +141,14 @@ class ComplementarityParameters:
 
 @dataclass(frozen=True)
 class LinearisedContact:
-    """Multipliers at an iterate and their derivative.
+    """The linearised multipliers lambda+ = lambda^0 + B T dx, (19) of docs/algorithms.md.
 
     Attributes
     ----------
     multipliers
-        Multipliers of the residual.
+        lambda^0, those of the residual.
     blocks
-        Derivative by the nodal unknowns, shape (n, block size, block size), without weights.
+        B, the derivative by the nodal unknowns, shape (n, block size, block size), without weights.
     active_set
         Active set of this step.
     unchanged

@@ -5,7 +5,7 @@ the last step of an evolution, and the accumulated slip: friction acts against t
 and a coefficient mu(slip) depends on the accumulated one. A static problem is one step from zero.
 
 The active set says which contact nodes are open, stick or slip; this is its only definition. A node
-is in contact where p - c (gap - u_nu) > 0, and sticks where |lambda_f + c u_tau| <= s: the pieces
+is in contact where p - c (rho - u_nu) > 0, and sticks where |lambda_f + c u_tau| <= s: the pieces
 of the complementarity functions (`contact.interface.complementarity`).
 """
 
@@ -30,7 +30,8 @@ class Multipliers:
     Attributes
     ----------
     pressure
-        lambda_c = -sigma_nu less the pressure of the layer, shape (n,).
+        lambda_c of the unilateral constraint, shape (n,): with a layer of pressure p_l
+        lambda_c + p_l = -sigma_nu (`Interface.pressure`).
     friction
         lambda_f = -sigma_tau, tangential vectors, shape (n, d).
     """
@@ -119,8 +120,8 @@ class ActiveSet:
     closed
         Where the non-penetration constraint is active, shape (n,).
     sticks, slips
-        Where friction is below its bound, and at it, shape (n,). With a smoothed pressure or
-        Tresca's law open nodes have a bound, and do either.
+        Where friction is below its bound, and at it, shape (n,). By Tresca's law, a smoothed
+        pressure or the pressure of a compliant layer open nodes have a bound, and do either.
     """
 
     closed: NDArray[np.bool_]

@@ -1,8 +1,17 @@
 """The fallbacks of the semismooth Newton method, in their order (`fall_back`).
 
-Where Newton's steps have ended without convergence, they are tried in turn from the zero initial
-guess. A condensed contact problem has all but the last of its own. The notes of the history name
-them. They are also tried where Newton's method has converged to a solution at which a rigid-body
+Where Newton's steps have ended without convergence, they are tried in turn:
+
+- all nodes open, by one linear solve from the best iterate, then a working set from its solution;
+- continuation in the conductivity, of a condensed problem alone, from the initial guess
+  `problem.start()`;
+- a rigid motion that separates the bodies, of a condensed problem alone;
+- proximal points, from that guess;
+- the interior point from that guess, its first slacks from the gaps of the linear solve;
+- steps on the condensed body, of a whole problem alone, from that guess.
+
+A condensed problem has fallbacks of its own, all but the last. The notes of the history name them.
+They are also tried where Newton's method has converged to a solution at which a rigid-body
 mode has become unconstrained, although friction could constrain it.
 
 References

@@ -1,7 +1,8 @@
-"""Semismooth Newton method on one problem, the whole body or the condensed one; no fallbacks.
+"""Semismooth Newton method on one problem, the whole body or the condensed one.
 
 Each step linearises all laws together (`newton_step`); the residuals, computed from scratch, end
-the iteration.
+the iteration. `iterate` takes no fallback: these are of `fallbacks`, which is given this object,
+and with it the solver on the condensed body as the last one.
 """
 
 from __future__ import annotations

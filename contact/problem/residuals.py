@@ -41,22 +41,26 @@ MARGIN = 4.0
 class Residuals:
     """Relative residuals of equilibrium, contact and friction.
 
+    They are accepted where r_i <= max(tol_i, floor_i) for each of the three (`excess`); `granted`
+    names one with tol_i < r_i <= floor_i. The tolerances tol_i are `Residuals` too.
+
     Attributes
     ----------
     equilibrium
-        |F(u) + contact forces| on free unknowns over the sum of the norms of loads, contact forces
+        |G(x, lambda)| on free unknowns over the sum of the norms of loads, contact forces
         and reactions; the largest of all connected components, and of forces and charges. The
         coupling forces of the potential and charges of the strain count as loads. Without any
         force the reference is the residual of the zero initial guess, and rounding counts as 0.
     contact
-        |p - max(0, p - c (gap - u_nu))| / |p| in L2(Gamma_3), the largest of all connected
-        components; c = c_0 = E/length of the touching bodies, times the elongation >= 1 of the
-        cells behind Gamma_3 (`contact.mesh.entities.elongation`).
+        |lambda_c - max(0, lambda_c + c (u_nu - rho))| in L2(Gamma_3) over max(|p|, 1e-4 c_0 |g|),
+        p = -sigma_nu, g the gaps up to the displacements (`interface_residuals`); the largest of
+        all connected components. c = c_0 = E/length of the touching bodies, times the elongation
+        >= 1 of the cells behind Gamma_3 (`contact.mesh.entities.elongation`).
     friction
-        |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s.
+        |lambda_f - proj_s(lambda_f + c u_tau)| over the same, with the final bound s.
     floors
-        Rounding floors of the three: a residual below its floor is accepted. `force_rounding` up to
-        the `rounding_limit` of the body, and these forces as pressures.
+        Rounding floors of the three: `force_rounding` up to the `rounding_limit` of the body, and
+        these forces as pressures.
     equilibrium_rounding
         Largest residual of equilibrium that is accepted as rounding; 0 where no force acts.
     pressure_rounding
@@ -380,10 +384,12 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
 
 
 def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> tuple[State, Residuals] | None:
-    """Return zero displacement and its residuals if it is in equilibrium, else None. Collective.
+    """Return `problem.start()` and its residuals if it is in equilibrium, else None. Collective.
 
-    Residuals are relative to the forces that act: approaching a state without forces, none becomes
-    small. With friction there may be other solutions, so a method asks for this where it fails.
+    That is zero displacement but for the prescribed values; of a whole problem each free foundation
+    is moved by its force to the first touch. Residuals are relative to the forces that act:
+    approaching a state without forces, none becomes small. With friction there may be other
+    solutions, so a method asks for this where it fails.
     """
     state = problem.start()
     residuals = evaluate(problem, state)

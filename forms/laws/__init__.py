@@ -1,4 +1,4 @@
-"""Laws on the contact boundary: friction, current and layer, one definition each.
+"""Laws on the contact boundary: friction, charge and layer, one definition each.
 
 Each law is a frozen dataclass that is called with UFL expressions or NumPy arrays, and
 knows the bounds that the theorems ask for. `derivative` is the derivative with respect to

@@ -1,4 +1,4 @@
-"""The current through a foundation: its conductivity psi, and phi_L, which drives it."""
+"""The charge psi phi_L on a conductive foundation: its conductivity psi, and phi_L."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from forms.ops import Condition, Value, absolute, clip, is_unlimited, less, less
 
 
 class PotentialLaw(Protocol):
-    """phi_L: the drive of the current at the potential difference s = phi - phi_F."""
+    """phi_L: the factor of the charge at the potential difference s = phi - phi_F."""
 
     def __call__(self, s: Value) -> Value:
         """Return phi_L at the potential difference."""
