@@ -100,7 +100,7 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
     order = sorted({*heights} - sides, key=lambda name: (heights[name], name))
     if len(order) < 2:
         raise InputError(
-            f"{mesh}: {', '.join(sorted(heights))} as parts: none to hold beside those in contact; "
+            f"{mesh}: {', '.join(sorted(heights))} as parts: none to hold beside that in contact; "
             "accepted: a mesh that also names the sides that are held and pressed",
             "new-parts",
         )

@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from contact.errors import InputError, clipped, nearest, shown
-from contact.settings import Accepted, Words, fault, keys_in
+from contact.settings import MISSING, Accepted, Words, fault, keys_in
 
 #: Most characters of a list of accepted names.
 LIST = 300
@@ -63,6 +63,8 @@ def _message(error: ErrorDetails) -> InputError:
     if error["type"] == "value_error":  # of a formula, say: its message is complete
         whole: InputError = context["error"]
         return whole.within(f"{clipped('.'.join(keys))}: " if keys else "")
+    if error["type"] == "missing":
+        return _line(keys, "", MISSING, "a value", "missing")
     # Of pydantic's own errors those of a literal have the accepted values.
     accepted = str(context.get("expected", "a table")).replace("'", '"')
     return _line(keys, "", f"given {shown(error['input'])}", accepted)

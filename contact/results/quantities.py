@@ -558,7 +558,7 @@ _RUN = (
     ),
     Quantity("dissipation", "work", "By friction in all steps.", files=(SWEEP,)),
     Quantity(
-        "plastic_dissipation", "work", "By plastic flow in the step; in the summary in all steps.",
+        "plastic_dissipation", "work", "In the materials in the step; in the summary in all steps.",
         files=(SUMMARY, STEPS), functionals=f.plastic_dissipations,
     ),
     Quantity(

@@ -79,7 +79,7 @@ def test_charges_need_a_potential():
     from tests.problems.mechanics import bar
 
     problem = bar(COMM, 2)
-    solver = FixedPoint(problem, FixedPointOptions(max_outer=0))
+    solver = FixedPoint(problem, FixedPointOptions())
     with pytest.raises(InputError, match=r"\[piezo\]"):
         charge_balance(problem, solver.state)
 

@@ -1,6 +1,6 @@
 """Rigid foundations: shapes, triangles, and gaps given as functions.
 
-Each shape has its signed distance with normals, and its chord rule; gaps along other directions
+Each shape has its signed distance with normals; gaps along other directions
 follow (`shapes.Shape`).
 """
 
