@@ -9,13 +9,14 @@ from typing import Any, TypeAlias
 import matplotlib
 import numpy as np
 from dolfinx import mesh as dmesh
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_hex, to_rgba
 from matplotlib.figure import Figure
 from scipy.spatial import KDTree
 
+from contact import _compat
 from contact.case.file import Case
-from contact.mesh.cells import shape_of
+from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
 from contact.mesh.geometry import facet_normals
@@ -56,13 +57,17 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
         return None if shares is None else np.concatenate(shares)
 
     boundary = gathered(_corners(domain, exterior_facets(domain.mesh)))
+    cells = gathered(_cells(domain)) if domain.dim == 2 else None
     parts = [(words, *map(gathered, rest)) for words, *rest in _parts(case, problem)]
     surface = _foundation(problem)
     if comm.rank > 0:
         return None
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.9, 5.0))
-        (_draw_plane if domain.dim == 2 else _draw_space)(figure, boundary, parts, surface)
+        if domain.dim == 2:
+            _draw_plane(figure, cells, boundary, parts, surface)
+        else:
+            _draw_space(figure, boundary, parts, surface)
         figure.suptitle(heading(case.title), fontsize="medium")
         figure.legend(loc="outside lower center", ncols=3, fontsize=7)
         if domain.dim == 2:
@@ -110,6 +115,14 @@ def _corners(domain: Domain, facets: Indices) -> Array:
     return np.asarray(domain.mesh.geometry.x[places[:, shape.around]][..., : domain.dim])
 
 
+def _cells(domain: Domain) -> Array:
+    """Return the corners of plane cells that this rank owns, around each, shape (n, c, 2)."""
+    owned = domain.mesh.topology.index_map(2).size_local
+    corners = _compat.geometry_dofmap(domain.mesh)[:owned, : shape_of(domain.mesh).corners]
+    around = facet_of(corners.shape[1]).around
+    return np.asarray(domain.mesh.geometry.x[corners[:, around]][..., :2])
+
+
 def _foundation(problem: ContactProblem) -> Array:
     """Return contact nodes, and where they would meet rigid foundations, (m, 2, d). Collective."""
     found: list[Array] = [np.zeros((0, 2, problem.dim))]
@@ -137,18 +150,23 @@ def _arrows(part: Part, boundary: Array) -> tuple[Array, Array]:
     return start - np.where(pulls[:, None], 0.0, step), step
 
 
-def _draw_plane(figure: Figure, boundary: Array, parts: list[Part], surface: Array) -> None:
-    """Draw a plane body by its boundary edges, shape (m, 2, 2)."""
+def _draw_plane(
+    figure: Figure, cells: Array, boundary: Array, parts: list[Part], surface: Array
+) -> None:
+    """Draw a plane body by its cells, shape (n, c, 2), and boundary edges, (m, 2, 2)."""
     ax = figure.subplots()
+    fine = 0.3 * min(1.0, 50 / np.sqrt(len(cells)))
+    ax.add_collection(PolyCollection(list(cells), facecolors="0.96", edgecolors="0.75", lw=fine))
     ax.add_collection(LineCollection(list(boundary), colors="0.4", lw=0.6))
     for k, part in enumerate(parts):
-        wide = 2.0 + 6.0 * (1 - k / len(parts))  # parts in one place are seen beside each other
+        wide = 1.5 + 2.5 * (1 - k / len(parts))  # parts in one place are seen beside each other
         lines = LineCollection(list(part[1]), colors=f"C{k}", lw=wide, label=part[0])
+        lines.set_capstyle("round")
         ax.add_collection(lines)
         start, step = _arrows(part, boundary)
         if start.size:
             exact: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
-            ax.quiver(*start.T, *step.T, color=f"C{k}", width=0.0025, **exact)
+            ax.quiver(*start.T, *step.T, color=f"C{k}", width=0.003, **exact)
             ax.update_datalim(np.concatenate([start, start + step]))
     if surface.size:
         ax.plot(*surface[:, 1].T, ".", ms=3, color="0.4", label="foundation")
