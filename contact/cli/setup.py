@@ -57,7 +57,7 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
         return None if shares is None else np.concatenate(shares)
 
     boundary = gathered(_corners(domain, exterior_facets(domain.mesh)))
-    cells = gathered(_cells(domain)) if domain.dim == 2 else None
+    cells = gathered(_cells(domain) if domain.dim == 2 else None)
     parts = [(words, *map(gathered, rest)) for words, *rest in _parts(case, problem)]
     surface = _foundation(problem)
     if comm.rank > 0:
