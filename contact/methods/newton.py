@@ -16,9 +16,10 @@
    linearises the material (`Newton._condensed_steps`), and the same method solves contact on the
    Schur complement, in small dense steps (`semismooth`).
 4. The iteration ends by the residuals of the problem, computed from scratch, or by their
-   stagnation: the active sets cycle. Where the body is not condensed first, it also ends after a
-   first step whose penetration shows that c is far above the stiffness of the body, as of slender
-   ones. Loads that friction is found not to balance end the solve, without further fallbacks.
+   stagnation: the active sets cycle. From zero it also ends after a first step whose penetration
+   shows that c is far above the stiffness of the body, as of slender ones; not so on the whole body
+   after steps on the condensed one. Loads that friction is found not to balance end the solve,
+   without further fallbacks.
 5. Where steps on the condensed body have ended without convergence, those on the whole body follow;
    then the fallbacks (`fallbacks`).
 
