@@ -25,6 +25,7 @@ from contact.mesh.domain import Domain, compiled
 from contact.mesh.geometry import area
 from contact.model.body import Load
 from contact.model.fields import Amplitude, Field, Moving, at_time, constant
+from contact.model.formula import is_zero
 from contact.ranks import on_all_ranks
 from contact.tolerances import HUGE
 from contact.typing import Array
@@ -74,7 +75,7 @@ def _check(domain: Domain, body: Body, load: Load, key: str) -> None:
             )
     if body.piezo is None and any(name.endswith("charge") for name in load.named):
         raise InputError(f"load on {place}: a charge needs a piezoelectric material", "piezo")
-    if domain.revolved and load.force is not None and not getattr(load.force[0], "is_zero", False):
+    if domain.revolved and load.force is not None and not is_zero(load.force[0]):
         raise InputError(
             f"{key}.force.0: given one across the axis, where it cancels over the full turn; "
             "accepted: 0, or a traction or pressure",

@@ -130,11 +130,6 @@ class Expression:
             raise ValueError(f"{self} depends on the coordinates or the time")
         return _read(self.source)[2] if isinstance(self.source, str) else self.source
 
-    @property
-    def is_zero(self) -> bool:
-        """Whether it is nothing."""
-        return self.is_constant and self.value == 0
-
     def number(self, time: float) -> float:
         """Return the value of an expression that depends on the time alone."""
         return float(Expression(self.source, time).numpy(np.zeros((1, 3)))[0])
@@ -220,6 +215,11 @@ class InTime(Expression):
     def at(self, time: float | fem.Constant) -> Expression:
         """Return the function of position at a time."""
         return Expression(self.source, time)
+
+
+def is_zero(given: object) -> bool:
+    """Tell whether a given value is a formula that is 0 everywhere at all times."""
+    return isinstance(given, Expression) and given.is_constant and given.value == 0
 
 
 def of_time(given: Any) -> Any:

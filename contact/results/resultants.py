@@ -24,6 +24,7 @@ from contact.mesh.domain import compiled, members
 from contact.mesh.geometry import area
 from contact.model.body import Bolt, Electrode
 from contact.model.fields import knows_time, steady
+from contact.model.formula import is_zero
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
@@ -187,7 +188,7 @@ class DrivenPart:
 def _driven(body: Body) -> str | None:
     for fixed in body.fixed:
         given = [value for key, value in fixed.given.items() if key != "potential"]
-        moves = any(not getattr(component, "is_zero", False) for component in given)
+        moves = any(not is_zero(component) for component in given)
         if moves and (knows_time(given) or fixed.factor is not steady):
             return str(fixed.on)
     loaded = [load.on for load in body.loads if load.on is not None]
