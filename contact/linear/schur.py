@@ -122,8 +122,8 @@ class SchurComplement:
         pc.setFactorSolverType("mumps")
         pc.setFromOptions()
 
-    def factorise(self, matrix: PETSc.Mat) -> Array:
-        """Return the Schur complement on rank 0, by columns; NaN if singular. Collective.
+    def complement(self, matrix: PETSc.Mat) -> Array:
+        """Factorise, and return S on rank 0, by columns; NaN if singular. Collective.
 
         Raises
         ------

@@ -326,7 +326,7 @@ class Condensation:
         self._bulk.assemble(self._matrix, part, state)
         balance(self._matrix, body.layout)
         with petsc_options(PREFIX):
-            stiffness = schur.factorise(self._matrix)
+            stiffness = schur.complement(self._matrix)
         self._kind, self._size = kind, self._matrix.norm()
         self.counters.factorizations += 1
         self._regular = body.comm.bcast(bool(np.isfinite(stiffness).all()))

@@ -29,7 +29,7 @@ from scripts.benchmarks.bench_one import (
 PHASES = {
     "assembly of matrices": ("body/equilibrium.py", "assemble"),
     "set-up of multigrid, factorisation": ("~", "<method 'setUp' of 'petsc4py.PETSc.KSP' objects>"),
-    "Schur complement, factorisation": ("linear/schur.py", "factorise"),
+    "Schur complement, factorisation": ("linear/schur.py", "complement"),
     "contact in multigrid": ("linear/multigrid.py", "follow"),
     "iterations, solves": ("~", "<method 'solve' of 'petsc4py.PETSc.KSP' objects>"),
     "solves with the factors": ("~", "<method 'matSolve' of 'petsc4py.PETSc.Mat' objects>"),

@@ -41,8 +41,8 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     kept = (problem.nodes.nodes[:, None] * size + np.arange(size, dtype=np.int32)).ravel()
     schur = SchurComplement(operator.matrix, kept, "contact_")
     # The second time the analysis is used again.
-    assert np.array_equal(schur.factorise(operator.matrix), schur.factorise(operator.matrix))
-    stiffness = schur.factorise(operator.matrix)
+    assert np.array_equal(schur.complement(operator.matrix), schur.complement(operator.matrix))
+    stiffness = schur.complement(operator.matrix)
     assert stiffness.shape == (problem.nodes.size * size * (WORLD.rank == 0),) * 2
     assert np.allclose(stiffness, stiffness.T, rtol=0, atol=1e-13)
     rhs = body.layout.mask(body.external())
@@ -53,7 +53,7 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
     for times in (2.0, 4.0):
         operator.matrix.scale(2.0)
-        again = schur.factorise(operator.matrix)
+        again = schur.complement(operator.matrix)
         assert np.allclose(again, times * stiffness, rtol=0, atol=1e-12)
         assert np.allclose(schur.interior(times * rhs), schur.interior(times * rhs))
 
@@ -67,7 +67,7 @@ def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
     problem.equilibrium.assemble(matrix, "secant", BodyState(problem.equilibrium.rest()))
     order = np.random.default_rng(1).permutation(problem.equilibrium.owned).astype(np.int32)
     kept, eliminated = np.sort(order[few:]), np.sort(order[:few])
-    found = SchurComplement(matrix, kept, "contact_").factorise(matrix)
+    found = SchurComplement(matrix, kept, "contact_").complement(matrix)
     dense = matrix[:, :]
     coupling = dense[np.ix_(eliminated, kept)]
     inside = dense[np.ix_(eliminated, eliminated)]
