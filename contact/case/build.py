@@ -140,11 +140,11 @@ def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
     for key, section in case.materials:
         if domain.revolved:
             section.check_revolved(key)
-        own = section.in_body(domain.dim)
         if law is not None:
-            own = Material(law, own.piezo, own.on or ())
-        check_range(f"{key}.young", float(own.law.young))
-        made.append(own.plane_stress() if case.space.kinematics == "plane_stress" else own)
+            section = Material(law, section.in_body(domain.dim).piezo, section.on or ())
+        check_range(f"{key}.young", float(section.law.young))
+        thin = case.space.kinematics == "plane_stress"
+        made.append(section.plane_stress() if thin else section)
     return made
 
 

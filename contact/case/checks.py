@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
@@ -16,7 +15,6 @@ from contact.model.messages import listed
 from contact.model.section import AMPLITUDE, PART, as_given, walk
 from contact.model.units import SYSTEMS, System, system_named
 from contact.settings import MISSING, SPATIAL, Words, fault
-from contact.tolerances import HUGE
 
 #: `contact.case.file.Case`, which calls these checks.
 Case: TypeAlias = Any
@@ -31,7 +29,6 @@ TIMED = ("fixed.", "load.", "rigid.", "electrode.", "bolt.")
 def check_sections(case: Case) -> None:
     """Raise a fault if sections contradict each other."""
     for path, value, marks in walk(case):
-        _check_size(path, value)
         if isinstance(value, Expression) and "t" in value.names:
             _check_time(case, path, value)
         if AMPLITUDE in marks and value is not None:
@@ -99,16 +96,6 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
         if poling is not None and isinstance(poling, tuple) != (dimension == 3):
             accepted = "an angle in 2-D" if dimension == 2 else "3 numbers in 3-D"
             raise fault(f"{path}.{key}", poling, accepted)
-
-
-def _check_size(path: str, value: Any) -> None:
-    """Raise a fault if a number is so large or so small that its square overflows or vanishes."""
-    if isinstance(value, Expression):
-        value = value.value if value.is_constant else 0.0
-    if isinstance(value, int | float) and value != 0 and math.isfinite(value):
-        if not 1 / HUGE <= abs(value) <= HUGE:
-            accepted = f"0, or sizes from {1 / HUGE:g} to {HUGE:g}, whose squares do not overflow"
-            raise fault(path, value, accepted)
 
 
 def growing(case: Case) -> list[str]:

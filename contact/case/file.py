@@ -58,9 +58,6 @@ REPLACEABLE = {
     "friction.mu": ("coefficient", "friction"),
 }
 
-#: Most keys above the last one of a path, and most digits of the number of a list's entry.
-DEEPEST, LONGEST_INDEX = 15, 9
-
 Kind = TypeVar("Kind")
 Materials: TypeAlias = Annotated[
     OneOrSome[Material], Accepted("a table [material], or tables [[material]]")
@@ -384,47 +381,35 @@ def _stand_ins(
 
 def override(data: dict[str, Any], text: str, source: str) -> None:
     """Set a value of a case, ``"path.to.key=value"``, in its tables."""
-    path, equals, given = text.partition("=")
-    if not equals or not path.strip():
+    path, equals, given = (part.strip() for part in text.partition("="))
+    if not equals or not path:
         raise _refusal(source, text, "no assignment; accepted: path.to.key=value")
-    path = path.strip()
-    value = _read_value(path, given.strip(), source)
+    value = _read_value(path, given, source)
+    try:
+        _enter(data, path, value)
+    except (IndexError, TypeError, ValueError):
+        words = "no such key; accepted: keys of tables, of a list the number of an entry"
+        raise _refusal(source, path, words) from None
+
+
+def _enter(data: dict[str, Any], path: str, value: Any) -> None:
+    """Set a value at a path of tables and lists; missing tables are made."""
     *parents, last = path.split(".")
-    if len(parents) > DEEPEST:
-        words = f"{len(parents) + 1} keys deep; accepted: at most {DEEPEST + 1}"
-        raise _refusal(source, path, words)
     place: Any = data
-    for i, key in enumerate((*parents, last)):
-        if not isinstance(place, dict | list):
-            words = f"{clipped('.'.join(parents[:i]))} is {shown(place)}, no table"
-            raise _refusal(source, path, f"{words}; accepted: keys of tables")
-        at: Any = key if isinstance(place, dict) else _index(place, key, parents[:i], path, source)
-        if i == len(parents):
-            place[at] = value
-        else:
-            place = place.setdefault(at, {}) if isinstance(place, dict) else place[at]
+    for key in parents:
+        place = place.setdefault(key, {}) if isinstance(place, dict) else place[int(key)]
+    place[last if isinstance(place, dict) else int(last)] = value
 
 
 def _read_value(path: str, text: str, source: str) -> Any:
     """Read a TOML value; anything that does not look like one is a text."""
     try:
-        table = tomllib.loads(f"value = {text}")
+        return tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError) as error:
         if not isinstance(error, tomllib.TOMLDecodeError) or text[:1] in "[{\"'":
             words = f"{shown(text)} is broken ({clipped(str(error))}); accepted: a TOML value"
             raise _refusal(source, path, words) from None
         return text
-    # A value with line breaks could smuggle in further keys.
-    return table["value"] if set(table) == {"value"} else text
-
-
-def _index(place: list[Any], key: str, above: list[str], path: str, source: str) -> int:
-    number = key.isascii() and key.isdigit() and len(key) <= LONGEST_INDEX
-    if not number or int(key) >= len(place):
-        accepted = f"0 to {len(place) - 1}" if len(place) > 1 else "0" if place else "none"
-        words = f"{clipped('.'.join(above))} has no entry {clipped(key)}; accepted: {accepted}"
-        raise _refusal(source, path, words)
-    return int(key)
 
 
 def _refusal(source: str, path: str, words: str) -> InputError:
@@ -460,14 +445,15 @@ def number_at(case: Case, key: str) -> float:
     InputError
         If there is none.
     """
-    place: Any = tomllib.loads(to_toml(case))
-    for name in key.split("."):
-        if isinstance(place, list) and name.isdigit() and int(name) < len(place):
-            place = place[int(name)]
-        else:
-            # Parameters of a mesh generator may stand in [mesh] itself.
-            inner = place.get("parameters", {}) if isinstance(place, Mapping) else {}
-            place = {**inner, **place}.get(name) if isinstance(place, Mapping) else None
+    place: Any = _tables(case)
+    try:
+        for name in key.split("."):
+            if isinstance(place, dict):  # parameters of a mesh generator may stand in [mesh] itself
+                place = {**place.get("parameters", {}), **place}[name]
+            else:
+                place = place[int(name)]
+    except (KeyError, IndexError, TypeError, ValueError):
+        place = None
     if isinstance(place, bool) or not isinstance(place, int | float):
         words = "nothing" if place is None else f"{place!r}"
         raise InputError(
@@ -479,16 +465,23 @@ def number_at(case: Case, key: str) -> float:
 
 def with_number(case: Case, key: str, value: float) -> Case:
     """Return a case with another number at a key; see `number_at`."""
-    data = tomllib.loads(to_toml(case, anchored=True))
-    override(data, f"{key}={float(value)!r}", case.source)
+    number_at(case, key)
+    data = _tables(case)
+    _enter(data, key, float(value))
     return parse_case(data, ".", case.source)
+
+
+def _tables(case: Case) -> dict[str, Any]:
+    """Return a case as the tables of its file, with the whole paths of files."""
+    context = {"path": os.path.abspath}
+    return case.model_dump(mode="json", by_alias=True, exclude_none=True, context=context)
 
 
 def _table(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
     """Write the values of a table, then the tables in it."""
     inner = {key: value for key, value in table.items() if _holds_tables(value)}
     for key, value in table.items():
-        if key not in inner and value != {} and not (value == () and not path):
+        if key not in inner and not (value == () and not path):
             yield f"{_key(key)} = {literal(value)}"
     for key, value in inner.items():
         place = (*path, key)

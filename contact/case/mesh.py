@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
@@ -19,7 +17,6 @@ from contact.errors import InputError
 from contact.mesh import grid
 from contact.mesh.cells import SHAPES, Shape
 from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_further_names
-from contact.mesh.geometry import volume_fractions, volumes
 from contact.mesh.grid import rotate
 from contact.mesh.reader import from_file, from_generator
 from contact.mesh.transfer import check_adaptable, refined
@@ -48,17 +45,6 @@ COMMON = tuple("generator file cell order rotation axis refine adapt inside regi
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200
-
-#: Seconds that it takes for a cell (seen: 5e-6 to 7e-6).
-CELL_SECONDS = 6e-6
-
-#: Number of cells from which on a warning gives their memory and time: about a minute.
-MANY = 10_000_000
-
-#: Share of a region from which on cells that its boundary cuts are worth a warning.
-CUT = 0.02
-
-logger = logging.getLogger("contact.mesh")
 
 Pair: TypeAlias = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), as_tuple]
 Along: TypeAlias = Annotated[
@@ -287,33 +273,13 @@ class Mesh(Section):
             As `rectangle`, `box`, `from_file` and `from_generator`, and if the mesh does not
             fit into the memory.
         """
-        shape = self.shape
-        if self.file is not None:
-            domain = from_file(comm, self.file)
-        elif self.generator == "rectangle":
-            assert shape is not None
-            triangles = 4 if self.diagonal == "crossed" else 2
-            each = triangles if shape.simplex else 1  # of a square
-            self._check_memory(comm, each * math.prod(self.cells or ()), 2)
-            diagonal = self.diagonal or "right"
-            domain = grid.rectangle(comm, *self._grid, diagonal=diagonal, cell=shape.name)
-        elif self.generator == "box":
-            assert shape is not None
-            each = 6 if shape.simplex else 1  # of a cube
-            self._check_memory(comm, each * math.prod(self.cells or ()), 3)
-            domain = grid.box(comm, *self._grid, cell=shape.name)
-        else:
-            assert self.generator is not None
-            with killed_on_signal():
-                domain = from_generator(
-                    comm, self.generator, self.cell, self.order, **self.parameters
-                )
-        domain = self._named(domain)
+        read = None if self.sides else self._read(comm)
+        dim = len(self.sides) // 2 if read is None else read.dim
+        cells = self._planned if read is None else read.mesh.topology.index_map(dim).size_global
+        _check_memory(comm, cells * 2 ** (dim * self.refine))
+        domain = self._named(self._made(comm) if read is None else read)
         axis = self.axis or (0.0, 1.0, 0.0)
         rotate(domain.mesh, self.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
-        if not self.sides:
-            cells = domain.mesh.topology.index_map(domain.dim).size_global
-            self._check_memory(comm, cells, domain.dim)
         for _ in range(self.refine):
             domain = refined(domain)
         if self.adapt is not None:
@@ -344,57 +310,43 @@ class Mesh(Section):
         with on_all_ranks(domain.comm):  # a formula may have no value on one of them
             facets = {name: facets_inside(mesh, marker) for name, marker in markers("inside")}
             cells = {name: cells_in(mesh, marker) for name, marker in markers("regions")}
-            sides = {name: volume_fractions(domain, marker) for name, marker in markers("regions")}
-        return straddled(with_further_names(domain, facets, cells), sides)
+        return with_further_names(domain, facets, cells)
 
-    def _check_memory(self, comm: MPI.Intracomm, cells: int, dim: int) -> None:
-        """Refuse a mesh that certainly does not fit, and warn of a large one, which takes long."""
-        total = cells * 2 ** (dim * self.refine)
-        least = comm.allreduce(memory(), op=MPI.MIN)
-        needed = total * CELL_MEMORY / comm.size
-        refined = f"mesh.refine: {self.refine} refinements of {cells:.3g} cells, "
-        place = refined if self.refine else "mesh: "
-        if needed > least:
-            raise InputError(
-                f"{place}{total:.3g} cells take more memory, {needed / 1e9:.3g} GB a rank, than "
-                f"there is, {least / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), "
-                "or more ranks on more machines",
-                "mesh-memory",
-            )
-        if total > MANY and comm.rank == 0:
-            gigabytes, seconds = needed / 1e9, total * CELL_SECONDS / comm.size
-            logger.warning(
-                f"{place}{total:.3g} cells: their mesh alone takes some {gigabytes:.2g} GB a rank "
-                f"and {seconds:.2g} s"
-            )
+    @property
+    def _planned(self) -> int:
+        """Number of cells of a rectangle or box."""
+        assert self.shape is not None
+        triangles = 4 if self.diagonal == "crossed" else 2
+        each = {2: triangles, 3: 6}[len(self.sides) // 2] if self.shape.simplex else 1
+        return each * math.prod(self.cells or ())
+
+    def _made(self, comm: MPI.Intracomm) -> Domain:
+        """Return the rectangle or box. Collective."""
+        assert self.shape is not None
+        if self.generator == "box":
+            return grid.box(comm, *self._grid, cell=self.shape.name)
+        diagonal = self.diagonal or "right"
+        return grid.rectangle(comm, *self._grid, diagonal=diagonal, cell=self.shape.name)
+
+    def _read(self, comm: MPI.Intracomm) -> Domain:
+        """Return the mesh of a file, or of another generator. Collective."""
+        if self.file is not None:
+            return from_file(comm, self.file)
+        assert self.generator is not None
+        with killed_on_signal():
+            return from_generator(comm, self.generator, self.cell, self.order, **self.parameters)
 
 
-def straddled(domain: Domain, sides: Mapping[str, Array]) -> Domain:
-    """Return a domain with notes on regions whose boundary cuts cells, and warn. Collective.
-
-    Parameters
-    ----------
-    domain
-        With the regions.
-    sides
-        Region -> the shares of the owned cells that were asked for, shape (cells,).
-    """
-    size, found = volumes(domain), []
-    for name, share in sides.items():
-        got = size[domain.regions[name]].sum()
-        cut = size @ np.minimum(share, 1 - share)
-        got, asked, cut = domain.comm.allreduce(np.array([got, size @ share, cut]), op=MPI.SUM)
-        if cut > CUT * asked:
-            word = "volume" if domain.dim == 3 else "area"
-            found.append(
-                f"mesh.regions.{name}: its boundary cuts cells; of whole cells the region has the "
-                f"{word} {got:.4g} instead of about {asked:.3g}, and a rough boundary; accepted: a "
-                "mesh with facets along the boundary"
-            )
-    if domain.comm.rank == 0:
-        for text in found:
-            logger.warning(text)
-    return replace(domain, notes=(*domain.notes, *found))
+def _check_memory(comm: MPI.Intracomm, cells: int) -> None:
+    """Refuse a mesh that certainly does not fit into the memory. Collective."""
+    least, needed = comm.allreduce(memory(), op=MPI.MIN), cells * CELL_MEMORY / comm.size
+    if needed > least:
+        raise InputError(
+            f"mesh: {cells:.3g} cells take more memory, {needed / 1e9:.3g} GB a rank, than there "
+            f"is, {least / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), or more "
+            "ranks on more machines",
+            "mesh-memory",
+        )
 
 
 def _check_parameters(name: str, parameters: Mapping[str, Any]) -> None:

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from contact import _compat
 from contact.mesh.cells import Shape, rule, shape_of
-from contact.mesh.domain import Domain, Indices, Marker
+from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cells_at
 from contact.typing import Array
 
-#: Relative distance from the middle of cells of the points near corners at which `volume_fractions`
-#: tries a marker; degree of the rule for integrands that are no polynomials.
-INWARD, FINE = 0.99, 20
+#: Degree of the rule for integrands that are no polynomials.
+FINE = 20
 
 
 def geometry_nodes(domain: Domain, cells: Indices | None = None) -> Array:
@@ -164,26 +163,3 @@ def volumes(domain: Domain) -> Array:
     points, weights = rule(shape, 1 if shape.simplex and domain.order == 1 else 3 * domain.order)
     nodes = geometry_nodes(domain)
     return integration_weights(domain.revolved, shape, nodes, points, weights).sum(axis=1)
-
-
-def volume_fractions(domain: Domain, marker: Marker) -> Array:
-    """Return the volume fractions of the owned cells in which a function of x is true, (cells,).
-
-    They are 0 or 1 for cells where it is the same in the middle and near all corners.
-    """
-    shape, of = shape_of(domain.mesh), geometry_nodes(domain)
-
-    def there(nodes: Array, at: Array) -> NDArray[np.bool_]:
-        """Tell where it is true at points of cells, (cells, q)."""
-        basis = shape.lagrange(shape.degree_of(nodes.shape[1]), at)
-        points = np.einsum("qk,nkd->nqd", basis, nodes)
-        return np.reshape(marker(points.reshape(-1, domain.dim).T), points.shape[:2])
-
-    corners = shape.nodes(1)
-    middle = corners.mean(axis=0, keepdims=True)
-    seen = there(of, np.concatenate([middle, middle + INWARD * (corners - middle)]))
-    found = seen[:, 0].astype(float)
-    both = np.flatnonzero(seen.any(axis=1) & ~seen.all(axis=1))
-    at, weights = rule(shape, FINE)
-    found[both] = there(of[both], at) @ (weights / weights.sum())
-    return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -37,12 +36,6 @@ from contact.model.section import (
     as_given,
 )
 from contact.settings import MISSING, SPATIAL, Accepted, Switch, Words, fault
-
-#: For scripts that are older than the meaning of the word.
-CHANGED = (
-    "Load(force=...) is the resultant, spread evenly over the part; the force per area, which it "
-    "was in scripts from before the first release, is traction=..."
-)
 
 ZERO = Expression(0.0)
 
@@ -238,8 +231,6 @@ class Load(Described):
             body_charge=body_charge,
             amplitude=amplitude,
         )
-        if force is not None:
-            warnings.warn(CHANGED, FutureWarning, stacklevel=2)
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -463,7 +463,9 @@ class Material(Described):
         """Return the material with its law and tensors in the axes of a body in 2-D or 3-D."""
         if not isinstance(self.kind, str | None) and not isinstance(self.coupling, Piezo):
             return self
-        axis = self.axis[1]
+        key, axis = self.axis
+        accepted = "an angle in 2-D" if dim == 2 else "3 numbers in 3-D"
+        expect(key, axis, accepted, axis is None or np.ndim(axis) == dim - 2)
         if dim == 2:
             turn = in_plane(90.0 if axis is None else float(axis))  # type: ignore[arg-type]
         else:
@@ -576,19 +578,14 @@ def make_material(dim: int, **keys: TableValue | Array) -> Material:
     ------
     InputError
         As for a case file: if a key is missing, unknown or has another value than is accepted; or
-        if the dimension is neither, or the axis of a crystal is none of it.
+        if the axis of a crystal is none of the body's dimension.
 
     Examples
     --------
     >>> make_material(2, young=210e3, poisson=0.3).law
     Linear(young=210000.0, poisson=0.3)
     """
-    expect("make_material: dim", dim, "2 or 3", dim in (2, 3))
     try:
-        section = Material.model_validate(keys)
+        return Material.model_validate(keys).in_body(dim)
     except ValidationError as error:
         raise describe(error, "make_material") from None
-    key, axis = section.axis
-    accepted = "an angle from x in degrees" if dim == 2 else f"a vector of {dim} numbers"
-    expect(f"make_material: {key}", axis, accepted, axis is None or np.ndim(axis) == dim - 2)
-    return section.in_body(dim)

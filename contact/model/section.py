@@ -127,7 +127,7 @@ class Section(BaseModel):
         keys = {name: field.alias or name for name, field in of.model_fields.items()}
         unread = {k for k, _, needs in conditions(of) if not needs.met(value_of(self, needs.key))}
         written = {keys.get(name, name): value for name, value in handler(self).items()}
-        return {key: value for key, value in written.items() if key not in unread}
+        return {k: value for k, value in written.items() if k not in unread and value != {}}
 
 
 class Described(Section):

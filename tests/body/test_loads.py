@@ -37,8 +37,7 @@ def block(load, dim=2, law=None, domain=None):
 
 
 def resultant(*force, **more):
-    with pytest.warns(FutureWarning, match="before the first release, is traction"):
-        return Load("top", force=force, **more)
+    return Load("top", force=force, **more)
 
 
 @pytest.mark.core

@@ -132,7 +132,6 @@ WRONG = {
     "no material": lambda: Body([], TOP),
     "regions": lambda: Material(LAW, on=3),
     "a crystal": lambda: make_material(2, young=1.0, poisson=0.3, piezo={"e31": 1.0}),
-    "a dimension": lambda: make_material(1, name="PZT-4"),
     "a load as support": lambda: Body(LAW, [Load("top", [0, 1])]),  # type: ignore[list-item]
     "an electrode": lambda: problem(electrodes=Electrode("left")),
     "a mesh": lambda: Problem(block().mesh, Body(LAW, TOP), Contact("bottom")),

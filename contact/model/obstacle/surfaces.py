@@ -27,9 +27,9 @@ class Heights(Shape):
     """A body below, or above, heights along the last axis, smooth between them (cubic splines).
 
     Beyond the outermost points the surface goes on level, and a hole between points is bridged:
-    contact there is told (`output.foundations`). Distances are those along the last axis times the
-    cosine of the slope: exact on the surface, and nearly so close to it; along an axis or the
-    body's normals gaps are exact.
+    a warning tells of contact there. Distances are those along the last axis times the cosine of
+    the slope: exact on the surface, and nearly so close to it; along an axis or the body's normals
+    gaps are exact.
     """
 
     places: Internal[Annotated[tuple[Array, ...], as_tuple]] = ()
