@@ -371,14 +371,15 @@ class InteriorPoint:
         self.problem, self._newton, self._step = problem, newton, newton.step
         interface = problem.interface
         nodes, self._state = interface.nodes, problem.start()
-        self._near = np.isfinite(interface.gap)
+        # A layer without a rigid part bears friction too, without a unilateral constraint.
+        self._rigid = np.isfinite(interface.gap)
         total, limit = all_loads(problem), nodes.weight * bound
         count = max(nodes.size, 1)
-        self._frictional = self._near & (limit > EPS * max(nodes.maximum(limit), total / count))
+        self._frictional = limit > EPS * max(nodes.maximum(limit), total / count)
         nodal = nodes.apply(self._state.x)
         moved = np.zeros_like(nodal) if begin is None else nodes.apply(begin.x) - nodal
-        normal_gap = interface.normal_gap(nodal + moved)[self._near]
-        gap = interface.gap[self._near]
+        normal_gap = interface.normal_gap(nodal + moved)[self._rigid]
+        gap = interface.gap[self._rigid]
         scales = problem.scales
         block = scales.plane_modulus * scales.area / scales.height
         if begin is not None:
@@ -422,14 +423,15 @@ class InteriorPoint:
             if not taken or not np.isfinite(residuals.significant):
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
-            nodal = self.problem.interface.nodes.apply(self._state.x)
-            pressure = self.problem.interface.nodes.maximum(self.state.forces.pressure)
-            if pressure <= self.problem.interface.rounding(nodal):
+            interface, state = self.problem.interface, self.state
+            nodal = interface.nodes.apply(state.x)
+            pressure = interface.nodes.maximum(interface.pressure(nodal, state.forces))
+            if pressure <= interface.rounding(nodal):
                 ended = f"nothing presses after {steps} steps"
                 break
             gap = self.relative_gap()
             balanced = residuals.equilibrium <= max(FORCING, residuals.floors[0])
-            if gap <= CLOSED and (balanced or gap <= CLOSED**2):
+            if gap <= CLOSED and (balanced or 0 < gap <= CLOSED**2):
                 ended = f"duality gap closed after {steps} steps"
                 break
         return Outcome(residuals, newton.options.allowed, ended)
@@ -439,7 +441,7 @@ class InteriorPoint:
         """The iterate."""
         cones, nodes = self.cones, self.problem.interface.nodes
         pressure, friction = np.zeros(nodes.weight.size), np.zeros(nodes.normal.shape)
-        pressure[self._near] = cones.force / nodes.weight[self._near]
+        pressure[self._rigid] = cones.force / nodes.weight[self._rigid]
         friction[self._frictional] = -cones.friction / nodes.weight[self._frictional, None]
         return replace(self._state, forces=Multipliers.of(nodes, pressure, friction))
 
@@ -449,7 +451,7 @@ class InteriorPoint:
         nodes, cones, nodal = interface.nodes, self.cones, interface.nodes.apply(x)
         ways = np.abs(interface.gap) + np.abs(nodes.normal_component(nodal))
         slips = interface.slip_length(nodal)[self._frictional]
-        contact = float(summed(nodes.comm, cones.force @ ways[self._near] + cones.bound @ slips))
+        contact = float(summed(nodes.comm, cones.force @ ways[self._rigid] + cones.bound @ slips))
         own = body.owned_part(x)[: body.owned]
         forces = self._internal, body.external(self._state.time)
         works = [abs(float(summed(nodes.comm, own @ force[: body.owned]))) for force in forces]
@@ -461,30 +463,30 @@ class InteriorPoint:
         cones, interface, state = self.cones, self.problem.interface, self.state
         if not cones.interior():
             return False
-        nodes, near, frictional = interface.nodes, self._near, self._frictional
+        nodes, rigid, frictional = interface.nodes, self._rigid, self._frictional
         body, d = self.problem.equilibrium, nodes.dim
         nodal = nodes.apply(state.x)
         residual = -residual_forces(self.problem, state, internal=self._internal)
-        slack = interface.normal_gap(nodal)[near] - cones.slack
+        slack = interface.normal_gap(nodal)[rigid] - cones.slack
         slip = interface.slip(nodal)[frictional] - cones.slip
         cones.scale()
         stiff, across = cones.stiffness()
         blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))
-        normal, tangent = nodes.normal[near], nodes.tangent[frictional]
-        blocks[near, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
+        normal, tangent = nodes.normal[rigid], nodes.tangent[frictional]
+        blocks[rigid, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
         blocks[frictional, :d, :d] += tangent @ across @ tangent
         self._step.assemble(self.problem, state, blocks / nodes.weight[:, None, None])
 
         def solve(constants: tuple[Array, Array]) -> tuple[Array, ConeStep]:
             force, friction = cones.reduced(constants)
             at_nodes = np.zeros((nodes.nodes.size, d))
-            at_nodes[near] = -(force - stiff * slack)[:, None] * normal
+            at_nodes[rigid] = -(force - stiff * slack)[:, None] * normal
             at_nodes[frictional] += friction - np.einsum("kij,kj->ki", across, slip)
             rhs = residual.copy()
             nodes.transpose(at_nodes, rhs)
             dx = self._step.operator.solve(rhs, FORCING)
             moved = nodes.apply(dx)
-            closed = slack - nodes.normal_component(moved)[near]
+            closed = slack - nodes.normal_component(moved)[rigid]
             return dx, cones.complete(
                 constants, closed, nodes.tangential_component(moved)[frictional] + slip
             )

@@ -235,7 +235,9 @@ class Iteration:
         return Outcome(self.residuals, self._options.allowed, ended)
 
     def _largest_pressure(self, state: State) -> float:
-        return self._problem.interface.nodes.maximum(state.forces.pressure)
+        interface = self._problem.interface
+        nodal = interface.nodes.apply(state.x)
+        return interface.nodes.maximum(interface.pressure(nodal, state.forces))
 
     def _loss_of_contact(self, state: State) -> tuple[State, Outcome] | None:
         """Return zero displacement if contact is lost and no load acts; else None. Collective."""

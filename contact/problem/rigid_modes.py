@@ -410,7 +410,7 @@ def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
     problem, free = group.problem, null_space(group.supports)
     if free.shape[1] == 0:
         return None
-    nodes, near = problem.nodes, np.isfinite(problem.interface.gap)
+    nodes, near = problem.nodes, np.isfinite(problem.nodes.gap)
     normal, tangential, bound = (
         nodes.gather(of[near]) for of in (group.normal @ free, group.tangential @ free, friction)
     )

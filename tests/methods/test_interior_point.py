@@ -11,7 +11,7 @@ from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
 from contact.errors import InputError, SingularError
-from contact.methods.interior_point import Cones, interior_point
+from contact.methods.interior_point import Cones, InteriorPoint, interior_point
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome, Record
@@ -127,6 +127,48 @@ def interior(
     begin = newton.step.without_contact(problem, problem.start()) if supported else None
     found, outcome = interior_point(newton, begin)
     return outcome, found.near(state, rtol=1e-6, atol=atol)
+
+
+@pytest.mark.core
+@pytest.mark.parametrize("rigid", [False, True], ids=["layer alone", "rigid part behind"])
+@pytest.mark.parametrize("kind", ["plane", "revolved", "in space"])
+def test_an_interior_point_with_friction_on_a_layer(kind, rigid):
+    """Where nothing is rigid the gap is infinite: there were no cones of friction."""
+    dim = 3 if kind == "in space" else 2
+    space = {"kinematics": "axisymmetric"} if kind == "revolved" else {}
+    down = [0.0] * (dim - 1) + [-0.04]
+    case = {
+        "mesh": {"generator": "rectangle" if dim == 2 else "box", "size": [2.0] * (dim - 1) + [1.0],
+                 "cells": [8, 4] if dim == 2 else [4, 4, 2]},
+        "space": space,
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": down}],
+        "load": [{"on": "right", "traction": [-0.02] + [0.0] * (dim - 1)}],
+        "contact": {"on": "bottom", "law": "compliance", "gap": 0.001, "stiffness": 2.0,
+                    "limit": np.inf, "layer": 0.01 if rigid else np.inf},
+        "friction": {"law": "coulomb", "mu": 0.05},
+    }  # fmt: skip
+    problem = build_problem(parse_case(case), SELF)
+    state, outcome = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
+    assert outcome.converged, outcome.reason
+    interface, nodal = problem.interface, problem.nodal(state)
+    layer = interface.foundation.pressure(nodal)
+    bound = interface.bound(nodal, state.forces)
+    slips = interface.slip_length(nodal) > 1e-6
+    assert (slips & (layer > 0)).any()
+    assert (problem.nodes.maximum(state.forces.pressure) > 0) == rigid
+    newton = Newton(problem, NewtonOptions(condense=False)).whole
+    begin = newton.step.without_contact(problem, problem.start())
+    method = InteriorPoint(newton, bound, begin)
+    ended = method.iterate().ended
+    assert ended.startswith("duality gap closed"), ended
+    found = method.state  # in equilibrium to 1e-4
+    assert np.abs(found.x - state.x).max() < 1e-4 * np.abs(state.x).max()
+    assert np.abs(found.forces.friction - state.forces.friction).max() < 1e-4 * bound.max()
+    # The friction bounds of the method itself, from zero on.
+    found, outcome = interior_point(newton, begin)
+    assert outcome.converged, outcome.reason
+    assert found.near(state, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("linear", ["lu", "iterative"])

@@ -13,7 +13,7 @@ from contact.results.remarks import untouched
 MU, PRESS = 0.3, 1e-3
 
 
-def wall(dim, part, angle=0.0):
+def wall(dim, part, angle=0.0, **contact):
     """Return a unit block pressed to a wall, and along it by a part of the force friction holds.
 
     Without Poisson's effect the wall presses by E times the way of the other side.
@@ -26,7 +26,7 @@ def wall(dim, part, angle=0.0):
         "material": {"young": 1.0, "poisson": 0.0},
         "fixed": [{"on": "right", "displacement": [-PRESS, *free]}],
         "load": [{"everywhere": True, "body_force": [0.0, *along.tolist()]}],
-        "contact": {"on": "left"},
+        "contact": {"on": "left", **contact},
         "friction": {"law": "coulomb", "mu": MU},
     })  # fmt: skip
 
@@ -46,6 +46,18 @@ def test_the_friction_that_holds_a_block(dim, angle):
         mode = sliding_mode(group, 1.0, part * friction)
         named = {name: abs(size) for name, size in zip(group.names, mode, strict=True)}
         assert max(named, key=named.get) == f"translation along {'xyz'[dim - 1]}"
+
+
+@pytest.mark.core
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_friction_that_holds_a_block_on_a_layer(dim):
+    """Behind a layer without a rigid part the gap is infinite: its friction was not counted."""
+    case = wall(dim, 1.0, law="compliance", layer=np.inf, stiffness=1.0)
+    problem = build_problem(case, MPI.COMM_WORLD)
+    (group,) = groups(problem)
+    friction = problem.nodes.weight * MU * PRESS
+    assert sliding_mode(group, 1.0, 1.001 * friction) is None
+    assert sliding_mode(group, 1.0, 0.999 * friction) is not None
 
 
 @pytest.mark.parallel
