@@ -32,13 +32,13 @@ from contact.problem.residuals import Residuals, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Forcing term of inexact Newton. One by the residuals (Eisenstat and Walker) would ask for more
-#: digits on finer meshes.
+#: First forcing term of inexact Newton. One by the residuals (Eisenstat and Walker) would ask for
+#: more digits on finer meshes.
 FORCING = 1e-2
 
-#: Steps without progress after which the forcing term is divided by 100: with two digits the active
-#: set may cycle. Its least value is the tolerance.
-STAGNANT = 3
+#: Steps without progress after which the forcing term is multiplied by `REDUCTION`: with two digits
+#: the active set may cycle. Its least value is the tolerance.
+STAGNANT, REDUCTION = 3, 1e-2
 
 #: Levenberg-Marquardt parameter over the stiffness of a node times the residual.
 REGULARISATION = 1e-2
@@ -99,7 +99,10 @@ class NewtonStep:
         self._stagnant = 0 if residual < self._nearest else self._stagnant + 1
         self._nearest = min(self._nearest, residual)
         if self._stagnant >= STAGNANT:
-            self._stagnant, self._forcing = 0, max(self._forcing * FORCING, self.options.tolerance)
+            self._stagnant, self._forcing = (
+                0,
+                max(self._forcing * REDUCTION, self.options.tolerance),
+            )
         return self._forcing
 
     @property
