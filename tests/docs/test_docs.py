@@ -203,6 +203,17 @@ def test_files_that_pages_name_are_there() -> None:
     assert len(named) > 20 and not [name for name in missing if "NAME" not in name]
 
 
+def test_equations_lead_to_names_that_are_there() -> None:
+    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    section = page.split("## The equations")[1].split("\n## ")[0]
+    places = re.findall(r"`([\w/]+\.py)`((?:[:,] `\w+`)*)", section)
+    assert len(places) > 25
+    for file, names in places:
+        (path,) = (path for root in ("contact", ".") if (path := ROOT / root / file).is_file())
+        defined = re.findall(r"(?:def|class) (\w+)", path.read_text(encoding="utf-8"))
+        assert {*re.findall(r"`(\w+)`", names)} <= {*defined}, file
+
+
 def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
     page = (DOCS / "algorithms.md").read_text()
     options = NewtonOptions()
