@@ -36,7 +36,7 @@ from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.refining import coarser_cases
 from contact.results.bodies import apart
-from contact.results.remarks import own_shape, without_heights
+from contact.results.remarks import beyond_heights, own_shape
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 from forms.elasticity import Anisotropic
@@ -121,7 +121,7 @@ def expectations(problem: ContactProblem) -> list[str]:
         f"# warning: {text} [{identifier}]"
         for identifier, remarks in {
             "curved-surface": own_shape(problem),
-            "part-end": without_heights(problem),
+            "part-end": beyond_heights(problem, np.ones(len(problem.nodes.weight), dtype=bool)),
             "supports": meeting_supports(problem, [problem.time]),
             "two-bodies": apart(problem),
         }.items()

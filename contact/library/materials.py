@@ -14,20 +14,16 @@ import numpy as np
 
 from contact.errors import InputError
 from contact.typing import Array
-from forms.crystal import coupling_tensor, isotropic_about_x3, stiffness_tensor
 from forms.elasticity import Anisotropic, hexagonal, isotropic
 from forms.piezo import Piezo, from_voigt, hexagonal_voigt
 
 #: The library of the package.
 PACKAGED = Path(__file__).with_name("materials.toml")
 
-#: Keys of texts, of stiffness, of coupling; all keys.
+#: Keys of texts, of stiffness, of coupling; all keys, with the published d and their accuracy.
 WORDS = ("class", "source", "temperature", "condition")
 ELASTIC, ELECTRIC = ("young", "c", "stiffness"), ("e", "coupling", "permittivity")
 KEYS = (*WORDS, *ELASTIC, "poisson", *ELECTRIC, "d", "within", "checked")
-
-#: Classes whose constants do not change with a rotation about X3.
-AXISYMMETRIC = ("isotropic", "6mm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +44,6 @@ class Entry:
         e, shape (3, 6) (C/m2); None if it is not piezoelectric.
     permittivity
         At constant strain, shape (3, 3) (F/m), or None.
-    published
-        Indices (i, J) of d_iJ -> published value (C/N).
-    within
-        Largest relative difference of d = e s from these.
     checked
         Other sources of the constants, and differences there; may be empty.
     """
@@ -65,8 +57,6 @@ class Entry:
     isotropic: tuple[float, float] | None
     coupling: Array | None
     permittivity: Array | None
-    published: Mapping[tuple[int, int], float]
-    within: float
     checked: str
 
     @staticmethod
@@ -86,15 +76,10 @@ class Entry:
             stiffness = 1e9 * hexagonal(**_numbers(table["c"]))
         else:
             stiffness = 1e9 * np.array(table["stiffness"], dtype=float)
-        published = {
-            (int(key[1]) - 1, int(key[2]) - 1): 1e-12 * value
-            for key, value in _numbers(table.get("d", {})).items()
-        }
         symmetry, source, temperature, condition = (str(table[key]) for key in WORDS)
         coupling, permittivity = _electric(table) if {*ELECTRIC} & {*table} else (None, None)
-        within, checked = float(table.get("within", 0.05)), str(table.get("checked", ""))
-        words = name, source, temperature, condition, symmetry
-        return Entry(*words, stiffness, elastic, coupling, permittivity, published, within, checked)
+        words, checked = (name, source, temperature, condition, symmetry), table.get("checked", "")
+        return Entry(*words, stiffness, elastic, coupling, permittivity, str(checked))
 
     @property
     def piezo(self) -> Piezo | None:
@@ -131,29 +116,10 @@ class Entry:
         return float(abs(self.charge_constants[field, strain]) / np.sqrt(free))
 
     def check(self) -> None:
-        """Check the constants: definiteness, symmetry about X3, published d = e s, k_33 < 1.
-
-        Raises
-        ------
-        ValueError
-            With the constant.
-        """
+        """Raise a ValueError unless stiffness and permittivity are positive definite."""
         Anisotropic(self.stiffness).check()
-        tensors = [stiffness_tensor(self.stiffness)]
         if self.coupling is not None and self.permittivity is not None:
             from_voigt(self.coupling, self.permittivity)
-            tensors += [coupling_tensor(self.coupling), self.permittivity]
-        if self.symmetry in AXISYMMETRIC and not isotropic_about_x3(*tensors):
-            raise ValueError(f"class {self.symmetry}: the constants change with a turn about X3")
-        for (i, j), given in self.published.items():
-            found = float(self.charge_constants[i, j])
-            if not abs(found - given) <= self.within * abs(given):
-                raise ValueError(
-                    f"d{i + 1}{j + 1} = {given * 1e12:.4g} pC/N is published, and e s makes "
-                    f"{found * 1e12:.4g}: they differ by more than {self.within:g}"
-                )
-        if self.coupling is not None and not self.bar_coupling(2, 2) < 1:
-            raise ValueError(f"k33 = {self.bar_coupling(2, 2):.4g}, which is not below 1")
 
 
 def _numbers(table: Mapping[str, Any]) -> dict[str, float]:

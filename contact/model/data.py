@@ -38,15 +38,26 @@ def read_data(path: str | Path) -> dict[str, Array]:
         names = [name.strip() for name in numbered[0][1]]
         if len(set(names)) < len(names):
             raise ValueError("a name stands twice")
+        if all(map(_is_number, names)):
+            raise ValueError("its first row has numbers")
         values = np.array([_numbers(number, names, row) for number, row in numbered[1:]])
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; accepted: a CSV file", "data-file") from None
     except ValueError as error:
         raise InputError(
-            f"{path}: {error}; accepted: a row of names, then rows of numbers", "data-file"
+            f"{path}: {error}; accepted: a row of names, then rows of numbers with decimal points, "
+            "separated by commas",
+            "data-file",
         ) from None
     columns = values.reshape(-1, len(names)).T
     return dict(zip(names, columns, strict=True))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return bool(np.isfinite(float(text)))
+    except ValueError:
+        return False
 
 
 def _numbers(number: int, names: Sequence[str], row: Sequence[str]) -> list[float]:

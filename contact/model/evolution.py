@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from contact.errors import InputError
+from contact.model.data import read_data
 from contact.model.section import Described, File, Text, as_tuple
 from contact.settings import MISSING, Accepted, Count, Number, Words, fault
 
@@ -42,7 +43,7 @@ class Amplitude(Described):
     """Values at these times. Likewise."""
     file: Annotated[File, Accepted("a CSV file of times and values")] | None = None
     """CSV file instead, relative to the case file: times in the first column, values in the second
-    one, a measured curve for instance. Its first row may have names."""
+    one, a measured curve for instance. Its first row has names."""
 
     @cached_property
     def points(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -79,45 +80,18 @@ class Amplitude(Described):
 
 
 def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the first two columns of a CSV file, at least two rows of numbers.
+    """Return the first two columns of a CSV file with a row of names, two numbers each at least.
 
     Raises
     ------
     InputError
-        If it cannot be read, or has no such rows.
+        If it cannot be read, or has no such columns.
     """
-    accepted = "a CSV file, rows of a time and a value, two at least, with decimal points"
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(
-            f"{path}: {error.strerror}; accepted: {accepted}", "amplitude-file"
-        ) from None
-    except UnicodeDecodeError:
-        raise InputError(
-            f"{path}: not a text in UTF-8; accepted: {accepted}", "amplitude-file"
-        ) from None
-    lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
-    rows: list[tuple[float, float]] = []
-    for number, line in enumerate(lines):
-        # A comma beside semicolons or blanks is that of decimals, which no number here has.
-        cells = line.split(next((mark for mark in ";," if mark in line), None))
-        try:
-            first, second = map(float, cells[:2])
-            if not np.isfinite([first, second]).all():
-                raise ValueError
-        except ValueError:
-            if number > 0 or cells[0][:1].isdigit():
-                raise InputError(
-                    f"{path}: no numbers in {line!r:.40}; accepted: {accepted}", "amplitude-file"
-                ) from None
-            continue  # names
-        rows.append((first, second))
-    if len(rows) < 2:
-        raise InputError(
-            f"{path}: {len(rows)} rows of numbers; accepted: {accepted}", "amplitude-file"
-        )
-    times, values = zip(*rows, strict=True)
+    columns = [*read_data(path).values()][:2]
+    if len(columns) < 2 or len(columns[0]) < 2 or not np.isfinite(columns).all():
+        accepted = "a row of names, then two rows or more of a finite time and value"
+        raise InputError(f"{path}: no curve; accepted: {accepted}", "amplitude-file")
+    times, values = (tuple(column.tolist()) for column in columns)
     return times, values
 
 

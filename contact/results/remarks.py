@@ -417,7 +417,7 @@ def beyond_part(solution: Solution) -> Iterator[Remark]:
     """Warn of contact that goes on where its part, or the map of heights, ends. Collective."""
     problem, d = solution.problem, solution.problem.dim
     if any(isinstance(contact.foundation, Heights) for contact in problem.contacts):
-        yield from without_heights(problem, _touched(solution))
+        yield from beyond_heights(problem, solution.status != "open")
     rigid = [contact for contact in problem.contacts if contact.against is None]
     facing = [(c.on, c.foundation) for c in rigid if isinstance(c.foundation, Shape)]
     if not facing or not solution.converged:
@@ -461,38 +461,24 @@ def _beside(problem: ContactProblem, parts: list[str]) -> tuple[Array, NDArray[n
     return space.tabulate_dof_coordinates()[nodes, : domain.dim], nodes
 
 
-def without_heights(
-    problem: ContactProblem, touched: NDArray[np.bool_] | None = None
-) -> Iterator[Remark]:
-    """Warn of contact parts without measured heights in front of them. Collective.
+def beyond_heights(problem: ContactProblem, touched: NDArray[np.bool_]) -> Iterator[Remark]:
+    """Warn of contact beyond the last place of measured heights; of the touched nodes. Collective.
 
-    `touched`: nodes that are in contact in some step, shape (n,); before a solve all may be.
+    `touched`: which nodes are in contact, shape (n,); before a solve all may be.
     """
     begin = 0
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         nodes, shape = geometry.nodes, contact.foundation
-        here = slice(begin, begin + len(nodes.weight))
-        begin = here.stop
-        if not isinstance(shape, Heights):
-            continue
-        aside = np.where(shape.direction == "foundation", 0.0, nodes.gap)
-        unknown = shape.unknown(nodes.points + aside[:, None] * nodes.normal)
-        seen = np.ones_like(unknown) if touched is None else touched[here]
-        area = nodes.sum((unknown & seen).astype(np.float64))
-        if area > 0:
-            yield (
-                f"{area / nodes.sum(seen.astype(np.float64)):.1%} of the area of {contact.on} lie "
-                "where its foundation has no heights, and is taken to go on smoothly"
-            )
-
-
-def _touched(solution: Solution) -> NDArray[np.bool_]:
-    """Return which contact nodes touch at the end of any step. Collective."""
-    interface, found = solution.problem.interface, solution.status != "open"
-    for record in solution.steps:
-        nodal = interface.nodes.apply(record.state.x)
-        found = found | (interface.pressure(nodal, record.state.forces) > interface.rounding(nodal))
-    return found
+        seen = touched[begin : begin + len(nodes.weight)]
+        begin += len(nodes.weight)
+        if isinstance(shape, Heights):
+            area = nodes.sum(seen.astype(np.float64))
+            beyond = nodes.sum((shape.beyond(nodes.points) & seen).astype(np.float64))
+            if beyond > 0:
+                yield (
+                    f"{beyond / area:.1%} of the area of {contact.on} lie beyond the last place of "
+                    "the heights of its foundation, which goes on level there"
+                )
 
 
 def coarse_curves(solution: Solution) -> Iterator[Remark]:

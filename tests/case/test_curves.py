@@ -21,8 +21,7 @@ def with_file(name="press.csv"):
     "text",
     [
         "t,factor\n0,0\n1,1\n3,-0.5\n",
-        "0 0\n1 1\n3 -0.5",
-        "# measured\ntime; force; more\n0; 0; 7\n1; 1; 7\n3; -0.5; 7\n\n",
+        "time, force, more\n0, 0, 7\n1, 1, 7\n3, -0.5, 7\n\n",
     ],
 )
 def test_an_amplitude_from_a_file(tmp_path, text):
@@ -47,14 +46,17 @@ def test_an_amplitude_from_a_file(tmp_path, text):
     ("text", "words"),
     [
         ("t,f\n", r"\[amplitude-file\]"),
-        ("0,0\n1,one\n3,1\n", r"\[amplitude-file\]"),
-        ("0,0\n1,1\n1,2\n3,1\n", r"\[value\]"),
-        ("0,0\n1,1\n", r"\[value\]"),
-        ("0,0\n1,nan\n3,1\n", r"\[amplitude-file\]"),
-        # They were taken for rows of 1 and 5, or for names: a load 7.5 times as large.
-        ("0;0\n1,5;1\n3;0,5\n", r"\[amplitude-file\]"),
-        ("0,5 1\n3 0\n", r"\[amplitude-file\]"),
-        (None, r"\[amplitude-file\]"),
+        ("t\n0\n3\n", r"\[amplitude-file\]"),
+        ("t,f\n0,0\n1,one\n3,1\n", r"\[data-file\]"),
+        ("t,f\n0,0\n1,1\n1,2\n3,1\n", r"\[value\]"),
+        ("t,f\n0,0\n1,1\n", r"\[value\]"),
+        ("t,f\n0,0\n1,nan\n3,1\n", r"\[amplitude-file\]"),
+        ("0,1\n1,1\n3,1\n", r"\[data-file\]"),  # no names
+        # Decimal commas, which are no separators of columns.
+        ("t;f\n0;0\n1,5;1\n3;0,5\n", r"\[data-file\]"),
+        ("t f\n0,5 1\n3 0\n", r"\[data-file\]"),
+        ("t,f\n0,0,0\n3,0,5\n", r"\[data-file\]"),
+        (None, r"\[data-file\]"),
     ],
 )
 def test_other_files_are_refused(tmp_path, text, words):

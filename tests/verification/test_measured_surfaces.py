@@ -78,16 +78,14 @@ def test_distances_and_normals_of_heights():
     assert normal[0] == pytest.approx(np.array([0.0, 0.2, 1.0]) / np.hypot(0.2, 1.0))
 
 
-def test_places_without_heights():
+def test_places_beyond_the_heights():
     """In 3-D, beside either axis; half a spacing beyond the last place is known."""
-    x, y = np.linspace(0.0, 2.0, 5), np.array([0.0, 0.1, 0.2, 0.8, 0.9, 1.0])
-    given = Heights((x, y), np.zeros((5, 6)))
-    known = [[-0.25, 0.0], [2.25, 1.05], [1.0, 0.25], [1.0, 0.75]]
-    unknown = [[-0.26, 0.0], [1.0, 1.06], [1.0, 0.26], [2.0, 0.5]]
-    points = np.column_stack([np.array(known + unknown), np.ones(8)])
-    assert given.unknown(points).tolist() == [False] * 4 + [True] * 4
-    few = Heights((np.array([0.0, 1.0]),), np.zeros(2))
-    assert few.unknown(np.array([[1.5, 0.0], [1.6, 0.0]])).tolist() == [False, True]
+    given = Heights((np.linspace(0.0, 2.0, 5), np.linspace(0.0, 1.0, 11)), np.zeros((5, 11)))
+    points = np.array(
+        [[-0.25, 0.0], [2.25, 1.05], [1.0, 0.5], [-0.26, 0.0], [2.26, 1.0], [1, 1.06]]
+    )
+    found = given.beyond(np.column_stack([points, np.ones(6)]))
+    assert found.tolist() == [False] * 3 + [True] * 3
 
 
 @pytest.mark.parametrize("file", ["grid.csv", "grid.npy"])
@@ -164,7 +162,7 @@ def test_contact_beyond_the_heights_is_told(shared_tmp_path, direction):
     case = flat(shared_tmp_path, places, -0.01)
     contact = case.contact.model_copy(update={"direction": direction})
     case = case.model_copy(update={"contact": contact})
-    warned = "60.0% of the area of bottom lie where its foundation has no heights"
+    warned = "60.0% of the area of bottom lie beyond the last place of the heights"
     (said,) = (w for w in solve(case).warnings if "[part-end]" in w)
     assert warned in said
     away = solve(flat(shared_tmp_path, places, 0.01))

@@ -26,10 +26,9 @@ from contact.typing import Array
 class Heights(Shape):
     """A body below, or above, heights along the last axis, smooth between them (cubic splines).
 
-    Beyond the outermost points the surface goes on level, and a hole between points is bridged:
-    a warning tells of contact there. Distances are those along the last axis times the cosine of
-    the slope: exact on the surface, and nearly so close to it; along an axis or the body's normals
-    gaps are exact.
+    Beyond the outermost points the surface goes on level; a warning tells of contact there.
+    Distances are those along the last axis times the cosine of the slope: exact on the surface, and
+    nearly so close to it; along an axis or the body's normals gaps are exact.
     """
 
     places: Internal[Annotated[tuple[Array, ...], as_tuple]] = ()
@@ -44,7 +43,7 @@ class Heights(Shape):
     ] = None
     """CSV file with a row of names and the columns x, y (3-D: x, y, z, at all points of a
     grid); or a NumPy array of heights, an image for instance. Relative to the case file. A
-    warning tells the share of the contact that lies beyond them, or in a hole."""
+    warning tells the share of the contact that lies beyond them."""
     spacing: Annotated[
         Annotated[tuple[Positive, ...], as_tuple] | None,
         Accepted("distances > 0, one per direction of the array"),
@@ -140,31 +139,13 @@ class Heights(Shape):
             slopes = [self._spline.ev(*inside, dx=1), self._spline.ev(*inside, dy=1)]
         return height, np.where(beyond, 0.0, slopes).T
 
-    @cached_property
-    def gaps(self) -> tuple[Array, ...]:
-        """Intervals along each axis that have no heights, shape (n, 2): infinite ones at its ends.
-
-        Within it these are longer than both beside them together. They begin and end half a spacing
-        beyond the last place, as an image has its places in the middle of its pixels.
-        """
-        found = []
-        for axis in map(np.asarray, self.grid[0]):
-            steps = np.diff(axis)
-            half = (0.5 + NEGLIGIBLE) * steps
-            wide = 1 + np.flatnonzero(steps[1:-1] > 2 * (half[:-2] + half[2:]))
-            begin = np.append(-np.inf, axis[wide] + half[wide - 1])
-            end = np.append(axis[0] - half[0], axis[wide + 1] - half[wide + 1])
-            last = [axis[-1] + half[-1], np.inf]
-            found.append(np.vstack([np.column_stack([begin, end]), last]))
-        return tuple(found)
-
-    def unknown(self, points: Array) -> NDArray[np.bool_]:
-        """Tell which points lie in one of the `gaps` of an axis, shape (n,)."""
-        found = np.zeros(len(points), dtype=bool)
-        for k, gaps in enumerate(self.gaps):
-            at = points[:, k, None]
-            found |= ((at > gaps[:, 0]) & (at < gaps[:, 1])).any(axis=1)
-        return found
+    def beyond(self, points: Array) -> NDArray[np.bool_]:
+        """Tell which points lie beyond the last places, more than half a spacing, shape (n,)."""
+        half = 0.5 + NEGLIGIBLE  # an image has its places in the middle of its pixels
+        least = [axis[0] - half * (axis[1] - axis[0]) for axis in self.grid[0]]
+        most = [axis[-1] + half * (axis[-1] - axis[-2]) for axis in self.grid[0]]
+        across = points[:, :-1]
+        return np.asarray(np.any((across < least) | (across > most), axis=1))
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""
