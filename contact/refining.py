@@ -193,8 +193,10 @@ def has_coarser(case: Case) -> bool:
     return _coarser(case.mesh) is not None
 
 
-def _coarser(mesh: Mesh) -> Mesh | None:
+def _coarser(mesh: Mesh | None) -> Mesh | None:
     """Return the next coarser mesh, if there is one."""
+    if mesh is None:
+        return None
     if mesh.refine > 0:
         return mesh.model_copy(update={"refine": mesh.refine - 1})
     if mesh.cells is None or min(mesh.cells) < 2 * COARSEST or mesh.inside or mesh.regions:
@@ -213,8 +215,8 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
     Of an evolution all steps are solved on each mesh, and the largest indicator of each cell
     counts.
     """
-    asked = case.mesh.adapt
-    assert asked is not None
+    asked = case.adapt
+    assert case.mesh is not None and asked is not None
     domain, solution, rows = case.mesh.build(comm), None, []
     while True:
         problem = build_problem(case, comm, domain=domain)

@@ -20,7 +20,7 @@ from mpi4py import MPI
 
 from contact._compat import destroy_unused
 from contact.arguments import expect
-from contact.case.build import REPLACEMENTS, Replacements, build_problem, named, replaced_by
+from contact.case.build import REPLACEMENTS, Replacements, build_problem, named
 from contact.case.file import Case, load_case, to_toml
 from contact.errors import InputError
 from contact.methods.load_stepping import METHODS, LoadStepping, Method, solve_step
@@ -119,7 +119,7 @@ def solve(
         return reviewed(solve_problem(case, options, monitor, start))
     solver = partial(solve_problem, settings=options, monitor=monitor, times=step_times(case))
     with named(case.source):
-        if case.mesh.adapt is not None:
+        if case.adapt is not None:
             solution = adapted(case, comm, partial(solver, guess=COARSE))
         else:
             problem, guess = build_problem(case, comm, **replacements), GIVEN
@@ -398,14 +398,14 @@ def _checked(
         accepted = f"{', '.join(REPLACEMENTS)}; a method as settings, times by solve_steps"
         raise InputError(f"{name}: unknown; accepted: {accepted}", "no-such-name")
     if not isinstance(case, Case | ContactProblem):
-        case = load_case(case, without=replaced_by(replacements))
+        case = load_case(case)
     options = settings or (case.solver if isinstance(case, Case) else NewtonOptions())
     nested = getattr(options, "nested", None) or None  # of Newton's method alone
     ignored: dict[str, object] = {"start": start, "nested": nested}
     if isinstance(case, ContactProblem):
         ignored, beside = {"nested": nested, **replacements}, "a problem that is built already"
         check_problem(case)
-    elif case.mesh.adapt is not None:
+    elif case.adapt is not None:
         ignored, beside = {**ignored, **replacements}, "[mesh.adapt]"
     elif case.evolution is not None:
         beside = "[evolution]; evolve(problem, times, start=state) goes on"

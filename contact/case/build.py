@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypedDict, TypeVar
 
@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from contact.arguments import check_range
 from contact.body.description import Body
-from contact.case.file import REPLACEABLE, Case
+from contact.case.file import Case
 from contact.errors import InputError
 from contact.mesh.domain import Domain, revolved
 from contact.model.body import Bolt, Electrode, Fixed, Load
@@ -77,9 +77,10 @@ def build_problem(
         or a rigid-body mode is not constrained.
     """
     with named(case.source):
-        given = {"domain": domain, "law": law, "coefficient": coefficient, "friction": friction}
-        _check_replaced(case.filled, given)
-        domain = case.mesh.build(comm) if domain is None else domain
+        if domain is None:
+            if case.mesh is None:
+                raise _missing("mesh", "domain")
+            domain = case.mesh.build(comm)
         if case.space.kinematics == "axisymmetric":
             domain = revolved(domain)
         check_range("mesh", domain.size)
@@ -114,20 +115,10 @@ def named(source: str) -> Iterator[None]:
         raise error.within("" if own else f"{source}: ") from error
 
 
-def replaced_by(arguments: Collection[str]) -> tuple[str, ...]:
-    """Return the keys of a case that arguments of `build_problem` replace."""
-    return tuple(key for key, names in REPLACEABLE.items() if {*names} & {*arguments})
-
-
-def _check_replaced(filled: Collection[str], arguments: Mapping[str, object]) -> None:
-    """Raise an InputError if a key that was filled in is replaced by nothing."""
-    for key in filled:
-        names = REPLACEABLE[key]
-        if all(arguments[name] is None for name in names):
-            raise InputError(
-                f"{key}: missing; accepted: it in the case, or {' or '.join(names)}=... in Python",
-                "missing",
-            )
+def _missing(key: str, argument: str) -> InputError:
+    """Return the error for a section that neither the case nor an argument gives."""
+    accepted = f"[{key}] in the case, or {argument}=... in Python"
+    return InputError(f"{key}: missing; accepted: {accepted}", "missing")
 
 
 def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
@@ -136,8 +127,12 @@ def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
         raise InputError(
             "law: a law given beside the case replaces one material, not several", "replaces-one"
         )
-    made = []
-    for key, section in case.materials:
+    materials, made = case.materials, []
+    if not materials:
+        if law is None:
+            raise _missing("material", "law")
+        materials = (("material", Material(law)),)
+    for key, section in materials:
         if domain.revolved:
             section.check_revolved(key)
         if law is not None:

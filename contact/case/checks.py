@@ -44,15 +44,15 @@ def check_sections(case: Case) -> None:
     _check_rigid(case)
     if case.evolution is not None and getattr(case.solver, "nested", False):
         raise fault("solver.nested", True, "nested = false with [evolution]")
-    if case.mesh.shape is not None:
-        accepted = needed(case.space.element, case.space.degree, case.mesh.shape)
+    mesh = case.mesh
+    if mesh is not None and mesh.shape is not None:
+        accepted = needed(case.space.element, case.space.degree, mesh.shape)
         if accepted is not None:
             raise fault("space.element", case.space.element, accepted)
     if case.space.kinematics == "plane_stress":
         _check_plane_stress(case)
-    if case.mesh.dimension is not None:
-        parts = [*case.mesh.sides, *case.mesh.parts, *case.mesh.inside]
-        check_mesh(case, case.mesh.dimension, parts)
+    if mesh is not None and mesh.dimension is not None:
+        check_mesh(case, mesh.dimension, [*mesh.sides, *mesh.parts, *mesh.inside])
 
 
 def _check_plane_stress(case: Case) -> None:
@@ -89,7 +89,7 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
     if dimension == 3 and case.space.kinematics != "plane_strain":
         accepted = '"plane_strain" with a mesh in 3-D, where it has no effect'
         raise fault("space.kinematics", case.space.kinematics, accepted)
-    if dimension == 2 and case.mesh.axis is not None:
+    if dimension == 2 and case.mesh is not None and case.mesh.axis is not None:
         raise fault("mesh.axis", case.mesh.axis, "no axis in 2-D")
     for path, material in case.materials:
         key, poling = material.axis

@@ -11,7 +11,7 @@ import json
 import os
 import re
 import tomllib
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import reduce
 from operator import or_
 from pathlib import Path
@@ -29,7 +29,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from contact.case.checks import check_mesh, check_sections
-from contact.case.mesh import Mesh, cut_about_axis
+from contact.case.mesh import Adapt, Mesh, cut_about_axis
 from contact.errors import InputError, clipped
 from contact.methods.options import OPTIONS, NewtonOptions, Options
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
@@ -50,13 +50,6 @@ from contact.model.section import (
 from contact.model.units import NAMES, SYSTEMS, system_named
 from contact.results.options import OutputOptions, Units
 from contact.settings import Accepted
-
-#: Key of the case -> the arguments of `build_problem` of which one replaces it.
-REPLACEABLE = {
-    "mesh": ("domain",),
-    "material": ("law",),
-    "friction.mu": ("coefficient", "friction"),
-}
 
 Kind = TypeVar("Kind")
 Materials: TypeAlias = Annotated[
@@ -133,12 +126,13 @@ class Case(Section):
     """Title, for reports and figures."""
     case: About = About()
     """Names of units: `[case]`."""
-    mesh: Mesh
-    """The body: `[mesh]`."""
+    mesh: Mesh | None = None
+    """The body: `[mesh]`. Required, but where Python gives a domain."""
     space: Space = Space()
     """Finite elements: `[space]`."""
-    material: Materials
-    """The material: `[material]`; several: `[[material]]`, each with its regions."""
+    material: Materials | None = None
+    """The material: `[material]`; several: `[[material]]`, each with its regions. Required, but
+    where Python gives a law."""
     fixed: Annotated[tuple[Fixed, ...], as_tuple, Accepted("tables [[fixed]]")] = ()
     """Supports and electrodes: `[[fixed]]`. Not required where contact and friction, or
     `[[rigid]]`, constrain the body."""
@@ -166,7 +160,6 @@ class Case(Section):
     """Files of results: `[output]`."""
 
     _source: str = PrivateAttr("case")
-    _filled: tuple[str, ...] = PrivateAttr(())
 
     @property
     def source(self) -> str:
@@ -174,14 +167,14 @@ class Case(Section):
         return self._source
 
     @property
-    def filled(self) -> tuple[str, ...]:
-        """Keys that were missing, for objects are to take their places."""
-        return self._filled
+    def adapt(self) -> Adapt | None:
+        """The adaptive refinement of the mesh, `[mesh.adapt]`; None without."""
+        return None if self.mesh is None else self.mesh.adapt
 
     @property
     def materials(self) -> tuple[tuple[str, Material], ...]:
         """The materials, each with its key in the file."""
-        return _entries("material", self.material)
+        return () if self.material is None else _entries("material", self.material)
 
     @property
     def contacts(self) -> tuple[tuple[str, Contact], ...]:
@@ -265,7 +258,6 @@ def _entries(key: str, given: Kind | tuple[Kind, ...]) -> tuple[tuple[str, Kind]
 def load_case(
     path: str | Path,
     overrides: Mapping[str, str] | Iterable[str] = (),
-    without: Collection[str] = (),
     folder: str | Path | None = None,
 ) -> Case:
     """Read a case file.
@@ -278,8 +270,8 @@ def load_case(
         Values that replace those of the file: ``"material.young=2.0"``, or a mapping of keys
         to texts. Keys are dotted paths, with numbers for list entries (``load.0.traction``);
         values are TOML, bare words are texts.
-    without, folder
-        As `parse_case` takes them; by default the folder of the file.
+    folder
+        As `parse_case` takes it; by default the folder of the file.
 
     Returns
     -------
@@ -308,14 +300,13 @@ def load_case(
         overrides = [f"{key}={value}" for key, value in overrides.items()]
     for given in overrides:
         override(data, given, str(path))
-    return parse_case(data, path.parent if folder is None else folder, str(path), without)
+    return parse_case(data, path.parent if folder is None else folder, str(path))
 
 
 def parse_case(
     data: Mapping[str, object],
     folder: str | Path = ".",
     source: str = "case",
-    without: Collection[str] = (),
 ) -> Case:
     """Make a case of a dictionary with the keys of the case file.
 
@@ -327,9 +318,6 @@ def parse_case(
         Folder that relative names of files in it belong to.
     source
         The name of the case in messages.
-    without
-        Keys that may be missing, for objects will take their places: "mesh", "material",
-        "friction.mu".
 
     Returns
     -------
@@ -340,43 +328,18 @@ def parse_case(
     InputError
         On the first mistake; the message is one line.
     """
-    data, filled = _stand_ins(data, without)
     try:
-        case = Case.model_validate(data, context={"folder": folder})
+        case = Case.model_validate(dict(data), context={"folder": folder})
     except ValidationError as error:
         raise describe(error, source) from None
-    file = case.mesh.file
+    file = None if case.mesh is None else case.mesh.file
     if file is not None and not Path(file).is_file():
         raise InputError(
             f"{source}: mesh.file: no file {file}; accepted: a mesh file (.msh, .inp, ...)",
             "file-name",
         )
-    case._source, case._filled = source, tuple(filled)
+    case._source = source
     return case
-
-
-def _stand_ins(
-    data: Mapping[str, object], without: Collection[str]
-) -> tuple[dict[str, object], list[str]]:
-    """Fill in missing keys that will be replaced, so that the rest can be checked.
-
-    Returns
-    -------
-    The tables, and the keys that were filled.
-    """
-    made, filled = dict(data), []
-    for key in without:
-        if key not in REPLACEABLE:
-            raise InputError(f"without: given {key!r}; accepted: {', '.join(REPLACEABLE)}", "value")
-        table = made.get("friction")
-        if key == "friction.mu":
-            if isinstance(table, Mapping) and table.get("law") == "coulomb" and "mu" not in table:
-                made["friction"] = {**table, "mu": 0.0}
-                filled.append(key)
-        elif key not in made:
-            made[key] = Mesh.absent() if key == "mesh" else {"young": 1.0, "poisson": 0.0}
-            filled.append(key)
-    return made, filled
 
 
 def override(data: dict[str, Any], text: str, source: str) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, model_validator
 
 import meshes
 from contact.errors import InputError
@@ -166,15 +166,6 @@ class Mesh(Section):
     parameters: dict[Name, Number] = Field(default={})
     """Parameters of another generator. They may stand in `[mesh]` itself."""
 
-    _absent: bool = PrivateAttr(False)
-
-    @staticmethod
-    def absent() -> Mesh:
-        """Return a stand-in where a domain made in Python takes the place of `[mesh]`."""
-        made = Mesh.model_construct()
-        made._absent = True
-        return made
-
     @property
     def sides(self) -> tuple[str, ...]:
         """Sides of a rectangle or box; none for other meshes."""
@@ -221,8 +212,6 @@ class Mesh(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self._absent:
-            return self
         if (self.generator is None) == (self.file is None):
             given = "neither generator nor file" if self.file is None else "generator and file"
             raise fault("generator", Words(given), "one of generator and file", "exclusive-keys")

@@ -119,7 +119,7 @@ def solve_and_keep(
     restart
         A folder with checkpoints of the same case, to continue from.
     """
-    if case.evolution is None or case.mesh.adapt is not None:
+    if case.evolution is None or case.adapt is not None:
         return solve(case, monitor=monitor, comm=comm)
     clock = time.perf_counter()
     problem = build_problem(case, comm)

@@ -213,7 +213,7 @@ def parameters_of(
         sections, value = key.split("."), number_at(case, key)
         accepted = "a number of the mesh, materials, supports, loads, contact or rigid parts"
         expect("parameters", key, accepted, sections[0] not in WITHOUT)
-        if sections[0] == "mesh" and case.mesh.adapt is not None:
+        if sections[0] == "mesh" and case.adapt is not None:
             raise InputError(
                 f"parameters: given {key!r}; accepted: a number of the mesh where that is not "
                 "adapted",

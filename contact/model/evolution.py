@@ -91,8 +91,8 @@ def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
     if len(columns) < 2 or len(columns[0]) < 2 or not np.isfinite(columns).all():
         accepted = "a row of names, then two rows or more of a finite time and value"
         raise InputError(f"{path}: no curve; accepted: {accepted}", "amplitude-file")
-    times, values = (tuple(column.tolist()) for column in columns)
-    return times, values
+    times, values = columns
+    return tuple(float(time) for time in times), tuple(float(value) for value in values)
 
 
 class Evolution(Described):

@@ -15,7 +15,6 @@ full = {"e": [[0] * 6] * 3, "beta": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
 BAD = {
     "unknown section": {"meterial__young": 1},
     "unknown key": {"material__yung": 1},
-    "no mesh": {"mesh": None},
     "missing key": {"material__young": None},
     "negative modulus": {"material__young": -1.0},
     "modulus as switch": {"material__young": True},

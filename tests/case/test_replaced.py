@@ -10,9 +10,7 @@ from forms.laws import ConstantCoefficient
 BARE = {
     "fixed": [{"on": "top", "displacement": [0.02, -0.02]}],
     "contact": {"on": "bottom"},
-    "friction": {"law": "coulomb"},
 }
-WITHOUT = ("mesh", "material", "friction.mu")
 
 
 def objects() -> dict[str, object]:
@@ -26,16 +24,13 @@ def test_the_same_as_in_the_case() -> None:
     material = {"young": 10.0, "poisson": 0.3}
     friction = {"law": "coulomb", "mu": 0.3}
     whole = solve(parse_case({**BARE, "mesh": mesh, "material": material, "friction": friction}))
-    bare = solve(parse_case(BARE, without=WITHOUT), **objects())
+    bare = solve(parse_case(BARE), **objects())
     assert bare.converged
     assert bare.contact_force == pytest.approx(whole.contact_force, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("key", "name"), [("mesh", "domain"), ("material", "law"), ("friction.mu", "coefficient")]
-)
+@pytest.mark.parametrize(("key", "name"), [("mesh", "domain"), ("material", "law")])
 def test_an_object_that_is_not_there(key: str, name: str) -> None:
-    """Nothing that only stands in for something is ever solved."""
     others = {k: v for k, v in objects().items() if k != name}
     with pytest.raises(InputError, match=rf"{key}.*\[missing\]"):
-        solve(parse_case(BARE, without=WITHOUT), **others)
+        solve(parse_case(BARE), **others)

@@ -68,7 +68,7 @@ def test_a_ring_that_a_lid_pushes_aside():
             {"on": "ring_outside", "against": "lid_bottom"},
         ],
     }
-    case = parse_case(tables, without=("mesh",))
+    case = parse_case(tables)
     solution = solve(case, domain=between_plates(COMM, 1))
     assert solution.converged, solution.outcome.reason
     assert solution.problem.nodes.maximum(solution.forces.pressure) == 0

@@ -130,5 +130,5 @@ def squeezed(
         "load": [] if traction is None else [{"on": "ring_inside", "traction": list(traction)}],
     }
     if file is None:
-        return parse_case(tables, without=("mesh",))
+        return parse_case(tables)
     return parse_case({"mesh": {"file": file}, **tables})
