@@ -50,8 +50,9 @@ class Interface:
     nodes
         The contact nodes.
     gap
-        rho of the unilateral constraint, shape (n,): that of the nodes, or infinite without one, as
-        behind a layer without a rigid part, and at nodes outside of a working set.
+        rho of the unilateral constraint, shape (n,), which methods change: g_0 of the nodes
+        (`ContactNodes.gap`), or infinite without one, as behind a layer without a rigid part, and
+        at nodes outside of a working set.
     foundation
         Layer and surface charge D.nu of the foundation.
     friction

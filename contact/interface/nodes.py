@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy import sparse
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
@@ -61,10 +60,15 @@ def contact_directions(
 
 @dataclass(frozen=True)
 class ContactNodes:
-    """The contact nodes that this rank owns, and their geometry: the jump T x, gaps and areas.
+    """The contact nodes that this rank owns: gaps, directions, areas, and their jumps T x.
 
     Which nodes these are is decided once, in the reference configuration. Arrays marked with (R)
-    belong to it, all others to the current place of the bodies (`Geometry`).
+    belong to it, all others to the current place of the bodies (`Geometry`). With the projector P
+    onto the free directions of a node, and its contact direction nu,
+
+        P     = I - sum_k e_k (x) e_k,                   e_k the directions that supports hold,
+        nu_a  = P nu/|P nu|^2,
+        P_tau = I - nu (x) nu,   or   P - P nu (x) P nu/|P nu|^2.
 
     Attributes
     ----------
@@ -82,17 +86,17 @@ class ContactNodes:
     normal
         Contact direction, a unit vector out of the body, shape (n, d).
     admissible_normal
-        nu_a = P nu/|P nu|^2, shape (n, d), P being the projector onto the free directions: the
-        least free displacement with nu_a . nu = 1; nu unless supports hold the node aslant to it.
+        nu_a, the least free displacement with nu_a . nu = 1, shape (n, d); nu unless supports hold
+        the node aslant to it.
     tangent
-        P_tau, the projector onto the directions of slip and friction, shape (n, d, d). Where P nu
-        is nu, and supports alone prescribe the other jumps: I - nu (x) nu, which prescribed
-        displacements belong to. Else, where supports hold the node aslant to nu, or while the
-        other side moves along them: P - P nu (x) P nu/|P nu|^2. The other jumps are no unknowns
-        there, as on a plane of symmetry, and the supports bear the friction.
+        P_tau, the projector onto the directions of slip and friction, shape (n, d, d): the second
+        formula where supports hold the node aslant to nu, or while the other side moves along
+        them. The other jumps are no unknowns there, as on a plane of symmetry, and the supports
+        bear the friction.
     gap
-        Distance to the foundation along the contact direction, shape (n,); infinite at nodes that
-        face nothing.
+        g_0, the geometric gap: the distance along the contact direction, shape (n,); infinite at
+        nodes that face nothing. Methods change the gap rho of the constraint alone
+        (`Interface.gap`).
     deviation
         Of a curved surface from its facets, without the part in the gaps, shape (n,) (length).
     block_size
@@ -105,9 +109,6 @@ class ContactNodes:
         these nodes is 0 (length).
     revolved
         Whether nodes are rings about the axis x = 0.
-    carried
-        Motion of the nodes with the global unknowns at a constant jump, as `motion`; along
-        constrained directions the `admissible_normal` takes it up.
     coupling
         Operator of the jumps that are sums over nodes (`JumpRows`), or None: between bodies, on
         quadratic triangles, and beside the axis of revolution.
@@ -126,7 +127,6 @@ class ContactNodes:
     cut: float = 0.0
     revolved: bool = False
     motion: Array | None = None
-    carried: Array | None = None
     coupling: CouplingOperator | None = None
 
     @property
@@ -239,21 +239,42 @@ def joined_nodes(
         is a sum is on a roller.
     """
     _refuse_shared(geometries, parts)
-    nodes = side_by_side([geometry.nodes for geometry in geometries])
-    inclined = body.layout.inclined
+    pieces = [geometry.nodes for geometry in geometries]
     jumps = [geometry.jumps for geometry in geometries if geometry.jumps is not None]
+    at_nodes = (
+        np.concatenate([piece.nodes for piece in pieces]),
+        np.concatenate([_unknowns_by_jumps(piece, body) for piece in pieces]),
+    )
+    coupling = coupling_operator(body.comm, body.layout.index_map, jumps, at_nodes, body.free)
+    nodes = side_by_side(pieces, coupling)
+    if coupling is not None and body.layout.inclined is not None:
+        _refuse_rollers(nodes, coupling, body.layout.inclined)
+    return nodes
+
+
+def _unknowns_by_jumps(nodes: ContactNodes, body: BodyEquilibrium) -> Array:
+    """Return the nodal unknowns by their jumps, shape (n, block size, block size)."""
+    # Free components, the normal one of which is that of the unknowns, of which the
+    # `admissible_normal` stands for that of the components that supports hold.
+    inclined, d = body.layout.inclined, nodes.dim
     there = None if inclined is None else inclined.at(nodes.nodes)
-    # The unknowns by their jumps: free components, the normal one of which is that of the unknowns,
-    # of which the `admissible_normal` stands for that of the components that supports hold.
-    unknowns, d = projectors(body.free[nodes.nodes], there), nodes.dim
+    unknowns = projectors(body.free[nodes.nodes], there)
     fixed = nodes.normal - np.einsum("nij,nj->ni", unknowns[:, :d, :d], nodes.normal)
     unknowns[:, :d, :d] += nodes.admissible_normal[:, :, None] * fixed[:, None, :]
-    at_nodes = nodes.nodes, unknowns
-    coupling = coupling_operator(nodes.comm, body.layout.index_map, jumps, at_nodes, body.free)
-    if coupling is not None and inclined is not None:
-        _refuse_rollers(nodes, coupling, inclined)
-    carried = _carried(nodes, coupling, body.global_unknowns.ties, unknowns)
-    return replace(nodes, coupling=coupling, carried=carried)
+    return unknowns
+
+
+def motion_at_constant_jump(nodes: ContactNodes, body: BodyEquilibrium) -> Array:
+    """Return N_q at the contact nodes for zero jump, as `ContactNodes.motion`. Collective.
+
+    Along constrained directions the `admissible_normal` takes it up.
+    """
+    assert nodes.motion is not None
+    moved, coupling = nodes.motion.copy(), nodes.coupling
+    if coupling is not None:
+        for k, column in enumerate(body.global_unknowns.ties.toarray().T):
+            moved[coupling.places, :, k] -= coupling.apply(column.reshape(-1, nodes.block_size))
+    return np.asarray(_unknowns_by_jumps(nodes, body) @ moved)
 
 
 def _refuse_shared(geometries: Sequence[Geometry], parts: Sequence[str]) -> None:
@@ -286,23 +307,13 @@ def _refuse_rollers(nodes: ContactNodes, coupling: CouplingOperator, inclined: I
     )
 
 
-def _carried(
-    nodes: ContactNodes, coupling: CouplingOperator | None, ties: sparse.csr_array, unknowns: Array
-) -> Array | None:
-    """Return how nodes move with the global unknowns where no jump changes. Collective."""
-    if nodes.motion is None:
-        return None
-    moved = nodes.motion.copy()
-    if coupling is not None:
-        for k, column in enumerate(ties.toarray().T):
-            moved[coupling.places, :, k] -= coupling.apply(column.reshape(-1, nodes.block_size))
-    return np.asarray(unknowns @ moved)
-
-
-def side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
-    """Return the nodes of several contacts as one array."""
+def side_by_side(
+    pieces: Sequence[ContactNodes], coupling: CouplingOperator | None = None
+) -> ContactNodes:
+    """Return the nodes of several contacts as one array, with the operator of their jumps."""
     first = pieces[0]
     names = ["nodes", "points", "weight", "normal", "admissible_normal", "tangent", "gap"]
     names += ["deviation"] if first.motion is None else ["deviation", "motion"]
     arrays = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in names}
-    return replace(first, cut=max(piece.cut for piece in pieces), **arrays)
+    cut = max(piece.cut for piece in pieces)
+    return replace(first, cut=cut, coupling=coupling, **arrays)

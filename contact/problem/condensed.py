@@ -183,7 +183,7 @@ def at_kept_nodes(interface: Interface) -> Interface:
 
     def kept(nodes: ContactNodes, positions: NDArray[np.int32]) -> ContactNodes:
         """Return nodes of other numbers, whose unknowns are the jumps."""
-        return replace(nodes, nodes=positions, motion=None, carried=None, coupling=None)
+        return replace(nodes, nodes=positions, motion=None, coupling=None)
 
     nodes, fixed_conducting = kept(interface.nodes, first), interface.fixed_conducting
     if fixed_conducting is not None:

@@ -29,7 +29,12 @@ from contact.interface.foundation import (
 from contact.interface.friction import joined_friction
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers, SlipHistory
-from contact.interface.nodes import ContactNodes, Geometry, joined_nodes
+from contact.interface.nodes import (
+    ContactNodes,
+    Geometry,
+    joined_nodes,
+    motion_at_constant_jump,
+)
 from contact.interface.pairing import PairPlacement, find_pair
 from contact.interface.placing import FoundationPlacement, find_nodes
 from contact.linear.constraint import ConstrainedOperator, Constraint
@@ -349,8 +354,8 @@ class ContactProblem:
         unknowns, motions = body.global_unknowns, body.global_unknowns.ties
         if nodes.coupling is None and unknowns.size == 0:
             return None
-        if nodes.carried is not None:
-            motions = unknowns.with_foundations(nodes.nodes, nodes.carried)
+        if nodes.motion is not None:
+            motions = unknowns.with_foundations(nodes.nodes, motion_at_constant_jump(nodes, body))
         change = None if nodes.coupling is None else nodes.coupling.change
         return Constraint(body.layout, change, motions, unknowns.free)
 
