@@ -143,9 +143,9 @@ OWN: dict[str, dict[str, Any]] = {
         "contact": {"on": "bottom"},
         "friction": COULOMB | {"mu": 0.2},
     },
-    # A ball that another one alone holds, pushed aside; solved by multigrid.
+    # A ball that another one alone holds, pushed aside.
     "two-spheres": {
-        "mesh": {"generator": "two_spheres", "quarters": 2, "size": 25.0, "contact_size": 1.25,
+        "mesh": {"generator": "two_spheres", "quarters": 2, "size": 25.0, "contact_size": 2.5,
                  "contact_width": 5.0},
         "material": {"young": 20e3, "poisson": 0.3},
         "fixed": [{"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},
