@@ -13,7 +13,7 @@ from contact.model.fields import CONSTANT
 from contact.model.formula import Expression
 from contact.model.messages import listed
 from contact.model.section import AMPLITUDE, PART, as_given, walk
-from contact.model.units import SYSTEMS, System, system_named
+from contact.model.units import SYSTEMS, labels_of, other_label
 from contact.settings import MISSING, SPATIAL, Words, fault
 
 #: `contact.case.file.Case`, which calls these checks.
@@ -221,30 +221,26 @@ def _check_rigid(case: Case) -> None:
 
 def _check_units(case: Case) -> None:
     """Raise a fault unless the materials by name have one system, and the labels are of it."""
-    labels = case.case.units.given
-    first: tuple[str, Any, System] | None = None
-    for path, material in case.materials:
-        if material.entry is None:
+    by_name = [entry for entry in case.materials if entry[1].name is not None]
+    for path, material in by_name:
+        first, other = by_name[0]
+        if material.system != other.system:
+            words = Words(f"{_units_of(material)}, and {first} has {_units_of(other)}")
+            raise fault(f"{path}.units", words, "one system of units for all materials", "units")
+        if not isinstance(material.units, str):
             continue
-        own = material.system(labels)
         kinds = ELECTRIC if material.piezoelectric else ELASTIC
-        known = {key: labels[key] for key in kinds if key in labels}
-        quantity = own.contradicted(known)
+        labels = {key: label for key, label in case.case.units.given.items() if key in kinds}
+        quantity = other_label(material.units, labels)
         if quantity is not None:
+            own = labels_of(material.units)[quantity]
             words = Words(
-                f"{_units_of(material)} has {own.labels[quantity]} for {quantity}, and "
+                f"{_units_of(material)} has {own} for {quantity}, and "
                 f'case.units.{quantity} = "{labels[quantity]}"'
             )
-            fitting = [k for k in SYSTEMS if system_named(k, labels).contradicted(known) is None]
-            accepted = listed([*map(shown, fitting)]) or (
-                "labels of one system: stress = force / length^2, charge = force length / potential"
-            )
+            fitting = [name for name in SYSTEMS if other_label(name, labels) is None]
+            accepted = listed(map(shown, fitting)) or "labels of one system"
             raise fault(f"{path}.units", words, accepted, "units")
-        if first is None:
-            first = path, material, own
-        elif own != first[2]:
-            words = Words(f"{_units_of(material)}, and {first[0]} has {_units_of(first[1])}")
-            raise fault(f"{path}.units", words, "one system of units for all materials", "units")
 
 
 def _units_of(material: Any) -> str:

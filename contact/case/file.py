@@ -47,7 +47,7 @@ from contact.model.section import (
     Text,
     as_tuple,
 )
-from contact.model.units import NAMES, SYSTEMS, system_named
+from contact.model.units import NAMES, SYSTEMS, labels_of
 from contact.results.options import OutputOptions, Units
 from contact.settings import Accepted
 
@@ -99,7 +99,7 @@ class Space(Section):
 def _labels(given: Any) -> Any:
     """Return the names of the units of a system that is given by its own name."""
     by_name = isinstance(given, str) and given in SYSTEMS
-    return system_named(given, {}).labels if by_name else given
+    return labels_of(given) if by_name else given
 
 
 #: `[case] units`: labels, or the name of a system, whose labels they then are.

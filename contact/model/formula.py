@@ -221,13 +221,11 @@ def of_time(given: Any) -> Any:
     return given
 
 
-def as_number(given: Expression | OfTime, unit: float = 1.0) -> float | OfTime:
+def as_number(given: Expression | OfTime) -> float | OfTime:
     """Return a formula without coordinates as a number, or as a function of the time."""
-    if isinstance(given, OfTime) and unit == 1.0:
+    if isinstance(given, OfTime):
         return given
-    if isinstance(given, Expression) and given.is_constant:
-        return unit * given.value
-    return OfTime(lambda time: unit * given.number(time), str(given))
+    return given.value if given.is_constant else OfTime(given.number, str(given))
 
 
 @lru_cache(maxsize=1000)

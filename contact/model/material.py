@@ -339,7 +339,7 @@ class Material(Described):
         if self.entry is None or self.entry.piezo is None:
             return None
         tensors = self.entry.piezo
-        units = self.system({})
+        units = self.system
         coupling, beta = np.asarray(tensors.e), np.asarray(tensors.beta)
         return PiezoTensors(coupling / units.unit("coupling"), beta / units.unit("permittivity"))
 
@@ -355,11 +355,12 @@ class Material(Described):
             return None
         return find(self.name, PACKAGED if self.library is None else Path(self.library))
 
-    def system(self, labels: Mapping[str, str]) -> System:
-        """Return the system of units of a material by name, the labels those of the case."""
+    @property
+    def system(self) -> System:
+        """The system of units of a material by name."""
         if isinstance(self.units, UnitSystem):
             return self.units.system
-        return system_named(self.units or "SI", labels)
+        return system_named(self.units or "SI")
 
     @property
     def piezoelectric(self) -> bool:
@@ -499,7 +500,7 @@ class Material(Described):
     def _law(self, turn: Array) -> Law:
         """Return the law of the stress, the crystal turned into the body."""
         if self.entry is not None:
-            unit = self.system({}).unit("stress")
+            unit = self.system.unit("stress")
             if self.entry.isotropic is not None:
                 young, poisson = self.entry.isotropic
                 return Linear(young / unit, poisson)

@@ -7,13 +7,20 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PrivateAttr, model_validator
+from pydantic import (
+    AfterValidator,
+    PlainSerializer,
+    PrivateAttr,
+    ValidationInfo,
+    model_validator,
+)
 
 from contact.arguments import OfTime, expect
 from contact.model.body import ZERO
 from contact.model.fields import Amplitude, GivenAmplitude, GivenTimed, amplitude_of
 from contact.model.formula import Expression, as_number
 from contact.model.section import (
+    IN_PYTHON,
     Described,
     Either,
     FactorOfTime,
@@ -43,8 +50,39 @@ Forces: TypeAlias = Annotated[
     SPATIAL,
     Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
 ]
+#: Prefix of a formula in degrees that is in radians.
+DEGREES = "pi/180*("
+
+
+def _in_radians(given: Any, info: ValidationInfo) -> Any:
+    """Return a rotation in radians: a table has degrees."""
+    if isinstance(given, tuple):
+        return tuple(_in_radians(value, info) for value in given)
+    if info.context == IN_PYTHON or not isinstance(given, Expression):
+        return given
+    if given.is_constant:
+        return Expression(np.pi / 180 * given.value)
+    return type(given)(f"{DEGREES}{given.source})")
+
+
+def _in_degrees(given: Any) -> Any:
+    """Return a rotation as a table has it."""
+    if isinstance(given, tuple):
+        return [_in_degrees(value) for value in given]
+    if not isinstance(given, Expression):
+        return given
+    if given.is_constant:  # 15 digits, for which both conversions together are exact
+        return float(f"{given.value / (np.pi / 180):.15g}")
+    source = str(given.source)
+    if source.startswith(DEGREES):
+        return source.removeprefix(DEGREES).removesuffix(")")
+    return f"180/pi*({source})"
+
+
 Rotation: TypeAlias = Annotated[
     Either[FreeTimed, Components],
+    AfterValidator(_in_radians),
+    PlainSerializer(_in_degrees),
     Accepted('in 2-D an angle, a formula in t or "free", in 3-D a list of 3 of these'),
 ]
 Moment: TypeAlias = Annotated[
@@ -66,15 +104,13 @@ class Motion(Described):
     force: Forces | None = None
     """Force on the free components of the displacement. Default: 0."""
     rotation: Rotation = ZERO
-    """Rotation about `centre` (degrees, in Python radians; small), or `"free"`."""
+    """Rotation about `centre` (in a case file degrees, in Python radians; small), or `"free"`."""
     moment: Moment = ZERO
     """Moment about `centre` on a free rotation."""
     centre: Vector | None = None
     """Centre of rotation. Required where something turns."""
     amplitude: FactorOfTime | None = None
     """Factor of all of these as a function of time, see `[evolution]`."""
-
-    _angle: float = PrivateAttr(np.pi / 180)
 
     def __init__(
         self,
@@ -98,7 +134,6 @@ class Motion(Described):
             value = given[key]
             given[key] = value[0] if isinstance(value, lists) and len(value) == 1 else value
         super().__init__(**given, amplitude=amplitude)
-        self._angle = 1.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -134,7 +169,8 @@ class Motion(Described):
             fits = isinstance(value, tuple) == (dimension == 3) or value == ZERO
             if not fits or (isinstance(value, tuple) and len(value) != 3):
                 accepted = "one angle or moment in 2-D, a list of 3 in 3-D"
-                raise fault(f"{path}{key}", as_given(value), accepted)
+                given = _in_degrees(value) if key == "rotation" else as_given(value)
+                raise fault(f"{path}{key}", given, accepted)
 
     @property
     def off_axis(self) -> str | None:
@@ -167,12 +203,8 @@ class Motion(Described):
     @property
     def values(self) -> tuple[float | OfTime | None, ...]:
         """Displacement and rotation in radians, None for free components."""
-        units = [*[1.0] * len(self.displacement or ()), *[self._angle] * len(self.turns)]
         given = (*(self.displacement or ()), *self.turns)
-        return tuple(
-            None if isinstance(value, str) else as_number(value, unit)
-            for value, unit in zip(given, units, strict=True)
-        )
+        return tuple(None if isinstance(value, str) else as_number(value) for value in given)
 
 
 class Rigid(Motion):
@@ -211,7 +243,7 @@ class Rigid(Motion):
         expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
         given = {key: getattr(motion, key) for key in Motion.model_fields}
         Described.__init__(self, on=on, **given)
-        self._angle, self._foundation = motion._angle, foundation
+        self._foundation = foundation
 
     @property
     def foundation(self) -> bool:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isclose
 from typing import Annotated, Self, TypeAlias
 
 from annotated_types import Predicate
@@ -20,7 +18,7 @@ PREFIXES = {
     **{"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "u": 1e-6, "n": 1e-9},
     **{"p": 1e-12, "f": 1e-15, "a": 1e-18, "da": 10.0, "d": 0.1, "c": 0.01, "µ": 1e-6, "μ": 1e-6},
 }
-BASES = {"length": "m", "force": "N", "stress": "Pa", "potential": "V", "charge": "C"}
+BASES = {"length": "m", "force": "N", "potential": "V"}
 
 #: Exponents of the units of length, force and potential in the other ones. They follow from one
 #: energy, force times length or charge times potential.
@@ -34,17 +32,17 @@ EXPONENTS = {
     "permittivity": (0, 1, -2),
 }
 
-#: Systems by name: length, force, potential.
+#: Systems by name: length, force, potential; and stress and charge, which follow.
 SYSTEMS = {
-    "SI": ("m", "N", "V"),
-    "N-mm-MPa": ("mm", "N", "V"),
-    "kN-mm-GPa": ("mm", "kN", "V"),
-    "kN-m-kPa": ("m", "kN", "V"),
-    "MN-m-MPa": ("m", "MN", "V"),
-    "uN-um-MPa": ("um", "uN", "V"),
-    "mN-um-GPa": ("um", "mN", "V"),
-    "nN-nm-GPa": ("nm", "nN", "V"),
-    "GPa": ("m", "GN", "GV"),
+    "SI": ("m", "N", "V", "Pa", "C"),
+    "N-mm-MPa": ("mm", "N", "V", "MPa", "mC"),
+    "kN-mm-GPa": ("mm", "kN", "V", "GPa", "C"),
+    "kN-m-kPa": ("m", "kN", "V", "kPa", "kC"),
+    "MN-m-MPa": ("m", "MN", "V", "MPa", "MC"),
+    "uN-um-MPa": ("µm", "µN", "V", "MPa", "pC"),
+    "mN-um-GPa": ("µm", "mN", "V", "GPa", "nC"),
+    "nN-nm-GPa": ("nm", "nN", "V", "GPa", "aC"),
+    "GPa": ("m", "GN", "GV", "GPa", "C"),
 }
 
 #: The system without a unit of length: stress in GPa, field in GV/m, charge per area in C/m2.
@@ -64,55 +62,41 @@ class System:
         length, force, potential = EXPONENTS[quantity]
         return self.length**length * self.force**force * self.potential**potential
 
-    @property
-    def labels(self) -> dict[str, str]:
-        """Names of the units of length, stress, potential and charge, as they are printed."""
-        quantities = ("length", "stress", "potential", "charge")
-        units = {name: _unit_name(self.unit(name), BASES[name]) for name in quantities}
-        return {name: re.sub("^u(?=.)", "µ", unit) for name, unit in units.items()}
-
-    def contradicted(self, labels: Mapping[str, str]) -> str | None:
-        """Return the first quantity whose label is another unit, or none at all."""
-        for quantity, label in labels.items():
-            if not isclose(unit_in_si(label, quantity) or 0.0, self.unit(quantity), rel_tol=1e-9):
-                return quantity
-        return None
-
 
 def unit_in_si(name: str, quantity: str) -> float | None:
-    """Return the value in SI of a unit of a quantity, None if it is unknown.
-
-    Known are m, N, Pa, V and C with the prefixes of SI, and force/area, such as ``daN/mm2``.
-    """
-    name, base = name.strip(), BASES[quantity]
-    area = re.fullmatch(r"(.+)/(.+?)(?:\^?2|²)", name)
-    if quantity == "stress" and area is not None:
-        force, length = unit_in_si(area[1], "force"), unit_in_si(area[2], "length")
-        return None if force is None or length is None else force / length**2
+    """Return the value in SI of m, N or V with a prefix of SI; None of other units."""
+    base = BASES[quantity]
     return PREFIXES.get(name.removesuffix(base)) if name.endswith(base) else None
 
 
-def system_named(name: str, labels: Mapping[str, str]) -> System:
-    """Return a system by its name; that of any length with the length of the labels."""
-    length, force, potential = (
-        PREFIXES[unit[:-1]] for unit in SYSTEMS[name]
-    )  # of m, N and V with a prefix
-    if name == ANY_LENGTH:
-        length = unit_in_si(labels.get("length", "m"), "length") or length
-        force, potential = force * length**2, potential * length
-    return System(length, force, potential)
+def system_named(name: str) -> System:
+    """Return a system by its name."""
+    return System(*(PREFIXES[unit[:-1]] for unit in SYSTEMS[name][:3]))
+
+
+def labels_of(name: str) -> dict[str, str]:
+    """Return the names of the units of length, stress, potential and charge of a system."""
+    length, _, potential, stress, charge = SYSTEMS[name]
+    return {"length": length, "stress": stress, "potential": potential, "charge": charge}
+
+
+def other_label(name: str, labels: Mapping[str, str]) -> str | None:
+    """Return the first quantity whose label is not that of a system; None if all are."""
+    own = {"stress": "GPa"} if name == ANY_LENGTH else labels_of(name)
+    others = (key for key in own if key in labels and plain(labels[key]) != plain(own[key]))
+    return next(others, None)
 
 
 def force_of(stress: str, length: str) -> str | None:
-    """Return the unit of force, stress times length^2, by its name; None for unknown units."""
-    pressure, side = unit_in_si(stress, "stress"), unit_in_si(length, "length")
-    return None if pressure is None or side is None else _unit_name(pressure * side**2, "N")
+    """Return the unit of force of the system with these units; None of others."""
+    asked = (plain(length), plain(stress))
+    systems = ((plain(s[0]), plain(s[3]), s[1]) for s in SYSTEMS.values())
+    return next((force for *units, force in systems if tuple(units) == asked), None)
 
 
-def _unit_name(value: float, base: str) -> str:
-    """Return the name of a unit: a value in SI and its base."""
-    prefix = next((p for p, factor in PREFIXES.items() if isclose(factor, value)), None)
-    return f"{value:g} {base}" if prefix is None else f"{prefix}{base}"
+def plain(label: str) -> str:
+    """Return a label with u for micro, which has three letters."""
+    return label.strip().replace("µ", "u").replace("μ", "u")
 
 
 NAMES = either(map(shown, SYSTEMS))

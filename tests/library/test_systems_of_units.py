@@ -62,7 +62,7 @@ def test_a_piezoelectric_problem_is_the_same_in_all_systems(name):
     si = contact.solve(pressed("SI", length, shift, volts, name="PZT-5A"))
     table = {"length": "mm", "force": "daN", "potential": "kV"}
     units = table if name == "table" else name
-    system = System(1e-3, 10.0, 1e3) if name == "table" else system_named(name, {})
+    system = System(1e-3, 10.0, 1e3) if name == "table" else system_named(name)
     case = pressed(
         units,
         length / system.length,

@@ -1,10 +1,12 @@
 """Motions of rigid parts: the same from Python and from a case file."""
 
+import tomllib
+
 import numpy as np
 import pytest
 
-from contact import Motion
-from contact.case.file import parse_case
+from contact import Motion, Rigid
+from contact.case.file import parse_case, to_toml
 from contact.model.rigid import numbers_at
 from tests.problems.bar import changed
 
@@ -29,6 +31,34 @@ def test_degrees_of_a_case_file_are_radians_in_python(time):
             forces = numbers_at((*motion.force, *motion.moments), None, 1.0)
             np.testing.assert_allclose(forces, [0.0, -3.0, 0.0])
             assert motion.centre == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("rotation", "written", "radians"),
+    [
+        (30.0, "30.0", np.pi / 6),
+        (0.1, "0.1", np.pi / 1800),
+        ("45*t", '"45*t"', np.pi / 4),
+        ("free", '"free"', None),
+    ],
+)
+def test_degrees_are_written_as_they_are_read(rotation, written, radians):
+    rigid = [{"on": "right", "rotation": rotation, "centre": [0.0, 0.0]}]
+    text = to_toml(parse_case(changed(rigid=rigid, evolution=TIMES, load=None)))
+    assert f"rotation = {written}\n" in text
+    again = parse_case(tomllib.loads(text))
+    assert to_toml(again) == text
+    value = again.rigid[0].filled(2).values[2]
+    assert value is None if radians is None else numbers_at([value], None, 1.0) == radians
+
+
+def test_radians_of_python_are_written_as_degrees():
+    case = parse_case(changed(rigid=[{"on": "right"}], load=None, evolution=TIMES))
+    for rotation in (0.3, "0.3*t"):
+        rigid = (Rigid("right", rotation=rotation, centre=[0.0, 0.0]),)
+        written = to_toml(case.model_copy(update={"rigid": rigid}))
+        read = parse_case(tomllib.loads(written)).rigid[0]
+        assert numbers_at(read.filled(2).values, None, 1.0)[2] == pytest.approx(0.3, rel=1e-14)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
