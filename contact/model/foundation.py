@@ -61,8 +61,8 @@ class Layer:
         Raises
         ------
         InputError
-            If the thickness, p_nu or h_nu is negative or no number, a law has no derivative, or one
-            that is not its own, or p_nu does not vanish before the layer is touched.
+            If the thickness, p_nu or h_nu is negative or no number, p_nu presses before the layer
+            is touched, or a derivative is not the slope of its law.
         """
         if not self.thickness >= 0:
             raise InputError(
@@ -74,27 +74,20 @@ class Layer:
             ("p_nu", self.p_nu, np.concatenate([-size * np.logspace(-9, 0, 37), depths])),
             ("h_nu", self.h_nu, np.concatenate([-differences, differences])),
         ):
-            if not callable(getattr(law, "derivative", None)):
-                raise InputError(f"layer: {name} has no method `derivative`", "layer-law")
-            with np.errstate(all="ignore"):
-                with naming(f"layer: {name}"):
-                    values = real(law(samples), samples.shape, EACH)
-                with naming(f"layer: {name}: derivative"):
-                    slopes = real(law.derivative(samples), samples.shape, EACH)
-            if not (np.isfinite(values).all() and np.isfinite(slopes).all()):
-                bad = samples[~(np.isfinite(values) & np.isfinite(slopes))][0]
-                raise InputError(
-                    f"layer: {name} or its derivative is no number at {bad:g}", "layer-law"
+            fits = hasattr(law, "derivative")
+            expect(f"layer: {name}", law, "a function with a derivative", fits, "layer-law")
+            with np.errstate(all="ignore"), naming(f"layer: {name}"):
+                values, slopes = (
+                    real(f(samples), samples.shape, EACH) for f in (law, law.derivative)
                 )
-            if values.min() < 0:
-                bad = samples[np.argmin(values)]
+            wrong = ~np.isfinite(values + slopes) | (values < 0)
+            if name == "p_nu":
+                wrong |= (samples < 0) & (values > 0)
+            if wrong.any():
+                place, value, slope = (given[wrong][0] for given in (samples, values, slopes))
                 raise InputError(
-                    f"layer: {name} is negative at {bad:g}; accepted: values >= 0", "layer-law"
-                )
-            if name == "p_nu" and np.any(values[samples < 0] > 0):
-                raise InputError(
-                    "layer: p_nu presses before the layer is touched; accepted: 0 at negative "
-                    "penetrations",
+                    f"layer: {name} is {value:g} at {place:g}, its derivative {slope:g}; accepted: "
+                    "finite numbers >= 0, of p_nu 0 at negative penetrations, finite derivatives",
                     "layer-law",
                 )
             check_slope(f"layer: {name}: derivative", law, law.derivative, samples[samples != 0])
@@ -166,10 +159,9 @@ class Conductor:
             ("psi", self.psi, ("k_e", "delta", "follows_gap", "at", "gap_slope")),
             ("phi_l", self.phi_l, ("__call__", "derivative")),
         ):
-            missing = [method for method in methods if not hasattr(law, method)]
+            has_all = all(hasattr(law, method) for method in methods)
             accepted = f"an object with {', '.join(methods)}"
-            place = f"Conductor: {name} without {', '.join(missing)}"
-            expect(place, law, accepted, not missing, "conductor-law")
+            expect(f"Conductor: {name}", law, accepted, has_all, "conductor-law")
         both = np.concatenate([-SAMPLES[::-1], SAMPLES])
         never, psi = np.zeros(both.size, dtype=bool), self.psi
         if psi.follows_gap:

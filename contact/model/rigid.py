@@ -31,7 +31,7 @@ from contact.model.section import (
     Vector,
     as_given,
 )
-from contact.settings import MISSING, SPATIAL, Accepted, fault
+from contact.settings import MISSING, SPATIAL, Accepted, Words, fault
 from contact.typing import Array
 
 #: A component as it is given.
@@ -169,8 +169,8 @@ class Motion(Described):
             fits = isinstance(value, tuple) == (dimension == 3) or value == ZERO
             if not fits or (isinstance(value, tuple) and len(value) != 3):
                 accepted = "one angle or moment in 2-D, a list of 3 in 3-D"
-                given = _in_degrees(value) if key == "rotation" else as_given(value)
-                raise fault(f"{path}{key}", given, accepted)
+                given = f"a list of {len(value)}" if isinstance(value, tuple) else "one"
+                raise fault(f"{path}{key}", Words(f"given {given}"), accepted)
 
     @property
     def off_axis(self) -> str | None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
+from contact.errors import InputError
 from contact.model.obstacle import (
     Cone,
     Cylinder,
@@ -179,13 +180,35 @@ def test_normals_are_the_slope_of_the_distance(name):
     SHAPES[name][0].check_normals(1e-3 * POINTS + np.array(TIP))
 
 
+class Turned(Plane):
+    """A plane whose normals point into it."""
+
+    def distance(self, points):
+        """Return distances and normals."""
+        distance, normal = super().distance(points)
+        return distance, -normal
+
+
+@pytest.mark.parametrize("count", [0, 1, 30])
+def test_a_wrong_sign_of_normals_is_refused(count):
+    points = 5.0 + POINTS[:count, :2]
+    Plane((0.0, 0.0), (1.0, 2.0)).check_normals(points)
+    turned = Turned((0.0, 0.0), (1.0, 2.0))
+    if count == 0:  # of a rank without contact nodes
+        turned.check_normals(points)
+        return
+    with pytest.raises(InputError, match=r"\[shape-normals\]"):
+        turned.check_normals(points)
+
+
 def test_shapes_by_formulas_and_files_are_those_of_functions_and_arrays(tmp_path):
     ellipse = Level(lambda x: (x[:, 0] / 2) ** 2 + x[:, 1] ** 2 - 1)
     x = np.linspace(-1.0, 1.0, 9)
     (tmp_path / "heights.csv").write_text("x,y\n" + "".join(f"{a},{a * a}\n" for a in x))
     corners = np.array([[[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]])
     rows = "".join(f"vertex {' '.join(map(str, c))}\n" for c in corners[0])
-    (tmp_path / "floor.stl").write_text(rows)
+    facet = f"facet normal 0 0 1\nouter loop\n{rows}endloop\nendfacet\n"
+    (tmp_path / "floor.stl").write_text(f"solid floor\n{facet}endsolid floor\n")
     points = np.random.default_rng(0).uniform(0.1, 1.0, (20, 3))
     for one, other, dim in (
         (Level("(x/2)**2 + y**2 - 1"), ellipse, 2),

@@ -17,7 +17,6 @@ from contact.model.contact import Contact
 from contact.model.obstacle import (
     Triangles,
 )
-from contact.model.obstacle.surfaces import read_stl
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant
@@ -112,13 +111,15 @@ def test_stl_files(tmp_path):
         for triangle in made
     )
     two.write_text(f"solid ball\n{facets}endsolid ball\n")
-    assert np.abs(read_stl(one) - made).max() < 1e-7
-    assert np.abs(read_stl(two) - made).max() < 1e-7
+    for file in (one, two):
+        read = Triangles(file=str(file)).triangles
+        assert np.abs(read - made).max() < 1e-7
     for name, content in (
         ("empty.stl", b""),
         ("other.stl", b"vertex a b c"),
         ("cut.stl", b"vertex 1 2 3"),
+        ("degenerate.stl", bytes(80) + np.uint32(1).tobytes() + bytes(50)),
     ):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InputError, match=name):
-            read_stl(tmp_path / name)
+            Triangles(file=str(tmp_path / name)).check(3)

@@ -16,7 +16,7 @@ from annotated_types import Gt, Lt
 from mpi4py import MPI
 from pydantic import Field
 
-from contact.arguments import LEAST, OFF, SHARE, SMOOTH, STEP, expect, naming, real
+from contact.arguments import STEP, expect, naming, real
 from contact.errors import InputError
 from contact.model.fields import Static, static
 from contact.model.formula import Expression
@@ -32,8 +32,8 @@ GRAZING = 1e-6
 #: Most steps along a ray.
 STEPS = 200
 
-#: Most points at which normals are checked, and steps of Newton's method from these to the surface.
-CHECKED, TOWARDS = 50, 5
+#: Most points at which normals are checked.
+CHECKED = 50
 
 
 class Obstacle(Protocol):
@@ -120,44 +120,31 @@ class Shape(ABC):
 
     @np.errstate(all="ignore")
     def check_normals(self, points: Array) -> None:
-        """Refuse normals that are not the slopes of the distances, by differences.
+        """Refuse normals against the slope of the distance, its difference quotient.
 
-        They are compared on the surface that some of the points lead to, for elsewhere a distance
-        may be an approximation, as that of a `Level` is; but not at its edges.
-
-        Parameters
-        ----------
-        points
-            Places from which it is seen, shape (n, d).
+        It is taken at some of the points from which the shape is seen, shape (n, d); at single ones
+        it may be off, at edges or where the distance is an approximation.
 
         Raises
         ------
         InputError
-            If they are off.
+            If normals point against it at most of the points.
         """
         x = points[:: len(points) // CHECKED + 1]
-        gaps = np.nan_to_num(self.distance(x)[0], posinf=0.0, neginf=0.0)
-        h = STEP * max(np.ptp(points, axis=0).max(), np.abs(gaps).max()) if len(x) else 0.0
-        if h == 0:
-            return
-        for step in range(TOWARDS + 1):
-            value, normal = self.distance(x)
-            ahead, behind = (
-                np.column_stack([self.distance(x + to)[0] for to in side * h * np.eye(x.shape[1])])
-                for side in (1, -1)
-            )
-            slope = (ahead - behind) / (2 * h)
-            if step < TOWARDS:
-                size = (slope**2).sum(axis=1, keepdims=True)
-                x = x - np.nan_to_num(value[:, None] * slope / np.where(size > 0.5, size, np.inf))
-        bend = np.abs(ahead + behind - 2 * value[:, None]).max(axis=1) / h
-        smooth = (np.abs(value) <= h) & (bend <= SMOOTH) & np.isfinite(normal).all(axis=1)
-        off = np.where(smooth, np.linalg.norm(normal - slope, axis=1), 0.0)
-        if np.count_nonzero(off > OFF) >= max(LEAST, SHARE * np.count_nonzero(smooth)):
-            worst = off.argmax()
+        distance, normal = self.distance(x)
+        known = np.abs(distance[np.isfinite(distance)])
+        h = STEP * max(np.abs(points).max(initial=0.0), known.max(initial=0.0))
+        ahead, behind = (
+            np.column_stack([self.distance(x + step)[0] for step in side * h * np.eye(x.shape[1])])
+            for side in (1, -1)
+        )
+        slope = (ahead - behind) / (2 * h)
+        along = np.einsum("nd,nd->n", normal, slope)
+        turned = np.flatnonzero(along < 0)
+        if 2 * turned.size > np.count_nonzero(np.isfinite(along)):
             given, there, place = (
                 f"({', '.join(f'{a:.4g}' for a in np.round(vector, 9) + 0.0)})"
-                for vector in (normal[worst], slope[worst], x[worst])
+                for vector in (normal[turned[0]], slope[turned[0]], x[turned[0]])
             )
             raise InputError(
                 f"{type(self).__name__}: distance: the normal {given} at {place}, where "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import field
 from functools import cached_property
 from pathlib import Path
@@ -211,12 +210,30 @@ class Triangles(Shape):
             raise fault("file", MISSING, "an STL file, or in Python corners")
 
     @cached_property
+    def _polydata(self) -> Any:
+        """The surface as a pyvista.PolyData of triangles, each vertex once.
+
+        Corners closer than 2^-20 of the size are one vertex: STL has single precision.
+        """
+        import pyvista
+
+        if self.corners is None:
+            assert self.file is not None  # one of both
+            made = read_stl(self.file)
+        else:
+            vertex = np.arange(self.corners.size // 3).reshape(-1, 3)
+            made = pyvista.PolyData.from_regular_faces(self.corners.reshape(-1, 3), vertex)
+        made = made.clean(tolerance=np.abs(made.points).max() / 2**20, absolute=True)
+        a, b, c = made.points[made.regular_faces].swapaxes(0, 1)
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        longest = np.linalg.norm([b - a, c - b, a - c], axis=2).max(axis=0)
+        faces = made.regular_faces[area > 1e-10 * longest**2]
+        return pyvista.PolyData.from_regular_faces(made.points, faces)
+
+    @property
     def triangles(self) -> Array:
         """The corners, shape (m, 3, 3)."""
-        if self.corners is not None:
-            return self.corners
-        assert self.file is not None  # one of both
-        return read_stl(self.file)
+        return np.asarray(self._polydata.points[self._polydata.regular_faces])
 
     def check(self, dim: int) -> None:
         """Refuse neighbours whose normals point to different sides, too.
@@ -224,9 +241,9 @@ class Triangles(Shape):
         Each of their edges is then run along twice in one direction, and never in the other.
         """
         super().check(dim)
-        vertex = _numbered(_vertices(self.triangles))
+        vertex = self._polydata.regular_faces
         ends = np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2).reshape(-1, 2)
-        edge = _numbered(ends.min(axis=1) * (vertex.max() + 1) + ends.max(axis=1))
+        _, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
         turns = np.bincount(edge, np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0))
         wrong = np.flatnonzero(np.abs(turns)[edge] > 1)
         if wrong.size:
@@ -241,29 +258,16 @@ class Triangles(Shape):
     @cached_property
     def _implicit(self) -> Any:
         """VTK's signed distance, with angle-weighted pseudonormals at edges and corners."""
-        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-        from vtkmodules.vtkCommonCore import vtkPoints
-        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
         from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
 
-        corners = self.triangles
-        _, first, number = np.unique(
-            _vertices(corners).ravel(), return_index=True, return_inverse=True
-        )
-        points, cells, surface = vtkPoints(), vtkCellArray(), vtkPolyData()
-        points.SetData(numpy_to_vtk(corners.reshape(-1, 3)[first], deep=True))
-        offsets = 3 * np.arange(len(corners) + 1, dtype=np.int64)
-        cells.SetData(*(numpy_to_vtkIdTypeArray(a, deep=True) for a in (offsets, number.ravel())))
-        surface.SetPoints(points)
-        surface.SetPolys(cells)
         implicit = vtkImplicitPolyDataDistance()
-        implicit.SetInput(surface)
+        implicit.SetInput(self._polydata)
         return implicit
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals: towards the nearest point, on it the pseudonormal."""
         distance, normal = self._signed(points)
-        size = np.abs(self.triangles).max()
+        size = np.abs(self._polydata.points).max()
         on = np.flatnonzero(np.abs(distance) <= 1e-9 * size)
         # On the surface the nearest point tells no direction, but the slope of the distance does.
         h = 1e-4 * size * np.eye(3)
@@ -283,63 +287,28 @@ class Triangles(Shape):
         return distance, (points - nearest) / np.where(distance == 0, 1.0, distance)[:, None]
 
 
-def _vertices(corners: Array) -> NDArray[np.int64]:
-    """Return a number for the place of each corner, (m, 3): STL has single precision."""
-    size = np.abs(corners).max()
-    places = np.round((corners / size + 1) * (2**20 - 1)).astype(np.int64)
-    return np.asarray(places @ np.array([2**42, 2**21, 1]))
-
-
-def _numbered(names: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return names as numbers from 0 on."""
-    return np.unique(names, return_inverse=True)[1].reshape(names.shape).astype(np.int64)
-
-
-#: Bytes of a binary file before its triangles, and of each triangle.
-HEADER, EACH = 84, 50
-
-_VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
-
-
-def read_stl(path: str | Path) -> Array:
-    """Return the corners of the triangles of an STL file, shape (m, 3, 3), none degenerate.
+def read_stl(path: str | Path) -> Any:
+    """Return the surface of an STL file, a pyvista.PolyData of triangles in double precision.
 
     Raises
     ------
     InputError
         If the file cannot be read, or holds no triangles.
     """
-    path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; accepted: an STL file", "stl") from None
-    count = int.from_bytes(data[80:84], "little") if len(data) >= HEADER else -1
-    if len(data) == HEADER + EACH * count:
-        kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-        corners = np.frombuffer(data, kind, offset=HEADER)["corners"].astype(np.float64)
-    else:
-        corners = _text(path, data)
-    if corners.size and not np.all(np.isfinite(corners)):
-        raise InputError(f"{path}: coordinates that are no numbers; accepted: an STL file", "stl")
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-    corners = corners[area > 1e-10 * longest**2]
-    if len(corners) == 0:
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file; accepted: an STL file", "stl")
+    reader = pyvista.STLReader(path)
+    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # the messages below say it in a line
+    with pyvista.VtkErrorCatcher(send_to_logging=False):
+        surface = reader.read()
+    vtkLogger.SetStderrVerbosity(verbosity)
+    if surface.n_cells == 0 or np.ptp(surface.points) == 0:
         raise InputError(f"{path}: no triangles; accepted: an STL file, binary or text", "stl")
-    return corners
-
-
-def _text(path: Path, data: bytes) -> Array:
-    found = _VERTEX.findall(data)
-    try:
-        numbers = np.array(found, dtype=np.float64)
-    except ValueError:
-        raise InputError(
-            f"{path}: coordinates that are no numbers; accepted: an STL file", "stl"
-        ) from None
-    if len(found) % 3:
-        raise InputError(f"{path}: triangles without three corners; accepted: an STL file", "stl")
-    return numbers.reshape(-1, 3, 3)
+    surface.points = surface.points.astype(np.float64)
+    if not np.isfinite(surface.points).all():
+        raise InputError(f"{path}: coordinates that are no numbers; accepted: an STL file", "stl")
+    return surface
