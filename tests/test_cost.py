@@ -144,9 +144,9 @@ def columns(_: Path) -> Counters:
     return largest_of(newton(one.problem(), tolerance=1e-11).counters for one in every)
 
 
-def ring(seed: int) -> Counted:
+def ring(_: Path) -> Counters:
     case = squeezed("newton", way=0.3, traction=(0.0, -1e-3))
-    return lambda _: solve(case, domain=between_plates(COMM, seed)).counters
+    return solve(case, domain=between_plates(COMM, 1)).counters
 
 
 def ball_on_ball(linear: str, mu: float, push: float) -> Counted:
@@ -156,10 +156,6 @@ def ball_on_ball(linear: str, mu: float, push: float) -> Counted:
             return solve(balls(linear, mu, push)).counters
 
     return counted
-
-
-def lifted(seed: int) -> Counted:
-    return lambda folder: solve(pads(folder, seed)).counters
 
 
 def lost(dim: int) -> Counted:
@@ -207,20 +203,10 @@ HEAVY = {"on": "top", "traction": [0.0, -1e-3]}
 #: iterations on the condensed problem).
 SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
     # Slender bodies
-    "beam on a stop": (of_case(beam(100.0, [200, 2], TIP, 0.5)), (1, 1, 3)),
-    "beam on a stop, friction": (of_case(beam(100.0, [200, 2], TIP, 0.5, 0.3)), (1, 1, 3)),
-    "beam on a stop, coarse": (of_case(beam(100.0, [100, 1], TIP, 0.5, 0.3)), (1, 1, 3)),
-    "beam, iterative": (of_case(beam(100.0, [200, 2], TIP, 0.5, **ITERATIVE)), (4, 2, 0)),
-    "beam, iterative, friction": (
-        of_case(beam(100.0, [200, 2], TIP, 0.5, 0.3, **ITERATIVE)),
-        (4, 2, 0),
-    ),
+    "beam on a stop": (of_case(beam(100.0, [200, 2], TIP, 0.5, 0.3)), (1, 1, 3)),
+    "beam, iterative": (of_case(beam(100.0, [200, 2], TIP, 0.5, 0.3, **ITERATIVE)), (4, 2, 0)),
     "beam on the ground": (of_case(beam(100.0, [400, 4], UNIFORM, 0.5)), (1, 1, 24)),
-    "beam, sparse interior point": (of_case(beam(100.0, [600, 2], UNIFORM, 0.5)), (27, 14, 0)),
-    "beam, sparse interior point, friction": (
-        of_case(beam(100.0, [600, 2], UNIFORM, 0.5, 0.3)),
-        (33, 20, 0),
-    ),
+    "beam, sparse interior point": (of_case(beam(100.0, [600, 2], UNIFORM, 0.5, 0.3)), (33, 20, 0)),
     "long beam": (of_case(beam(1000.0, [400, 1], LIGHT, 0.1, 0.8, **LONG)), (6, 4, 0)),
     "long beam, rounding": (
         of_case(beam(1000.0, [100, 1], LIGHT, 0.1, 0.8, **LONG, solver=EXACT)),
@@ -236,18 +222,16 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
     "beam whose tip is pressed, whole": (of_case(on_the_ground(), condense=False), (74, 54, 0)),
     "beam pressed along the ground": (drawn("lifted-4"), (7, 7, 0)),
     **{
-        f"half ring pressed flat, {thickness} thick, mu {mu}": (
-            lambda _, given=(thickness, mu): flattened("ring", *given).counters,
+        f"half {shape} pressed flat, {thickness} thick": (
+            lambda _, given=(shape, thickness): flattened(*given, 0.3).counters,
             (1, 1, seen),
         )
-        for thickness, mu, seen in [(0.1, 0.0, 42), (0.1, 0.3, 44), (1.0, 0.0, 38), (1.0, 0.3, 40)]
-    },
-    **{
-        f"arch pressed flat, {thickness} thick, mu {mu}": (
-            lambda _, given=(thickness, mu): flattened("arch", *given).counters,
-            (1, 1, seen),
-        )
-        for thickness, mu, seen in [(0.1, 0.0, 20), (0.1, 0.3, 22), (1.0, 0.0, 12), (1.0, 0.3, 13)]
+        for shape, thickness, seen in [
+            ("ring", 0.1, 44),
+            ("ring", 1.0, 40),
+            ("arch", 0.1, 22),
+            ("arch", 1.0, 13),
+        ]
     },
     **{
         f"strap around a drum, ratio {given[1]}": (
@@ -294,19 +278,18 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
     "block on a block": (of_case(pairs.case()), (1, 1, 3)),
     "box on a box": (lambda _: halved("over", "under").counters, (1, 1, 2)),
     "box under a box": (lambda _: halved("under", "over").counters, (1, 1, 2)),
-    "ball on a ball": (ball_on_ball("lu", 0.0, 0.0), (1, 1, 4)),
-    "ball on a ball, friction": (ball_on_ball("lu", 0.3, 0.5), (1, 1, 9)),
+    "ball on a ball": (ball_on_ball("lu", 0.3, 0.5), (1, 1, 9)),
     "ball on a ball, iterative": (ball_on_ball("iterative", 0.0, 0.0), (7, 2, 0)),
     "ball on a ball, iterative, friction": (ball_on_ball("iterative", 0.3, 0.5), (10, 2, 0)),
     # Bodies that supports do not hold. Rounding decides: these are the largest counts of runs with
     # moduli that differ by 1e-12, of 170 with the ring, of 6 with the others.
-    **{f"ring on a plate, {seed}": (ring(seed), (2, 1, 100)) for seed in (1, 2, 6, 8)},
+    "ring on a plate": (ring, (2, 1, 100)),
     "ring in its clearance": (drawn("rings-24", "bodies"), (2, 1, 585)),
     "unsupported block": (drawn("unsupported-5"), (1, 1, 4)),
     "beam that is let go": (drawn("snap_fits-0", "bodies"), (2, 1, 3)),
     "another beam that is let go": (drawn("snap_fits-1", "bodies"), (2, 1, 4)),
     # In most runs (4, 1, 43); some go on with the whole bodies
-    **{f"pads that are lifted off, {seed}": (lifted(seed), (112, 70, 43)) for seed in range(3)},
+    "pads that are lifted off": (lambda folder: solve(pads(folder, 0)).counters, (112, 70, 43)),
     # Loads that friction cannot hold: all nodes slide, and the proximal points find nothing
     **{
         f"block that friction cannot hold, {dim}-D": (lost(dim), seen)
@@ -383,7 +366,7 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
 
 #: Problems that ranks solve too.
 ON_RANKS = [
-    "beam on a stop, coarse",
+    "beam on a stop",
     "bimorph on a good conductor",
     "block that leans and yields",
     "box on a box",
@@ -408,7 +391,6 @@ def check(name: str, folder: Path) -> None:
 
 @pytest.mark.core(
     "beam on a stop",
-    "beam on a stop, friction",
     "beam on the ground",
     "strap around a drum, ratio 1.2",
     "columns on a layer",
@@ -416,7 +398,7 @@ def check(name: str, folder: Path) -> None:
     "short linear bar, whole",
     "bar that yields",
     "fine bar that yields, nested",
-    "ring on a plate, 1",
+    "ring on a plate",
     "blocks that part, largest",
     "indenter under a force",
     "indenter that is moved",
@@ -432,7 +414,7 @@ def test_at_most_twice_what_is_seen(name: str, tmp_path: Path) -> None:
     check(name, tmp_path)
 
 
-@pytest.mark.core("beam on a stop, coarse", "block that leans and yields", "bolt and flanges")
+@pytest.mark.core("beam on a stop", "block that leans and yields", "bolt and flanges")
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("name", ON_RANKS)
 def test_ranks_take_as_many(name: str, shared_tmp_path: Path) -> None:
@@ -643,11 +625,10 @@ def test_multigrid_converges_for_two_bodies_as_for_one(held, monkeypatch):
 
 
 @pytest.mark.parametrize("f2", [-0.005, -0.05])
-@pytest.mark.parametrize("n", [32, 64])
-def test_block_relaxation_takes_few_iterations_on_fine_meshes(n, f2):
+def test_block_relaxation_takes_few_iterations_on_a_fine_mesh(f2):
     """To 1e-8, for the frictionless start and each Tresca step."""
     options = {"inner_tolerance": 1e-8, "max_outer": 2}
-    loop, _ = attempt(short_bar(MPI.COMM_SELF, n, f2), **options)
+    loop, _ = attempt(short_bar(MPI.COMM_SELF, 64, f2), **options)
     counts = [record.inner for record in loop.history]
     assert len(counts) == 3
     assert max(counts) <= 34

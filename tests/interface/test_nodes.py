@@ -20,7 +20,7 @@ from contact.problem.problem import ContactProblem
 from contact.results.resultants import supports
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
-from tests.problems.mechanics import bar, constant, contact_data, flat, leaning_block, solve, turn
+from tests.problems.mechanics import bar, constant, flat, leaning_block, solve, turn
 
 LAW = Linear(1.0, 0.3)
 ZERO = constant(0.0, 2)
@@ -163,34 +163,6 @@ def test_an_end_without_contact_nodes_says_why(radius, held, words):
     }
     with pytest.raises(InputError, match=words):
         build_problem(parse_case(tables, source="tip"), MPI.COMM_SELF)
-
-
-def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
-    """Not only for uniform fields: a bar turned with its clamp, load and foundation."""
-    straight = bar(MPI.COMM_SELF, 8, -0.02)
-    q = turn(2, 30.0)
-    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [4.0, 1.0], [32, 8], rotation=30.0)
-    body = Body(
-        straight.body.law,
-        [Fixed("left", [ZERO, ZERO])],
-        [Load("top", [constant(c, 2) for c in q @ [0.0, -0.01]])],
-    )
-    plane = Plane((0.0, 0.0), tuple(q @ [0.0, 1.0]))
-    friction = straight.contacts[0].friction
-    turned = ContactProblem(domain, body, Contact("bottom", plane), friction)
-    upright = ContactProblem(
-        rectangle(MPI.COMM_SELF, [0.0, 0.0], [4.0, 1.0], [32, 8]),
-        Body(body.law, body.fixed, [Load("top", [ZERO, constant(-0.01, 2)])]),
-        Contact("bottom", flat()),
-        friction,
-    )
-    ours, theirs = contact_data(solve(turned, 1e-11)), solve(upright, 1e-11)
-    order = np.argsort(ours["points"] @ q[:, 0])
-    expected = contact_data(theirs)
-    for name in ("pressure", "bound", "u_n"):
-        assert np.abs(ours[name][order] - expected[name]).max() < 1e-9
-    assert np.abs(ours["friction"][order] @ q - expected["friction"]).max() < 1e-9
-    assert np.abs(ours["u_t"][order] @ q - expected["u_t"]).max() < 1e-9
 
 
 def circle(_, radius, *, direction):

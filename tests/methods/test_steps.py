@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact import build_problem, evolve, load_case
+from contact import evolve
 from contact.errors import InputError
 from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.problem.problem import SLIP
@@ -13,7 +13,6 @@ from contact.problem.residuals import Balance, balance, evaluate
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
-from scripts.cases import CASES
 from tests.problems import mechanics
 from tests.problems.mechanics import SlidingBlock
 from tests.problems.shaken import SELF, TIGHT, shaken, steps_of, times
@@ -113,26 +112,6 @@ def test_methods_agree_at_every_step(law):
         active = interface.active_set(nodal, one.forces, bound, rounding=1e-9)
         kinds |= set(zip(active.closed, active.sticks, active.slips, strict=True))
     assert len(kinds) == 3  # open, sticking and sliding nodes have been met
-
-
-@pytest.mark.slow
-def test_methods_agree_on_a_yielding_piezoelectric_body():
-    """Hencky's law, friction and piezoelectricity together, loaded and unloaded twice."""
-    changes = ["mesh.cells=[8, 4]", "material.law=log", "material.yield_strain=0.005"]
-    changes += ["evolution.steps=[3, 2, 2, 1, 1]", 'load.0.traction=[0.0, "-1*x"]']
-    case = load_case(CASES / "piezo-sensor-cyclic.toml", changes)
-    newton, uzawa = (
-        steps_of(
-            build_problem(case, SELF),
-            case.evolution.ends,
-            told.model_copy(update={"tolerance": 1e-11}),
-        )
-        for told in TIGHT.values()
-    )
-    for one, two in zip(newton, uzawa, strict=True):
-        assert np.abs(one.x - two.x).max() < 1e-7 * np.abs(one.x).max()
-        difference = np.abs(one.forces.friction - two.forces.friction).max()
-        assert difference < 1e-7 * one.forces.pressure.max()
 
 
 def test_penalty_comes_near():

@@ -7,7 +7,6 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.model.friction import Friction
 from contact.model.material import Material
 from contact.results.resultants import charge_balance
 from contact.thesis.fixed_point import FixedPoint
@@ -58,34 +57,6 @@ def test_plane_body_refuses_a_crystal_that_leaves_the_plane(monkeypatch):
     monkeypatch.setattr("tests.problems.piezo.pzt", lambda *_: CRYSTAL.poled_along([1.0, 1.0, 1.0]))
     with pytest.raises(InputError, match=r"\[material-constants\]"):
         example(COMM, (4, 2))
-
-
-@pytest.mark.core
-@pytest.mark.parametrize("cells", [(16, 8), (4, 2, 3)], ids=["plane", "space"])
-def test_turned_body(cells):
-    """Rotated body, load and poling axis: the rotated solution to rounding."""
-    found = []
-    for degrees in (0.0, 37.0):
-        problem = example(COMM, cells, -10.0, degrees=degrees)
-        solver = solve(problem, tolerance=1e-12)
-        nodal = problem.nodal(solver.state)
-        normal = problem.nodes.normal_component(nodal)
-        along = np.linalg.norm(problem.nodes.tangential_component(nodal), axis=1)
-        found.append(
-            (solver.state.forces.pressure, normal, along, potential(problem, solver.state))
-        )
-    for straight, turned in zip(*found, strict=True):
-        assert np.abs(straight - turned).max() <= 1e-9 * np.abs(straight).max() + 1e-10
-
-
-def test_turned_frictionless_body_to_rounding():
-    found = []
-    for degrees in (0.0, 37.0):
-        problem = example(COMM, (16, 8), -10.0, friction=Friction(), degrees=degrees)
-        solver = solve(problem, tolerance=1e-13)
-        found.append((solver.state.forces.pressure, potential(problem, solver.state)))
-    for straight, turned in zip(*found, strict=True):
-        assert np.abs(straight - turned).max() <= 1e-11 * np.abs(straight).max()
 
 
 def test_printed_ramp_does_not_conduct(monkeypatch):

@@ -149,25 +149,20 @@ def example(
     delta: float = 125.0,
     degree: int = 1,
     units: Units = SCALED,
-    degrees: float = 0.0,
     grounded: bool = True,
 ) -> ContactProblem:
     """Return Example 8.1, or 8.2 with its law, or a block of 8 x 2 x 4 for three cell counts.
 
-    The bar is held and grounded at the left and carries the traction load * x on top. Body,
-    load and poling axis are turned together (in space about y).
+    The bar is held and grounded at the left and carries the traction load * x on top.
     """
     dim = len(cells)
     zero = constant(0.0, dim)
-    q = turn(dim, degrees)
-    traction = [Affine(tuple(load * units.stress * q[i, -1] * q[:, 0])) for i in range(dim)]
-    q3 = np.eye(3)
-    q3[:dim, :dim] = q
+    traction = [zero] * (dim - 1) + [Affine((load * units.stress, *[0.0] * (dim - 1)))]
     body = Body(
         law or units.law(),
         [Fixed("left", [zero] * dim, zero if grounded else None)],
         [Load("top", traction)],
-        pzt(dim, units).rotated(q3),
+        pzt(dim, units),
     )
     psi = ShiftedConductivity(k_e / units.potential, delta)
     conductor = Conductor(
@@ -176,9 +171,9 @@ def example(
     if friction is None:
         friction = Friction(SlipCoefficient(0.5, 0.2, 1e5))
     if dim == 2:
-        domain = rectangle(comm, [0.0, 0.0], [8.0, 4.0], cells, rotation=degrees)
+        domain = rectangle(comm, [0.0, 0.0], [8.0, 4.0], cells)
     else:
-        domain = box(comm, [0.0] * 3, [8.0, 2.0, 4.0], cells, rotation=degrees)
+        domain = box(comm, [0.0] * 3, [8.0, 2.0, 4.0], cells)
     return ContactProblem(
         domain, body, Contact("bottom", flat()), friction, conductor if k_e else None, degree
     )

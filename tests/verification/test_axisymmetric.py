@@ -20,7 +20,7 @@ from contact.mesh.geometry import area, volume
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
-from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
 from contact.model.contact import Contact
 from contact.problem.checks import check_rigid_modes
@@ -91,23 +91,6 @@ def test_a_poled_cylinder(degree):
     stress = DerivedFields(solution.problem.equilibrium, solution.state).nodes()["stress"]
     hoop = stress.x.array.reshape(-1, 3, 3)[:, 2, 2]
     assert np.abs(hoop).max(initial=0.0) < 1e-8 * column.force
-
-
-@pytest.mark.parametrize("degree", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_methods_agree(comm, degree):
-    """A rough plate, a smoothed pressure, a material that yields."""
-    newton = solved(pressed_cylinder(comm, 6, degree, 0.3))
-    status = np.concatenate(comm.allgather(newton.status))
-    assert {"stick", "slip"} <= set(status)
-    assert force_balance(newton.problem, newton.state).imbalance < 1e-12
-    # 2 pi times the integral of (0.02 + 0.03 r^2) r.
-    assert newton.contact_force == pytest.approx([0.0, -np.pi * 0.035], rel=1e-9)
-    uzawa = solved(pressed_cylinder(comm, 6, degree, 0.3), FixedPointOptions(tolerance=1e-9))
-    scale = newton.problem.nodes.maximum(newton.pressure)
-    assert np.abs(uzawa.pressure - newton.pressure).max(initial=0.0) < 1e-6 * scale
-    given = PenaltyOptions(eps_contact=1e-6, eps_slip=1e-8, tolerance=1e-4)
-    penalty = solve(pressed_cylinder(comm, 6, degree, 0.3), given)
-    assert np.abs(penalty.pressure - newton.pressure).max(initial=0.0) < 1e-2 * scale
 
 
 @pytest.mark.core
