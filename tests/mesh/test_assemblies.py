@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,8 @@ from contact.model.material import Material
 from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
-from tests.mesh.test_input_files import block
+from tests.mesh.test_input_files import cube
+from tests.problems import files
 from tests.problems.mechanics import constant
 from tests.problems.sizes import integral
 
@@ -41,7 +43,7 @@ def sets(n: int, first: int = 0, cells: int = 0, before: str = "") -> str:
 
 def part(name: str, n: int) -> str:
     """Return a block as a part, its nodes and elements numbered from 1."""
-    return f"*PART, NAME={name}\n{block(n).replace(', ELSET=Eall', '')}{sets(n)}*END PART\n"
+    return f"*PART, NAME={name}\n{files.abaqus(cube(n))}{sets(n)}*END PART\n"
 
 
 def instance(name: str, of: str, lines: str = "", content: str = "") -> str:
@@ -56,16 +58,9 @@ def flat(*blocks) -> str:
     """Return blocks in a file without parts: a name, n and a map of the nodes of each."""
     text, first, cells = "", 0, 0
     for name, n, moved in blocks:
-        nodes, elements = block(n).replace(", ELSET=Eall", "").split("*ELEMENT")
-        text += "*NODE\n"
-        for line in nodes.splitlines()[1:]:
-            number, *x = map(float, line.split(","))
-            text += ", ".join(map(repr, [int(number) + first, *moved(*x)])) + "\n"
-        head, *rows = elements.splitlines()
-        text += f"*ELEMENT{head}\n"
-        for row in rows:
-            element, *corners = map(int, row.split(","))
-            text += ", ".join(map(str, [element + cells, *(k + first for k in corners)])) + "\n"
+        contents = cube(n)
+        points = np.transpose(moved(*contents.points.T))
+        text += files.abaqus(replace(contents, points=points), first + 1, cells + 1)
         text += sets(n, first, cells, f"{name}.")
         first, cells = first + (n + 1) ** 3, cells + n**3
     return text
@@ -131,7 +126,7 @@ def test_motions(lines, moved, tmp_path):
 
 def test_two_parts_numbered_from_one(tmp_path):
     """One has its nodes in its instance, as an independent one has; unique names stand alone."""
-    own = block(3).replace(", ELSET=Eall", "") + sets(3)
+    own = files.abaqus(cube(3)) + sets(3)
     parts = part("Cube", 2) + "*PART, NAME=Other\n*END PART\n" + part("Unused", 1)
     parts = parts.replace("*END PART\n", "*NSET, NSET=Edge\n1, 2, 4, 5\n*END PART\n", 1)
     instances = instance("One", "Cube") + instance("Two", "Other", "0., 0., 1.\n", own)

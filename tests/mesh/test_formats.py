@@ -9,8 +9,9 @@ from mpi4py import MPI
 import meshes
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
-from contact.mesh.contents import SERENDIPITY
+from contact.mesh.contents import SERENDIPITY, Contents
 from contact.mesh.reader import from_file, mesh_files
+from tests.problems import files
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD
@@ -54,33 +55,28 @@ ground, 2
 *END STEP
 """
 
-#: Corners of a cube of two hexahedra along x, and the middle nodes of C3D20 between them.
+#: Edges of a hexahedron by their corners, in the order of the middle nodes of C3D20.
 EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)]
 EDGES += [(0, 4), (1, 5), (2, 6), (3, 7)]
+
+
+def two_cubes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of two cubes along x, and each of them by its nodes in a unit cube."""
+    every = np.concatenate([nodes, nodes + np.array([1.0, 0.0, 0.0])])
+    points, number = np.unique(every, axis=0, return_inverse=True)
+    return points, number.reshape(2, -1)
 
 
 def bricks(bend: float = 0.0) -> str:
     """Two elements of twenty nodes, of which one edge may be bent; faces as Abaqus numbers them."""
     square = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    places: dict[tuple[float, ...], int] = {}
-    rows = []
-    for k in (0, 1):
-        corners = [(x + k, y, float(z)) for z in (0, 1) for x, y in square]
-        middles = [tuple(np.mean([corners[a], corners[b]], axis=0)) for a, b in EDGES]
-        nodes = [
-            places.setdefault(tuple(map(float, x)), len(places) + 1) for x in corners + middles
-        ]
-        rows.append(
-            ", ".join(map(str, [k + 1, *nodes[:12]])) + ",\n" + ", ".join(map(str, nodes[12:]))
-        )
-    moved = {(0.5, 0.0, 0.0): (0.5, 0.0, bend)}
-    lines = [f"{n}, " + ", ".join(map(str, moved.get(x, x))) for x, n in places.items()]
+    corners = np.array([(x, y, z) for z in (0, 1) for x, y in square], float)
+    points, rows = two_cubes(np.concatenate([corners, corners[EDGES].mean(axis=1)]))
+    points[(points == [0.5, 0.0, 0.0]).all(axis=1), 2] = bend
     surfaces = [("low", "Eall, S1"), ("high", "Eall, S2"), ("front", "1, S3"), ("end", "2, S4")]
     surfaces += [("back", "2, S5"), ("start", "1, S6"), ("skin", "Eall,")]
-    text = ["*NODE", *lines, "*ELEMENT, TYPE=C3D20R, ELSET=EALL", *rows]
-    for name, face in surfaces:
-        text += [f"*SURFACE, NAME={name}", face]
-    return "\n".join(text) + "\n"
+    text = files.abaqus(Contents(points, [("hexahedron", rows)], {"EALL": {0: np.arange(2)}}))
+    return text + "".join(f"*SURFACE, NAME={name}\n{face}\n" for name, face in surfaces)
 
 
 def write_other(path, name: str) -> None:
@@ -132,55 +128,20 @@ H27 = np.array(
 )
 
 
-def write_salome(path, count: int = 27, bend: float = 0.0) -> None:
-    """Write two cubes along x as Salome does: mirrored cells, families, none for whole kinds.
+#: Nodes of its lower and its upper side: corners, edges between them, the middle.
+LOWER, UPPER = [0, 1, 2, 3, 8, 9, 10, 11, 20], [4, 7, 6, 5, 15, 14, 13, 12, 25]
 
-    Groups have names of 80 letters, several a family; a family of its own is 0, FAMILLE_ZERO, and
-    a kind of cells that is all in it has no array FAM.
-    """
-    h5py = pytest.importorskip("h5py")
-    places, rows = {}, []
-    for k in (0, 1):
-        at = [tuple(x) for x in (H27[:count] + np.array([k, 0.0, 0.0])).tolist()]
-        rows.append([places.setdefault(x, len(places) + 1) for x in at])
-    points = np.array(list(places))
+
+def salome(count: int = 27, bend: float = 0.0) -> Contents:
+    """Return two mirrored cubes along x as Salome has them: a side in two groups, one in none."""
+    points, rows = two_cubes(H27[:count])
     points[:, 2] += bend * points[:, 0] * (2 - points[:, 0])
-    faces = {"low": [0, 1, 2, 3], "high": [4, 7, 6, 5]}
-    kind = {27: ("H27", "QU9"), 20: ("H20", "QU8"), 8: ("HE8", "QU4")}[count]
-    quads = [[row[c] for c in around] for around in faces.values() for row in rows]
-
-    def middle(nodes: list[int]) -> int:
-        return places[tuple(np.mean(np.array(list(places))[np.array(nodes) - 1], axis=0).tolist())]
-
-    if count > 8:
-        edges = [[middle([q[k], q[(k + 1) % 4]]) for k in range(4)] for q in quads]
-        inner = [[middle(q)] if count == 27 else [] for q in quads]
-        quads = [a + b + c for a, b, c in zip(quads, edges, inner, strict=True)]
-    with h5py.File(path, "w") as data:
-        mesh = data.create_group("ENS_MAA/piece")
-        mesh.attrs["ESP"], mesh.attrs["DIM"] = 3, 3
-        step = mesh.create_group("-0000000000000000001-0000000000000000001")
-        step["NOE/COO"] = points.T.ravel()
-        step["NOE/COO"].attrs["NBR"] = len(points)
-        families = np.where(points[:, 0] == 0, 3, 0)
-        step["NOE/FAM"] = families
-        for name, of in zip(kind, (rows, quads), strict=True):
-            step[f"MAI/{name}/NOD"] = np.array(of).T.ravel()
-            step[f"MAI/{name}/NOD"].attrs["NBR"] = len(of)
-        step[f"MAI/{kind[1]}/FAM"] = [-6, -6, -7, 0]
-        sets = {
-            "ELEME/FAM_-6_low": (-6, ["low", "Group_of_faces"]),
-            "NOEUD/FAM_3_left": (3, ["left"]),
-        }
-        sets["ELEME/FAM_-7_high"] = (-7, ["high"])
-        for name, (number, groups) in sets.items():
-            family = data.create_group(f"FAS/piece/{name}")
-            family.attrs["NUM"] = number
-            letters = [list(group.encode().ljust(80, b"\0")) for group in groups]
-            family["GRO/NOM"] = np.array(letters, dtype=np.int8)
-            family["GRO"].attrs["NBR"] = len(groups)
-        zero = data.create_group("FAS/piece/FAMILLE_ZERO")
-        zero.attrs["NUM"] = 0
+    of_side = {27: 9, 20: 8, 8: 4}[count]
+    sides = np.concatenate([rows[:, side[:of_side]] for side in (LOWER, UPPER)])
+    both = {1: np.arange(2)}
+    groups = {"low": both, "Group_of_faces": both, "high": {1: np.array([2])}}
+    left = {"left": np.flatnonzero(points[:, 0] == 0)}
+    return Contents(points, [("hexahedron", rows), ("quad", sides)], groups, left)
 
 
 FILES = {
@@ -262,7 +223,7 @@ def test_groups_of_salome(count, shared_tmp_path):
     """Families of several groups, arrays that are left out, nodes in MED's own order."""
     path = shared_tmp_path / "piece.med"
     if COMM.rank == 0:
-        write_salome(path, count, 0.0 if count == 8 else 0.05)
+        files.write(path, salome(count, 0.0 if count == 8 else 0.05))
     COMM.barrier()
     domain = from_file(COMM, path)
     bent = 1.0 if count == 8 else measures(domain)["high"]
@@ -273,7 +234,7 @@ def test_groups_of_salome(count, shared_tmp_path):
 
 
 def test_a_med_file_of_two_meshes_is_refused(tmp_path):
-    write_salome(tmp_path / "piece.med", 8)
+    files.write(tmp_path / "piece.med", salome(8))
     import h5py
 
     with h5py.File(tmp_path / "piece.med", "a") as data:
@@ -301,21 +262,11 @@ def test_input_files_that_gmsh_writes(cell, order, shared_tmp_path):
 
 @pytest.mark.core
 def test_side_sets_of_exodus(tmp_path):
-    netcdf, meshio = pytest.importorskip("netCDF4"), pytest.importorskip("meshio")
-    points = np.array(
-        [(x, y, z) for z in (0, 1) for x, y in [(0, 0), (1, 0), (1, 1), (0, 1)]], float
-    )
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    points = np.array([(x, y, z) for z in (0, 1) for x, y in square], float)
     path = tmp_path / "cube.exo"
-    meshio.write(path, meshio.Mesh(points, [("hexahedron", np.arange(8)[None])]))
-    with netcdf.Dataset(str(path), "a") as data:
-        data.createDimension("num_side_sets", 6)
-        for side in range(1, 7):
-            data.createDimension(f"num_side_ss{side}", 1)
-            for kind, value in (("elem", 1), ("side", side)):
-                made = data.createVariable(f"{kind}_ss{side}", "i4", (f"num_side_ss{side}",))
-                made[:] = value
-        numbers = data.createVariable("ss_prop1", "i4", ("num_side_sets",))
-        numbers[:] = np.arange(11, 17)
+    files.write(path, Contents(points, [("hexahedron", np.arange(8)[None])]))
+    files.add_side_sets(path, {10 + side: [(1, side)] for side in range(1, 7)})
     domain = from_file(MPI.COMM_SELF, path)
     assert measures(domain) == pytest.approx({str(k): 1.0 for k in range(11, 17)})
     # Outward normals: -y, x, y, -x, -z, z.

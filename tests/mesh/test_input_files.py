@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact.errors import InputError
+from contact.mesh.contents import Contents
 from contact.mesh.reader import from_file
+from tests.problems import files
 from tests.problems.sizes import integral, measures
 
 
-def block(n: int = 2) -> str:
-    """Return the unit cube of n x n x n elements C3D8, those of the lowest layer first."""
-    grid = [np.arange(n + 1)] * 3
-    z, y, x = (axis.ravel() / n for axis in np.meshgrid(*grid, indexing="ij"))
-    number = np.arange(1, (n + 1) ** 3 + 1).reshape((n + 1,) * 3)
-    lines = [
-        "*NODE",
-        *(f"{k}, {a}, {b}, {c}" for k, a, b, c in zip(number.ravel(), x, y, z, strict=True)),
-    ]
-    lines.append("*ELEMENT, TYPE=C3D8, ELSET=Eall")
-    for k, (c, b, a) in enumerate(np.ndindex(n, n, n), 1):
-        face = [(0, 0), (0, 1), (1, 1), (1, 0)]
-        nodes = [number[c + up, b + j, a + i] for up in (0, 1) for j, i in face]
-        lines.append(", ".join(map(str, [k, *nodes])))
-    return "\n".join(lines) + "\n"
+def cube(n: int = 2) -> Contents:
+    """Return the unit cube of n x n x n elements, those of the lowest layer first."""
+    points = np.array([*np.ndindex((n + 1,) * 3)], float)[:, ::-1] / n
+    number = np.arange((n + 1) ** 3).reshape((n + 1,) * 3)
+    around = [(up, *ji) for up in (0, 1) for ji in [(0, 0), (0, 1), (1, 1), (1, 0)]]
+    corners = [number[c : n + c, b : n + b, a : n + a].ravel() for c, b, a in around]
+    return Contents(points, [("hexahedron", np.stack(corners, axis=1))])
+
+
+def block() -> str:
+    """Return the cube of eight elements as an input file, all in the set Eall."""
+    return files.abaqus(replace(cube(), groups={"Eall": {0: np.arange(8)}}))
 
 
 #: The faces of the cube's lower side, as shells.
@@ -105,7 +106,7 @@ PARTS = """*PART, NAME=Part-1
 
 def in_parts(sets: str) -> str:
     """Return the unit cube as Abaqus/CAE writes it: a part with sets, and those of an assembly."""
-    return PARTS.format(block=block().replace(", ELSET=Eall", ""), sets=sets)
+    return PARTS.format(block=files.abaqus(cube()), sets=sets)
 
 
 def test_a_part_and_its_assembly_have_names_of_their_own(tmp_path):

@@ -12,13 +12,11 @@ import meshes
 from contact.mesh.cells import FACES
 from contact.mesh.contents import Cells, Contents, Groups, check
 from contact.mesh.reader import from_file
+from tests.problems import files
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD
 FIXTURES = Path(meshes.__file__).parent / "fixtures"
-
-#: Elements of Abaqus.
-TYPES = {"hexahedron": "C3D8", "wedge": "C3D6", "pyramid": "C3D5", "tetra": "C3D4"}
 
 
 def stack() -> Contents:
@@ -102,19 +100,10 @@ def test_neighbours_cut_their_faces_alike_whatever_the_numbers(seed):
 def write(path, contents: Contents) -> None:
     """Write the stack in a program's format."""
     if path.suffix == ".inp":
-        lines = ["*NODE"]
-        lines += [f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(contents.points, 1)]
-        first = 1
-        for name, rows in contents.blocks:
-            lines.append(f"*ELEMENT, TYPE={TYPES[name]}, ELSET={name}")
-            lines += [", ".join(map(str, [first + k, *(row + 1)])) for k, row in enumerate(rows)]
-            first += len(rows)
-        lines += ["*ELSET, ELSET=all", "hexahedron, wedge, pyramid, tetra"]
-        lines += ["*SURFACE, NAME=start", "hexahedron, S1", "*SURFACE, NAME=end", "5, S1"]
-        lines += ["*SURFACE, NAME=below", "hexahedron, S3", "3, S1"]
-        lines += ["*SURFACE, NAME=skin", "all,", "*NSET, NSET=side"]
-        lines += [", ".join(map(str, contents.nodes["side"] + 1))]
-        path.write_text("\n".join(lines) + "\n")
+        text = files.abaqus(contents) + "*ELSET, ELSET=all\nhexahedron, wedge, pyramid, tetra\n"
+        text += "*SURFACE, NAME=start\nhexahedron, S1\n*SURFACE, NAME=end\n5, S1\n"
+        text += "*SURFACE, NAME=below\nhexahedron, S3\n3, S1\n*SURFACE, NAME=skin\nall,\n"
+        path.write_text(text)
         return
     meshio = pytest.importorskip("meshio")
     quads = ("quad", np.concatenate([contents.surfaces["start"], contents.surfaces["end"]]))
@@ -187,15 +176,10 @@ def test_cells_of_second_order_become_straight(tmp_path):
 
 def test_prisms_alone_and_side_sets_of_exodus(tmp_path):
     """Extruded meshes: sides of three and of four corners."""
-    netcdf, meshio = pytest.importorskip("netCDF4"), pytest.importorskip("meshio")
     points = np.array([(x, y, z) for z in (0, 1) for x, y in [(0, 0), (1, 0), (0, 1)]], float)
     path = tmp_path / "prism.exo"
-    meshio.write(path, meshio.Mesh(points, [("wedge", np.arange(6)[None])]))
-    with netcdf.Dataset(str(path), "a") as data:
-        data.createDimension("num_side_sets", 1)
-        data.createDimension("num_side_ss1", 5)
-        for kind, values in (("elem", [1] * 5), ("side", [1, 2, 3, 4, 5])):
-            data.createVariable(f"{kind}_ss1", "i4", ("num_side_ss1",))[:] = values
+    files.write(path, Contents(points, [("wedge", np.arange(6)[None])]))
+    files.add_side_sets(path, {1: [(1, side) for side in range(1, 6)]})
     domain = from_file(MPI.COMM_SELF, path)
     assert measures(domain) == pytest.approx({"1": 3 + 2**0.5})
     assert domain.notes == (

@@ -26,6 +26,7 @@ from tests.problems.mechanics import (
     pressed_block,
     solve,
 )
+from tests.problems.meshes import assembled
 from tests.problems.revolution import pressed_cylinder
 
 pytestmark = pytest.mark.parallel(alone=False)
@@ -118,16 +119,13 @@ def test_a_rank_without_contact_nodes_with_friction_and_smoothing(comm):
 def on_one_rank(comm):
     """Return a unit square whose cells are all on rank 0."""
     whole = mesh.create_unit_square(MPI.COMM_SELF, 4, 4)
-    cells, x = np.empty((0, 3), np.int64), np.empty((0, 2))
-    if comm.rank == 0:
-        cells, x = geometry_dofmap(whole).astype(np.int64), whole.geometry.x[:, :2].copy()
 
     def partitioner(_comm, _parts, _types, cells):
         size = len(cells[0]) // 3
         return adjacency(np.zeros((size, 1), dtype=np.int32))
 
-    element = whole.ufl_domain().ufl_coordinate_element()
-    return mesh.create_mesh(comm, cells, x=x, e=element, partitioner=partitioner)
+    x = whole.geometry.x[:, :2].copy()
+    return assembled(comm, x, geometry_dofmap(whole), partitioner=partitioner)
 
 
 def adjacency(links):

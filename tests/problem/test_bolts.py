@@ -1,9 +1,7 @@
 """Bolt preload: closed forms of a bar, and of a bolt through two flanges in series."""
 
-import basix.ufl
 import numpy as np
 import pytest
-import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
@@ -26,6 +24,7 @@ from contact.mesh.domain import from_mesh
 from contact.methods.options import NewtonOptions
 from contact.problem.checks import check_problem
 from contact.results.fields import DerivedFields
+from tests.problems.meshes import assembled, midpoints
 
 COMM = MPI.COMM_WORLD
 LENGTH, YOUNG = 2.0, 10.0
@@ -105,28 +104,19 @@ def joint(comm, cut):
         points.append(np.stack([x.ravel(), y.ravel()], axis=1))
         quads = [number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]]
         cells.append(np.stack(quads, axis=2).reshape(-1, 4))
-    x, quads = np.concatenate(points), np.concatenate(cells)
-    if comm.rank > 0:
-        x, quads = x[:0], quads[:0]
-    element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,), dtype=np.float64)
-    mesh = dmesh.create_mesh(comm, cells=quads, x=x, e=ufl.Mesh(element))
+    mesh = assembled(comm, np.concatenate(points), np.concatenate(cells), "quadrilateral")
     top = low + high
     parts = {
         "foot": lambda x: np.isclose(x[1], 0.0),
         "head": lambda x: np.isclose(x[1], top),
         "sides": lambda x: np.isclose(x[0], 0.0) | np.isclose(x[0], 1.0),
     }
-    mesh.topology.create_entities(1)
-    edges = dmesh.locate_entities_boundary(mesh, 1, lambda x: np.isclose(x[1], low) & (x[0] > 0.9))
-    mesh.topology.create_connectivity(1, 2)
-    behind = mesh.topology.connectivity(1, 2)
-    middles = dmesh.compute_midpoints(
-        mesh, 2, np.arange(mesh.topology.index_map(2).size_local, dtype=np.int32)
-    )
-    lower = np.array([middles[behind.links(e)[0], 1] < low for e in edges], dtype=bool)
+    facets, middle, inside, _ = midpoints(mesh)
+    between = np.isclose(middle[:, 1], low) & (middle[:, 0] > 0.9)
+    lower = inside[:, 1] < low
     return from_mesh(
         mesh,
-        parts | {"joint_low": edges[lower], "joint_high": edges[~lower]},
+        parts | {"joint_low": facets[between & lower], "joint_high": facets[between & ~lower]},
         regions={
             "bolt": lambda x: x[0] < b + 1e-9,
             "low": lambda x: (x[0] > 0.9) & (x[1] < low + 1e-9),
@@ -300,11 +290,7 @@ def frame(columns):
                 cells.append([first, first + 1, first + n, first + n + 1])
     used, quads = np.unique(np.array(cells, dtype=np.int64), return_inverse=True)
     x = np.stack([used % n, used // n], axis=1).astype(float)
-    quads = quads.reshape(-1, 4)
-    if COMM.rank > 0:
-        x, quads = x[:0], quads[:0]
-    element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,), dtype=np.float64)
-    mesh = dmesh.create_mesh(COMM, cells=quads, x=x, e=ufl.Mesh(element))
+    mesh = assembled(COMM, x, quads.reshape(-1, 4), "quadrilateral")
     outer = {"left": 0.5, "right": 4.5}
     return from_mesh(
         mesh,

@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 
-import basix.ufl
 import numpy as np
-import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
@@ -17,6 +15,7 @@ from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import flat
+from tests.problems.meshes import assembled
 
 
 def blocks(comm: MPI.Intracomm, heights: Sequence[float] = (1.0, 3.0), n: int = 4) -> Domain:
@@ -31,10 +30,7 @@ def blocks(comm: MPI.Intracomm, heights: Sequence[float] = (1.0, 3.0), n: int = 
         block = dmesh.create_rectangle(MPI.COMM_SELF, corners, [n, round(n * height)])
         cells = np.concatenate([cells, block.geometry.dofmap + len(points)])
         points = np.concatenate([points, block.geometry.x[:, :2]])
-    element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,), dtype=np.float64)
-    first = comm.rank == 0
-    given = (cells, points) if first else (cells[:0], points[:0])
-    mesh = dmesh.create_mesh(comm, cells=given[0], x=given[1], e=ufl.Mesh(element))
+    mesh = assembled(comm, points, cells)
 
     def top(k, height):
         return lambda x: (np.abs(x[1] - height) < 1e-9) & (np.abs(x[0] - 2 * k - 0.5) < 0.6)

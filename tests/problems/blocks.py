@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import basix.ufl
 import numpy as np
-import ufl
-from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.mesh.cells import Shape
+from contact.mesh.contents import Contents
 from contact.mesh.domain import Domain, from_mesh
+from tests.problems import files
+from tests.problems.meshes import assembled, midpoints
 
 
 @dataclass(frozen=True)
@@ -60,19 +60,10 @@ class Blocks:
         points, cells = self._cells()
         if self.bow > 0:
             points, cells = self._bowed(points, cells)
-        order = self.shape.degree_of(cells.shape[1])
-        name = self.shape.name
-        element = basix.ufl.element("Lagrange", name, order, shape=(self.dim,), dtype=np.float64)
-        first = cells if comm.rank == 0 else np.zeros((0, cells.shape[1]), dtype=np.int64)
-        x = points if comm.rank == 0 else np.zeros((0, self.dim))
-        mesh = dmesh.create_mesh(comm, cells=first, x=x, e=ufl.Mesh(element))
-        d = self.dim
-        mesh.topology.create_connectivity(d - 1, d)
-        facets = dmesh.exterior_facet_indices(mesh.topology)
-        middle = dmesh.compute_midpoints(mesh, d - 1, facets)[:, :d]
-        to_cell = mesh.topology.connectivity(d - 1, d)
-        inside = dmesh.compute_midpoints(mesh, d, to_cell.array[to_cell.offsets[facets]])[:, d - 1]
-        height, up = middle[:, d - 1], inside > 1 + self.gap / 2
+        order, d = self.shape.degree_of(cells.shape[1]), self.dim
+        mesh = assembled(comm, points, cells, self.shape.name, order)
+        facets, middle, inside, centre = midpoints(mesh)
+        height, up = middle[:, -1], inside[:, -1] > 1 + self.gap / 2
 
         def near(value):
             return np.abs(height - value) < 1e-9
@@ -90,9 +81,8 @@ class Blocks:
         if d == 3:
             parts["front"] = np.abs(middle[:, 1]) < 1e-9
             parts["back"] = np.abs(middle[:, 1] - 1) < 1e-9
-        count = mesh.topology.index_map(d).size_local
-        centre = dmesh.compute_midpoints(mesh, d, np.arange(count, dtype=np.int32))[:, d - 1]
-        regions = {"upper": np.flatnonzero(centre > 1), "lower": np.flatnonzero(centre < 1)}
+        above = centre[:, -1] > 1
+        regions = {"upper": np.flatnonzero(above), "lower": np.flatnonzero(~above)}
         domain = from_mesh(mesh, {n: facets[m] for n, m in parts.items()}, 2.0, regions)
         angle = np.deg2rad(self.turn)
         turned = mesh.geometry.x.copy()
@@ -106,10 +96,7 @@ class Blocks:
         _, first, number = np.unique(
             np.round(points, 9), axis=0, return_index=True, return_inverse=True
         )
-        name = self.shape.name
-        element = basix.ufl.element("Lagrange", name, 1, shape=(self.dim,), dtype=np.float64)
-        cells = number.reshape(-1)[cells]
-        mesh = dmesh.create_mesh(comm, cells=cells, x=points[first], e=ufl.Mesh(element))
+        mesh = assembled(comm, points[first], number.reshape(-1)[cells], self.shape.name)
         d = self.dim
         parts = {
             "top": lambda x: np.abs(x[d - 1] - 2) < 1e-9,
@@ -185,33 +172,25 @@ class Blocks:
         return x, np.concatenate(cells)
 
 
-#: Elements of Abaqus by the number of their corners, in 2-D and in 3-D.
-ELEMENTS = {2: {3: "CPE3", 4: "CPE4"}, 3: {4: "C3D4", 8: "C3D8"}}
-
-
 def write_unlike(path: Path, upper: Blocks, lower: Blocks) -> None:
     """Write the upper block of one pair on the lower one of another, of other cells, for Abaqus."""
-    d = upper.dim
-    lines, sets, first, points = ["*NODE"], [], 1, 1
-    elements: list[str] = []
-    for name, given, n, low in (("lower", lower, lower.lower, 0), ("upper", upper, upper.upper, 1)):
+    d, points, blocks, sets, count = upper.dim, [], [], {}, 0
+    for low, name, given, n, ends in (
+        (0, "lower", lower, lower.lower, ("bottom", "over")),
+        (1, "upper", upper, upper.upper, ("under", "top")),
+    ):
         x, cells = given._block(n, np.random.default_rng(n))
         x[:, -1] += low
         order = np.argsort(given.shape.vtk(1)[1])
-        rows = cells[:, order] + points
-        lines += [f"{points + k}, " + ", ".join(map(repr, p)) for k, p in enumerate(x.tolist())]
-        elements.append(f"*ELEMENT, TYPE={ELEMENTS[d][rows.shape[1]]}, ELSET={name}")
-        elements += [", ".join(map(str, [first + k, *row])) for k, row in enumerate(rows)]
-        ends = {"lower": ("bottom", "over"), "upper": ("under", "top")}[name]
-        for part, axis, value in (
-            *((end, d - 1, low + k) for k, end in enumerate(ends)),
-            (f"{name}_left", 0, 0),
-            *([(f"{name}_front", 1, 0)] if d == 3 else []),
-        ):
-            sets.append(f"*NSET, NSET={part}")
-            sets += map(str, np.flatnonzero(np.abs(x[:, axis] - value) < 1e-12) + points)
-        first, points = first + len(rows), points + len(x)
-    path.write_text("\n".join([*lines, *elements, *sets]) + "\n")
+        blocks.append((given.shape.name, cells[:, order] + count))
+        sides = {ends[0]: (d - 1, low), ends[1]: (d - 1, low + 1), f"{name}_left": (0, 0)}
+        sides |= {f"{name}_front": (1, 0)} if d == 3 else {}
+        for part, (axis, value) in sides.items():
+            sets[part] = np.flatnonzero(np.abs(x[:, axis] - value) < 1e-12) + count
+        points.append(x)
+        count += len(x)
+    groups = {name: {k: np.arange(len(blocks[k][1]))} for k, name in enumerate(("lower", "upper"))}
+    files.write(path, Contents(np.concatenate(points), blocks, groups, sets))
 
 
 def squares(comm: MPI.Intracomm, corners, cells) -> Domain:
@@ -230,24 +209,12 @@ def squares(comm: MPI.Intracomm, corners, cells) -> Domain:
         parts.append(x + np.array(corner))
         blocks.append(own + count)
         count += len(x)
-    element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,), dtype=np.float64)
-    first = comm.rank == 0
-    cells_here = np.concatenate(blocks).astype(np.int64) if first else np.zeros((0, 3), np.int64)
-    points = np.concatenate(parts) if first else np.zeros((0, 2))
-    mesh = dmesh.create_mesh(comm, cells=cells_here, x=points, e=ufl.Mesh(element))
-    mesh.topology.create_connectivity(1, 2)
-    facets = dmesh.exterior_facet_indices(mesh.topology)
-    to_cell = mesh.topology.connectivity(1, 2)
-    inside = dmesh.compute_midpoints(mesh, 2, to_cell.array[to_cell.offsets[facets]])
-    middle = dmesh.compute_midpoints(mesh, 1, facets)
-    every = np.arange(mesh.topology.index_map(2).size_local, dtype=np.int32)
-    centre = dmesh.compute_midpoints(mesh, 2, every)
+    mesh = assembled(comm, np.concatenate(parts), np.concatenate(blocks))
+    facets, middle, inside, centre = midpoints(mesh)
     named, regions = {}, {}
     for k, corner in enumerate(np.array(corners, dtype=float)):
-        own = (np.abs(inside[:, :2] - corner - 0.5) < 0.5).all(axis=1)
-        regions[f"body{k}"] = np.flatnonzero(
-            (np.abs(centre[:, :2] - corner - 0.5) < 0.5).all(axis=1)
-        )
+        own = (np.abs(inside - corner - 0.5) < 0.5).all(axis=1)
+        regions[f"body{k}"] = np.flatnonzero((np.abs(centre - corner - 0.5) < 0.5).all(axis=1))
         for side, axis, value in (("left", 0, 0), ("right", 0, 1), ("bottom", 1, 0), ("top", 1, 1)):
             there = np.abs(middle[:, axis] - corner[axis] - value) < 1e-9
             named[f"{side}{k}"] = facets[own & there]

@@ -3,17 +3,15 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import basix.ufl
 import numpy as np
-import ufl
 from dolfinx import fem
-from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact import Body, Fixed, Linear, Load
 from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, from_mesh, revolved
 from contact.mesh.grid import box, rectangle
+from tests.problems.meshes import assembled, midpoints
 
 #: Young's modulus and Poisson's ratio.
 YOUNG, POISSON = 10.0, 0.3
@@ -62,15 +60,8 @@ def layers(
         places.append(x)
         rows.append(space.dofmap.list + count)
         count += len(x)
-    element = basix.ufl.element("Lagrange", cell, order, shape=(d,), dtype=np.float64)
-    first = None if comm.rank == 0 else 0
-    cells = np.concatenate(rows).astype(np.int64)[:first]
-    mesh = dmesh.create_mesh(
-        comm, cells=cells, x=np.concatenate(places)[:first], e=ufl.Mesh(element)
-    )
-    mesh.topology.create_connectivity(d - 1, d)
-    facets = dmesh.exterior_facet_indices(mesh.topology)
-    middle = dmesh.compute_midpoints(mesh, d - 1, facets)
+    mesh = assembled(comm, np.concatenate(places), np.concatenate(rows), cell, order)
+    facets, middle, *_ = midpoints(mesh)
     sides = {
         f"{name}{k}": np.abs(middle[:, 0] - 2 * k - end) < 1e-9
         for k in range(len(counts))

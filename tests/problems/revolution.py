@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import mesh as dmesh
@@ -25,6 +24,7 @@ from forms.laws import ConstantCoefficient
 from forms.piezo import Piezo
 from scripts.studies.exact_solutions import Given
 from tests.problems.mechanics import constant, flat
+from tests.problems.meshes import assembled, midpoints
 
 ZERO = constant(0.0, 2)
 
@@ -123,10 +123,7 @@ class Layers:
             tube = dmesh.create_rectangle(MPI.COMM_SELF, corners, number)
             cells = np.concatenate([cells, tube.geometry.dofmap + len(points)])
             points = np.concatenate([points, tube.geometry.x[:, :2]])
-        if MPI.COMM_WORLD.rank > 0:
-            points, cells = points[:0], cells[:0]
-        element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,), dtype=np.float64)
-        mesh = dmesh.create_mesh(MPI.COMM_WORLD, cells=cells, x=points, e=ufl.Mesh(element))
+        mesh = assembled(MPI.COMM_WORLD, points, cells)
         regions = {"in": lambda x: x[0] < c + 1e-9, "out": lambda x: x[0] > c - 1e-9}
         domain = revolved(from_mesh(mesh, self._parts(mesh, bodies), regions=regions))
         fixed = [Fixed("ends", [None, 0.0]), Fixed("outside", [0.0, None])]
@@ -150,12 +147,9 @@ class Layers:
         parts = {"inside": at(a), "outside": at(b), "ends": on_end}
         if bodies == 1:
             return parts
-        mesh.topology.create_connectivity(1, 2)
-        between = dmesh.locate_entities_boundary(mesh, 1, at(c))
-        cells = mesh.topology.connectivity(1, 2)
-        mine = np.array([cells.links(facet)[0] for facet in between], dtype=np.int32)
-        inner = dmesh.compute_midpoints(mesh, 2, mine)[:, 0] < c
-        return {**parts, "inner": between[inner], "outer": between[~inner]}
+        facets, middle, inside, _ = midpoints(mesh)
+        between, within = at(c)(middle.T), inside[:, 0] < c
+        return {**parts, "inner": facets[between & within], "outer": facets[between & ~within]}
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
-import basix.ufl
 import numpy as np
-import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.case.file import Case, parse_case
 from contact.mesh.domain import Domain, from_mesh
+from tests.problems.meshes import assembled, midpoints
 
 #: Radii of the ring, and half the width and the height of plate and lid.
 INNER, OUTER, HALF, HEIGHT = 0.5, 1.0, 0.75, 0.5
@@ -37,12 +36,8 @@ def between_plates(comm: MPI.Intracomm, seed: int, around: int = 28) -> Domain:
         number = sum(map(len, points)) + np.arange(x.size).reshape(x.shape)
         points.append(np.stack([x.ravel(), y.ravel()], axis=1))
         cells.append(_quads(number, False))
-    x, triangles = np.concatenate(points), np.concatenate(cells).astype(np.int64)
-    if comm.rank > 0:
-        x, triangles = x[:0], triangles[:0]
-    element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,), dtype=np.float64)
-    mesh = dmesh.create_mesh(comm, cells=triangles, x=x, e=ufl.Mesh(element))
-    return from_mesh(mesh, *_named(mesh, comm.bcast(points[2][0, 1] if comm.rank == 0 else 0.0)))
+    mesh = assembled(comm, np.concatenate(points), np.concatenate(cells))
+    return from_mesh(mesh, *_named(mesh, points[2][0, 1]))
 
 
 def _quads(number: np.ndarray, closed: bool) -> np.ndarray:
@@ -56,18 +51,13 @@ def _quads(number: np.ndarray, closed: bool) -> np.ndarray:
 
 def _named(mesh: dmesh.Mesh, top: float) -> tuple[dict, float, dict]:
     """Return parts, what they are found by, and regions; the lid begins at a height."""
-    mesh.topology.create_connectivity(1, 2)
-    facets = dmesh.exterior_facet_indices(mesh.topology)
-    to_cell = mesh.topology.connectivity(1, 2)
-    inside = dmesh.compute_midpoints(mesh, 2, to_cell.array[to_cell.offsets[facets]])[:, 1]
-    middle = dmesh.compute_midpoints(mesh, 1, facets)
-    every = np.arange(mesh.topology.index_map(2).size_local, dtype=np.int32)
-    centre = dmesh.compute_midpoints(mesh, 2, every)[:, 1]
+    facets, middle, inside, centre = midpoints(mesh)
+    inside, centre = inside[:, 1], centre[:, 1]
 
     def at(height):
         return np.abs(middle[:, 1] - height) < 1e-9
 
-    outside = np.linalg.norm(middle[:, :2] - [0.0, top / 2], axis=1) > (INNER + OUTER) / 2
+    outside = np.linalg.norm(middle - [0.0, top / 2], axis=1) > (INNER + OUTER) / 2
     parts = {
         "plate_bottom": at(-HEIGHT),
         "plate_top": at(0.0) & (inside < 0),
