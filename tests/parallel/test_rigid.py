@@ -1,17 +1,16 @@
 """What is rigid moves alike on any number of ranks."""
 
 import pytest
-from mpi4py import MPI
 
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from tests.problems.everywhere import agree
 from tests.problems.rigid import column, indented, plate, solved
 
 pytestmark = pytest.mark.parallel(alone=False)
 
 
 def alike(case, settings, tolerance):
-    together, alone = (solved(case, comm, settings)[1] for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
-    assert flat(together) == pytest.approx(flat(alone), rel=tolerance, abs=1e-11)
+    agree(lambda comm: solved(case, comm, settings)[1], flat, tolerance, 1e-11)
 
 
 def flat(values):

@@ -22,7 +22,7 @@ from contact.results.resultants import charge_balance
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks
-from tests.problems.everywhere import pressures
+from tests.problems.everywhere import agree, at_all, pressures
 from tests.problems.mechanics import constant
 from tests.problems.pairs import case
 
@@ -124,19 +124,17 @@ def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("condense", [True, False])
 @pytest.mark.parametrize("dim", [2, 3])
-def test_ranks_agree(comm, dim, condense):
-    found = []
-    for ranks in (comm, MPI.COMM_SELF):
-        problem = pushed(ranks, 1, dim)
-        options = OPTIONS["newton"](tolerance=1e-12, condense=condense)
+def test_ranks_agree(dim, condense):
+    options = OPTIONS["newton"](tolerance=1e-12, condense=condense)
+
+    def quantities(problem):
         state, outcome = METHODS["newton"](problem, options, None).solve()
         assert outcome.converged
         nodes = problem.nodes
-        both = [nodes.gather(a) for a in (nodes.points, state.forces.vectors(nodes))]
-        order = np.lexsort(np.round(both[0], 9).T)
-        found.append([values[order] for values in both])
-    np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-12)
-    np.testing.assert_allclose(found[0][1], found[1][1], rtol=0, atol=1e-11)
+        values = {"points": nodes.points, "forces": state.forces.vectors(nodes)}
+        return {name: at_all(nodes.comm, nodes.points, x) for name, x in values.items()}
+
+    agree(lambda ranks: pushed(ranks, 1, dim), quantities, rtol=0, atol=1e-11)
 
 
 def held(fixed, load, mu=0.0, pair=("under", "over")):

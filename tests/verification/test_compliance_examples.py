@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from contact import Solution, build_problem, load_case, solve
 from contact.model.formula import Expression
@@ -17,6 +16,7 @@ from forms.laws import Compliance, PotentialFactor, SlipCoefficient
 from scripts.cases import CASES, TABLE_8_4
 from scripts.studies import limit_theorem
 from scripts.thesis import figures_compliance, tables_compliance
+from tests.problems.everywhere import agree
 
 
 @cache
@@ -217,18 +217,14 @@ def test_ranks_agree(name):
     changes = ["friction.mu=0.068", "electric.k_e=0.068"] if "8-4" in name else []
     exact = ["mesh.cells=[24, 4]", "solver.tolerance=1e-11", *changes]
     case = load_case(CASES / f"compliance-{name}.toml", exact)
-    tables = []
-    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
-        solution = solve(build_problem(case, comm), case.solver)
+
+    def quantities(solution):
         assert solution.converged, solution.outcome
-        tables.append(contact_table(solution))
-    if MPI.COMM_WORLD.rank > 0:
-        return
-    shared, alone = tables
-    assert np.array_equal(shared["status"], alone["status"])
-    for key in ("x", "u_n", "u_t", "pressure", "tau", "phi", "d_n"):
-        size = max(np.abs(alone[key]).max(), 1e-3)
-        assert np.abs(shared[key] - alone[key]).max() <= 1e-8 * size, key
+        table = contact_table(solution)
+        names = ("x", "u_n", "u_t", "pressure", "tau", "phi", "d_n", "status")
+        return {name: np.asarray(table[name]) for name in names}
+
+    agree(lambda comm: solve(build_problem(case, comm), case.solver), quantities, atol=1e-11)
 
 
 #: The steep ramp of psi: far below the spacing of any mesh, so that the mesh decides.
