@@ -47,7 +47,6 @@ from tests.methods.test_belt import STRAPS, around_a_drum
 from tests.methods.test_chord import followed, yielding
 from tests.methods.test_curved import flattened
 from tests.methods.test_free_body import between_jaws, pads
-from tests.methods.test_newton import bar_case
 from tests.methods.test_nothing_touches import (
     APPROACH,
     LIFTED,
@@ -67,7 +66,7 @@ from tests.problem.test_moved_nodes import halved
 from tests.problem.test_rigid import FREE
 from tests.problem.test_rigid_pairs import stacked
 from tests.problems import pairs
-from tests.problems.mechanics import attempt, leaning_block, newton, pressed_block
+from tests.problems.mechanics import attempt, bar_case, leaning_block, newton, pressed_block
 from tests.problems.mechanics import bar as short_bar
 from tests.problems.mechanics import solve as relax
 from tests.problems.rigid import indented

@@ -1,6 +1,5 @@
 """contact sweep: one row a value, resumable, warm-started, over several keys."""
 
-import csv
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,7 @@ from contact.errors import InputError
 from contact.plot.series import read_sweep, sweep_figure
 from contact.sweeping import Axis
 from tests.problems.bar import BAR
+from tests.problems.written import rows_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -34,7 +34,7 @@ def sweep(tmp_path):
         told = ["sweep", case, "--out", out, *arguments, *(["--quiet"] if quiet else [])]
         status = main([str(argument) for argument in told])
         table = out / "sweep.csv"
-        rows = list(csv.DictReader(table.open())) if table.exists() else []
+        rows = rows_of(table) if table.exists() else []
         return status, rows
 
     return run

@@ -1,6 +1,5 @@
 """The files that a solve leaves, on any number of ranks."""
 
-import csv
 import os
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from mpi4py import MPI
 from contact.methods.options import OPTIONS, with_method
 from contact.results.contact_nodes import contact_table, tangent_of
 from contact.solving import solve
-from tests.problems.written import block, electric, written
+from tests.problems.written import block, electric, rows_of, written
 
 # Debian's adios2 would take its serial library in a run without mpirun.
 os.environ.setdefault("ADIOS2_ALWAYS_USE_MPI", "1")
@@ -39,7 +38,7 @@ def test_fixed_formats(dim: int, degree: int, shared_tmp_path: Path) -> None:
     assert summary["contact_nodes"] == sum(s != "open" for s in status)
     assert summary["stick_nodes"] == status.count("stick") > 0
     assert summary["slip_nodes"] == status.count("slip") > 0
-    history = list(csv.DictReader((shared_tmp_path / "history.csv").open()))
+    history = rows_of(shared_tmp_path / "history.csv")
     assert len(history) == summary["outer_iterations"]
     records = solution.history
     assert [len(row["steps"].split()) for row in history] == [len(r.steps) for r in records]

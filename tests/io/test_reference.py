@@ -29,7 +29,7 @@ from contact.solving import solve
 from contact.writing import write_outputs
 from scripts.output_page import PAGE, page
 from tests.problems.rigid import column, indented, plate
-from tests.problems.written import block, electric
+from tests.problems.written import block, electric, rows_of
 from tests.results.test_steps import case_of as steps_case
 
 
@@ -138,7 +138,7 @@ def test_one_entry_is_a_key_a_column_and_a_derivative(
     monkeypatch.setattr(registry, "QUANTITIES", (*QUANTITIES, mean, sink))
     solution = solve(steps_case())
     write_outputs(solution, tmp_path)
-    rows = list(csv.DictReader((tmp_path / STEPS).open()))
+    rows = rows_of(tmp_path / STEPS)
     summary = json.loads((tmp_path / SUMMARY).read_text())
     for name in ("mean_pressure", "sink"):
         assert float(rows[-1][name]) == summary[name] != 0

@@ -1,6 +1,5 @@
 """An evolution that is ended at any step goes on from its checkpoints to the same numbers."""
 
-import csv
 import json
 import shutil
 import signal
@@ -15,6 +14,7 @@ from contact.cli.main import main
 from contact.cli.solve import solve_and_keep
 from contact.io.checkpoint import Checkpoints, read_steps
 from tests.problem.test_plasticity import block
+from tests.problems.written import rows_of
 from tests.results.test_steps import case_of as steps_case
 
 SELF = MPI.COMM_SELF
@@ -160,11 +160,6 @@ def test_the_command_line(tmp_path, ended, capfd):
     assert len((out / "steps.csv").read_text().splitlines()) == 6
 
 
-def rows_of(out):
-    with (out / "steps.csv").open() as file:
-        return list(csv.DictReader(file))
-
-
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number, status):
     """They are written, and checkpoints remain to go on from, to the numbers of a whole run."""
@@ -181,13 +176,15 @@ def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number,
         context.setattr(Checkpoints, "keep", interrupted)
         assert on_the_line("solve", case, "--out", out) == status
     assert f"results in {out}; contact solve --restart {out} goes on" in capfd.readouterr().err
-    assert len(rows_of(out)) == 2
+    assert len(rows_of(out / "steps.csv")) == 2
     summary = json.loads((out / "summary.json").read_text())
     assert not summary["converged"]
     assert f"interrupted ({number.name})" in summary["reason"]
     assert len(list((out / "checkpoints").glob("0*.npz"))) == 2
     assert on_the_line("solve", "--restart", out) == 0
-    for one, two in zip(rows_of(tmp_path / "whole"), rows_of(out), strict=True):
+    for one, two in zip(
+        rows_of(tmp_path / "whole" / "steps.csv"), rows_of(out / "steps.csv"), strict=True
+    ):
         for name in one.keys() - {"linear_solves", "factorizations", "kkt"}:
             assert float(two[name]) == pytest.approx(float(one[name]), rel=1e-9, abs=1e-12)
 

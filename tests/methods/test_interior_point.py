@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.case.build import build_problem
-from contact.case.file import Case, parse_case
+from contact.case.file import parse_case
 from contact.cli.main import main
 from contact.errors import InputError, SingularError
 from contact.methods.interior_point import Cones, InteriorPoint, interior_point
@@ -21,17 +21,11 @@ from contact.model.rigid import rigid_motions
 from contact.problem.residuals import Residuals, evaluate
 from contact.solving import solve
 from forms.laws import ConstantCoefficient
-from scripts.cases import bar
 from tests.problems import mechanics
-from tests.problems.mechanics import newton
+from tests.problems.mechanics import bar_case, newton
 from tests.problems.rigid import PIEZO
 
 SELF = MPI.COMM_SELF
-
-
-def bar_case(n: int, *changes: str) -> Case:
-    """Return Example 7.2 with ten times its load and a constant mu."""
-    return bar(n, -0.05, 1.0, "friction.mu=0.5", "solver.tolerance=1e-10", *changes)
 
 
 COULOMB = Friction(ConstantCoefficient(0.5))

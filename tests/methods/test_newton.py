@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.case.build import build_problem
-from contact.case.file import Case, parse_case
+from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
@@ -24,7 +24,7 @@ from forms.laws import ConstantCoefficient, SlipCoefficient
 from scripts.cases import bar
 from tests.problems import mechanics
 from tests.problems.everywhere import agree
-from tests.problems.mechanics import newton
+from tests.problems.mechanics import bar_case, newton
 
 SELF = MPI.COMM_SELF
 
@@ -153,11 +153,6 @@ def test_the_iterative_solver_finds_the_same_solution():
     method = newton(iterative, linear="iterative")
     assert method.whole.step.operator.iterative
     assert np.allclose(exact.state.x, method.state.x, rtol=0, atol=1e-9)
-
-
-def bar_case(n: int, *changes: str) -> Case:
-    """Return Example 7.2 with ten times its load and a constant mu."""
-    return bar(n, -0.05, 1.0, "friction.mu=0.5", "solver.tolerance=1e-10", *changes)
 
 
 @pytest.mark.core

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.case.build import build_problem
+from contact.case.file import Case
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
@@ -19,6 +20,7 @@ from contact.model.contact import Contact
 from contact.model.friction import Friction
 from contact.model.obstacle import GapFunction, Plane
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
@@ -210,6 +212,17 @@ def newton(problem: ContactProblem, **options) -> Newton:
     _, outcome = method.solve()
     assert outcome.converged, outcome
     return method
+
+
+def bar_case(n: int, *changes: str) -> Case:
+    """Return Example 7.2 with ten times its load and a constant mu."""
+    exact = "friction.mu=0.5", "solver.tolerance=1e-10"
+    return cases.bar(n, -0.05, 1.0, *exact, *changes)
+
+
+def state_of(problem: ContactProblem, tolerance: float = 1e-13, condense: bool = True) -> State:
+    """Return the state that Newton's method finds."""
+    return newton(problem, tolerance=tolerance, condense=condense).state
 
 
 def contact_data(loop: FixedPoint) -> dict[str, Array]:

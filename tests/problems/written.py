@@ -47,5 +47,10 @@ def written(
     """Write the outputs; return the summary and the rows of the contact table."""
     write_outputs(solution, folder, figures)
     summary = json.loads((folder / "summary.json").read_text())
-    with (folder / "contact.csv").open() as file:
-        return summary, list(csv.DictReader(file))
+    return summary, rows_of(folder / "contact.csv")
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table, by the names of the columns."""
+    with path.open() as file:
+        return list(csv.DictReader(file))

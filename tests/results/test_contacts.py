@@ -1,6 +1,5 @@
 """Results of each contact, by its name."""
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from contact import parse_case, sensitivity, solve, write_outputs
 from contact.case.file import Case
 from contact.results import quantities as registry
 from contact.results.quantities import CONTACTS, Quantity
+from tests.problems.written import rows_of
 
 
 def between_plates(**more: Any) -> Case:
@@ -61,8 +61,7 @@ def test_they_stand_in_the_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert list(summary["contacts"]) == ["lid", "bottom"]
     assert summary["contacts"]["lid"]["force"] == pytest.approx(solution.contacts["lid"].force)
-    with (tmp_path / "steps.csv").open() as stream:
-        rows = list(csv.DictReader(stream))
+    rows = rows_of(tmp_path / "steps.csv")
     total = sum(float(row["dissipation_lid"]) for row in rows)
     assert summary["contacts"]["lid"]["dissipation"] == pytest.approx(total)
     assert float(rows[-1]["contact_force_y_lid"]) == pytest.approx(

@@ -1,6 +1,5 @@
 """What an evolution writes: a row a step, the contact nodes of all steps, fields with time."""
 
-import csv
 import json
 
 import numpy as np
@@ -15,6 +14,7 @@ from contact.solving import evolve
 from tests.problems.bar import changed
 from tests.problems.piezo import COUPLING, PERMITTIVITY
 from tests.problems.rigid import plate
+from tests.problems.written import rows_of
 
 SELF = MPI.COMM_SELF
 PRESS = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.2]}
@@ -28,11 +28,6 @@ def case_of(**changes):
     if given["load__0__amplitude"] is None:
         del given["load__0__amplitude"]
     return parse_case(changed(**given))
-
-
-def rows_of(path):
-    with path.open() as file:
-        return list(csv.DictReader(file))
 
 
 @pytest.mark.core

@@ -1,6 +1,5 @@
 """The script that compares the methods, on coarse meshes."""
 
-import csv
 from pathlib import Path
 
 import pytest
@@ -11,11 +10,7 @@ from scripts.cases import CASES
 from scripts.studies import agreement, branches
 from scripts.studies.agreement_examples import Example
 from scripts.studies.branches import AGREE, Branches
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open() as stream:
-        return list(csv.DictReader(stream))
+from tests.problems.written import rows_of
 
 
 @pytest.fixture(scope="module")
@@ -40,13 +35,13 @@ def test_block_relaxation_is_given_up_after_its_solves(monkeypatch, tmp_path):
     assert run.counters.linear_solves == 20
     assert not run.converged
     assert run.outcome.reason.startswith("given up: 20 solves")
-    (row,) = rows(tmp_path / "agreement.csv")
+    (row,) = rows_of(tmp_path / "agreement.csv")
     assert row["verdict"] == "not converged"
     assert row["uzawa's"] == "20"
 
 
 def test_newton_and_block_relaxation_agree_or_find_different_solutions(folder):
-    found = {row["example"]: row for row in rows(folder / "agreement.csv")}
+    found = {row["example"]: row for row in rows_of(folder / "agreement.csv")}
     assert len(found) == 8
     for name, row in found.items():
         assert max(float(row["newton"]), float(row["uzawa"])) <= 1e-10
@@ -62,7 +57,7 @@ def test_newton_and_block_relaxation_agree_or_find_different_solutions(folder):
 def test_both_methods_stay_at_each_other_s_solutions(folder):
     found = [
         row
-        for row in rows(folder / "agreement-branches.csv")
+        for row in rows_of(folder / "agreement-branches.csv")
         if {"newton", "uzawa"} & set(row["found by"].split(", "))
     ]
     assert len(found) >= 4
@@ -87,7 +82,7 @@ def test_a_foundation_that_moves_has_unknowns_of_its_own():
 
 
 def test_the_penalty_method_tends_to_a_solution(folder):
-    for row in rows(folder / "agreement-penalty.csv"):
+    for row in rows_of(folder / "agreement-penalty.csv"):
         assert row["converged"] == "True"
         assert float(row["eps 1e-7"]) < 1e-4
         if not row["example"].startswith("7.2"):

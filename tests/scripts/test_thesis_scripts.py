@@ -1,7 +1,5 @@
 """Scripts beside the thesis on coarse meshes: set-ups, stopping by (6.40), refinement, norms."""
 
-import csv
-
 import numpy as np
 import pytest
 
@@ -13,22 +11,18 @@ from scripts.studies import corner, pressure_convergence, refinement_8, sensitiv
 from scripts.studies.dual_norm import DualNorm
 from scripts.studies.hertz_exact import Line, Point
 from scripts.thesis import setups, stopping_8_3
-
-
-def rows(path):
-    with path.open() as stream:
-        return list(csv.DictReader(stream))
+from tests.problems.written import rows_of
 
 
 def test_constants_are_those_of_the_thesis(tmp_path):
     setups.constants(Report(tmp_path))
-    for row in rows(tmp_path / "table-8-1.csv"):
+    for row in rows_of(tmp_path / "table-8-1.csv"):
         assert float(row["case file by the thesis"]) == pytest.approx(1.0, abs=1e-5)
 
 
 def test_example_8_3_stops_after_two_iterations(tmp_path):
     stopping_8_3.main(["--coarse", "--out", str(tmp_path)])
-    found = rows(tmp_path / "stopping-8-3.csv")
+    found = rows_of(tmp_path / "stopping-8-3.csv")
     (honest,) = [r for r in found if r["case"] == "as printed" and "solved" in r["inner loop"]]
     assert [int(honest[key]) for key in list(honest)[2:5]] == [2, 2, 2]
     (early,) = [r for r in found if r["case"] == "as printed" and "0.25 E" in r["inner loop"]]
@@ -59,7 +53,7 @@ def test_the_dual_norm_of_a_pressure_is_the_energy_that_it_makes():
 
 def test_sensitivity(tmp_path):
     sensitivity.study(Report(tmp_path), "radius", coarse=True)
-    found = rows(tmp_path / "sensitivity-radius-table.csv")
+    found = rows_of(tmp_path / "sensitivity-radius-table.csv")
     assert {row["converged"] for row in found} == {"True"}
     assert (tmp_path / "sensitivity-radius.pdf").is_file()
 

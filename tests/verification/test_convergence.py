@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 import pytest
 from dolfinx import fem
@@ -21,6 +19,7 @@ from scripts.studies.fixed_point_rates import fixed_points, secant_rate
 from scripts.studies.grading import grade, pulled
 from scripts.thesis import figures_mechanics, table_7_2
 from tests.problems.mechanics import bar
+from tests.problems.written import rows_of
 
 
 def function(domain, degree, formula):
@@ -113,8 +112,7 @@ def test_known_solutions(tmp_path):
         if "Signorini" in label:
             low = np.array([1.8, 0.95 if degree == 1 else 1.3])
         assert np.all(orders > low), label
-    with (tmp_path / "known-solutions.csv").open() as stream:
-        assert all(float(row["residual"]) <= 1e-9 for row in csv.DictReader(stream))
+    assert all(float(row["residual"]) <= 1e-9 for row in rows_of(tmp_path / "known-solutions.csv"))
 
 
 def test_theorem_4_3(tmp_path):
@@ -126,8 +124,7 @@ def test_theorem_4_3(tmp_path):
 def test_rates_of_the_fixed_points(tmp_path):
     """Theorems 3.2 and 4.5: linear convergence, with friction or without."""
     rates = fixed_points(Report(tmp_path), coarse=True)
-    with (tmp_path / "fixed-point-rates.csv").open() as stream:
-        rows = {row["iteration"]: row for row in csv.DictReader(stream)}
+    rows = {row["iteration"]: row for row in rows_of(tmp_path / "fixed-point-rates.csv")}
     assert set(rows) == set(rates)
     for label, rate in rates.items():
         assert rate < 0.9
@@ -153,8 +150,7 @@ def test_theorem_4_2(tmp_path):
 @pytest.mark.slow
 def test_table_7_2(tmp_path):
     table_7_2.table(Report(tmp_path), 8)
-    with (tmp_path / "table-7-2.csv").open() as stream:
-        rows = list(csv.DictReader(stream))
+    rows = rows_of(tmp_path / "table-7-2.csv")
     assert [int(row["thesis"]) for row in rows] == [6, 9, 13, 14, 10, 14, 15, 16]
     assert all(float(row["residual of (PV_eps)"]) <= 1e-8 for row in rows)
     counts = [int(row["(4.38)"]) for row in rows]

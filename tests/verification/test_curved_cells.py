@@ -5,7 +5,6 @@ The exact solutions are Lame's: a ring that is pressed on a shaft, and two rings
 
 from __future__ import annotations
 
-import csv
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +35,7 @@ from scripts.reporting import Report
 from scripts.studies import cell_orders, curved_cells, round_bodies
 from scripts.studies.curved_cells import LAME, LAW, on_a_shaft, solved, supports, two_rings
 from scripts.studies.lame_rings import Lame, error, rings
+from tests.problems.written import rows_of
 
 COMM = MPI.COMM_WORLD
 NAMES = [shape.name for shape in SHAPES]
@@ -221,8 +221,7 @@ def test_known_contacts_on_moved_cells(tmp_path, monkeypatch) -> None:
     assert len(found) == 12
     for (_, _, _, degree), (displacement, _) in found.items():
         assert displacement > (1.6, 2.0)[degree - 1]
-    with (tmp_path / "known-contacts.csv").open() as file:
-        assert all(float(row["p in L2"]) < 0.017 for row in csv.DictReader(file))
+    assert all(float(row["p in L2"]) < 0.017 for row in rows_of(tmp_path / "known-contacts.csv"))
 
 
 def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:

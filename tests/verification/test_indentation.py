@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 import pytest
 
@@ -16,6 +14,7 @@ from scripts.reporting import Report
 from scripts.studies import half_space
 from scripts.studies.indentation import CURVATURE, Setting, extrapolated, units_and_poling
 from scripts.studies.indentation_figures import BALL, TIME, charges
+from tests.problems.written import rows_of
 
 #: Material -> E* insulating and conducting (GPa), |Q/P| of a grounded indenter (pC/N): published
 #: constants, computed independently of this code.
@@ -75,8 +74,7 @@ def test_pzt4(shape, potential):
 def test_poling_reversed_and_si_units(tmp_path):
     """Pressure is the same, potential and charge turn with the poling."""
     units_and_poling(Report(tmp_path), 4.0)
-    with (tmp_path / "units-and-poling.csv").open() as stream:
-        found = list(csv.DictReader(stream))
+    found = rows_of(tmp_path / "units-and-poling.csv")
     assert len(found) == 6
     for row in found:
         first = next(other for other in found if other["indenter"] == row["indenter"])

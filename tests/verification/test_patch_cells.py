@@ -8,8 +8,6 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.mesh.domain import revolved
-from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
@@ -20,7 +18,7 @@ from forms.hencky import Linear, Log
 from forms.j2 import J2
 from forms.laws import ConstantCoefficient
 from scripts.force_balance import force_balance
-from tests.problems.mechanics import Affine, constant
+from tests.problems.mechanics import Affine, constant, state_of
 from tests.problems.quadrilaterals import SHAPES, unit_block
 
 COMM = MPI.COMM_WORLD
@@ -38,13 +36,6 @@ def ground(dim: int) -> Plane:
     return Plane((0.0,) * dim, (*(0.0,) * (dim - 1), 1.0))
 
 
-def solve(problem: ContactProblem, tolerance: float = 1e-13, condense: bool = True):
-    newton = Newton(problem, NewtonOptions(tolerance=tolerance, condense=condense))
-    state, outcome = newton.solve()
-    assert outcome.converged, outcome
-    return state
-
-
 @pytest.mark.core(*(f"{kind}-dense" for kind in CORE))
 @pytest.mark.parallel
 @pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
@@ -59,7 +50,7 @@ def test_uniform_pressure(cell: str, degree: int, element: str, condense: bool) 
     problem = ContactProblem(
         domain, body, Contact("bottom", ground(dim)), degree=degree, element=element
     )
-    state = solve(problem, condense=condense)
+    state = state_of(problem, condense=condense)
     np.testing.assert_allclose(state.forces.pressure, 0.02, rtol=1e-12)
     stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(stress[:, 4 * (dim - 1)], -0.02, rtol=1e-10)
@@ -90,7 +81,7 @@ def test_constant_shear_under_stick(cell: str, degree: int, element: str) -> Non
     friction = Friction(ConstantCoefficient(2.0))
     body, contact = Body(law, fixed, loads), Contact("bottom", ground(dim))
     problem = ContactProblem(domain, body, contact, friction, degree=degree, element=element)
-    state = solve(problem, 1e-13)
+    state = state_of(problem, 1e-13)
     x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ gradient.T, rtol=0, atol=1e-12)
     vectors = state.forces.vectors(problem.nodes)
@@ -114,7 +105,7 @@ def test_discs_about_an_axis(degree: int, element: str, law: str) -> None:
     body = Body(laws[law], [Fixed("top", [None, constant(-0.02, 2)])])
     contact = Contact("bottom", ground(2))
     problem = ContactProblem(domain, body, contact, degree=degree, element=element)
-    state = solve(problem, 1e-12)
+    state = state_of(problem, 1e-12)
     assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
     stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(np.delete(stress, 4, axis=1), 0, atol=1e-10)

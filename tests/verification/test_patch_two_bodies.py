@@ -14,8 +14,6 @@ from contact.body.description import Body
 from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, revolved
 from contact.mesh.reader import from_file
-from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact
 from contact.model.friction import Friction
@@ -28,7 +26,7 @@ from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from scripts.force_balance import force_balance
 from tests.problems.blocks import Blocks, squares, write_unlike
-from tests.problems.mechanics import constant
+from tests.problems.mechanics import constant, state_of
 
 COMM = MPI.COMM_WORLD
 KINDS = [
@@ -69,13 +67,6 @@ def blocks(dim: int, **more) -> Blocks:
     return Blocks(dim, upper, lower, **more)
 
 
-def solve(problem: ContactProblem, tolerance: float = 1e-13, condense: bool = True):
-    newton = Newton(problem, NewtonOptions(tolerance=tolerance, condense=condense))
-    state, outcome = newton.solve()
-    assert outcome.converged, outcome
-    return state
-
-
 def contact(on: str, against: str, mu: float = 0.0) -> Contact:
     friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
     return Contact(on, NOTHING, friction=friction, against=against)
@@ -107,7 +98,7 @@ def check_constant_pressure(
     load = Load("top", pressure=constant(0.01, dim))
     body = Body(materials, fixed, [load])
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
-    state = solve(problem, condense=dense)
+    state = state_of(problem, condense=dense)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
     stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
     k = 4 * (dim - 1)
@@ -174,7 +165,7 @@ def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
     fixed, load = [Fixed("bottom", [None, zero])], Load("top", pressure=constant(0.01, 2))
     body = Body(materials, fixed, [load])
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
-    state = solve(problem)
+    state = state_of(problem)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-11)
     assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
     stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
@@ -216,7 +207,7 @@ def check_constant_stress(given: Blocks, degree: int, pair: Sequence[str]) -> No
     loads = [Load(part, constants(stress @ outward[part])) for part in ("top", *SIDES[dim])]
     body = Body(law, [Fixed("bottom", linear)], loads)
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
-    state = solve(problem, 1e-12)
+    state = state_of(problem, 1e-12)
     x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
     traction = -problem.nodes.normal @ stress
@@ -240,7 +231,7 @@ def test_a_rim_that_is_held_carries_no_multiplier(
     body = Body(law, fixed)
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
     # The rim has no jump of its own, and the gap of the others is that of the linear field.
-    state = solve(problem, 1e-12)
+    state = state_of(problem, 1e-12)
     x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
 
@@ -262,7 +253,7 @@ def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int, cell: str) 
     problem = ContactProblem(
         given.domain(COMM), Body(law, fixed, loads), contact("under", "over", 2.0), degree=degree
     )
-    state = solve(problem, 1e-12)
+    state = state_of(problem, 1e-12)
     x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
     vectors = state.forces.vectors(problem.nodes)
@@ -281,12 +272,12 @@ def test_matching_meshes_are_one_body(dim: int, degree: int, cell: str) -> None:
     two = ContactProblem(
         given.domain(MPI.COMM_SELF), body, contact("under", "over", 50.0), degree=degree
     )
-    state = solve(two, 1e-12)
+    state = state_of(two, 1e-12)
     assert (state.forces.pressure > 0).all()
     joined = given.joined(MPI.COMM_SELF)
     far = GapFunction(lambda points: np.full(len(points), 1e3))
     one = ContactProblem(joined, body, Contact("top", far), degree=degree)
-    alone = solve(one, 1e-12)
+    alone = state_of(one, 1e-12)
     spaces = [problem.equilibrium.space for problem in (two, one)]
     points, others = (space.tabulate_dof_coordinates()[:, :dim] for space in spaces)
     distance, nearest = cKDTree(others).query(points)
@@ -308,7 +299,7 @@ def test_a_chain_of_bodies(degree: int, condense: bool) -> None:
     fixed = [Fixed("bottom0", [None, zero]), *(Fixed(f"left{k}", [zero, None]) for k in range(3))]
     body = Body(materials, fixed, [Load("top2", pressure=constant(0.01, 2))])
     pairs = [contact("bottom1", "top0"), contact("bottom2", "top1")]
-    state = solve(ContactProblem(domain, body, pairs, degree=degree), condense=condense)
+    state = state_of(ContactProblem(domain, body, pairs, degree=degree), condense=condense)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
 
 
@@ -326,6 +317,6 @@ def test_a_corner_that_is_on_one_body_and_against_another(degree: int, condense:
     body = Body(Linear(1.0, 0.3), fixed, loads)
     pairs = [contact("bottom1", "top0"), contact("left2", "right1")]
     problem = ContactProblem(domain, body, pairs, degree=degree)
-    state = solve(problem, condense=condense)
+    state = state_of(problem, condense=condense)
     expected = np.where(np.abs(problem.nodes.normal[:, 0]) > 0.5, 0.02, 0.01)
     np.testing.assert_allclose(state.forces.pressure, expected, rtol=1e-12)

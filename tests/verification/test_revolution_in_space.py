@@ -1,7 +1,5 @@
 """The same ball as a body of revolution and as a quarter in space."""
 
-import csv
-
 import numpy as np
 import pytest
 
@@ -9,6 +7,7 @@ pytest.importorskip("gmsh")
 from contact import solve
 from scripts.studies import indentation_in_space
 from scripts.studies.indentation_in_space import ball, measured
+from tests.problems.written import rows_of
 
 
 def test_a_quarter_in_space_tends_to_the_body_of_revolution():
@@ -41,13 +40,11 @@ def test_a_piezoelectric_quarter_in_space_tends_to_the_body_of_revolution(conduc
 @pytest.mark.slow
 def test_the_tables(tmp_path):
     indentation_in_space.main(["--coarse", "--out", str(tmp_path)])
-    with (tmp_path / "in-space.csv").open() as stream:
-        rows = list(csv.DictReader(stream))
+    rows = rows_of(tmp_path / "in-space.csv")
     assert [row["mesh"] for row in rows] == 3 * ["half plane"] + 3 * ["space"]
     orders = [float(row[name]) for row in rows[2::3] for name in list(row)[2:]]
     assert min(orders) > 1.4
-    with (tmp_path / "tilted-punch.csv").open() as stream:
-        rows = list(csv.DictReader(stream))
+    rows = rows_of(tmp_path / "tilted-punch.csv")
     coarse, fine, far = (float(row["theta"]) for row in rows)
     assert coarse < fine < 1
     assert far == pytest.approx(fine, abs=0.005)

@@ -1,10 +1,9 @@
 """The script of Table 7.1 on a coarse mesh."""
 
-import csv
-
 import pytest
 
 from scripts.thesis import table_7_1
+from tests.problems.written import rows_of
 
 
 @pytest.mark.slow
@@ -20,8 +19,7 @@ def test_the_table(tmp_path, capsys):
         assert runs["converged"].square <= 9
         assert runs["single"].residual <= 1e-8
         assert runs["single"].solves < 0.5 * runs["converged"].solves
-    with (tmp_path / "table-7-1.csv").open() as stream:
-        rows = list(csv.DictReader(stream))
+    rows = rows_of(tmp_path / "table-7-1.csv")
     assert [int(row["thesis"]) for row in rows] == [3, 3, 4, 6, 5, 5, 6, 8]
     assert [int(row["to 1e-8"]) for row in rows] == [runs["converged"].outer for runs in found]
     assert "| f2 | rho | thesis |" in (tmp_path / "table-7-1.md").read_text()
