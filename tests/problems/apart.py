@@ -19,11 +19,7 @@ from tests.problems.meshes import assembled
 
 
 def blocks(comm: MPI.Intracomm, heights: Sequence[float] = (1.0, 3.0), n: int = 4) -> Domain:
-    """Return blocks of width 1, one at x = 0, one at x = 2 and so on, with n cells a length of 1.
-
-    Their parts are `bottom` and `held`, the sides on the left, of all of them; `top0`, `top1` and
-    so on are the tops of one each.
-    """
+    """Return blocks of width 1 at x = 0, 2, ...: `bottom`, `held` (left), `top0`, `top1`, ..."""
     points, cells = np.zeros((0, 2)), np.zeros((0, 3), dtype=np.int64)
     for k, height in enumerate(heights):
         corners = [[2.0 * k, 0.0], [2.0 * k + 1, height]]

@@ -194,15 +194,7 @@ def write_unlike(path: Path, upper: Blocks, lower: Blocks) -> None:
 
 
 def squares(comm: MPI.Intracomm, corners, cells) -> Domain:
-    """Return unit squares, each a region with its own mesh, in the plane.
-
-    Parameters
-    ----------
-    corners
-        The lower left corner of each.
-    cells
-        Cells along its edges. Regions are ``body0``, ..., parts ``left0``, ``top1``, ...
-    """
+    """Return unit squares by their lower left corners: regions `body0`, ..., parts `left0`, ..."""
     parts, blocks, count = [], [], 0
     for k, (corner, n) in enumerate(zip(corners, cells, strict=True)):
         x, own = Blocks(2)._block(n, np.random.default_rng(k))

@@ -31,10 +31,7 @@ LINEAR_TO_LIMIT, CONSTANT = Compliance(0.1), PotentialFactor(60.0)
 
 @dataclass(frozen=True)
 class LayerColumn:
-    """A column of height 4, held sideways, its top lowered by `push`.
-
-    The layer is touched at 0.1 and the rigid part at 0.3 (infinity: never).
-    """
+    """A column on a layer from 0.1 to 0.3, held sideways, its top lowered by `push`."""
 
     push: float
     piezo: bool = False

@@ -145,11 +145,7 @@ class SlidingBlock:
         degrees: float = 0.0,
         axis: Sequence[float] = (0.0, 1.0, 0.0),
     ) -> ContactProblem:
-        """Return the problem, turned together with its foundation.
-
-        In 3-D the plane of the motion is that of x and z; across it, the front and the back
-        are held in y where the axis of the rotation leaves y alone, else in all components.
-        """
+        """Return the problem, turned with its foundation; in 3-D front and back are held across."""
         q = turn(dim, degrees, axis)
         gradient = np.zeros((dim, dim))
         gradient[0, -1], gradient[-1, -1] = self.shear, -self.squeeze
@@ -177,11 +173,7 @@ def pressed_block(
     gap: float = 0.0,
     poisson: float = 0.3,
 ) -> ContactProblem:
-    """Return a block of height 1 under uniform pressure, on smooth walls on three sides.
-
-    The walls x = 0 and y = 0 hold the normal component, x = 1 and y = 1 are free. The top is
-    held by the load alone, and where there is a gap the foundation is met after it closes.
-    """
+    """Return a block of height 1 under uniform pressure, on smooth walls x = 0 and y = 0."""
     zero = constant(0.0, dim)
     if dim == 2:
         domain = rectangle(comm, [0.0, 0.0], [1.0, 1.0], [3, 4])

@@ -32,22 +32,7 @@ def layers(
     radii: Sequence[float] = RADII,
     counts: Sequence[int] = (4, 5),
 ) -> Domain:
-    """Return layers with the parts `inner0`, `outer0`, `inner1`, ... and the planes beside them.
-
-    Parameters
-    ----------
-    comm, cell, order
-        Communicator, shape of the cells, and the degree of their geometry.
-    form
-        "flat": blocks along x; "tube": the same, of revolution about x = 0; "ring": quarters of
-        rings, in 3-D of tubes.
-    depth
-        How far each layer but the first reaches into the one before.
-    radii
-        Ends of the layers before they are moved.
-    counts
-        Facets of each layer on a side; across it there are half as many cells.
-    """
+    """Return blocks ("flat"), revolved tubes ("tube") or rings ("ring"), `depth` in each other."""
     shape = Shape(cell)
     d, places, rows, count = shape.dim, [], [], 0
     for k, n in enumerate(counts):
@@ -92,10 +77,7 @@ def of_layer(domain: Domain, number: int) -> np.ndarray:
 
 
 def body(form: str, dim: int, layers: int, traction: float = 0.0) -> Body:
-    """Return the body: planes beside the layers are rollers, and flat layers held at their ends.
-
-    With a traction the last end of flat layers is pulled instead of held.
-    """
+    """Return the body between rollers; its end is held where no traction pulls at it."""
     across = {"below": 1, "above": 0 if form == "ring" else 1, "front": 2, "back": 2}
     held = list(across.items())[: 2 * dim - 2]
     last, loads = f"outer{layers - 1}", []
@@ -108,10 +90,7 @@ def body(form: str, dim: int, layers: int, traction: float = 0.0) -> Body:
 
 
 def pressure(form: str, depth: float, radii: Sequence[float] = RADII) -> float:
-    """Return the pressure on the first of two layers; of rings and tubes Lame's, in plane strain.
-
-    The second ring is drawn as deep within the first; both forces are equal.
-    """
+    """Return the pressure on the first of two layers; of rings Lame's, for the drawn radii."""
     a, c, b = radii
     if form == "flat":
         return UNIAXIAL * depth / (b - a)

@@ -60,11 +60,7 @@ def pzt(dim: int, units: Units = SCALED, scale: float = 1.0) -> Piezo:
 
 @dataclass(frozen=True)
 class Column:
-    """Closed form 2 of the specification, and 3 without coupling and load.
-
-    A column of height H, held sideways, pressed by p and set to the potential V0 on top, rests
-    on a conductive foundation.
-    """
+    """A column pressed by p, at the potential V0 on top, on a conductive foundation."""
 
     pressure: float = 80.0
     k_e: float = 0.0
@@ -151,10 +147,7 @@ def example(
     units: Units = SCALED,
     grounded: bool = True,
 ) -> ContactProblem:
-    """Return Example 8.1, or 8.2 with its law, or a block of 8 x 2 x 4 for three cell counts.
-
-    The bar is held and grounded at the left and carries the traction load * x on top.
-    """
+    """Return Example 8.1 under load * x on top, 8.2 with its law, or a block in space."""
     dim = len(cells)
     zero = constant(0.0, dim)
     traction = [zero] * (dim - 1) + [Affine((load * units.stress, *[0.0] * (dim - 1)))]

@@ -86,11 +86,7 @@ def homogeneous_values(solution, step=-1):
 
 
 def integrated(young, poisson, yield_stress, hardening, kinematic, free, driven):
-    """Return stress and equivalent plastic strain after steps of the first principal strain.
-
-    All equations of a backward Euler step in principal directions, solved at once by Powell's
-    method: strains of free directions, plastic strain, and all back stresses are unknowns.
-    """
+    """Return stress and plastic strain after steps of backward Euler, by Powell's method."""
     k, g, m, n = young / (3 - 6 * poisson), young / (2 + 2 * poisson), len(kinematic), len(free)
     scale = yield_stress / young
 

@@ -56,11 +56,7 @@ while line := comm.bcast(sys.stdin.readline() if comm.rank == 0 else None):
 def served(
     ranks: int = 1, seconds: float = 300, before: str = ""
 ) -> Iterator[Callable[..., tuple[int, str]]]:
-    """Start processes that run one command line after the other, after some Python.
-
-    Yields a function that runs one and returns its status and what it said. One that ends its
-    process gives the status of this, and the next fails. After so many seconds all are killed.
-    """
+    """Yield a function that runs a command line in a kept process: its status and what it said."""
     process = subprocess.Popen(
         [*_launch(ranks), sys.executable, "-c", SERVER.format(before=before)],
         env=environment(), text=True,

@@ -23,10 +23,7 @@ def shaken(points: Array, amount: float) -> Array:
 def unit_block(
     comm: MPI.Comm, cell: str, n: int = 3, amount: float = 0.3, low: float = 0.0
 ) -> Domain:
-    """Return a unit square or cube of n x n (x n) cells without a right angle, if so asked.
-
-    Its lowest side is at the height `low`.
-    """
+    """Return a unit square or cube of n x n (x n) distorted cells, from the height `low` on."""
     dim = 2 if cell in SHAPES[2] else 3
     make = rectangle if dim == 2 else box
     domain = make(comm, (0.0,) * dim, (1.0,) * dim, (n,) * dim, cell=cell)

@@ -83,10 +83,7 @@ class Tube:
 
 @dataclass(frozen=True)
 class Layers:
-    """Two tubes, one in the other, under an inner pressure; held outside, in plane strain.
-
-    Of one body with two materials, or of two bodies in contact whose meshes do not match.
-    """
+    """Two tubes, one in the other, under an inner pressure: one body of two materials, or two."""
 
     laws: tuple[Linear, Linear] = (Linear(1.0, 0.3), Linear(4.0, 0.2))
     radii: tuple[float, float, float] = (1.0, 1.5, 2.0)
@@ -154,11 +151,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class Drum:
-    """A solid cylinder r < 1, 0 < z < 1 with u_r = a r (1 + (z-1)^2), u_z = b z (3/2 - z).
-
-    The top presses on a rigid plate without friction: it is not sheared. Side and bottom follow
-    the displacement.
-    """
+    """A smooth cylinder r, z < 1 with u_r = a r (1 + (z-1)^2), u_z = b z (3/2 - z)."""
 
     law: Hencky = field(default_factory=lambda: Log(1.0, 0.3, yield_strain=0.06))
     a: float = 0.05
@@ -215,10 +208,7 @@ def pressed_cylinder(
 
 @dataclass(frozen=True)
 class PoledCylinder:
-    """A piezoelectric cylinder poled along its axis, lifted by u_z < 0 onto a plate; free side.
-
-    The fields are uniform: eps_r = eps_theta, eps_z, E_z.
-    """
+    """A cylinder poled along its axis, lifted by u_z < 0 onto a plate; its fields are uniform."""
 
     law: Linear
     piezo: Piezo

@@ -19,11 +19,7 @@ MODULI = {"ring": (0.44, 0.45), "plate": (0.68, 0.2), "lid": (9.8, 0.45)}
 
 
 def between_plates(comm: MPI.Intracomm, seed: int, around: int = 28) -> Domain:
-    """Return the mesh; angles of the ring's nodes are irregular, and so are its facets' normals.
-
-    Regions and parts are `plate`, `ring` and `lid`; `plate_bottom`, `plate_top`, `ring_outside`,
-    `ring_inside`, `lid_bottom` and `lid_top`.
-    """
+    """Return the mesh; the ring's facets are irregular. Parts are named as in `_named`."""
     rng = np.random.default_rng(seed)
     angle = -np.pi / 2 + 2 * np.pi * (np.arange(around) + rng.uniform(-0.2, 0.2, around)) / around
     angle[0] = -np.pi / 2  # touches the plate; opposite to it is a facet or a node beside the top
@@ -84,25 +80,7 @@ def squeezed(
     traction: tuple[float, float] | None = None,
     **solver: object,
 ) -> Case:
-    """Return the case: the lid goes down a little, both flat sides `against` the ring.
-
-    Parameters
-    ----------
-    method, solver
-        The method, and its options.
-    moduli
-        Young's modulus and Poisson's ratio of each region.
-    side
-        The part of the ring.
-    way
-        Displacement of the lid's top.
-    file
-        The mesh; None if it is given otherwise.
-    guided
-        Whether supports keep the ring from moving sideways and rolling.
-    traction
-        On the inside of the ring.
-    """
+    """Return the case: the lid goes down by -`way`, both flat sides `against` the ring."""
     tables: dict[str, Any] = {
         "material": [
             {"on": on, "young": young, "poisson": nu} for on, (young, nu) in moduli.items()

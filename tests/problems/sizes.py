@@ -13,10 +13,7 @@ DEGREE = 8
 
 
 def integral(domain, of=1.0, part=None, region=None):
-    """Return an integral over the body, a part or a region. Collective.
-
-    `of` is a number or a function of points, shape (d, ...), on a part also of unit normals.
-    """
+    """Return the integral of a number or function over a body, part or region. Collective."""
     shape = shape_of(domain.mesh)
     if part is None:
         cells = None if region is None else domain.cells(region)

@@ -26,10 +26,7 @@ class Between:
 
 @dataclass(frozen=True)
 class SteppedBlock:
-    """A block that sticks or slides through the steps: it slides as far as friction asks.
-
-    `block` is pressed by its squeeze at once; its push and slip are replaced by those of a step.
-    """
+    """A block, pressed at once, that sticks or slides through the steps."""
 
     block: SlidingBlock
     pushes: Sequence[float]
