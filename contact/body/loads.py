@@ -24,7 +24,7 @@ from contact.errors import InputError
 from contact.mesh.domain import Domain, compiled
 from contact.mesh.geometry import area
 from contact.model.body import Load
-from contact.model.fields import Amplitude, Field, Moving, at_time, constant
+from contact.model.fields import Factor, Field, Moving, at_time, constant
 from contact.model.formula import is_zero
 from contact.ranks import on_all_ranks
 from contact.tolerances import HUGE
@@ -87,7 +87,7 @@ def _check(domain: Domain, body: Body, load: Load, key: str) -> None:
 class _Share:
     """Loads with one amplitude: assembled once, or at each time where their values know it."""
 
-    amplitude: Amplitude
+    amplitude: Factor
     moving: bool
     terms: list[ufl.Form]
     vector: Array = default(default_factory=lambda: np.zeros(0))

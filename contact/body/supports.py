@@ -23,7 +23,7 @@ from contact.linear.layout import Inclined
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, on_axis
 from contact.mesh.geometry import facet_normals
-from contact.model.fields import Amplitude, Field, Moving, steady, values_at
+from contact.model.fields import Factor, Field, Moving, steady, values_at
 from contact.model.formula import Expression
 from contact.ranks import on_all_ranks
 from contact.tolerances import ROUNDING
@@ -60,7 +60,7 @@ class Support:
     """
 
     condition: fem.DirichletBC
-    amplitude: Amplitude
+    amplitude: Factor
     field: Field | Moving | None
     values: fem.Function
     dofs: NDArray[np.int32]
@@ -234,7 +234,7 @@ def _support(
     part: str,
     value: Field | Moving,
     scale: float,
-    amplitude: Amplitude,
+    amplitude: Factor,
     name: str,
 ) -> Support:
     """Return the support of a component on a part. Collective."""
@@ -308,7 +308,7 @@ class Roller:
     lift: Array
     slack: Array
     field: Field | Moving
-    amplitude: Amplitude
+    amplitude: Factor
     comm: MPI.Intracomm
 
     def given(self, time: float) -> Array:

@@ -25,7 +25,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from contact.mesh.domain import Measure
-from contact.model.fields import Amplitude
+from contact.model.fields import Factor
 from forms.hencky import FormLaw, secant_form
 from forms.history import QuadratureLaw
 from forms.kinematics import Strained
@@ -62,7 +62,7 @@ class Given(NamedTuple):
     value: Expr
     over: Measure
     on: str | None
-    amplitude: Amplitude
+    amplitude: Factor
     moving: bool
 
 

@@ -35,7 +35,7 @@ from contact.methods.options import OPTIONS, NewtonOptions, Options
 from contact.model.body import Bolt, Elastic, Electrode, Fixed, Load
 from contact.model.contact import Contact
 from contact.model.evolution import Evolution
-from contact.model.fields import CONSTANT, Amplitude, Ramp, steady
+from contact.model.fields import CONSTANT, Factor, Ramp, steady
 from contact.model.foundation import Electric
 from contact.model.friction import Friction
 from contact.model.material import Material
@@ -202,7 +202,7 @@ class Case(Section):
             return f"{key}.electric", contact.electric
         return "electric", self.electric
 
-    def amplitude(self, name: Amplitude | str | None) -> Amplitude | None:
+    def amplitude(self, name: Factor | str | None) -> Factor | None:
         """Return a factor of time by its name; for none growth over the first stage."""
         if callable(name):
             return name

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from contact.arguments import OfTime, one_of
 from contact.model.fields import (
-    Amplitude,
+    Factor,
     Field,
     FreeVector,
     GivenAmplitude,
@@ -126,7 +126,7 @@ class Fixed(Described):
         return {key: value for key, value in found.items() if value is not None}
 
     @property
-    def factor(self) -> Amplitude:
+    def factor(self) -> Factor:
         """The amplitude, also where none is given."""
         return amplitude_of(self.amplitude, knows_time([*self.given.values()]))
 
@@ -264,7 +264,7 @@ class Load(Described):
         return {name: field for name, field in given.items() if field is not None}
 
     @property
-    def factor(self) -> Amplitude:
+    def factor(self) -> Factor:
         """The amplitude, also where none is given."""
         return amplitude_of(self.amplitude, knows_time([*self.named.values()]))
 

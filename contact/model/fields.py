@@ -16,17 +16,17 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact import _compat
-from contact.arguments import OfTime, check_finite, expect, naming, real, shorten
+from contact.arguments import check_finite, expect, naming, real
 from contact.errors import InputError
 from contact.model.formula import Expression, InTime
 from contact.ranks import on_all_ranks
 from contact.typing import Array
 
 #: A factor as a function of time.
-Amplitude: TypeAlias = Callable[[float], float]
+Factor: TypeAlias = Callable[[float], float]
 
 #: An amplitude as it is given: "constant" for values that always act.
-GivenAmplitude: TypeAlias = Amplitude | Literal["constant"]
+GivenAmplitude: TypeAlias = Factor | Literal["constant"]
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ Static: TypeAlias = float | str | Callable[[Array], Array | float] | Expr | Fiel
 Scalar: TypeAlias = Static | Moving
 
 #: A number, a formula in t, or a function of time.
-GivenTimed: TypeAlias = float | str | Amplitude
+GivenTimed: TypeAlias = float | str | Factor
 
 #: A given vector, as `vector` takes it: its components, or one UFL expression of vectors.
 Vector: TypeAlias = Sequence[Scalar] | Array | Expr
@@ -98,26 +98,14 @@ def at_time(field: Field | Moving, time: float | fem.Constant) -> Field:
 CONSTANT = "constant"
 
 
-def own_amplitude(name: str, given: GivenAmplitude | None) -> Amplitude | None:
-    """Return a given function of time so that it says whose amplitude it is where it fails."""
-    if isinstance(given, str) and given == CONSTANT:
-        return steady
-    if not (given is None or callable(given)):
-        accepted = f'a function of time, such as lambda t: 2 * t, or "{CONSTANT}"'
-        raise InputError(f"given {shorten(repr(given))}; accepted: {accepted}", "value")
-    plain = given is None or given is steady or isinstance(given, Ramp)
-    made = given if plain else OfTime(cast(Amplitude, given), f"{name}: amplitude")
-    return cast(Amplitude | None, made)
-
-
-def amplitude_of(given: Amplitude | str | None, known: bool) -> Amplitude:
+def amplitude_of(given: Factor | str | None, known: bool) -> Factor:
     """Return the amplitude of values where none may be given: a `Ramp` by default.
 
     Of values some of which are `known` functions of time themselves it is `steady`.
     """
     if given is None or isinstance(given, Ramp):
         return steady if known else (given or Ramp())
-    assert not isinstance(given, str), "a case has exchanged the name for the function"
+    assert callable(given)  # a case has names, which `build_problem` exchanges
     return given
 
 

@@ -16,7 +16,7 @@ from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import area, volume
 from contact.model.body import ZERO
-from contact.model.fields import GivenAmplitude, GivenTimed, steady
+from contact.model.fields import GivenAmplitude, GivenTimed, amplitude_of
 from contact.model.formula import as_number
 from contact.model.section import Described, FactorOfTime, Timed
 from contact.settings import NonNegative, Positive, ReadWith, Switch
@@ -233,9 +233,8 @@ class Electric(Described):
         phi_f = as_number(self.phi_f)
         if isinstance(phi_f, float) and self.amplitude is None:
             return Conductor(psi, phi_f, truncation, self.lagged)
-        assert not isinstance(self.amplitude, str), "a case has exchanged the name for the function"
         # A foundation has its potential from the beginning.
-        factor, number = self.amplitude or steady, self.phi_f.number
+        factor, number = amplitude_of(self.amplitude, known=True), self.phi_f.number
 
         def phi_f_at(time: float) -> float:
             """Return the potential of the foundation at a time."""

@@ -17,7 +17,7 @@ from pydantic import (
 
 from contact.arguments import OfTime, expect
 from contact.model.body import ZERO
-from contact.model.fields import Amplitude, GivenAmplitude, GivenTimed, amplitude_of
+from contact.model.fields import Factor, GivenAmplitude, GivenTimed, amplitude_of
 from contact.model.formula import Expression, as_number
 from contact.model.section import (
     IN_PYTHON,
@@ -252,7 +252,7 @@ class Rigid(Motion):
 
 
 def numbers_at(
-    values: Sequence[float | OfTime | Expression | None], given: Amplitude | str | None, time: float
+    values: Sequence[float | OfTime | Expression | None], given: Factor | str | None, time: float
 ) -> Array:
     """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it."""
     known = any("t" in getattr(value, "names", ()) for value in values)

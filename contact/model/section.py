@@ -53,10 +53,10 @@ from pydantic_core import PydanticCustomError, PydanticOmit, core_schema
 from ufl.core.expr import Expr
 
 from contact import settings
-from contact.arguments import OfTime
+from contact.arguments import OfTime, shorten
 from contact.errors import InputError, shown
 from contact.mesh.domain import PART_ACCEPTED, part_name
-from contact.model.fields import Amplitude, Field, GivenAmplitude, Moving, own_amplitude
+from contact.model.fields import CONSTANT, Factor, Field, GivenAmplitude, Moving, Ramp, steady
 from contact.model.fields import field as given_field
 from contact.model.formula import Expression, of_time
 from contact.model.messages import accepted_by, describe, keys_of, table_fields, unknown
@@ -370,11 +370,17 @@ def _free_timed(given: Any, info: ValidationInfo) -> Expression | OfTime | Liter
 
 def _factor(given: Any, info: ValidationInfo) -> GivenAmplitude | str:
     """Return an amplitude: of a case file its name, in Python a function of time."""
-    if info.context == IN_PYTHON:
-        return cast(Amplitude, own_amplitude(_named(info), given))
-    if isinstance(given, str) and given:
-        return given
-    raise PydanticCustomError("amplitude", "amplitude")
+    if info.context != IN_PYTHON:
+        if isinstance(given, str) and given:
+            return given
+        raise PydanticCustomError("amplitude", "amplitude")
+    if given == CONSTANT:
+        return steady
+    if not callable(given):
+        accepted = f'a function of time, such as lambda t: 2 * t, or "{CONSTANT}"'
+        raise InputError(f"given {shorten(repr(given))}; accepted: {accepted}", "value")
+    plain = given is steady or isinstance(given, Ramp | OfTime)
+    return given if plain else OfTime(given, f"{_named(info)}: amplitude")
 
 
 def _named(info: ValidationInfo) -> str:
@@ -538,7 +544,7 @@ FreeTimed: TypeAlias = Annotated[
     WithJsonSchema(_FORMULA),
 ]
 FactorOfTime: TypeAlias = Annotated[
-    Amplitude | str,
+    Factor | str,
     PlainValidator(_factor),
     AMPLITUDE,
     Accepted('a name below evolution.amplitudes, or "constant"'),

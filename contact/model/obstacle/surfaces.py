@@ -221,8 +221,9 @@ class Triangles(Shape):
             assert self.file is not None  # one of both
             made = read_stl(self.file)
         else:
-            vertex = np.arange(self.corners.size // 3).reshape(-1, 3)
-            made = pyvista.PolyData.from_regular_faces(self.corners.reshape(-1, 3), vertex)
+            corners = self.corners.reshape(-1, 3).astype(np.float64)
+            vertex = np.arange(len(corners)).reshape(-1, 3)
+            made = pyvista.PolyData.from_regular_faces(corners, vertex)
         made = made.clean(tolerance=np.abs(made.points).max() / 2**20, absolute=True)
         a, b, c = made.points[made.regular_faces].swapaxes(0, 1)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
