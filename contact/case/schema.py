@@ -42,7 +42,13 @@ def schema() -> dict[str, Any]:
         tables[name]["additionalProperties"] = False  # pydantic says so of models alone
         for key, field in keys_of(section).items():
             tables[name]["properties"][key].setdefault("description", field.description)
-    return {"$schema": DIALECT, **made, "title": "Case file of contact-fenicsx"}
+    required = ["mesh", "material", *made["required"]]  # without objects of Python
+    return {
+        "$schema": DIALECT,
+        **made,
+        "required": required,
+        "title": "Case file of contact-fenicsx",
+    }
 
 
 def sections(above: type) -> dict[str, type]:
