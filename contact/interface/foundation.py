@@ -1,4 +1,4 @@
-"""The law of the foundation: layer and charge, beside the unilateral constraint and friction.
+"""Normal compliance and electrical contact, beside the unilateral constraint and friction.
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
@@ -57,7 +57,7 @@ class NormalGraph:
     gap: Array
 
     def layer(self, u_n: Array) -> Array:
-        """Return the pressure of the layer at normal displacements."""
+        """Return the pressure of the layer, by its law also where an iterate exceeds rho."""
         return self.stiffness * self.p_nu(u_n - self.touch)
 
     def layer_slope(self, u_n: Array) -> Array:
@@ -65,29 +65,29 @@ class NormalGraph:
         return self.stiffness * self.p_nu.derivative(u_n - self.touch)
 
     def pressure(self, z: Array, r: float) -> Array:
-        """Return P with (phi, P) on the graph and P + r phi = z: (3.43) with a layer.
+        """Return the resolvent of the maximal monotone graph: p(u_nu) with p + r u_nu = z.
 
-        It is unique for any r > 0 above the slope of a falling p_nu.
+        It is (3.43) with a layer, and unique for any r > 0 above the slope of a falling p_nu.
         """
         low, high = self.touch, np.minimum(self.gap, z / r)
-        phi, layer, steep = high, self.layer(high), self.layer_slope(high)
+        u_n, layer, steep = high, self.layer(high), self.layer_slope(high)
         free, rigid = z <= r * low, z - r * self.gap >= layer
         done = free | rigid
         # Newton's method in a bracket; every third sweep halves it, should Newton not.
         for sweep in range(90):
-            excess, slope = r * phi + layer - z, r + steep
-            # Below this the excess is rounding in phi.
-            rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(phi) + np.abs(self.touch)))
+            excess, slope = r * u_n + layer - z, r + steep
+            # Below this the excess is rounding in u_n.
+            rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(u_n) + np.abs(self.touch)))
             done |= np.abs(excess) <= rounding
             if np.all(done):
                 break
-            low, high = np.where(excess < 0, phi, low), np.where(excess > 0, phi, high)
-            newton = phi - excess / np.where(slope > 0, slope, r)
+            low, high = np.where(excess < 0, u_n, low), np.where(excess > 0, u_n, high)
+            newton = u_n - excess / np.where(slope > 0, slope, r)
             inside = (newton > low) & (newton < high) & (sweep % 3 < 2)
-            phi = np.where(done, phi, np.where(inside, newton, 0.5 * (low + high)))
-            layer, steep = self.layer(phi), self.layer_slope(phi)
+            u_n = np.where(done, u_n, np.where(inside, newton, 0.5 * (low + high)))
+            layer, steep = self.layer(u_n), self.layer_slope(u_n)
         # The layer's pressure is exact where it is small, the remainder where it is stiff.
-        pressed = np.where(steep < r, layer, z - r * phi)
+        pressed = np.where(steep < r, layer, z - r * u_n)
         return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
 
     def displacement(self, z: Array, r: float) -> Array:

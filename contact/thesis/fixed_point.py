@@ -4,7 +4,8 @@ An outer iteration freezes nonlinear terms (Kacanov's secant modulus, the fricti
 the frozen problem by an inner iteration, and evaluates the residuals: `OuterLoop`, of `uzawa` and
 of `penalty`. A loop that fails ends with its best iterate, by the thesis's rules with the last.
 
-Method `uzawa` has Algorithms 1, 4, 6 and 8, which differ in the frozen terms:
+Method `uzawa` has variants of Algorithms 1, 4, 6 and 8 (as printed with the options that
+docs/results.md names), which differ in the frozen terms:
 
 - Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
 - Algorithm 4, Problem (P~V): also psi, or all of the charge l where it is lagged.
@@ -32,14 +33,19 @@ from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads, s
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate, undeformed_equilibrium
 from contact.problem.state import State
-from contact.thesis.uzawa import augmentation, split, uzawa_block_relaxation
+from contact.thesis.uzawa import (
+    FrozenProblem,
+    augmentation,
+    displacement_and_slip,
+    uzawa_block_relaxation,
+)
 from contact.typing import Array
 
 #: Residual below which tangents take the place of frozen coefficients.
 NEAR = 1e-2
 
 #: Note of a step with a singular linear system.
-LOST = "the body has been moved to where nothing constrains it"
+LOST = "the linear system is singular: a rigid-body mode is unconstrained at this iterate"
 
 
 @dataclass
@@ -227,10 +233,10 @@ class FixedPoint(OuterLoop):
             # Secant at zero strain: prescribed values so far strain only the elements beside them.
             self.state, self._secant_at = problem.start(), problem.equilibrium.rest()
             stuck = sticking_bound(problem)
-            # Iteration 0 is the frictionless problem of the thesis: none with a bound that is
-            # updated in the relaxation, or with a mode that friction alone constrains.
+            # Iteration 0 is the frictionless problem of the thesis: not with single_loop, nor where
+            # friction alone constrains a rigid-body mode.
             first = 0 if frictional and not self.options.single_loop and stuck is None else 1
-            self._z = self._about(0.0, frictional and first > 0)
+            self._z = self._initial_z(0.0, frictional and first > 0)
             self.bound = np.zeros(interface.nodes.gap.size) if stuck is None else stuck
         else:
             self.state, first = start, 1
@@ -244,10 +250,10 @@ class FixedPoint(OuterLoop):
         outcome = self._iterate(first)
         return self.state, outcome
 
-    def _about(self, z: Array | float, friction: bool) -> Array:
+    def _initial_z(self, z: Array | float, friction: bool) -> Array:
         """Return z = lambda + r (u - u_0) of lambda + r u, with u_0 of the iterate."""
         nodal = self.problem.interface.nodes.apply(self.state.x)
-        return z - self.r * split(self.problem.interface, nodal, friction)
+        return z - self.r * displacement_and_slip(self.problem.interface, nodal, friction)
 
     def _step(self, iteration: int) -> tuple[int, str]:
         """Freeze, and solve by the Uzawa block relaxation."""
@@ -255,7 +261,7 @@ class FixedPoint(OuterLoop):
         friction, body = interface.friction.acts and iteration > 0, problem.equilibrium
         if friction and self._first == 0 and iteration == 1:
             # Slip and contact without friction are a bad initial guess.
-            self._z = self._about(0.0, friction)
+            self._z = self._initial_z(0.0, friction)
         state, nodal = self.state, interface.nodes.apply(self.state.x)
         blocks = augmentation(interface.nodes, self.r, friction)
         if interface.foundation.active:
@@ -265,18 +271,9 @@ class FixedPoint(OuterLoop):
         linearised_at = self._secant_at if kind == "secant" else state.x
         weighted = interface.weighted(blocks, state.x)
         self.operator.update(kind, replace(state, x=linearised_at), weighted, constant=body.linear)
+        frozen = FrozenProblem(problem, state, self._secant_at, self.bound, friction, self.r)
         result = uzawa_block_relaxation(
-            problem,
-            state,
-            self.operator,
-            self.bound,
-            friction,
-            self._secant_at,
-            self._z,
-            self.r,
-            self.options,
-            self._norm,
-            self.recorder.poll,
+            frozen, self.operator, self._z, self.options, self._norm, self.recorder.poll
         )
         self._stalled = result.stalled and not self._gap_derivative.included
         x = body.moved(state.x, result.increment)

@@ -1,15 +1,15 @@
 """Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
 
-One step solves for u, projects the auxiliary variables phi and updates the multipliers lambda,
-(3.34)-(3.36): the alternating direction method of multipliers. It is a fixed-point map of
-lambda + r u: its projection is the next multiplier, the remainder r phi. The variable is
-z = lambda + r (u - u_0), with u_0 of the outer iterate, against rounding of a small lambda beside a
-large slip.
+The augmented Lagrangian of (3.32), (3.33) has the auxiliary variables phi = (phi_c, phi_f) for
+u_nu and the slip, and their multipliers lambda. An iteration is
 
-It is accelerated by nonlinear GMRES over all solves so far. Affine combinations of forces and
-displacements in equilibrium are in equilibrium: only complementarity is nonlinear. The combination
-of least defect of complementarity costs no linear solve, and is the next iterate. With the right
-active set this is GMRES.
+- Step 1, (3.34): u of K u + r u = f + r phi - lambda (`FrozenProblem.displacement_load`),
+- Step 2, (3.44): phi, lambda + r u less its projection, over r,
+- Step 3, (3.36): lambda + r (u - phi), which is this projection (`FrozenProblem.project`).
+
+So the iteration is a fixed-point map of z = lambda + r u. Here u is u - u_0 with u_0 of the outer
+iterate, against rounding of a small lambda beside a large slip. It is accelerated
+(`contact.thesis.acceleration`). Numbers of equations are those of the thesis.
 
 References
 ----------
@@ -23,8 +23,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +33,6 @@ from contact.interface.complementarity import (
     project_disc,
     project_half_line,
 )
-from contact.interface.foundation import NormalGraph
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
@@ -46,149 +44,9 @@ from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
+from contact.thesis.acceleration import ResidualMinimiser
 from contact.tolerances import ROUNDING
 from contact.typing import Array
-
-#: Trial lengths: of a Gauss-Newton step, between two points, beyond the last one.
-DAMPED = 0.5 ** np.arange(5)
-BETWEEN = np.linspace(0, 1, 5)
-BEYOND = 2.0 ** np.arange(1, 21)
-
-#: Most Gauss-Newton steps of a search.
-SWEEPS = 20
-
-
-class ResidualMinimiser:
-    """Nonlinear GMRES for lambda = P(z), z = lambda + r u, with u affine in lambda.
-
-    Points are pairs (lambda, z), arrays of shape (2, m) with m values on this rank.
-
-    Parameters
-    ----------
-    inner
-        Global inner products: maps two matrices (m, k) and (m, l) of local values to the
-        (k, l) matrix of sums over all ranks.
-    project
-        P: the projections of z, the next contact forces, shape (..., m).
-    derivative
-        Maps z and directions, shape (m, k), to the directional derivatives of P, (m, k).
-    depth
-        Number of directions kept.
-
-    References
-    ----------
-    Washio and Oosterlee, Krylov subspace acceleration for nonlinear multigrid schemes,
-    Electron. Trans. Numer. Anal. 6 (1997); Walker and Ni, Anderson acceleration for
-    fixed-point iterations, SIAM J. Numer. Anal. 49 (2011).
-    """
-
-    def __init__(
-        self,
-        inner: Callable[[Array, Array], Array],
-        project: Callable[[Array], Array],
-        derivative: Callable[[Array, Array], Array],
-        depth: int,
-    ) -> None:
-        self._inner, self._project, self._derivative = inner, project, derivative
-        self._directions: deque[Array] = deque(maxlen=depth)
-        self._best: Array | None = None
-
-    def next(self, force: Array, z: Array, image: Array) -> Array:
-        """Return the next z. Collective.
-
-        Parameters
-        ----------
-        force, z
-            The last lambda and lambda + r u, shape (m,).
-        image
-            The next z of the plain relaxation.
-        """
-        new, old = np.stack([force, z]), self._best
-        if old is None:
-            self._best = new
-            return z
-        self._append(new - old)
-        # Without contact there is no slope: try points in between.
-        starts = [old + t * (new - old) for t in BETWEEN]
-        norms = self._defect_norms(starts)
-        first = int(np.argmin(norms))
-        point, norm = self._descend(starts[first], float(norms[first]))
-        if norm < (1 - 1e-9) * norms[0]:
-            self._best = point
-            return point[1]
-        beyond = self._beyond(old, new)
-        if beyond is not None:
-            self._best = beyond
-            return beyond[1]
-        # No descent: a plain step, which contracts.
-        self._directions.clear()
-        self._best = new
-        return image
-
-    def _defect(self, point: Array) -> Array:
-        return point[0] - self._project(point[1])
-
-    def _defect_norms(self, points: Sequence[Array]) -> Array:
-        """Return the norms of lambda - P(z) at several points."""
-        defects = self._defect(np.stack(points, axis=1)).T
-        return np.sqrt(np.maximum(np.diag(self._inner(defects, defects)), 0.0))
-
-    def _append(self, direction: Array) -> None:
-        """Add a direction, orthonormal in z to the others, unless it depends on them."""
-        length = self._norm(direction)
-        for _ in range(2):  # twice is enough, in spite of cancellation
-            if self._directions:
-                basis = np.stack(self._directions, axis=-1)
-                direction = direction - basis @ self._inner(basis[1], direction[1][:, None])[:, 0]
-        rest = self._norm(direction)
-        if rest > 1e-10 * length:
-            self._directions.append(direction * (1 / rest))
-
-    def _norm(self, direction: Array) -> float:
-        column = direction[1][:, None]
-        return float(np.sqrt(self._inner(column, column)[0, 0]))
-
-    def _descend(self, point: Array, norm: float) -> tuple[Array, float]:
-        """Minimise the residual over the directions by damped Gauss-Newton steps."""
-        if not self._directions:
-            return point, norm
-        basis = np.stack(self._directions, axis=-1)
-        for _ in range(SWEEPS):
-            slopes = basis[0] - self._derivative(point[1], basis[1])
-            load = self._inner(slopes, self._defect(point)[:, None])[:, 0]
-            step = -basis @ least_squares(self._inner(slopes, slopes), load)
-            trials = [point + t * step for t in DAMPED]
-            norms = self._defect_norms(trials)
-            k = int(np.argmin(norms))
-            if not norms[k] < (1 - 1e-6) * norm:
-                break
-            point, norm, old = trials[k], float(norms[k]), norm
-            if norm > 0.99 * old:
-                break
-        return point, norm
-
-    def _beyond(self, old: Array, new: Array) -> Array | None:
-        """Extend a step without change of the forces until they change; else None.
-
-        A body that contact alone constrains moves freely until it touches.
-        """
-        before, after = self._defect(old), self._defect(new)
-        changes = np.column_stack([after - before, after])
-        change, norm = np.sqrt(np.maximum(np.diag(self._inner(changes, changes)), 0.0))
-        if change > 1e-6 * norm:
-            return None
-        trials = [new, *(new + t * (new - old) for t in BEYOND)]
-        norms = self._defect_norms(trials)
-        level = (1 + 1e-6) * np.min(norms)
-        return trials[int(np.flatnonzero(norms <= level)[-1])]
-
-
-def least_squares(gram: Array, load: Array) -> Array:
-    """Solve the normal equations, without singular values below 1e-6: free motions."""
-    values, vectors = np.linalg.eigh(gram)
-    kept = values > 1e-12
-    return vectors[:, kept] @ ((vectors[:, kept].T @ load) / values[kept])
-
 
 logger = logging.getLogger("contact.inner")
 
@@ -211,7 +69,7 @@ def augmentation(nodes: ContactNodes, r: float, friction: bool) -> Array:
     return r * blocks
 
 
-def split(interface: Interface, nodal: Array, friction: bool) -> Array:
+def displacement_and_slip(interface: Interface, nodal: Array, friction: bool) -> Array:
     """Return normal displacement and slip, shape (n, 1 + d); slip 0 without friction."""
     parts = normal_and_tangential(interface.nodes, nodal, friction)
     parts[:, 1:] -= friction * interface.friction.history.jump
@@ -225,7 +83,7 @@ def normal_and_tangential(nodes: ContactNodes, nodal: Array, friction: bool) -> 
 
 
 @dataclass
-class Relaxed:
+class RelaxationResult:
     """End of a Uzawa block relaxation.
 
     Attributes
@@ -275,51 +133,90 @@ def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
 
 
 @dataclass
-class _Projection:
-    """Steps 2 and 3, from z, shape (..., n, 1 + d), to the multipliers: (3.43) and the disc.
+class FrozenProblem:
+    """The problem of one outer iteration: what Kacanov's method freezes, and the steps on it.
 
-    Attributes
+    Contact forces and jumps are arrays of normal and tangential parts, shape (n, 1 + d).
+
+    Parameters
     ----------
-    nodes, gap, r
-        The contact nodes, the gap of the constraint, and the augmentation parameter.
+    problem, state
+        The problem, and the iterate u_0 at which layer, charge and geometry are frozen.
+    secant_at
+        Unknowns of the secant modulus.
     bound
-        Friction bound, shape (n,).
-    law
-        Compliant layer in front of the rigid part, None without one; multipliers are then those of
-        the total pressure -sigma_nu.
-    origin
-        r u_0, shape (n, 1 + d).
+        Friction bound s_n, shape (n,).
+    friction
+        Whether there is friction.
+    r
+        Augmentation parameter (stress/length).
     """
 
-    nodes: ContactNodes
-    gap: Array
-    r: float
+    problem: ContactProblem
+    state: State
+    secant_at: Array
     bound: Array
-    law: NormalGraph | None
-    origin: Array
+    friction: bool
+    r: float
 
-    def __call__(self, z: Array) -> Array:
-        """Return the new multipliers."""
+    def __post_init__(self) -> None:
+        """Evaluate the loads and the layer at the iterate. Collective."""
+        interface, nodes = self.problem.interface, self.problem.interface.nodes
+        self.interface, self.nodes = interface, nodes
+        self.at = nodes.apply(self.state.x)
+        #: The layer, within the constraint; None without one.
+        self.layer = interface.foundation.normal_graph(self.at)
+        self.origin = self.r * displacement_and_slip(interface, self.at, self.friction)
+        residual = residual_forces(self.problem, self.state, self.secant_at)
+        contact = self.state.forces.vectors(nodes)
+        if self.layer is not None:
+            contact += interface.foundation.pressure(self.at)[:, None] * nodes.normal
+        self._add(-contact, residual)
+        self._load = -residual
+
+    def _add(self, forces: Array, to: Array) -> None:
+        """Add the nodal forces of stresses on Gamma_3, shape (n, d)."""
+        self.nodes.transpose(self.nodes.weight[:, None] * forces, to)
+
+    def displacement_load(self, multipliers: Array, z: Array) -> Array:
+        """Return the right-hand side of Step 1, f + r phi - lambda, with r phi = z - lambda."""
+        forces, load = 2 * multipliers - z, self._load.copy()
+        self._add(-(forces[:, :1] * self.nodes.normal + forces[:, 1:]), load)
+        return load
+
+    def augmented(self, moved: Array) -> Array:
+        """Return r (u - u_0) of jumps u - u_0, shape (n, block size)."""
+        return self.r * normal_and_tangential(self.nodes, moved, self.friction)
+
+    def project(self, z: Array) -> Array:
+        """Return lambda of Step 3, (3.43) and its like in the disc, of z, (..., n, 1 + d).
+
+        With a layer the normal one is the total pressure -sigma_nu.
+        """
         z = z + self.origin
-        if self.law is None:
-            pressure = project_half_line(z[..., 0] - self.r * self.gap)
+        if self.layer is None:
+            pressure = project_half_line(z[..., 0] - self.r * self.interface.gap)
         else:
             # Laws of users take one value per node.
             rows = z[..., 0].reshape(math.prod(z.shape[:-2]), z.shape[-2])
-            pressure = np.reshape([self.law.pressure(row, self.r) for row in rows], z.shape[:-1])
+            pressure = np.reshape([self.layer.pressure(row, self.r) for row in rows], z.shape[:-1])
         friction = project_disc(z[..., 1:], self.bound)
         return np.concatenate([pressure[..., None], friction], axis=-1)
 
-    def derivative(self, z: Array, directions: Array) -> Array:
-        """Return the derivatives of the multipliers along directions, shape (n, 1 + d, k)."""
+    def projection_derivative(self, z: Array, directions: Array) -> Array:
+        """Return the derivatives of `project` along directions, shape (n, 1 + d, k)."""
         z = z + self.origin
-        if self.law is None:
-            slope = np.where(z[:, 0] > self.r * self.gap, 1.0, 0.0)
+        if self.layer is None:
+            slope = np.where(z[:, 0] > self.r * self.interface.gap, 1.0, 0.0)
         else:
-            slope = self.law.pressure_slope(z[:, 0], self.r)
+            slope = self.layer.pressure_slope(z[:, 0], self.r)
         normal = slope[:, None, None] * directions[:, :1]
         tangential = disc_derivative(z[:, 1:], self.bound, directions[:, 1:])
         return np.concatenate([normal, tangential], axis=1)
+
+    def auxiliary(self, z: Array) -> Array:
+        """Return phi of Step 2, (3.44)."""
+        return (z + self.origin - self.project(z)) * (1 / self.r)
 
     def accelerator(self, depth: int, size: Array) -> ResidualMinimiser:
         """Return the acceleration of the flat z; `size`: unit of stresses, (n,)."""
@@ -330,118 +227,116 @@ class _Projection:
             return summed(nodes.comm, a.T @ (weights[:, None] * b))
 
         def project(flat: Array) -> Array:
-            return self(flat.reshape(*flat.shape[:-1], *shape)).reshape(flat.shape)
+            return self.project(flat.reshape(*flat.shape[:-1], *shape)).reshape(flat.shape)
 
         def derivative(flat: Array, directions: Array) -> Array:
             columns = directions.reshape(*shape, directions.shape[1])
-            return self.derivative(flat.reshape(shape), columns).reshape(directions.shape)
+            found = self.projection_derivative(flat.reshape(shape), columns)
+            return found.reshape(directions.shape)
 
         return ResidualMinimiser(inner, project, derivative, depth)
 
 
-def _residual(problem: ContactProblem, state: State, secant_at: Array, layer: bool) -> Array:
-    """Return the owned residual without multipliers and implicit layer. Collective."""
-    interface, nodes = problem.interface, problem.interface.nodes
-    residual, unknown = residual_forces(problem, state, secant_at), state.forces.vectors(nodes)
-    if layer:
-        pressure = interface.foundation.pressure(nodes.apply(state.x))
-        unknown += pressure[:, None] * nodes.normal
-    nodes.transpose(-nodes.weight[:, None] * unknown, residual)
-    return residual
+@dataclass
+class ThesisCriterion:
+    """The thesis's criterion (3.45), (5.38): relative change of (u, phi) in L2.
+
+    Attributes
+    ----------
+    frozen
+        The problem.
+    domain_norm
+        L2(Omega) norm of owned unknowns.
+    eps
+        Its tolerance.
+    """
+
+    frozen: FrozenProblem
+    domain_norm: Callable[[Array], float]
+    eps: float
+    last: tuple[Array, Array] | None = None
+
+    def __call__(self, increment: Array, phi: Array) -> tuple[bool, float | None]:
+        """Return whether it is met, and the relative change, None in the first iteration."""
+        before, self.last = self.last, (increment, phi)
+        if before is None:
+            return False, None
+        norm, nodal = self.domain_norm, self.frozen.nodes.norm
+        own = self.frozen.problem.equilibrium.owned_part(self.frozen.state.x)
+        change = norm(increment - before[0]) ** 2 + nodal(phi - before[1]) ** 2
+        size = norm(own + increment) ** 2 + nodal(phi) ** 2
+        return change < self.eps**2 * size, float(np.sqrt(change / size)) if size > 0 else 0.0
 
 
 def uzawa_block_relaxation(
-    problem: ContactProblem,
-    state: State,
+    frozen: FrozenProblem,
     operator: Operator,
-    bound: Array,
-    friction: bool,
-    secant_at: Array,
     z: Array,
-    r: float,
     options: FixedPointOptions,
     domain_norm: Callable[[Array], float] | None,
     poll: Callable[[], None],
-) -> Relaxed:
+) -> RelaxationResult:
     """Iterate Steps 1 to 3 of Algorithm 2 (5, 7, 9) on one frozen problem. Collective.
 
     Parameters
     ----------
-    problem, state
-        The problem, and the iterate at which it is frozen.
+    frozen
+        The problem.
     operator
         Factorised operator with `augmentation(nodes, r, friction)`.
-    bound
-        Friction bound s_n, shape (n,).
-    friction
-        Whether there is friction.
-    secant_at
-        Unknowns of the secant modulus.
     z
-        Initial lambda + r (u - u_0), shape (n, 1 + d), with u_0 of the iterate.
-    r, options
-        Augmentation parameter (stress/length), and the options.
+        Initial lambda + r (u - u_0), shape (n, 1 + d).
+    options
+        The options.
     domain_norm
-        L2(Omega) norm of owned unknowns, for the thesis's criterion (3.45); None for residuals.
+        L2(Omega) norm of owned unknowns, for the thesis's criterion; None for residuals.
     poll
         Called before each iteration, on all ranks.
     """
-    interface, nodes = problem.interface, problem.interface.nodes
-    at, own = nodes.apply(state.x), problem.equilibrium.owned_part(state.x)
-    law = interface.foundation.normal_graph(at)
-    constant = -_residual(problem, state, secant_at, law is not None)
-    origin = r * split(interface, at, friction)
-    project = _Projection(nodes, interface.gap, r, bound, law, origin)
+    interface, nodes = frozen.interface, frozen.nodes
     accelerated, over = options.acceleration == "anderson", options.relaxation
     accelerator: ResidualMinimiser | None = None
     stress_unit: Array = np.ones_like(nodes.weight)
-    last: tuple[Array, Array] | None = None
+    criterion = None if domain_norm is None else ThesisCriterion(frozen, domain_norm, options.eps)
     rtol = max(SHARE * options.inner, ROUNDING)
-    increment: Array = np.zeros(own.size)
+    increment: Array = np.zeros(frozen.problem.equilibrium.owned)
     stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
     for iteration in range(1, options.max_inner + 1):
         poll()
         # Tangential again: rounding along the normal would be amplified by the acceleration.
         z[:, 1:] = nodes.tangential_component(z[:, 1:])
-        multiplier = project(z)
-        q = 2 * multiplier - z
-        rhs = constant.copy()
-        vectors = q[:, :1] * nodes.normal + q[:, 1:]
-        nodes.transpose(-nodes.weight[:, None] * vectors, rhs)
-        increment = operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
+        # Steps 2 and 3 of the last solve, then Step 1.
+        multipliers = frozen.project(z)
+        load = frozen.displacement_load(multipliers, z)
+        increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.apply(increment)
-        nodal = at + moved
-        augmented_jump = r * normal_and_tangential(nodes, moved, friction)
-        # q + r (u - u_0) is the contact force of this solve.
-        total = q + augmented_jump
+        nodal, r_u = frozen.at + moved, frozen.augmented(moved)
+        # The contact force of this solve, in equilibrium with u.
+        force = 2 * multipliers - z + r_u
         if iteration == 1:
-            stress_unit = interface.component_norms(total)
-        layer = 0.0 if law is None else law.layer(nodes.normal_component(nodal))
-        forces = Multipliers.of(nodes, total[:, 0] - layer, total[:, 1:])
-        if options.single_loop and friction:
-            project.bound = interface.bound(nodal, forces)
-        residual = float(interface_residuals(interface, nodal, forces, project.bound)[0].max())
+            stress_unit = interface.component_norms(force)
+        layer: Array | float = 0.0
+        if frozen.layer is not None:
+            layer = frozen.layer.layer(nodes.normal_component(nodal))
+        forces = Multipliers.of(nodes, force[:, 0] - layer, force[:, 1:])
+        if options.single_loop and frozen.friction:
+            frozen.bound = interface.bound(nodal, forces)
+        residual = float(interface_residuals(interface, nodal, forces, frozen.bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
-        image = multiplier + (1 - over) * (z - multiplier) + over * augmented_jump
+        plain = multipliers + (1 - over) * (z - multipliers) + over * r_u
         done = residual <= options.inner or not np.isfinite(residual)
         # The residual is small before contact, the defect of the fixed point is not.
-        defect = nodes.norm((total - project(total + augmented_jump)) / stress_unit[:, None])
-        if domain_norm is not None:
-            phi: Array = (image + origin - project(image)) * (1 / r)
-            before, done = last, False
-            last = increment, phi
-            if before is not None:
-                change = domain_norm(increment - before[0]) ** 2 + nodes.norm(phi - before[1]) ** 2
-                size = domain_norm(own + increment) ** 2 + nodes.norm(phi) ** 2
-                done = change < options.eps**2 * size
-                defect = float(np.sqrt(change / size)) if size > 0 else 0.0
+        defect = nodes.norm((force - frozen.project(force + r_u)) / stress_unit[:, None])
+        if criterion is not None:
+            done, change = criterion(increment, frozen.auxiliary(plain))
+            defect = defect if change is None else change
         stalled = not done and stagnation(defect)
         if done or stalled:
-            return Relaxed(increment, forces, image - augmented_jump, iteration, stalled)
-        z = image
+            return RelaxationResult(increment, forces, plain - r_u, iteration, stalled)
+        z = plain
         if accelerated:
             if accelerator is None:
-                accelerator = project.accelerator(options.depth, stress_unit)
-            newest = (total + augmented_jump).ravel()
-            z = accelerator.next(total.ravel(), newest, image.ravel()).reshape(z.shape)
-    return Relaxed(increment, forces, z - augmented_jump, options.max_inner)
+                accelerator = frozen.accelerator(options.depth, stress_unit)
+            newest = (force + r_u).ravel()
+            z = accelerator.next(force.ravel(), newest, plain.ravel()).reshape(z.shape)
+    return RelaxationResult(increment, forces, z - r_u, options.max_inner)

@@ -1,11 +1,15 @@
 """What an iteration of the block relaxation is made of: projections and their acceleration."""
 
+from functools import partial
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from contact.interface.complementarity import project_disc, project_half_line
 from contact.interface.foundation import NormalGraph
-from contact.thesis.uzawa import ResidualMinimiser, _Projection, disc_derivative
+from contact.thesis.acceleration import ResidualMinimiser
+from contact.thesis.uzawa import FrozenProblem, disc_derivative
 from forms.laws import Compliance
 
 
@@ -77,7 +81,11 @@ def test_several_points_are_projected_as_one_after_the_other(nodes, layer):
     rng = np.random.default_rng(1)
     gap = np.full(nodes, 0.5)
     law = NormalGraph(Compliance(2.0), np.ones(nodes), 0 * gap, gap) if layer else None
-    project = _Projection(None, gap, 3.0, np.full(nodes, 0.4), law, np.zeros((nodes, 3)))
+    frozen = SimpleNamespace(
+        layer=law, r=3.0, origin=np.zeros((nodes, 3)), bound=np.full(nodes, 0.4),
+        interface=SimpleNamespace(gap=gap),
+    )  # fmt: skip
+    project = partial(FrozenProblem.project, frozen)
     points = rng.normal(size=(5, nodes, 3))
     found = project(points)
     assert found.shape == points.shape
