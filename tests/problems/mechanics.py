@@ -164,15 +164,7 @@ class SlidingBlock:
         )
 
 
-def pressed_block(
-    comm: MPI.Comm,
-    dim: int,
-    degree: int = 1,
-    *,
-    pressure: float = 0.02,
-    gap: float = 0.0,
-    poisson: float = 0.3,
-) -> ContactProblem:
+def pressed_block(comm: MPI.Comm, dim: int, degree: int = 1, *, gap: float = 0.0) -> ContactProblem:
     """Return a block of height 1 under uniform pressure, on smooth walls x = 0 and y = 0."""
     zero = constant(0.0, dim)
     if dim == 2:
@@ -182,7 +174,7 @@ def pressed_block(
         domain = box(comm, [0.0] * 3, [1.0] * 3, [2, 3, 2])
         fixed = [Fixed("left", [zero, None, None]), Fixed("front", [None, zero, None])]
     plane = Plane((0.0,) * (dim - 1) + (-gap,), (0.0,) * (dim - 1) + (1.0,))
-    body = Body(Linear(1.0, poisson), fixed, [Load("top", pressure=constant(pressure, dim))])
+    body = Body(Linear(1.0, 0.3), fixed, [Load("top", pressure=constant(0.02, dim))])
     return ContactProblem(domain, body, Contact("bottom", plane), degree=degree)
 
 

@@ -1,4 +1,4 @@
-"""Patch test: a block under uniform pressure rests on a plane with exactly that pressure."""
+"""Contact nodes of regular meshes: their areas, normals, and what supports leave of them."""
 
 import numpy as np
 import pytest
