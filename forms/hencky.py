@@ -19,7 +19,7 @@ from ufl.core.expr import Expr
 from forms.elasticity import Anisotropic, moduli
 from forms.history import HistoryLaw, QuadratureLaw
 from forms.kinematics import CARTESIAN, Strained, deviator_squared, embed, strain
-from forms.ops import Value, is_symbolic, log, maximum, sqrt
+from forms.ops import Value, log, maximum, sqrt
 
 
 class Hencky(Protocol):
@@ -212,33 +212,21 @@ class UserLaw(Isotropic):
     modulus: Callable[[Value], Value] = field(kw_only=True)
 
     def __post_init__(self) -> None:
-        """Refuse constants that UFL cannot take, before they stand in a form."""
-        accepted = (
-            "accepted: a function of t = |dev eps| by arithmetic and the functions of forms.ops, "
-            "for UFL and NumPy alike"
-        )
-        small = ufl.variable(ufl.as_ufl(1e-3))
+        """Refuse functions without a scalar of UFL, or without a number at t = 0."""
         try:
-            found = self.modulus(small)
+            form = ufl.as_ufl(self.modulus(ufl.variable(ufl.as_ufl(1e-3))))
             with np.errstate(all="ignore"):
-                start = self.secant_modulus(np.zeros(1))
+                start = np.asarray(self.secant_modulus(np.zeros(1)), dtype=float)
+            found = f"returns {start} at t = 0, and UFL of shape {form.ufl_shape}"
+            fits = form.ufl_shape == () and start.size == 1 and bool(np.isfinite(start).all())
         except Exception as error:
+            found, fits = f"raises {type(error).__name__}: {error}", False
+        if not fits:
             raise ValueError(
-                f"UserLaw: modulus: the function raises {type(error).__name__}: {error}; {accepted}"
-            ) from error
-        kinds = int | float | np.number
-        scalar = isinstance(found, kinds) or getattr(found, "ufl_shape", None) == ()
-        if is_symbolic(start):
-            raise ValueError(
-                f"UserLaw: modulus: the function returns {start!r} for a number; {accepted}; a "
+                f"UserLaw: modulus: the function {found}; accepted: one finite number at each "
+                "t = |dev eps| >= 0, by arithmetic and forms.ops for UFL and NumPy alike; a "
                 "modulus that varies in the body is Material(law, factor=...)"
             )
-        given = np.asarray(start).dtype.kind in "iuf"
-        if not (scalar and given and np.shape(start) in ((), (1,))):
-            raise ValueError(f"UserLaw: modulus: the function returns {found!r}; {accepted}")
-        if not np.isfinite(start).all():
-            start = float(np.mean(start))
-            raise ValueError(f"UserLaw: modulus: {start} without strain; accepted: finite values")
 
     def secant_modulus(self, q: Value) -> Value:
         """Return g(sqrt(q)), kept away from the kink of the square root at q = 0."""

@@ -95,7 +95,7 @@ class ComponentNorms:
     def apart(self) -> Subsystems | None:
         """Connected components as uncoupled subsystems; None for one."""
         of = np.repeat(self.component, self.block_size)
-        return Subsystems(self.comm, of, self.count) if self.count > 1 else None
+        return (of, self.count) if self.count > 1 else None
 
     def norms(self, values: Array) -> Array:
         """Return the norms of forces, and of charges if any, shape (1 or 2, k). Collective."""

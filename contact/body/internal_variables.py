@@ -1,8 +1,8 @@
 """Laws with internal variables at quadrature points: their stresses, and the history of a body.
 
 A `forms.history.HistoryLaw` maps strains at the end of a step and variables at its beginning to
-stresses and stiffness, functions at the quadrature points that forms contain. Its responses, of
-laws built in or a user's own, are checked.
+stresses and stiffness, functions at the quadrature points that forms contain. Names and shapes of
+its responses are checked once, at small strains.
 """
 
 from __future__ import annotations
@@ -79,43 +79,46 @@ def first_values(law: HistoryLaw, size: int) -> dict[str, Array]:
 
 
 def respond(
-    law: HistoryLaw, strain: Array, variables: Mapping[str, Array], kind: str = ""
+    law: HistoryLaw,
+    strain: Array,
+    variables: Mapping[str, Array],
+    kind: str = "",
+    check: bool = False,
 ) -> Response:
-    """Return `HistoryLaw.respond` of a law at n points, checked, with the stiffness of `kind`."""
-    place, (n, size) = f"{name_of(law)}: respond", strain.shape
-    with naming(place):
+    """Return `HistoryLaw.respond` of a law at n points, with the stiffness of `kind`."""
+    with naming(f"{name_of(law)}: respond"):
         found = law.respond(strain, variables, kind)
-        _returned(found, "a Response(stress, variables, ...)", isinstance(found, Response))
-    with naming(f"{place}: variables"):
-        given = [*found.variables] if isinstance(found.variables, Mapping) else found.variables
-        fits = isinstance(given, list) and {*given} == variables.keys()
-        _returned(given, f"a mapping with the names {[*variables]}", fits)
+        if check:
+            _check_response(found, strain, variables)
+        return with_stiffness(law, strain, variables, kind, found)
+
+
+def _returned(given: object, accepted: str, fits: bool, part: str = "") -> None:
+    """Refuse a returned value unless it fits, inside `naming`."""
+    if not fits:
+        raise Returned(f"{part}the function returns {shorten(repr(given))}; accepted: {accepted}")
+
+
+def _check_response(found: object, strain: Array, variables: Mapping[str, Array]) -> None:
+    """Refuse all but a response with the same variables, and real arrays of n rows."""
+    n, size = strain.shape
+    _returned(found, "a Response(stress, variables, ...)", isinstance(found, Response))
+    assert isinstance(found, Response)
+    given = [*found.variables] if isinstance(found.variables, Mapping) else found.variables
+    fits = isinstance(given, list) and {*given} == variables.keys()
+    _returned(given, f"a mapping with the names {[*variables]}", fits, "variables: ")
     shapes = {"stress": (n, size), "stiffness": (n, size, size)} | dict.fromkeys(ENERGIES, (n,))
     parts = [(name, getattr(found, name), shape) for name, shape in shapes.items()]
     parts += [(repr(name), found.variables[name], had.shape) for name, had in variables.items()]
     for name, value, shape in parts:
         if value is None and name in OPTIONAL:
             continue
-        with naming(f"{place}: {name}"):
-            _check_array(value, shape)
-    with naming(place):
-        return with_stiffness(law, strain, variables, kind, found)
-
-
-def _returned(given: object, accepted: str, fits: bool) -> None:
-    """Refuse a returned value unless it fits, inside `naming`."""
-    if not fits:
-        raise Returned(f"the function returns {shorten(repr(given))}; accepted: {accepted}")
-
-
-def _check_array(given: object, shape: tuple[int, ...]) -> None:
-    """Refuse all but real arrays of a shape, inside `naming`."""
-    accepted = f"an array of real numbers of shape {shape}, a row per point"
-    _returned(given, accepted, isinstance(given, np.ndarray))
-    assert isinstance(given, np.ndarray)
-    if given.dtype.kind not in "biuf" or given.shape != shape:
-        shown = f"values of shape {given.shape} ({given.dtype})"
-        raise Returned(f"the function returns {shown}; accepted: {accepted}")
+        shown, fits = value, False
+        if isinstance(value, np.ndarray):
+            shown = f"values of shape {value.shape} ({value.dtype})"
+            fits = value.dtype.kind in "biuf" and value.shape == shape
+        accepted = f"an array of real numbers of shape {shape}, a row per point"
+        _returned(shown, accepted, fits, f"{name}: ")
 
 
 def check_law(law: HistoryLaw, size: int, comm: MPI.Intracomm) -> None:
@@ -134,7 +137,7 @@ def check_law(law: HistoryLaw, size: int, comm: MPI.Intracomm) -> None:
     }
     with on_all_ranks(comm), np.errstate(all="ignore"):
         for kind in ("", "tangent", "secant"):
-            found = respond(law, strain, variables, kind)
+            found = respond(law, strain, variables, kind, check=True)
             for name in ("stress", *OPTIONAL):
                 if (values := getattr(found, name)) is not None:
                     with naming(f"{name_of(law)}: respond: {name}"):

@@ -12,7 +12,6 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.la import InsertMode
-from mpi4py import MPI
 from ufl.constantvalue import ScalarValue
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import traverse_unique_terminals
@@ -27,7 +26,6 @@ from contact.model.body import Load
 from contact.model.fields import Factor, Field, Moving, at_time, constant
 from contact.model.formula import is_zero
 from contact.ranks import on_all_ranks
-from contact.tolerances import HUGE
 from contact.typing import Array
 
 
@@ -48,18 +46,18 @@ def given_loads(domain: Domain, body: Body, time: fem.Constant) -> Mapping[str, 
         vectors: dict[tuple[str, bool], list[Expr]] = {}
         for name, field in load.named.items():
             value = expression(domain, field, x, time, f"load.{number}.{name}")
-            moving, (key, *component) = isinstance(field, Moving), name.split(".")
+            varies, (key, *component) = isinstance(field, Moving), name.split(".")
             if not component:
-                found[key].append(Given(value, over, load.on, load.factor, moving))
+                found[key].append(Given(value, over, load.on, load.factor, varies))
                 continue
             none = [constant(domain.mesh, 0.0) for _ in range(domain.dim)]
-            vectors.setdefault((key, moving), none)[int(component[0])] = value
-        for (key, moving), values in vectors.items():
+            vectors.setdefault((key, varies), none)[int(component[0])] = value
+        for (key, varies), values in vectors.items():
             vector = ufl.as_vector(values)
             if key == "force":
                 assert load.on is not None
                 key, vector = "traction", vector / constant(domain.mesh, area(domain, load.on))
-            found[key].append(Given(vector, over, load.on, load.factor, moving))
+            found[key].append(Given(vector, over, load.on, load.factor, varies))
     return found
 
 
@@ -85,10 +83,10 @@ def _check(domain: Domain, body: Body, load: Load, key: str) -> None:
 
 @dataclass
 class _Share:
-    """Loads with one amplitude: assembled once, or at each time where their values know it."""
+    """Loads with one amplitude: assembled once, or at each time where their values depend on it."""
 
     amplitude: Factor
-    moving: bool
+    time_dependent: bool
     terms: list[ufl.Form]
     vector: Array = default(default_factory=lambda: np.zeros(0))
     time: float = np.nan
@@ -119,20 +117,20 @@ class Loads:
         for form, load in residual:
             if load is None:
                 continue
-            kind = load.amplitude, load.moving
-            share = next((s for s in self._shares if (s.amplitude, s.moving) == kind), None)
+            kind = load.amplitude, load.time_dependent
+            share = next((s for s in self._shares if (s.amplitude, s.time_dependent) == kind), None)
             if share is None:
                 self._shares.append(_Share(*kind, [form]))
             else:
                 share.terms.append(form)
 
     def at(self, time: float) -> Array:
-        """Return the owned nodal loads at a time. Collective where loads know the time."""
+        """Return the owned nodal loads at a time. Collective where loads depend on it."""
         if self._last is not None and self._last[0] == time:
             return self._last[1]
         total = np.zeros(self._owned)
         for share in self._shares:
-            if np.isnan(share.time) or (share.moving and share.time != time):
+            if np.isnan(share.time) or (share.time_dependent and share.time != time):
                 self._time.value = time
                 share.vector = np.sum([assembled(f, self._owned) for f in share.forms], axis=0)
                 share.time = time
@@ -174,20 +172,3 @@ def expression(
         if isinstance(found, ScalarValue | ufl.classes.Zero):
             return constant(domain.mesh, float(found))
         return found
-
-
-def to_blame(loads: Sequence[Load], domain: Domain, time: float = 1.0) -> str:
-    """Return the key of the first load whose integral is not finite, or too large. Collective.
-
-    Where none is, for the quadrature meets other points with the test functions, the answer is
-    ``load``.
-    """
-    x = ufl.SpatialCoordinate(domain.mesh)
-    for i, load in enumerate(loads):
-        measure = domain.dx if load.on is None else domain.ds(load.on)
-        for name, field in load.named.items():
-            form = compiled(expression(domain, field, x, time, f"load.{i}.{name}") * measure)
-            value = domain.comm.allreduce(float(fem.assemble_scalar(form)), op=MPI.SUM)
-            if not abs(value) <= HUGE:
-                return f"load.{i}.{name}"
-    return "load"

@@ -7,8 +7,9 @@ that vanish where displacements and potentials are prescribed,
             = -int_Gamma_3 ((lambda_c + p_l) v_nu + lambda_f . v_tau - (D.nu) xi),
 
 with the pressure p_l of a layer. The first line is of this module, the second of
-`contact.interface`. That is (10) of docs/theory.md, and (5.26) of the thesis, without a potential
-(3.9): the test function of the potential is negated, so that the derivative of r is symmetric.
+`contact.interface`. That is (10) of docs/theory.md and [T 5.26], without a potential [T 3.9], where
+[T n] is equation (n) of the thesis; the test function of the potential is negated, so that the
+derivative of r is symmetric.
 Loads are negative terms: r = <F(x), z> - <f, z>. Stresses are those of `forms`.
 
 Measures, fields and laws in UFL are made by `contact.body.materials` and `contact.body.loads`;
@@ -57,13 +58,13 @@ class ElasticSupport(NamedTuple):
 
 
 class Given(NamedTuple):
-    """A given load: a vector or a number, measure, part, factor; and if the value knows time."""
+    """A given load: vector or number, measure, part, factor; whether the value depends on time."""
 
     value: Expr
     over: Measure
     on: str | None
     amplitude: Factor
-    moving: bool
+    time_dependent: bool
 
 
 class Term(NamedTuple):
@@ -119,7 +120,10 @@ class WeakForm:
     def internal_forces(
         self, x: Fields, z: Fields, secant_at: Expr | None, history_at: Expr | None
     ) -> list[Term]:
-        """Return int_Omega sigma : eps(v) + D . grad(xi) dx, equations (1), (4); (3.10), (5.27)."""
+        """Return int_Omega sigma : eps(v) + D . grad(xi) dx, [T 3.10, 5.27].
+
+        With the laws (1) and (4) of docs/theory.md.
+        """
         terms = []
         for law, piezo, strains, dx in self.solids:
             u_0 = history_at if isinstance(law, QuadratureLaw) else secant_at
@@ -143,12 +147,12 @@ class WeakForm:
         return terms
 
     def body_forces(self, z: Fields) -> list[Term]:
-        """Return - int_Omega f_0 . v dx, of (3.8)."""
+        """Return - int_Omega f_0 . v dx, [T 3.8]."""
         given = self.loads.get("body_force", ())
         return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in given]
 
     def tractions(self, z: Fields) -> list[Term]:
-        """Return - int_Gamma_2 f_2 . v da, of (3.8); of a resultant force F, f_2 = F/|Gamma_2|."""
+        """Return - int_Gamma_2 f_2 . v da, [T 3.8]; of a resultant force F, f_2 = F/|Gamma_2|."""
         given = self.loads.get("traction", ())
         return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in given]
 
@@ -158,7 +162,7 @@ class WeakForm:
         return [Term(p.value * ufl.dot(self.nu, z.u) * p.over, p) for p in given]
 
     def charges(self, z: Fields) -> list[Term]:
-        """Return int_Omega q_0 xi dx - int_Gamma_b q_2 xi da, of (5.29)."""
+        """Return int_Omega q_0 xi dx - int_Gamma_b q_2 xi da, [T 5.29]."""
         volume, surface = (self.loads.get(key, ()) for key in ("body_charge", "charge"))
         return [
             *(Term(q.value * z.phi * q.over, q) for q in volume),

@@ -47,7 +47,7 @@ class PairPlacement:
         The two sides in the reference configuration.
     reach
         Largest distance at which facets face each other (length).
-    without, nodes
+    no_multiplier, nodes
         Global numbers of the slave nodes that carry no multiplier, and of those of this rank that
         carry one (`couple`).
     added
@@ -60,7 +60,7 @@ class PairPlacement:
     slave: Surface
     master: Surface
     reach: float
-    without: NDArray[np.int64]
+    no_multiplier: NDArray[np.int64]
     nodes: NDArray[np.int64]
     added: Array
     press: bool
@@ -71,7 +71,7 @@ class PairPlacement:
         Nodes that face nothing there are open: their gap is infinite.
         """
         slave, master = (side.moved(displacement) for side in (self.slave, self.master))
-        found = couple(slave, master, self.reach, self.without, self.nodes)
+        found = couple(slave, master, self.reach, self.no_multiplier, self.nodes)
         return self.geometry(slave, master, found)
 
     def geometry(self, slave: Surface, master: Surface, found: Coupling) -> Geometry:
@@ -108,7 +108,7 @@ def _without_sagittas(body: BodyEquilibrium, found: Coupling) -> tuple[Array, fl
     """Return the gaps of sides that touch, and the largest depth that is left out. Collective."""
     # Chords of two curved sides in contact cut each other by their sagittas. A negative mean of a
     # gap that touches 0 within a facet stays.
-    least = np.minimum(found.apart, 0.0)
+    least = np.minimum(found.gap_positive_part, 0.0)
     cut = body.comm.allreduce(float(np.max(least - found.gap, initial=0.0)), op=MPI.MAX)
     return np.maximum(found.gap, least), cut if cut > TOUCHING * body.domain.size else 0.0
 
@@ -158,9 +158,9 @@ def find_pair(
     _refuse_shared(slave, master, label)
     reach = REACH * body.domain.size
     found = couple(slave, master, reach)
-    without = _without_multiplier(body, slave, found, label, part if friction else None)
-    if body.comm.allreduce(without.size, op=MPI.SUM) > 0:
-        found = couple(slave, master, reach, without)
+    no_multiplier = _without_multiplier(body, slave, found, label, part if friction else None)
+    if body.comm.allreduce(no_multiplier.size, op=MPI.SUM) > 0:
+        found = couple(slave, master, reach, no_multiplier)
     if body.comm.allreduce(found.nodes.size, op=MPI.SUM) == 0:
         raise InputError(
             f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
@@ -175,7 +175,7 @@ def find_pair(
     points = body.space.tabulate_dof_coordinates()[local, : body.dim]
     _, added = measured(distance, points, found.normal, body.comm, key)
     check_gap(body.domain, added, key)
-    placement = PairPlacement(body, slave, master, reach, without, found.nodes, added, press)
+    placement = PairPlacement(body, slave, master, reach, no_multiplier, found.nodes, added, press)
     return placement, placement.geometry(slave, master, found)
 
 

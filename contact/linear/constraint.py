@@ -35,7 +35,7 @@ from scipy import sparse
 
 from contact.history import LinearisationPoint
 from contact.linear.layout import Layout, congruent, times
-from contact.linear.operator import Bulk, Counters, SparseOperator
+from contact.linear.operator import BorderedBulk, Counters, SparseOperator
 from contact.mesh.owners import Halo
 from contact.ranks import summed
 from contact.tolerances import ROUNDING
@@ -67,8 +67,8 @@ class BasisChange:
     ) -> BasisChange:
         """Return the change that makes jumps the free unknowns of some nodes. Collective.
 
-        A jump j = s x + ... has s in the diagonal D, and x = F x + j/s with a nilpotent F, without
-        the fixed unknowns: Q = (1 + F + F^2 + ...)/D.
+        Jumps are T x, T = S + R with the diagonal S of the replaced nodes, and R without fixed
+        unknowns: Q = T^-1 = (I + S^-1 R)^-1 S^-1, a finite sum, for S^-1 R is nilpotent.
 
         Parameters
         ----------
@@ -97,8 +97,8 @@ class BasisChange:
         row, column = at[entry] * size + first, halo.numbers[entries.col[entry]] * size + second
         value = blocks[entry, first, second]
         begin, here = halo.begin * size, np.arange(count * size)
-        follows = _matrix(comm, size, count, row, column, -value / scale.ravel()[row])
-        diagonal = scale.ravel()
+        diagonal = scale.ravel()  # S, and -S^-1 R in `follows`
+        follows = _matrix(comm, size, count, row, column, -value / diagonal[row])
         inverse = _matrix(
             comm,
             size,
@@ -210,7 +210,9 @@ class ConstrainedBulk:
         (owned, m) and (m, m).
     """
 
-    def __init__(self, bulk: Bulk, constraint: Constraint, rest: LinearisationPoint) -> None:
+    def __init__(
+        self, bulk: BorderedBulk, constraint: Constraint, rest: LinearisationPoint
+    ) -> None:
         self._bulk, self.constraint, self._rest = bulk, constraint, rest
         self._plain: PETSc.Mat | None = None
         self.columns: Array = np.zeros(constraint.motions.shape)
@@ -256,9 +258,6 @@ class ConstrainedBulk:
         kept = matrix.createVecLeft()
         kept.array[:] = self.layout.free.ravel()
         matrix.diagonalScale(kept, kept)
-
-    def border(self, kind: str) -> None:
-        """Return None: `columns` and `corner` are the border."""
 
 
 class BorderedSolve:

@@ -42,6 +42,9 @@ from contact.linear.petsc import (
 from contact.ranks import summed
 from contact.typing import Array
 
+#: Prefix of PETSc options, for instance ``-contact_ksp_type cg``.
+PREFIX = "contact_"
+
 #: Default options of the displacement's block, under ``fieldsplit_u_``. The W-cycle keeps the
 #: counts flat; coarse levels have few unknowns.
 MECHANICAL = {
@@ -151,6 +154,10 @@ class Bulk(Protocol):
     def assemble(self, matrix: PETSc.Mat, kind: str, state: LinearisationPoint) -> None:
         """Assemble the "secant", the "tangent" or its "symmetric" part. Collective."""
 
+
+class BorderedBulk(Bulk, Protocol):
+    """Matrices of a body with global unknowns q."""
+
     def border(self, kind: str) -> tuple[Array, Array] | None:
         """Return the derivatives by q of the forces on x and q beyond K N_q, if any. Collective."""
 
@@ -200,8 +207,6 @@ class SparseOperator:
         Owned nodes with blocks, local numbers, shape (n,).
     symmetric
         Whether the blocks are symmetric too: LDL^T instead of LU.
-    prefix
-        Prefix of PETSc options, for instance ``-contact_ksp_type cg``.
     counters
         Counters of factorisations and solves.
     kind
@@ -217,7 +222,6 @@ class SparseOperator:
         nodes: NDArray[np.int32],
         *,
         symmetric: bool = True,
-        prefix: str = "contact_",
         counters: Counters | None = None,
         kind: str = "auto",
         subsystems: Subsystems | None = None,
@@ -233,12 +237,11 @@ class SparseOperator:
         self._subsystems = subsystems
         self._rhs, self._solution = self.matrix.createVecs()
         self.ksp = PETSc.KSP().create(self.layout.comm)
-        self.ksp.setOptionsPrefix(prefix)
+        self.ksp.setOptionsPrefix(PREFIX)
         self.iterative = multigrid.is_chosen(kind, self.layout)
         self._split: BlockPreconditioner | None = None
         self._hierarchy: Hierarchy | None = None
         self._modes: PETSc.NullSpace | None = None
-        self._prefix = prefix
         if self.iterative and self.layout.coupled:
             self._split = BlockPreconditioner(self.ksp, self.layout, symmetric)
         elif self.iterative:
@@ -249,7 +252,7 @@ class SparseOperator:
             pc = self.ksp.getPC()
             pc.setType("cholesky" if symmetric else "lu")
             pc.setFactorSolverType("mumps")
-        with petsc_options(prefix):
+        with petsc_options(PREFIX):
             self.ksp.setFromOptions()
         self._tolerance = self.ksp.getTolerances()[0]
 
@@ -320,7 +323,7 @@ class SparseOperator:
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         split = self._split
         self.ksp.setOperators(self.system, split.matrix(self.matrix) if split else self.matrix)
-        with petsc_options(self._prefix):
+        with petsc_options(PREFIX):
             set_up_with_workspace(self.ksp)
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
@@ -392,7 +395,7 @@ class SparseOperator:
         norm = float(np.sqrt(summed(self.layout.comm, np.sum(given**2))))
         if self.ksp.getPC().getFailedReason():
             check_overflow(self.layout, self.matrix.norm(), norm)
-            raise no_solution(self.ksp.getPC(), self._prefix)
+            raise no_solution(self.ksp.getPC(), PREFIX)
         found = mat_solve(self.ksp, given)
         self._solved(1, norm, float(np.sqrt(summed(self.layout.comm, np.sum(found**2)))))
         return np.column_stack([self.layout.mask(x) for x in found.T])
@@ -404,4 +407,4 @@ class SparseOperator:
         failed = self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
         if failed or not np.isfinite(solution):
             check_overflow(self.layout, self.matrix.norm(), rhs)
-            raise no_solution(self.ksp.getPC(), self._prefix)
+            raise no_solution(self.ksp.getPC(), PREFIX)

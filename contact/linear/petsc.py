@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -150,27 +149,8 @@ def out_of_memory(pc: PETSc.PC) -> bool:
     return is_mumps(pc) and bool(pc.getFactorMatrix().getMumpsInfog(1) in OUT_OF_MEMORY)
 
 
-@dataclass(frozen=True)
-class Subsystems:
-    """Uncoupled subsystems: those of connected components.
-
-    Attributes
-    ----------
-    comm
-        Communicator.
-    of
-        Subsystem of each owned unknown.
-    count
-        Number of subsystems.
-    """
-
-    comm: MPI.Intracomm
-    of: NDArray[np.intp]
-    count: int
-
-    def norms(self, vector: PETSc.Vec) -> Array:
-        """Return the norm of a vector in each subsystem, shape (count,). Collective."""
-        return np.sqrt(component_sums(self.comm, self.of, vector.array_r**2, self.count))
+#: Connected components: that of each owned unknown, and their number.
+Subsystems: TypeAlias = tuple[NDArray[np.intp], int]
 
 
 def refine(
@@ -196,7 +176,13 @@ def refine(
     subsystems
         Uncoupled subsystems; None for one.
     """
-    norms = (lambda vector: np.array([vector.norm()])) if subsystems is None else subsystems.norms
+
+    def norms(vector: PETSc.Vec) -> Array:
+        if subsystems is None:
+            return np.array([vector.norm()])
+        return np.sqrt(component_sums(vector.comm.tompi4py(), component, vector.array_r**2, count))
+
+    component, count = subsystems or (np.zeros(0, dtype=np.intp), 1)
     matrix, asked_for = ksp.getOperators()[0], ksp.getTolerances()[0]
     allowed = asked_for**0.5 * norms(rhs)
     left = rhs - matrix * solution
@@ -207,7 +193,7 @@ def refine(
             return
         correction, asked = left.duplicate(), left.copy()
         if subsystems is not None:
-            asked.array[~beyond[subsystems.of]] = 0.0
+            asked.array[~beyond[component]] = 0.0
         ksp.setInitialGuessNonzero(False)
         # No more digits than are missing.
         missing = float(allowed[beyond].min() / np.linalg.norm(before[beyond]))
@@ -221,7 +207,7 @@ def refine(
         if not np.any(gained & beyond):
             return
         if subsystems is not None:
-            lost = ~gained[subsystems.of]
+            lost = ~gained[component]
             correction.array[lost], corrected.array[lost] = 0.0, left.array_r[lost]
         solution.axpy(1.0, correction)
         left = corrected

@@ -11,13 +11,12 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import linalg
 
-from contact.arguments import check_range
-from contact.body.loads import to_blame
 from contact.errors import InputError
 from contact.interface.foundation import FoundationLaw
 from contact.model.fields import values_at
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
+    PULLED_OFF,
     Group,
     UnilateralSupport,
     described,
@@ -108,18 +107,14 @@ def _check_loads(problem: ContactProblem) -> None:
 
 def _check_sizes(problem: ContactProblem) -> None:
     """Refuse loads that are not finite, or too large. Collective."""
-    given, domain, time = problem.body.loads, problem.domain, problem.time
-    loads = problem.equilibrium.external(time)
-    if not domain.comm.allreduce(bool(np.isfinite(loads).all()), op=MPI.LAND):
-        key = to_blame(given, domain, time)
+    loads = problem.equilibrium.external(problem.time)
+    fits = bool(np.isfinite(loads).all()) and np.abs(loads).max(initial=0.0) <= HUGE
+    if not problem.comm.allreduce(bool(fits), op=MPI.LAND):
         raise InputError(
-            f"{key}: a formula is not finite everywhere on its part; accepted: a formula, or a "
-            "function, that is",
+            "load: a load is not finite everywhere on its part, or too large; accepted: formulas "
+            f"and functions that are finite, and units that keep sizes up to {HUGE:g}",
             "not-finite",
         )
-    largest = domain.comm.allreduce(float(np.abs(loads).max(initial=0.0)), op=MPI.MAX)
-    if largest > HUGE:
-        check_range(to_blame(given, domain, time), largest)
 
 
 def check_supports(problem: ContactProblem) -> None:
@@ -222,37 +217,34 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
         return
     unconstrained = null_space(group.constraints(problem.frictional))
     if unconstrained.shape[1] > 0:
-        raise InputError(_unconstrained(problem, group, unconstrained), "unsupported")
+        raise InputError(_unconstrained(group, unconstrained), "unsupported")
     support = UnilateralSupport.of(group)
     if support is not None and support.release(problem.time) is not None:
         raise InputError(
-            f"the loads pull the body off the foundation{support.besides}, and no support holds it "
-            "there; accepted: loads that press it on, or more displacement components fixed",
+            f"the loads {PULLED_OFF}, and no support holds it there; accepted: loads that press it "
+            "on, or more displacement components fixed",
             "pulled-off",
         )
 
 
-def _unconstrained(problem: ContactProblem, group: Group, unconstrained: Array) -> str:
+def _unconstrained(group: Group, unconstrained: Array) -> str:
     """Return the message on unconstrained modes."""
-    count, accepted = group.count, "displacement components fixed so that it cannot"
-    whole = "the body, or a rigid part," if group.moving else "the body"
-    if count > 1:
+    about, motions = "", unconstrained
+    if group.count > 1:
         moves = np.linalg.norm(group.of_components(unconstrained), axis=2).max(axis=1) > 1e-6
-        where = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in group.centres[moves])
-        which = "the one" if np.count_nonzero(moves) == 1 else "the group"
-        pieces = f"the cuts of bolts make {count} pieces" if group.cut else ""
-        whole = pieces or f"the mesh has {count} connected components"
-        whole += f", and {which} about {where}"
-        accepted += (
-            ", or a shortening of a bolt instead of its force"
-            if group.cut
-            else ", or regions that share the nodes between them"
-        )
-    motions = unconstrained
+        about = f" about {_places(group.centres[moves])}"
     if group.cut:  # shortenings only follow
         motions = linalg.orth(np.concatenate(group.of_components(unconstrained)))
     modes = described(motions, group.names[: len(motions)])
-    return f"{whole} is not held: it can move as a rigid body ({modes}); accepted: {accepted}"
+    return (
+        f"the body{about} is not held: it can move as a rigid body ({modes}); accepted: "
+        "displacement components fixed so that it cannot"
+    )
+
+
+def _places(points: Array) -> str:
+    """Return points in words."""
+    return " and ".join(f"({', '.join(f'{x:.4g}' for x in point)})" for point in points)
 
 
 def check_potential(problem: ContactProblem, state: State | None = None) -> None:
@@ -295,9 +287,8 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     where, known = "", "a conductive foundation"
     if count > 1:
         alone = np.flatnonzero(np.linalg.norm(floating[:count], axis=1) > 1e-6)
-        middles = (middle(problem, body.layout.points[component == k])[0] for k in alone)
-        found = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in middles)
-        where = f" of the component of the mesh about {found}"
+        middles = [middle(problem, body.layout.points[component == k])[0] for k in alone]
+        where = f" of the component of the mesh about {_places(np.array(middles))}"
         known += ", or with a body that conducts and whose potential is known"
     raise InputError(
         f"the potential{where} is not determined: it is prescribed nowhere, and the foundation "

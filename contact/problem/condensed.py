@@ -22,7 +22,7 @@ from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
 from contact.linear.constraint import BorderedSolve, ConstrainedBulk, Constraint
 from contact.linear.layout import Inclined, balance, masked
-from contact.linear.operator import Counters
+from contact.linear.operator import PREFIX, Counters
 from contact.linear.petsc import check_overflow, petsc_options
 from contact.linear.schur import DenseOperator, DenseStiffness, SchurComplement
 from contact.problem.problem import ContactProblem
@@ -37,8 +37,6 @@ LARGEST = 4200
 #: Largest residual that is accepted as rounding at the contact nodes. Larger than for the whole
 #: body, whose residuals are evaluated afterwards.
 MOST_ROUNDING = 1e-3
-
-PREFIX = "contact_"
 
 #: Kept unknowns up to which condensation always pays.
 ALWAYS = 1000

@@ -62,8 +62,8 @@ class Group:
         Names of the modes, and centres of the components.
     supports
         Gram matrix of the modes at the supports, shape (m, m).
-    moving, cut
-        Whether the modes have those of rigid parts, and shortenings of bolts.
+    cut
+        Whether the modes have shortenings of bolts.
     """
 
     problem: ContactProblem
@@ -74,7 +74,6 @@ class Group:
     names: list[str]
     centres: Array
     supports: Array
-    moving: bool
     cut: bool
 
     @property
@@ -230,7 +229,6 @@ def _group(
         names,
         np.array(centres),
         _gram(problem, fixed) + _elastic_gram(problem, moved) + _gram(problem, joints),
-        any("rigid part" in name for name in moving.values()),
         pieces is not None,
     )
 
@@ -255,19 +253,14 @@ def _elastic_gram(problem: ContactProblem, moved: Array) -> Array:
 
 
 def described(motions: Array, names: list[str]) -> str:
-    """Name the translations and rotations that a space of rigid motions contains."""
-    contained = np.linalg.norm(motions, axis=1) > 1 - 1e-6
-    found = [name for name, inside in zip(names, contained, strict=True) if inside]
-    for axis in "xyz":
-        if f"translation along {axis}" in found:
-            continue
-        # A common translation of several components.
-        all_along = np.array([f"translation along {axis}" in name for name in names], dtype=float)
-        along = all_along * (np.linalg.norm(motions, axis=1) > 1e-6)
-        size = float(np.linalg.norm(along))
-        if size > 1 and np.linalg.norm(motions.T @ along) > (1 - 1e-6) * size:
-            found.append(f"translation along {axis}, together")
-    return ", ".join(dict.fromkeys(found)) or "translation and rotation combined"
+    """Name the modes that a space of rigid motions contains, else those that it combines."""
+    share = np.linalg.norm(motions, axis=1)
+    contained, combined = (
+        [*dict.fromkeys(name for name, own in zip(names, share, strict=True) if own > least)]
+        for least in (1 - 1e-6, 1e-6)
+    )
+    found = ", ".join(contained or combined)
+    return found if contained or len(combined) == 1 else f"a combination of {found}"
 
 
 def middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
@@ -296,6 +289,10 @@ DIRECTIONS = 8
 
 #: Bisections for the time of release; linear programs of an overload.
 ROUNDS = 20
+
+
+#: What loads do to a body that unilateral supports do not hold.
+PULLED_OFF = "pull the body off the foundation, or along it by more than friction holds"
 
 
 @dataclass(frozen=True)
@@ -360,14 +357,6 @@ class UnilateralSupport:
             return None
         return np.asarray(self.free @ motion.x)
 
-    @property
-    def besides(self) -> str:
-        """Other ways of release than a body pulled off, in words."""
-        moving = ", or force and moment the rigid part off the body" if self.group.moving else ""
-        moving += ", or the force of a bolt one side of its cut" if self.group.cut else ""
-        along = ", or along it by more than friction holds" if self.group.problem.frictional else ""
-        return moving + along
-
 
 def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
     """Return the unilateral supports of all groups that need one. Collective."""
@@ -391,7 +380,7 @@ def released(supports: Sequence[UnilateralSupport], begin: float, end: float) ->
         for _ in range(ROUNDS):
             middle = (begin + end) / 2
             begin, end = (middle, end) if support.release(middle) is None else (begin, middle)
-        return f"from t = {end:g} on the loads pull the body off the foundation{support.besides}"
+        return f"from t = {end:g} on the loads {PULLED_OFF}"
     return ""
 
 

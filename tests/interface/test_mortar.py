@@ -146,7 +146,7 @@ def test_nodes_without_a_multiplier_hand_their_functions_over(kind) -> None:
     slave, x = flat(kind, 7, 1.0, 1.0, 1)
     master, y = flat(kind, 11, 1.1, -1.0, 2, FIRST)
     rim = np.flatnonzero(np.any((x[:, :-1] < 1e-9) | (x[:, :-1] > 1 - 1e-9), axis=1))
-    found = couple(slave, master, 1.0, without=rim)
+    found = couple(slave, master, 1.0, no_multiplier=rim)
     assert not np.isin(found.nodes, rim).any()
     assert found.nodes.size == len(x) - rim.size
     assert found.weight.sum() == pytest.approx(1)
@@ -280,12 +280,12 @@ def test_a_bowl_that_touches_within_facets_does_not_cut_them() -> None:
     vertices = {0.5: 0.5, 0.25: (0.25 - 0.2) / 0.6, 0.0: -0.2 / 0.6}  # S of the positive functions
     expected = [vertices[value] for value in values[found.nodes].round(9)]
     np.testing.assert_allclose(found.gap / depth, expected, atol=1e-7)
-    np.testing.assert_allclose(found.apart, found.gap, atol=1e-12)
+    np.testing.assert_allclose(found.gap_positive_part, found.gap, atol=1e-12)
     lower = replace(slave, points=slave.points + np.array([0.0, 0.0, 0.1 * depth]))
     cut = couple(lower, replace(bowl, deviation=depth * np.sum(np.square(edges), axis=2).T), 1.0)
     np.testing.assert_allclose(cut.gap / depth, np.array(expected) - 0.1, atol=1e-7)
     deepest = int(np.argmin(cut.gap))
-    assert cut.apart[deepest] > cut.gap[deepest] + 0.1 * depth
+    assert cut.gap_positive_part[deepest] > cut.gap[deepest] + 0.1 * depth
 
 
 @pytest.mark.core

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.linear.petsc import Subsystems, refine
+from contact.linear.petsc import refine
 
 SIZE = np.array([2.0, 3.0, 4.0, 5.0])
 
@@ -28,7 +28,7 @@ def test_each_piece_takes_the_corrections_that_help_it(wrong):
         found.array[:] = asked.array_r / SIZE * np.array([1.0, 1.0, wrong, wrong])
 
     solution = vector([0.1, 0.2, 0.3, 0.4])
-    refine(ksp, vector(SIZE), solution, solve, Subsystems(MPI.COMM_SELF, np.array([0, 0, 1, 1]), 2))
+    refine(ksp, vector(SIZE), solution, solve, (np.array([0, 0, 1, 1]), 2))
     assert np.allclose(solution.array_r, [1.0, 1.0, 0.3, 0.4], rtol=0, atol=1e-12)
 
 
@@ -72,5 +72,5 @@ def test_a_correction_is_asked_for_the_digits_that_are_missing(off, digits):
 def test_no_piece_waits_for_its_correction_because_another_is_larger():
     """Each of four took a correction of its own, and the last one got none."""
     sizes, count = [1.0, 1e-2, 1e-4, 1e-6], 4
-    left, _ = refined(sizes, 4 * [1e-2], Subsystems(MPI.COMM_SELF, np.arange(count), count))
+    left, _ = refined(sizes, 4 * [1e-2], (np.arange(count), count))
     assert left.max() <= RTOL**0.5

@@ -49,32 +49,35 @@ NOTHING: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class ModifiedDualBasis:
-    """The multipliers that act on facets where some nodes carry none.
+    """The dual basis Phi'_j = Phi_j + sum_k m_jk Phi_k, without functions of some nodes k.
+
+    These are nodes at crosspoints, or with Dirichlet conditions. With sum_j m_jk = 1 multipliers
+    contain the constants.
 
     Attributes
     ----------
     nodes
-        Global numbers of their nodes, shape (f, k).
+        Global numbers of the nodes j of the functions on each facet, shape (f, k).
     functions
-        Their functions as combinations of the facet's own, shape (f, k, k).
+        The functions by the facet's own, shape (f, k, k).
     """
 
     nodes: NDArray[np.int64]
     functions: Array
 
     @staticmethod
-    def of(slave: Surface, without: NDArray[np.int64]) -> ModifiedDualBasis:
-        """Return the carriers of the dual functions of nodes without multiplier. Collective.
+    def of(slave: Surface, no_multiplier: NDArray[np.int64]) -> ModifiedDualBasis:
+        """Return the basis without functions of some nodes. Collective.
 
-        These are the other nodes of the facet in equal parts, or the nearest corner of another
-        facet of any rank.
+        m_jk is the same for the other nodes j of a facet; on one without any it is 1 for the
+        nearest corner of another facet, of any rank.
 
         Parameters
         ----------
-        slave, without
+        slave, no_multiplier
             Facets of this rank, and the global numbers of their nodes without multiplier.
         """
-        gone = np.isin(slave.nodes, without)
+        gone = np.isin(slave.nodes, no_multiplier)
         kept = ~gone
         among = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
         functions = among[:, :, None] * gone[:, None, :] + kept[:, :, None] * np.eye(gone.shape[1])
@@ -96,8 +99,8 @@ class Parts:
     ----------
     nodes
         Global numbers of the facets' nodes, shape (f, k).
-    carriers
-        Those of the nodes whose functions Phi these are, shape (f, k).
+    dual_nodes
+        Those of the nodes whose functions Phi' these are, shape (f, k).
     D
         int Phi_i N~_j over the part that faces the master, shape (f, k, k).
     whole
@@ -109,13 +112,13 @@ class Parts:
         int Phi_i times the vector across, everywhere and where the sides do not cut each other,
         shape (f, k, 2, d).
     rows, columns, values
-        int Phi_i (N_l o Pi): numbers of the carrier and of the master's node, shape (e,).
+        int Phi_i (N_l o Pi): numbers of the node of Phi' and of the master's node, shape (e,).
     depth
         Of the deepest overlap (length), as of `Coupling`, on this rank.
     """
 
     nodes: NDArray[np.int64]
-    carriers: NDArray[np.int64]
+    dual_nodes: NDArray[np.int64]
     D: Array
     whole: Array
     normal: Array
@@ -127,22 +130,22 @@ class Parts:
     depth: float
 
 
-def integrate(slave: Surface, opposite: Opposite, carriers: ModifiedDualBasis) -> Parts:
+def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> Parts:
     """Integrate the dual functions of slave facets, alone and with the facets opposite.
 
     Parameters
     ----------
     slave, opposite
         Slave facets of this rank, and the master facets that they may face.
-    carriers
-        The nodes whose functions act on the slave facets.
+    basis
+        The dual functions on the slave facets.
     """
     master = opposite.master
     direction, found = _facing(slave, opposite)
     change = dual_basis_transformation(slave.shape, slave.degree)
     dual, weight = _dual(slave, found, change)
-    dual, d_matrix = carriers.functions @ dual, carriers.functions * weight[:, None, :]
-    whole = np.einsum("fij,fj->fi", carriers.functions, integrals(slave))
+    dual, d_matrix = basis.functions @ dual, basis.functions * weight[:, None, :]
+    whole = np.einsum("fij,fj->fi", basis.functions, integrals(slave))
     gap, normal = np.zeros((*weight.shape, 2)), np.zeros((*weight.shape, direction.shape[1]))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
     for points in found:
@@ -152,14 +155,14 @@ def integrate(slave: Surface, opposite: Opposite, carriers: ModifiedDualBasis) -
         _add(gap, points.slave, phi[:, :, None] * across[:, None, :])
         normals = _normals(points, slave, master, direction)
         _add(normal, points.slave, own_share[:, :, None] * normals[:, None, :])
-        entries.append(_master_entries(points, phi, carriers.nodes, master))
+        entries.append(_master_entries(points, phi, basis.nodes, master))
     rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
     return Parts(
         slave.nodes,
-        carriers.nodes,
+        basis.nodes,
         d_matrix,
         whole,
-        carriers.functions @ normal,
+        basis.functions @ normal,
         whole[:, :, None] * slave.normal[:, None, :],
         gap[:, :, :, None] * direction[:, None, None, :],
         rows,
@@ -233,7 +236,7 @@ def _add(total: Array, index: NDArray[np.intp], values: Array) -> None:
 
 
 def _master_entries(
-    points: Points, phi: Array, carriers: NDArray[np.int64], master: Surface
+    points: Points, phi: Array, dual_nodes: NDArray[np.int64], master: Surface
 ) -> Entries:
     """Return int Phi_j N_l as global row, global column, value."""
     n = master.shape.lagrange(master.degree, points.on_master)
@@ -243,7 +246,7 @@ def _master_entries(
     if first.size == 0:
         return NOTHING, NOTHING, np.zeros(0)
     values = np.add.reduceat(phi[:, :, None] * n[:, None, :], first, axis=0)
-    rows = carriers[points.slave[first]][:, :, None]
+    rows = dual_nodes[points.slave[first]][:, :, None]
     columns = master.nodes[points.master[first]][:, None, :]
     rows, columns = np.broadcast_arrays(rows, columns)
     return rows.ravel(), columns.ravel(), values.ravel()
@@ -266,9 +269,9 @@ class Coupling(JumpRows):
         Unit vectors from the slave to the master, between their normals, shape (n, d).
     gap
         Mean distance along them, shape (n,) (length); infinite where nothing faces the master.
-    apart
-        The gap without overlaps of the sides, shape (n,); negative means come from negative
-        functions alone.
+    gap_positive_part
+        int Phi_j max(g, 0) / int N~_j of the distance g at a point, whose mean is `gap`, shape
+        (n,); below 0 by negative functions Phi_j alone.
     covered
         Share of int N~_j that faces the master, shape (n,).
     depth
@@ -279,7 +282,7 @@ class Coupling(JumpRows):
     weight: Array
     normal: Array
     gap: Array
-    apart: Array
+    gap_positive_part: Array
     covered: Array
     depth: float
 
@@ -288,7 +291,7 @@ def couple(
     slave: Surface,
     master: Surface,
     reach: float,
-    without: NDArray[np.int64] = NOTHING,
+    no_multiplier: NDArray[np.int64] = NOTHING,
     nodes: NDArray[np.int64] | None = None,
 ) -> Coupling:
     """Integrate the dual mortar operator. Collective.
@@ -299,24 +302,26 @@ def couple(
         The facets of both sides that this rank owns.
     reach
         Largest distance at which facets face each other (length).
-    without
+    no_multiplier
         Global numbers of slave nodes without multiplier, at least those of this rank and of its
-        facets; others carry their functions, so that multipliers contain the constants.
+        facets (`ModifiedDualBasis`).
     nodes
         Global numbers of the nodes of this rank with a multiplier, whether they face the master or
         not; by default those that do.
     """
     opposite = Opposite.of(slave, master, reach)
-    parts = integrate(slave, opposite, ModifiedDualBasis.of(slave, without))
+    parts = integrate(slave, opposite, ModifiedDualBasis.of(slave, no_multiplier))
     change = dual_basis_transformation(slave.shape, slave.degree)
-    return _assembled(parts, slave.owners, np.asarray(np.linalg.inv(change.T)), without, nodes)
+    return _assembled(
+        parts, slave.owners, np.asarray(np.linalg.inv(change.T)), no_multiplier, nodes
+    )
 
 
 def _assembled(
     parts: Parts,
     owners: Owners,
     back: Array,
-    without: NDArray[np.int64],
+    no_multiplier: NDArray[np.int64],
     nodes: NDArray[np.int64] | None,
 ) -> Coupling:
     """Return the sums at the nodes of this rank, given those of its facets and A^-T."""
@@ -328,7 +333,7 @@ def _assembled(
         *(parts.normal, parts.open_normal, parts.gap),
     )
     every, total = owners.sums(
-        parts.carriers.ravel(),
+        parts.dual_nodes.ravel(),
         np.hstack([part.reshape(f * k, int(np.prod(part.shape[2:]))) for part in shares]),
     )
     areas, *vectors = np.split(total, 3 + d * np.arange(4), axis=1)
@@ -336,14 +341,14 @@ def _assembled(
     some = whole > NEGLIGIBLE * around
     covered = np.where(some, weight / np.where(some, whole, 1.0), 0.0)
     if nodes is None:
-        nodes = every[(covered > LEAST_COVERED) & ~np.isin(every, without)]
+        nodes = every[(covered > LEAST_COVERED) & ~np.isin(every, no_multiplier)]
     kept = np.searchsorted(every, nodes)
     faces = covered[kept] > LEAST_COVERED
     weight = np.where(faces, weight[kept], whole[kept])
     normal, outward, *gaps = (vector[kept] for vector in vectors)
     normal = np.where(faces[:, None], normal, outward)
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    gap, apart = (
+    gap, positive_part = (
         np.where(faces, np.einsum("nd,nd->n", vector, normal) / weight, np.inf) for vector in gaps
     )
     # Each facet with a node has all of the node's row of D. The jump of an open node is its u.
@@ -353,7 +358,7 @@ def _assembled(
         there = ~np.isin(entries[0], opened)
         return entries[0][there], entries[1][there], entries[2][there]
 
-    rows, columns = np.broadcast_arrays(parts.carriers[:, :, None], parts.nodes[:, None, :])
+    rows, columns = np.broadcast_arrays(parts.dual_nodes[:, :, None], parts.nodes[:, None, :])
     values = (parts.D @ back).ravel()
     row, column, value = of_facing(owners.entries(rows.ravel(), columns.ravel(), values))
     own = np.append(row, opened), np.append(column, opened), np.append(value, weight[~faces])
@@ -363,4 +368,4 @@ def _assembled(
     divide = sparse.diags_array(1 / weight)
     jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
     depth = owners.comm.allreduce(parts.depth, op=MPI.MAX)
-    return Coupling(*jumps, weight, normal, gap, apart, covered[kept], depth)
+    return Coupling(*jumps, weight, normal, gap, positive_part, covered[kept], depth)
