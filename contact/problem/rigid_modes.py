@@ -291,7 +291,7 @@ DIRECTIONS = 8
 ROUNDS = 20
 
 
-#: What loads do to a body that unilateral supports do not hold.
+#: The motion of a body by loads beyond its unilateral supports.
 PULLED_OFF = "pull the body off the foundation, or along it by more than friction holds"
 
 
