@@ -50,9 +50,6 @@ TABLE, CASE = "sweep.csv", "sweep.toml"
 #: Column with the digests of the files that the case of a row reads.
 INPUT = "input"
 
-#: Most values of a range.
-MOST = 10_000
-
 #: Columns that every table has.
 COLUMNS = ("converged", "kkt", "seconds", INPUT)
 
@@ -72,10 +69,8 @@ class Axis:
 
     @staticmethod
     def of(text: str) -> Axis:
-        """Read ``key=v1,v2,...``: TOML values, bare words, or ``a:b:n``, n numbers from a to b."""
+        """Read ``key=v1,v2,...``: TOML values or bare words."""
         key, _, given = text.partition("=")
-        if ":" in given and not {*given} & {*"[]{}\"'"}:
-            given = ",".join(_spread(part, text) for part in given.split(","))
         try:
             values = tomllib.loads(f"values = [{given}]")["values"]
             # Each in one way: a row is found again by its texts.
@@ -89,30 +84,6 @@ class Axis:
                 f"--over {text}: a value stands there twice; accepted: each once", "over"
             )
         return Axis(key.strip(), tuple(texts))
-
-
-def _spread(text: str, whole: str) -> str:
-    """Return the numbers of a range ``a:b:n``; anything else as it is."""
-    first, *more = text.split(":")
-    if not more:
-        return text
-    try:
-        (last, count) = more
-        if not 2 <= int(count) <= MOST:
-            raise ValueError
-        ends = float(first), float(last)
-        if not np.isfinite(ends).all():
-            raise ValueError
-        numbers = np.linspace(*ends, int(count))
-    except ValueError:
-        accepted = f"a:b:n, n numbers from a to b, 2 to {MOST} of them"
-        raise InputError(
-            f"--over {whole}: given {text.strip()}; accepted: {accepted}", "over"
-        ) from None
-    # To twelve digits: 0.3, and not 0.30000000000000004. Some keys take whole numbers alone.
-    as_written = not {*f"{first}{last}"} & {*".eE"} and (numbers == np.rint(numbers)).all()
-    kind = int if as_written else float
-    return ",".join(repr(kind(float(f"{number:.12g}"))) for number in numbers)
 
 
 def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float]:

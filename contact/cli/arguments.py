@@ -202,7 +202,7 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
         "--over",
         metavar="KEY=V1,V2,...",
         **MANY,
-        help="the values of a key, for all combinations; a:b:n is n numbers; may be repeated",
+        help="the values of a key, for all combinations; may be repeated",
     )
     sweep.add_argument(
         "--columns",

@@ -20,7 +20,6 @@ from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
     Group,
     UnilateralSupport,
-    constrained_by_supports,
     described,
     groups,
     null_space,
@@ -46,9 +45,6 @@ MOVED = 1e-3
 #: Relative stiffness above which contact constrains a rigid-body mode: normals of a mesh are off by
 #: more than the root of it.
 CONSTRAINED = 1e-8
-
-#: Largest pressure at the end of a step, over that of all steps, that is rounding of none.
-NOTHING = 1e-12
 
 
 def sides(solution: Solution) -> Iterator[Remark]:
@@ -151,7 +147,6 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     friction where it slips.
     """
     problem, body = solution.problem, solution.problem.equilibrium
-    yield from _released(solution)
     if not solution.converged:
         return
     modes = [(group, null_space(group.supports)) for group in groups(problem)]
@@ -181,19 +176,6 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
                 f"forces may move it by up to {moved:.2g}; accepted: friction, or supports"
             )
             return
-
-
-def _released(solution: Solution) -> Iterator[Remark]:
-    """Warn of earlier steps in which nothing holds a body any more. Collective."""
-    pressures = np.array([record.row["max_pressure"] for record in solution.steps])
-    pressed = pressures > NOTHING * pressures.max(initial=0.0)
-    # Before it has been pressed it has not moved.
-    free = np.flatnonzero(~pressed[:-1] & np.logical_or.accumulate(pressed)[:-1])
-    if free.size > 0 and not constrained_by_supports(solution.problem):
-        yield (
-            f"at t = {solution.steps[free[0]].row['t']:g} nothing presses any more, and no support "
-            "holds the body: it is then in one of many places, and so it is later"
-        )
 
 
 def _named(group: Group, motions: Array) -> str:

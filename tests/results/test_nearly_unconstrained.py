@@ -5,7 +5,6 @@ from mpi4py import MPI
 
 from contact import parse_case, solve
 from tests.problems.pairs import case
-from tests.problems.written import block
 
 CYLINDERS = {
     "mesh": {"generator": "two_half_cylinders", "contact_size": 0.2, "contact_width": 0.7},
@@ -53,30 +52,3 @@ def test_a_box_that_slips_all_around_is_held_across_the_friction():
     solution = solve(parse_case(given), comm=MPI.COMM_SELF)
     assert solution.converged
     assert not [text for text in solution.warnings if "the mesh is too coarse" not in text]
-
-
-@pytest.mark.parametrize(
-    ("values", "fixed", "warned"),
-    [
-        ([0.0, 1.0, 0.0, 1.0], [], True),
-        ([0.0, 1.0, 1e-6, 1.0], [], False),
-        ([0.0, 0.0, 1.0, 0.5], [], False),
-        ([0.0, 1.0, 0.0, 1.0], [{"on": "top", "displacement": [0.0, "free"]}], True),
-        ([0.0, 1.0, 0.0, 1.0], [{"on": "left", "displacement": [0.0, 0.0]}], False),
-    ],
-)
-def test_a_block_that_nothing_holds_on_the_way(values, fixed, warned):
-    """Methods leave it in different places, and what comes after differs."""
-    times = [0.0, 1.0, 2.0, 3.0]
-    amplitudes = {"pulse": {"time": times, "value": values}}
-    given = block(
-        2,
-        material={"young": 10.0, "poisson": 0.3},
-        fixed=fixed,
-        load=[{"on": "top", "traction": [0.0, -0.01], "amplitude": "pulse"}],
-        evolution={"times": times, "steps": [1, 1, 1], "amplitudes": amplitudes},
-        solver={"method": "newton"},
-    )
-    solution = solve(given, comm=MPI.COMM_SELF)
-    assert solution.converged
-    assert any("nothing presses any more" in text for text in solution.warnings) == warned
