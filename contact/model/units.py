@@ -83,20 +83,26 @@ def labels_of(name: str) -> dict[str, str]:
 def other_label(name: str, labels: Mapping[str, str]) -> str | None:
     """Return the first quantity whose label is not that of a system; None if all are."""
     own = {"stress": "GPa"} if name == ANY_LENGTH else labels_of(name)
-    others = (key for key in own if key in labels and plain(labels[key]) != plain(own[key]))
-    return next(others, None)
+    length, force, *_ = map(plain, SYSTEMS[name])
+    for key in (key for key in own if key in labels):
+        label = plain(labels[key])
+        if label != plain(own[key]) and not (key == "stress" and label == f"{force}/{length}2"):
+            return key
+    return None
 
 
 def force_of(stress: str, length: str) -> str | None:
-    """Return the unit of force of the system with these units; None of others."""
+    """Return the unit of force of a named system, or of a stress F/L^2; None of others."""
     asked = (plain(length), plain(stress))
+    if asked[1].endswith(f"/{asked[0]}2"):
+        return stress.partition("/")[0].strip()
     systems = ((plain(s[0]), plain(s[3]), s[1]) for s in SYSTEMS.values())
     return next((force for *units, force in systems if tuple(units) == asked), None)
 
 
 def plain(label: str) -> str:
-    """Return a label with u for micro, which has three letters."""
-    return label.strip().replace("µ", "u").replace("μ", "u")
+    """Return a label with u for micro, which has three letters, and 2 for a square."""
+    return label.strip().replace("µ", "u").replace("μ", "u").replace("²", "2")
 
 
 NAMES = either(map(shown, SYSTEMS))

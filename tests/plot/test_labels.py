@@ -22,3 +22,8 @@ def test_units_of_a_unit_of_thickness(quantity: str, plane: str, space: str) -> 
     ours = Units(length="l", stress="s")
     assert unit_of("work", ours, True) == " (s l$^2$)"
     assert unit_of("force", ours, True) == " (s l)"
+
+
+def test_a_stress_per_area_names_the_force() -> None:
+    assert unit_of("force", Units(length="mm", stress="daN/mm²"), False) == " (daN)"
+    assert unit_of("force", Units(length="m", stress="N/mm2"), False) == " (N/mm2 m$^2$)"
