@@ -59,7 +59,7 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     given = body.nodal(body.external(state.time))[:, :d].sum(axis=0)
     pushes = np.zeros_like(body.external(state.time))
     forces = -problem.nodes.weight[:, None] * stress
-    problem.nodes.transpose(forces, pushes)
+    problem.nodes.add_jump_transposed(forces, pushes)
     contact = body.nodal(pushes)[:, :d].sum(axis=0)
     ends = np.cumsum([own.nodes.nodes.size for own in problem.geometries])[:-1]
     passed = [part.sum(axis=0) for part in np.split(forces, ends)]

@@ -227,7 +227,7 @@ class BodyEquilibrium:
         self.laws = self.forms.laws
         self._loads = self.loads_along(self.space)
         # Values that are no numbers, or contradict each other, are refused first of all.
-        self.prescribe(self.rest())
+        self.prescribe(self.zero_displacement())
         if self.cuts is not None:
             every = np.arange(len(self.free), dtype=np.int32)
             free = projectors(self.unsupported, self.layout.inclined)[:, : self.dim, : self.dim]
@@ -285,7 +285,7 @@ class BodyEquilibrium:
         """Return the owned part of local unknowns, with the global ones behind."""
         return np.concatenate([x[: self.owned], self.motion(x)])
 
-    def rest(self) -> Array:
+    def zero_displacement(self) -> Array:
         """Return the unknowns of the reference configuration, without prescribed values."""
         return np.zeros(self._at.x.array.size + self.global_unknowns.size)
 
@@ -311,7 +311,7 @@ class BodyEquilibrium:
         at.scatter_forward()
         return np.concatenate([at.array, self.motion(owned)])
 
-    def moved(self, x: Array, increment: Array) -> Array:
+    def updated(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment of the owned ones. Collective."""
         return self.local(self.owned_part(x) + increment)
 
@@ -467,7 +467,7 @@ class BodyEquilibrium:
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "kind": kind}
         if constraint is None:
             return SparseOperator(self, nodes, subsystems=self.component_norms.apart, **options)
-        bulk = ConstrainedBulk(self, constraint, BodyState(self.rest()))
+        bulk = ConstrainedBulk(self, constraint, BodyState(self.zero_displacement()))
         return ConstrainedOperator(bulk, nodes, **options)
 
     def norm(self, values: Array) -> float:
@@ -487,7 +487,7 @@ class BodyEquilibrium:
         """Return the `norms` of the nodal loads at a time. Collective."""
         return self.norms(self.external(time))
 
-    def exchanged(self, state: LinearisationPoint) -> Array:
+    def coupling_norms(self, state: LinearisationPoint) -> Array:
         """Return the `norms` of the potential's forces and the strain's charges. Collective."""
         if not self.piezoelectric:
             return np.zeros((1, self.component_norms.count))

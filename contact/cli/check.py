@@ -239,7 +239,7 @@ def acting(problem: ContactProblem) -> list[str]:
     gap = np.where(np.abs(gap) < NEGLIGIBLE * size, 0.0, gap)  # rounding is no gap
     least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
     largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
-    loads, given = body.external(time), body.prescribe(body.rest(), time)
+    loads, given = body.external(time), body.prescribe(body.zero_displacement(), time)
     pressed, moved = (x / size for x in expected_displacements(problem, loads, given))
     rows = [*_resultants(problem, loads, given), *_members(problem)]
     rows += [

@@ -94,12 +94,12 @@ def interface_residuals(
     now = np.linalg.norm(nodal[:, : interface.dim], axis=1)
     way = np.maximum(now, before)
     closing = interface.c_0 * interface.norms(
-        np.minimum(np.minimum(np.abs(normal_gap), way), interface.diameter)
+        np.minimum(np.minimum(np.abs(normal_gap), way), interface.size)
     )
     pressed = interface.norms(interface.pressure(nodal, multipliers))
     # Without pressure nodes may just touch: their gaps are rounding too.
     moved = interface.norms(np.full_like(way, interface.rounding(nodal)))
-    covered = interface.c_0 * interface.norms(np.minimum(now, interface.diameter))
+    covered = interface.c_0 * interface.norms(np.minimum(now, interface.size))
     closing = np.where(pressed <= moved, np.maximum(closing, covered), closing)
     scale = np.maximum(pressed, 1e-4 * closing)
     scale = np.maximum(scale, EPS * scale.max())
@@ -190,7 +190,7 @@ def linearise(
     total = interface.pressure(nodal, multipliers)
     bound = interface.friction.bound(total, length)
     if before is None:
-        active = ActiveSet.without_slip(normal_gap <= 1e-12 * interface.diameter, frictional)
+        active = ActiveSet.without_slip(normal_gap <= 1e-12 * interface.size, frictional)
     else:
         lam = at_bound(before, lam, slip, bound)
         raised = Multipliers(p, lam)

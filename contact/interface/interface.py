@@ -1,6 +1,6 @@
 """Gamma_3 with all its laws, node by node.
 
-Of the body behind it has the constants c_0, diameter, elongation and connected components alone: no
+Of the body behind it has the constants c_0, size, elongation and connected components alone: no
 mesh, no space, no stiffness.
 """
 
@@ -60,8 +60,8 @@ class Interface:
     fixed_conducting
         The charge at nodes without a free displacement, but with a free potential, or None.
     c_0
-        Complementarity parameter c_0 = E/diameter (stress/length), E behind Gamma_3.
-    diameter
+        Complementarity parameter c_0 = E/size (stress/length), E behind Gamma_3.
+    size
         Largest extent of the body (length).
     elongation
         Aspect ratio of the cells behind Gamma_3 (`contact.mesh.entities.elongation`), by which c
@@ -79,7 +79,7 @@ class Interface:
     friction: NodalFriction
     fixed_conducting: FoundationLaw | None
     c_0: float
-    diameter: float
+    size: float
     elongation: float
     component: NDArray[np.intp]
     components: int
@@ -203,21 +203,25 @@ class Interface:
         self, x: Array, multipliers: Multipliers
     ) -> Iterator[tuple[FoundationLaw, Array, Array]]:
         """Yield law, unknowns and pressures of contact, then fixed conducting nodes. Collective."""
-        nodal = self.nodes.apply(x)
+        nodal = self.nodes.jump(x)
         yield self.foundation, nodal, self.pressure(nodal, multipliers)
         if self.fixed_conducting is not None:
-            nodal = self.fixed_conducting.nodes.apply(x)
+            nodal = self.fixed_conducting.nodes.jump(x)
             yield self.fixed_conducting, nodal, self.fixed_conducting.resting(nodal)
 
     def add_forces(self, residual: Array, x: Array, multipliers: Multipliers) -> None:
         """Add the contact forces and the charge at local unknowns to owned values."""
         nodes = self.nodes
-        nodes.transpose(nodes.weight[:, None] * multipliers.vectors(nodes), residual)
+        nodes.add_jump_transposed(nodes.weight[:, None] * multipliers.vectors(nodes), residual)
         for law, nodal, pressure in self.acting(x, multipliers):
-            law.nodes.transpose(law.nodes.weight[:, None] * law.force(nodal, pressure), residual)
+            law.nodes.add_jump_transposed(
+                law.nodes.weight[:, None] * law.force(nodal, pressure), residual
+            )
         if self.proximal is not None:
-            away = nodes.tangential_component(nodes.apply(x)) - self.proximal.about
-            nodes.transpose(self.proximal.stiffness * nodes.weight[:, None] * away, residual)
+            away = nodes.tangential_component(nodes.jump(x)) - self.proximal.about
+            nodes.add_jump_transposed(
+                self.proximal.stiffness * nodes.weight[:, None] * away, residual
+            )
 
     def add_charge(
         self, residual: Array, x: Array, change: Array, multipliers: Multipliers
@@ -225,8 +229,8 @@ class Interface:
         """Add the change of the charge with local unknowns, psi frozen, to owned values."""
         for law, nodal, pressure in self.acting(x, multipliers):
             block = law.charge_block(nodal, pressure)
-            density = np.einsum("nij,nj->ni", block, law.nodes.apply(change))
-            law.nodes.transpose(law.nodes.weight[:, None] * density, residual)
+            density = np.einsum("nij,nj->ni", block, law.nodes.jump(change))
+            law.nodes.add_jump_transposed(law.nodes.weight[:, None] * density, residual)
 
     @property
     def coupled(self) -> NDArray[np.int32]:
@@ -252,6 +256,6 @@ class Interface:
         if self.fixed_conducting is None:
             return weighted
         there = self.fixed_conducting.nodes
-        nodal = there.apply(x)
+        nodal = there.jump(x)
         block = self.fixed_conducting.charge_block(nodal, self.fixed_conducting.resting(nodal))
         return np.concatenate([weighted, there.weight[:, None, None] * block])

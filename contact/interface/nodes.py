@@ -134,7 +134,7 @@ class ContactNodes:
         """Dimension d of the displacement."""
         return self.normal.shape[1]
 
-    def apply(self, x: Array) -> Array:
+    def jump(self, x: Array) -> Array:
         """Return the jumps T x, shape (n, block_size), of a local dof array. Collective.
 
         These are the nodal unknowns, in front of a moving foundation relative to it.
@@ -152,7 +152,7 @@ class ContactNodes:
         count = values.size // self.block_size
         return values[: count * self.block_size].reshape(count, self.block_size)
 
-    def transpose(self, nodal: Array, into: Array) -> None:
+    def add_jump_transposed(self, nodal: Array, into: Array) -> None:
         """Add T^T times vectors, (n, d) or (n, block_size), to a local dof array. Collective."""
         size = nodal.shape[1]
         values = self._nodal(into)[:, :size]

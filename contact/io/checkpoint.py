@@ -314,7 +314,7 @@ def _nodes(problem: ContactProblem) -> Array:
     np.add.at(sums.x.array.reshape(-1, d + 1), links[:cells], own[:, None, :])
     sums.x.scatter_reverse(InsertMode.add)
     sums.x.scatter_forward()
-    at_nodes = np.empty((len(body.nodal(body.rest())), d + 1))
+    at_nodes = np.empty((len(body.nodal(body.zero_displacement())), d + 1))
     at_nodes[space.dofmap.list] = sums.x.array.reshape(-1, d + 1)[links]
     owned = body.owned // body.block_size
     means = at_nodes[:owned, :d] / at_nodes[:owned, d:]

@@ -226,10 +226,10 @@ def working_set(newton: SemismoothNewton, state: State) -> State | None:
     inside = np.zeros(nodes.weight.shape, dtype=bool)
     deepest, count = _penetrating(interface, state, inside)
     while count > 0:
-        normal_gap = interface.normal_gap(nodes.apply(state.x))
+        normal_gap = interface.normal_gap(nodes.jump(state.x))
         inside |= normal_gap <= -deepest
         gap = np.where(inside, interface.gap, np.inf)
-        less = problem.with_laws(replace(interface, gap=gap))
+        less = problem.with_interface(replace(interface, gap=gap))
         # At one stiff node of a soft body a forcing term leaves pressures of any sign.
         state, outcome = newton.on(less).iterate(state, note=WORKING_SET, exact=True)
         before = count
@@ -243,7 +243,7 @@ def _penetrating(
     interface: Interface, state: State, inside: NDArray[np.bool_]
 ) -> tuple[float, int]:
     """Return the largest penetration of nodes outside a set, and their number. Collective."""
-    nodal = interface.nodes.apply(state.x)
+    nodal = interface.nodes.jump(state.x)
     depth = np.where(inside, 0.0, -interface.normal_gap(nodal))
     deepest = interface.nodes.maximum(depth)
     rounding = interface.rounding(nodal) / interface.c_0
@@ -295,7 +295,7 @@ def conductivity_continuation(
 
     def solve(part: float, state: State) -> tuple[State, Outcome]:
         less = replace(interface, foundation=interface.foundation.conducting(part))
-        method = newton if part == 1.0 else newton.on(problem.with_laws(less))
+        method = newton if part == 1.0 else newton.on(problem.with_interface(less))
         return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
 
     return continuation(solve, problem.start())
@@ -320,8 +320,8 @@ def proximal_points(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, 
     least, stagnant = np.inf, 0
     while stagnant < STAGNANT_PROBLEMS:
         stagnant += 1
-        term = Proximal(stiffness, nodes.tangential_component(nodes.apply(state.x)))
-        method = newton.on(problem.with_laws(replace(interface, proximal=term)))
+        term = Proximal(stiffness, nodes.tangential_component(nodes.jump(state.x)))
+        method = newton.on(problem.with_interface(replace(interface, proximal=term)))
         try:
             balanced, outcome = method.iterate(state, note=PROXIMAL_POINT)
         except SingularError:  # no contact: a normal motion is unconstrained

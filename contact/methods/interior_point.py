@@ -341,7 +341,7 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
         if aside is None and outcome.residuals.significant < PROGRESS * best:
             state = last
         best = min(best, outcome.residuals.significant)
-        nodal = interface.nodes.apply(state.x)
+        nodal = interface.nodes.jump(state.x)
         bound = interface.bound(nodal, state.forces)
         # With all nodes open the next bound is zero, and the solution the same.
         if aside is not None and interface.nodes.maximum(bound) <= interface.rounding(nodal):
@@ -376,8 +376,8 @@ class InteriorPoint:
         total, limit = all_loads(problem), nodes.weight * bound
         count = max(nodes.size, 1)
         self._frictional = limit > EPS * max(nodes.maximum(limit), total / count)
-        nodal = nodes.apply(self._state.x)
-        moved = np.zeros_like(nodal) if begin is None else nodes.apply(begin.x) - nodal
+        nodal = nodes.jump(self._state.x)
+        moved = np.zeros_like(nodal) if begin is None else nodes.jump(begin.x) - nodal
         normal_gap = interface.normal_gap(nodal + moved)[self._rigid]
         gap = interface.gap[self._rigid]
         scales = problem.scales
@@ -385,7 +385,7 @@ class InteriorPoint:
         if begin is not None:
             way = nodes.maximum(np.abs(moved[:, : nodes.dim]).max(axis=1, initial=0.0))
             # Without loads the stiffness is that of a block; without penetration any work will do.
-            far = nodes.maximum(-normal_gap) or SHARE * (way or interface.diameter)
+            far = nodes.maximum(-normal_gap) or SHARE * (way or interface.size)
             least = np.sqrt(SHARE) * far
             work = (total / way if total > 0 and way > 0 else block) * least**2
         else:
@@ -424,7 +424,7 @@ class InteriorPoint:
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
             interface, state = self.problem.interface, self.state
-            nodal = interface.nodes.apply(state.x)
+            nodal = interface.nodes.jump(state.x)
             pressure = interface.nodes.maximum(interface.pressure(nodal, state.forces))
             if pressure <= interface.rounding(nodal):
                 ended = f"nothing presses after {steps} steps"
@@ -448,7 +448,7 @@ class InteriorPoint:
     def relative_gap(self) -> float:
         """Return the duality gap over the work of loads and contact. Collective."""
         body, interface, x = self.problem.equilibrium, self.problem.interface, self._state.x
-        nodes, cones, nodal = interface.nodes, self.cones, interface.nodes.apply(x)
+        nodes, cones, nodal = interface.nodes, self.cones, interface.nodes.jump(x)
         ways = np.abs(interface.gap) + np.abs(nodes.normal_component(nodal))
         slips = interface.slip_length(nodal)[self._frictional]
         contact = float(summed(nodes.comm, cones.force @ ways[self._rigid] + cones.bound @ slips))
@@ -465,7 +465,7 @@ class InteriorPoint:
             return False
         nodes, rigid, frictional = interface.nodes, self._rigid, self._frictional
         body, d = self.problem.equilibrium, nodes.dim
-        nodal = nodes.apply(state.x)
+        nodal = nodes.jump(state.x)
         residual = -residual_forces(self.problem, state, internal=self._internal)
         slack = interface.normal_gap(nodal)[rigid] - cones.slack
         slip = interface.slip(nodal)[frictional] - cones.slip
@@ -483,9 +483,9 @@ class InteriorPoint:
             at_nodes[rigid] = -(force - stiff * slack)[:, None] * normal
             at_nodes[frictional] += friction - np.einsum("kij,kj->ki", across, slip)
             rhs = residual.copy()
-            nodes.transpose(at_nodes, rhs)
+            nodes.add_jump_transposed(at_nodes, rhs)
             dx = self._step.operator.solve(rhs, FORCING)
-            moved = nodes.apply(dx)
+            moved = nodes.jump(dx)
             closed = slack - nodes.normal_component(moved)[rigid]
             return dx, cones.complete(
                 constants, closed, nodes.tangential_component(moved)[frictional] + slip
@@ -502,7 +502,7 @@ class InteriorPoint:
         length = min(1.0, share * cones.to_boundary(step))
         if not (np.isfinite(length) and length > 1e-12):
             return False
-        x = body.prescribe(body.moved(state.x, length * dx), state.time)
+        x = body.prescribe(body.updated(state.x, length * dx), state.time)
         self._state = replace(state, x=x)
         cones.move(step, length)
         return True

@@ -250,4 +250,4 @@ def _extrapolation(problem: ContactProblem, ends: Sequence[tuple[ContactProblem,
 def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:
     """Return the owned loads and prescribed values at a time."""
     body = problem.equilibrium
-    return body.external(time), body.owned_part(body.prescribe(body.rest(), time))
+    return body.external(time), body.owned_part(body.prescribe(body.zero_displacement(), time))

@@ -219,7 +219,7 @@ class Newton:
         if body.linear:
             secant_at = None
         elif start is None:
-            secant_at = body.rest()
+            secant_at = body.zero_displacement()
         whole.begin(begin)
         if self._pays:
             state, outcome = self._condensed_steps(begin, secant_at)
@@ -266,7 +266,7 @@ class Newton:
             if unsolved and not overloaded:
                 return previous, loop.outcome(NOT_CONDENSED)
             increment = self.condensation.expand(condensed, end.x)
-            state = replace(end, x=body.moved(state.x, increment), history=state.history)
+            state = replace(end, x=body.updated(state.x, increment), history=state.history)
             secant_at = None
             if not body.linear:
                 chord.note_factorisation()

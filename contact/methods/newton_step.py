@@ -122,7 +122,7 @@ class NewtonStep:
         """Assemble the operator with nodal blocks and those of layer and charge. Collective."""
         interface, body = problem.interface, problem.equilibrium
         if interface.foundation.active:
-            nodal = interface.nodes.apply(state.x)
+            nodal = interface.nodes.jump(state.x)
             blocks = blocks + interface.foundation.block(
                 nodal, interface.pressure(nodal, state.forces)
             )
@@ -136,7 +136,7 @@ class NewtonStep:
         size = nodes.block_size
         self.assemble(problem, free, np.zeros((nodes.nodes.size, size, size)))
         step = self.operator.solve(-residual_forces(problem, free))
-        return replace(free, x=body.prescribe(body.moved(free.x, step), free.time))
+        return replace(free, x=body.prescribe(body.updated(free.x, step), free.time))
 
     def __call__(
         self,
@@ -173,7 +173,7 @@ class NewtonStep:
         """
         interface = problem.interface
         body, nodes = problem.equilibrium, interface.nodes
-        nodal = nodes.apply(state.x)
+        nodal = nodes.jump(state.x)
         contact = linearise(
             interface,
             nodal,
@@ -199,7 +199,7 @@ class NewtonStep:
         self._kind = kind
         here = replace(state, forces=contact.multipliers)
         residual = residual_forces(problem, here, secant_at, internal_forces)
-        nodes.transpose((nodes.weight * shift)[:, None] * nodes.normal, residual)
+        nodes.add_jump_transposed((nodes.weight * shift)[:, None] * nodes.normal, residual)
         forcing = None if exact else self._forcing_term(residuals.significant)
         try:
             increment = self.operator.solve(-residual, forcing)
@@ -208,14 +208,14 @@ class NewtonStep:
                 raise
             self.renew()
             return None
-        moved = nodes.apply(increment)
+        moved = nodes.jump(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)
         vectors = contact.multipliers.vectors(nodes) + change[:, : interface.dim]
         forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
         pressed = nodes.normal_component(np.einsum("nij,nj->ni", layer, moved))
         layer_pressure = interface.foundation.pressure(nodal) + shift + pressed
         # Far motions leave nodes of a rigid part off it by rounding.
-        x = body.prescribe(body.moved(state.x, increment), state.time)
+        x = body.prescribe(body.updated(state.x, increment), state.time)
         return replace(
             state,
             x=x,

@@ -99,7 +99,7 @@ class SemismoothNewton:
     def started(self, start: State) -> State:
         """Return an initial guess with its active set."""
         interface, c = self.problem.interface, self.step.parameters.c
-        nodal = interface.nodes.apply(start.x)
+        nodal = interface.nodes.jump(start.x)
         # Rounding of the pressure at an open node would be a friction bound, and make it stick.
         closed = constraint_active(start.forces.pressure, interface.normal_gap(nodal), c)
         pressure = np.where(closed, start.forces.pressure, 0.0)
@@ -236,7 +236,7 @@ class Iteration:
 
     def _largest_pressure(self, state: State) -> float:
         interface = self._problem.interface
-        nodal = interface.nodes.apply(state.x)
+        nodal = interface.nodes.jump(state.x)
         return interface.nodes.maximum(interface.pressure(nodal, state.forces))
 
     def _loss_of_contact(self, state: State) -> tuple[State, Outcome] | None:
@@ -265,13 +265,13 @@ def _node_counts(state: State, problem: AnyProblem) -> tuple[int, int, int] | No
     if state.active_set is None:
         return None
     interface = problem.interface
-    return interface.node_counts(interface.nodes.apply(state.x), state.active_set)
+    return interface.node_counts(interface.nodes.jump(state.x), state.active_set)
 
 
 def _overestimates_stiffness(problem: AnyProblem, c: float, state: State) -> bool:
     """Tell whether c times the penetration of a first state is far above all loads. Collective."""
     interface = problem.interface
-    penetration = np.maximum(-interface.normal_gap(interface.nodes.apply(state.x)), 0.0)
+    penetration = np.maximum(-interface.normal_gap(interface.nodes.jump(state.x)), 0.0)
     forces = np.abs(residual_forces(problem, problem.start()))
     on_nodes, on_global = np.split(forces, [problem.equilibrium.owned])
     loads = float(summed(interface.comm, on_nodes.sum())) + on_global.sum()

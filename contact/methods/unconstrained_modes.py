@@ -99,7 +99,7 @@ class UnconstrainedModes:
     def _constrained_undeformed(self, friction: bool) -> bool:
         """Tell whether supports and contact of the reference configuration constrain all modes."""
         interface, rest = self.problem.interface, self.problem.start()
-        touching = interface.normal_gap(interface.nodes.apply(rest.x)) <= 1e-12 * interface.diameter
+        touching = interface.normal_gap(interface.nodes.jump(rest.x)) <= 1e-12 * interface.size
         grams = [group.constraints(friction, touching) for group in groups(self.problem)]
         return all(null_space(gram).size == 0 for gram in grams)
 
@@ -137,7 +137,7 @@ class UnconstrainedModes:
         state = start
         for _ in range(2):  # each leaves an error of sqrt(EPS)
             increment = operator.solve(-residual_forces(problem, state))
-            state = replace(state, x=problem.equilibrium.moved(state.x, increment))
+            state = replace(state, x=problem.equilibrium.updated(state.x, increment))
         found = self.free_motion(problem, state)
         if found is None:
             return None
@@ -155,7 +155,7 @@ class UnconstrainedModes:
         None without any. Collective.
         """
         interface = problem.interface
-        nodes, nodal = interface.nodes, interface.nodes.apply(state.x)
+        nodes, nodal = interface.nodes, interface.nodes.jump(state.x)
         # Pressures that are rounding do not constrain.
         pressed = interface.pressure(nodal, state.forces) > interface.rounding(nodal)
         motions, columns = [], []
@@ -181,10 +181,10 @@ class UnconstrainedModes:
         near, normal_gap = np.isfinite(interface.gap), interface.normal_gap(nodal)
         rising = np.einsum("ni,nik->nk", nodes.normal, moved)
         depth = nodes.maximum(-(normal_gap + rising @ wanted)[near])
-        limited = depth > NEGLIGIBLE * interface.diameter
+        limited = depth > NEGLIGIBLE * interface.size
         if limited:
             # Penetration of a solution is rounding.
-            deep = normal_gap < -NEGLIGIBLE * interface.diameter
+            deep = normal_gap < -NEGLIGIBLE * interface.size
             room = np.where(deep, normal_gap, np.maximum(normal_gap, 0.0))
             parts = nodes.comm.allgather((rising[near], room[near]))
             cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -242,7 +242,7 @@ def with_least_displacements(
     found = modes.free_motion(problem, state)
     if found is None:
         return state, outcome
-    x = body.moved(state.x, -found.motion)
+    x = body.updated(state.x, -found.motion)
     # Contact forces that are rounding are out of balance after the motion.
     for forces in (Multipliers.zero(problem.interface.nodes), state.forces):
         least = replace(state, x=x, forces=forces)

@@ -276,10 +276,10 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     columns = linalg.block_diag(raised.reshape(body.owned, count), electrodes)
     locally = [body.local(column) for column in columns.T]
     flows, among_held = _flows(problem, state)
-    rows.append(np.column_stack([problem.nodes.apply(x)[flows, -1] for x in locally]))
+    rows.append(np.column_stack([problem.nodes.jump(x)[flows, -1] for x in locally]))
     if interface.fixed_conducting is not None:
         nodes = interface.fixed_conducting.nodes
-        rows.append(np.column_stack([nodes.apply(x)[among_held, -1] for x in locally]))
+        rows.append(np.column_stack([nodes.jump(x)[among_held, -1] for x in locally]))
     gram = sum(problem.comm.allreduce(part.T @ part, op=MPI.SUM) for part in rows)
     floating = null_space(gram / max(np.trace(gram), 1.0))
     if floating.shape[1] == 0:
@@ -304,7 +304,7 @@ def _flows(
     interface = problem.interface
     law, held = interface.foundation, interface.fixed_conducting
     if state is None:
-        return _conducts(law, interface.diameter), _conducts(held, interface.diameter)
+        return _conducts(law, interface.size), _conducts(held, interface.size)
     found = [
         law.charge_block(nodal, pressure, full=True)[:, -1, -1] != 0
         for law, nodal, pressure in interface.acting(state.x, state.forces)

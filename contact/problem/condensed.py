@@ -95,7 +95,7 @@ class CondensedBody:
         """Number of unknowns that this rank owns."""
         return self.free.size
 
-    def rest(self) -> Array:
+    def zero_displacement(self) -> Array:
         """Return zeros."""
         return np.zeros(self.owned)
 
@@ -104,7 +104,7 @@ class CondensedBody:
         fixed = self.at - masked(self.free, self.inclined, self.at)
         return masked(self.free, self.inclined, x) + fixed
 
-    def moved(self, x: Array, increment: Array) -> Array:
+    def updated(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment."""
         return x + increment
 
@@ -137,7 +137,7 @@ class CondensedBody:
         """Return the `norms` of loads, reactions and coupling forces of the whole body."""
         return self.acting
 
-    def exchanged(self, state: LinearisationPoint) -> Array:
+    def coupling_norms(self, state: LinearisationPoint) -> Array:
         """Return zero: part of `load_norms`."""
         return np.zeros_like(self.acting)
 
@@ -155,12 +155,12 @@ class CondensedProblem:
     scales: Scales
     time: float = 1.0
 
-    def start(self, time: float | None = None) -> State:
+    def start(self) -> State:
         """Return the zero initial guess."""
-        x = self.equilibrium.prescribe(self.equilibrium.rest())
+        x = self.equilibrium.prescribe(self.equilibrium.zero_displacement())
         return State(x, Multipliers.zero(self.interface.nodes), self.time)
 
-    def with_laws(self, interface: Interface) -> CondensedProblem:
+    def with_interface(self, interface: Interface) -> CondensedProblem:
         """Return the problem with another interface on the same contact nodes."""
         return replace(self, interface=interface)
 
@@ -211,7 +211,7 @@ class Condensation:
         body = full.equilibrium
         none = Constraint(body.layout, None, body.global_unknowns.ties, body.global_unknowns.free)
         self._constraint = full.constraint or none
-        self._bulk = ConstrainedBulk(body, self._constraint, BodyState(body.rest()))
+        self._bulk = ConstrainedBulk(body, self._constraint, BodyState(body.zero_displacement()))
         self._free = np.flatnonzero(self._constraint.free)
         self._matrix = self._bulk.create_matrix()
         size = body.block_size
@@ -271,7 +271,7 @@ class Condensation:
         if not self._regular:
             return None
         reactions = body.norms(body.reactions(residual))
-        acting = body.load_norms(state.time) + reactions + body.exchanged(state)
+        acting = body.load_norms(state.time) + reactions + body.coupling_norms(state)
         restricted = self._constraint.restrict(-residual)
         self._rhs = body.layout.mask(restricted[: body.owned])
         # With loads along those before, the extrapolated state is in equilibrium inside.
@@ -295,7 +295,7 @@ class Condensation:
             self._rows,
             self._stiffness,
             forces,
-            np.concatenate([nodes.apply(state.x), others]).ravel(),
+            np.concatenate([nodes.jump(state.x), others]).ravel(),
             self._own,
             acting,
             body.component_norms.at(self.nodes),

@@ -210,9 +210,9 @@ class Linearised:
         size, steps = 0.0, list[float]()
         while True:
             known = np.einsum("nij,nj->ni", self._regular, left)
-            nodes.transpose(-nodes.weight[:, None] * known, rhs)
+            nodes.add_jump_transposed(-nodes.weight[:, None] * known, rhs)
             dx = self._operator.solve(rhs, EPS)
-            moved = nodes.apply(self.problem.equilibrium.local(dx))
+            moved = nodes.jump(self.problem.equilibrium.local(dx))
             df = known - np.einsum(
                 "nij,nj->ni", self._regular, np.einsum("nij,nj->ni", self._by_jump, moved)
             )
@@ -231,15 +231,15 @@ class Linearised:
         size, steps = 0.0, list[float]()
         while True:
             known = np.einsum("nji,nj->ni", self._regular, left)
-            nodes.transpose(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
+            nodes.add_jump_transposed(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
             dx = self._operator.solve_transposed(rhs)
-            moved = weight * nodes.apply(self.problem.equilibrium.local(dx))[:, : nodes.dim]
+            moved = weight * nodes.jump(self.problem.equilibrium.local(dx))[:, : nodes.dim]
             dc = known - np.einsum("nji,nj->ni", self._regular, moved)
             x, c = x + dx, c + dc
             by_jump, by_own = self._smoothed_transposed(dc)
             left = left - moved - np.einsum("nji,nj->ni", self._by_force, dc) - by_own
             rhs -= self._operator.multiply(dx, transposed=True)
-            nodes.transpose(-by_jump, rhs)
+            nodes.add_jump_transposed(-by_jump, rhs)
             size, steps = max(size, self._norm(x, c)), [*steps, self._norm(dx, dc)]
             if self._enough(steps, size):
                 return x, c
@@ -249,7 +249,7 @@ class Linearised:
         nodes, d = self.problem.nodes, self.problem.dim
         by_normal = np.einsum("nij,nj->ni", self._by_jump[:, :, :d], nodes.normal)
         found = np.einsum("ni,ni->n", conditions, by_normal)
-        moved = nodes.apply(self.problem.equilibrium.local(x))
+        moved = nodes.jump(self.problem.equilibrium.local(x))
         pressed = nodes.weight * nodes.normal_component(moved)
         return found + pressed * np.einsum("ni,ni->n", self._layer[:, :d], nodes.normal)
 
@@ -297,7 +297,7 @@ def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> St
     nodes = problem.nodes
     vectors = state.forces.vectors(nodes) + f
     forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
-    return replace(state, x=problem.equilibrium.moved(state.x, x), forces=forces)
+    return replace(state, x=problem.equilibrium.updated(state.x, x), forces=forces)
 
 
 def commit_along(linearised: Linearised, x: Array, change: History) -> History:
@@ -305,7 +305,7 @@ def commit_along(linearised: Linearised, x: Array, change: History) -> History:
     problem, state = linearised.problem, linearised.state
     slip, variables = _parts(change)
     along = problem.equilibrium.local(x)
-    jump = problem.nodes.tangential_component(problem.nodes.apply(along))
+    jump = problem.nodes.tangential_component(problem.nodes.jump(along))
     longer = np.einsum("ni,ni->n", _direction(problem, problem.nodal(state)), jump - slip.jump)
     parts: dict[str, Part] = {SLIP: SlipHistory(jump, slip.accumulated + longer)}
     if variables is not None:
@@ -336,7 +336,7 @@ def commit_transposed(problem: ContactProblem, state: State, after: History) -> 
     by_jump = np.zeros_like(nodal)
     by_jump[:, : nodes.dim] = nodes.tangential_component(slip.jump)
     by_jump[:, : nodes.dim] += slip.accumulated[:, None] * _direction(problem, nodal)
-    nodes.transpose(by_jump, by_x)
+    nodes.add_jump_transposed(by_jump, by_x)
     return by_x
 
 

@@ -76,7 +76,7 @@ def approached(
         push[member.columns] = forces[member.columns]
         if nodes.motion is None or not member.foundation or not push.any():
             continue
-        normal_gap = interface.normal_gap(nodes.apply(x))
+        normal_gap = interface.normal_gap(nodes.jump(x))
         closing = -nodes.normal_component(nodes.motion @ push)
         mine = np.abs(nodes.motion[:, :, member.columns]).max(axis=(1, 2), initial=0.0) > 0
         way = np.full(normal_gap.size, np.inf)
@@ -230,7 +230,7 @@ class ContactProblem:
         other.interface = other._interface().at(self.time, self.slip_history)
         return other
 
-    def with_laws(self, interface: Interface) -> ContactProblem:
+    def with_interface(self, interface: Interface) -> ContactProblem:
         """Return the problem with other laws at the same contact nodes."""
         other = copy(self)
         other.interface = interface
@@ -316,8 +316,8 @@ class ContactProblem:
             acting += list(np.moveaxis(nodes.tangent, 2, 0))
         along = np.zeros((len(body.free), self.dim, len(acting)))
         for k, vectors in enumerate(acting):
-            into = np.zeros_like(body.owned_part(body.rest()))
-            nodes.transpose(vectors, into)
+            into = np.zeros_like(body.owned_part(body.zero_displacement()))
+            nodes.add_jump_transposed(vectors, into)
             along[:, :, k] = body.nodal(into)[:, : self.dim]
         body.cuts.check(np.arange(len(along), dtype=np.int32), along, "contact meets")
 
@@ -406,7 +406,7 @@ class ContactProblem:
 
     def nodal(self, state: State) -> Array:
         """Return the unknowns at the owned contact nodes, shape (n, block size)."""
-        return self.nodes.apply(state.x)
+        return self.nodes.jump(state.x)
 
     def start(self, time: float | None = None) -> State:
         """Return the state to start from: zero, but for the prescribed values at a time.
@@ -415,7 +415,7 @@ class ContactProblem:
         as these alone determine it: far from phi_F a truncated charge has no derivative.
         """
         body, time = self.equilibrium, self.time if time is None else time
-        x = body.rest()
+        x = body.zero_displacement()
         conductors = [c.conductor for c in self.contacts if c.conductor is not None]
         if self.piezoelectric and conductors:
             if all(fixed.potential is None for fixed in self.body.fixed):

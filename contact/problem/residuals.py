@@ -177,7 +177,7 @@ def _perturbed(problem: AnyProblem, state: State) -> _Perturbed:
     # Global unknowns, behind those of the nodes, have the same sign on all ranks.
     step = np.full(own.size, PERTURBATION)
     step[: body.owned] = _random_signs(body.owned)
-    moved = body.moved(state.x, step * own)
+    moved = body.updated(state.x, step * own)
     return moved, body.internal_forces(replace(state, x=moved))
 
 
@@ -199,7 +199,7 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
     Multipliers at open nodes, and pressures that are rounding, do not count as contact.
     """
-    nodal, own = interface.nodes.apply(state.x), state.forces.pressure
+    nodal, own = interface.nodes.jump(state.x), state.forces.pressure
     rounding = interface.rounding(nodal)
     on = constraint_active(own, interface.normal_gap(nodal), interface.c_0, rounding)
     pressed = interface.norms(interface.pressure(nodal, state.forces) - own * ~on)
@@ -223,7 +223,7 @@ def evaluate_forces(problem: AnyProblem, state: State) -> tuple[Residuals, Array
     on_contact = np.zeros_like(internal)
     interface.add_forces(on_contact, state.x, state.forces)
     residual = internal - body.external(state.time) + on_contact
-    exerted = body.norms(on_contact) + body.exchanged(state)
+    exerted = body.norms(on_contact) + body.coupling_norms(state)
     scale = loads + exerted + body.norms(body.reactions(residual))
     unbalanced = body.norms(body.unbalanced(residual))
     limit, loaded = body.rounding_limit * scale, loads > 0
@@ -248,7 +248,7 @@ def evaluate_forces(problem: AnyProblem, state: State) -> tuple[Residuals, Array
     scale = np.maximum(scale, EPS * scale.max())
     reference = np.where(scale > 0, scale, 1.0)
     balance = worst((unbalanced / reference).reshape(1, -1), (rounding / reference).reshape(1, -1))
-    nodal = interface.nodes.apply(state.x)
+    nodal = interface.nodes.jump(state.x)
     bound = interface.bound(nodal, state.forces)
     pressures = _as_pressures(interface, contact_rounding)
     laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
@@ -298,7 +298,7 @@ class Balance:
     @staticmethod
     def rest(problem: ContactProblem) -> Balance:
         """Return that of the reference configuration."""
-        x = problem.equilibrium.rest()
+        x = problem.equilibrium.zero_displacement()
         zero = np.zeros_like(problem.equilibrium.owned_part(x))
         return Balance(0.0, 0.0, 0.0, None, 0.0, x, zero, zero)
 
@@ -312,7 +312,7 @@ def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]
     interface.add_forces(foundation, state.x, state.forces)
     internal = residual + external - foundation
     vectors = interface.nodes.weight[:, None] * state.forces.vectors(interface.nodes)
-    interface.nodes.transpose(-vectors, foundation)
+    interface.nodes.add_jump_transposed(-vectors, foundation)
     return external - foundation + body.reactions(residual), internal
 
 

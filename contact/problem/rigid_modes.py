@@ -90,7 +90,7 @@ class Group:
     @cached_property
     def _at_contact(self) -> Array:
         body, nodes = self.problem.equilibrium, self.problem.nodes
-        moved = [nodes.apply(body.local(column))[:, : body.dim] for column in self.moved.T]
+        moved = [nodes.jump(body.local(column))[:, : body.dim] for column in self.moved.T]
         return np.stack(moved, axis=2)
 
     @cached_property

@@ -420,7 +420,7 @@ def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
     laws = [material.law for material in body.body.materials]
     if not states or all(is_linear(law) or isinstance(law, HistoryLaw) for law in laws):
         return 0.0
-    fields = DerivedFields(body, BodyState(body.rest()))
+    fields = DerivedFields(body, BodyState(body.zero_displacement()))
     of_cells = volumes(body.domain)
     sizes = [of_cells[cells] for cells in body.cells]
     sums, after = np.zeros(len(states) + 1), fields.strains()

@@ -141,7 +141,9 @@ class ContactForce:
         by_force[:, self.axis] = turn * nodes.weight
         layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
-        nodes.transpose((turn * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x)
+        nodes.add_jump_transposed(
+            (turn * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x
+        )
         return by_x, by_force
 
 
@@ -188,7 +190,7 @@ class MaxPressure(Largest):
         at = _largest(problem, self.values(problem, state))
         layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
-        nodes.transpose(at[:, None] * layer, by_x)
+        nodes.add_jump_transposed(at[:, None] * layer, by_x)
         return by_x, at[:, None] * nodes.normal
 
 
@@ -263,12 +265,12 @@ class Reaction:
         body, interface, nodes = problem.equilibrium, problem.interface, problem.nodes
         weights = self.weights(problem)
         by_x = body.tangent_transposed(state, weights)
-        seen = nodes.apply(body.local(weights))
+        seen = nodes.jump(body.local(weights))
         by_force = nodes.weight[:, None] * seen[:, : nodes.dim]
         for law, nodal, pressure in interface.acting(state.x, state.forces):
             block = law.block(nodal, pressure, full=law is interface.foundation)
-            there = law.nodes.apply(body.local(weights))
-            law.nodes.transpose(
+            there = law.nodes.jump(body.local(weights))
+            law.nodes.add_jump_transposed(
                 law.nodes.weight[:, None] * np.einsum("nji,nj->ni", block, there), by_x
             )
         return by_x, by_force
@@ -291,7 +293,7 @@ class FoundationCharge:
         for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
             full = law is problem.interface.foundation
             slope = -law.charge_block(nodal, pressure, full)[:, -1] / law.phi_scale
-            law.nodes.transpose(law.nodes.weight[:, None] * slope, by_x)
+            law.nodes.add_jump_transposed(law.nodes.weight[:, None] * slope, by_x)
         return by_x, np.zeros_like(problem.nodes.normal)
 
 

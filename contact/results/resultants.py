@@ -281,7 +281,7 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
         density = np.zeros((nodal.shape[0], body.block_size))
         density[:, -1] = law.nodes.weight * law.charge(nodal, pressure)
-        law.nodes.transpose(density, leaving)
+        law.nodes.add_jump_transposed(density, leaving)
     return np.asarray(body.nodal(leaving)[:, -1])
 
 

@@ -68,12 +68,12 @@ def uniqueness(
         return np.nan, False
     if condensation is None and not condensation_pays(problem, "auto"):
         return np.inf, False
-    nodal = nodes.apply(state.x)
+    nodal = nodes.jump(state.x)
     pressure = interface.pressure(nodal, state.forces)
     rounding = interface.negligible(nodal, pressure)
     closed = constraint_active(pressure, interface.normal_gap(nodal), interface.c_0, rounding)
     if nodes.maximum(closed.astype(float)) == 0:
-        closed = interface.gap <= EPS * interface.diameter
+        closed = interface.gap <= EPS * interface.size
     mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(nodal))
     condensation = condensation or Condensation(problem, Counters())
     stiffness = condensation.stiffness(state)

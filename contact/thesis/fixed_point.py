@@ -155,7 +155,7 @@ class OuterLoop(ABC):
         interface, forces, old = self.problem.interface, self.state.forces, self.bound
         if not interface.friction.acts:
             return np.nan
-        nodal = interface.nodes.apply(self.state.x)
+        nodal = interface.nodes.jump(self.state.x)
         if iteration == 0:  # frictionless start: bound of zero slip
             pressure = interface.pressure(nodal, forces)
             self.bound = interface.friction.bound(pressure, np.zeros_like(pressure))
@@ -231,7 +231,7 @@ class FixedPoint(OuterLoop):
         frictional = interface.friction.acts
         if start is None:
             # Secant at zero strain: prescribed values so far strain only the elements beside them.
-            self.state, self._secant_at = problem.start(), problem.equilibrium.rest()
+            self.state, self._secant_at = problem.start(), problem.equilibrium.zero_displacement()
             stuck = sticking_bound(problem)
             # Iteration 0 is the frictionless problem of the thesis: not with single_loop, nor where
             # friction alone constrains a rigid-body mode.
@@ -241,7 +241,7 @@ class FixedPoint(OuterLoop):
         else:
             self.state, first = start, 1
             self._secant_at = start.x if secant_at is None else secant_at
-            nodal, pressure = interface.nodes.apply(start.x), start.forces.pressure
+            nodal, pressure = interface.nodes.jump(start.x), start.forces.pressure
             if interface.foundation.normal_graph(nodal) is not None:
                 pressure = interface.pressure(nodal, start.forces)
             self._z = np.column_stack([pressure, start.forces.friction])
@@ -252,7 +252,7 @@ class FixedPoint(OuterLoop):
 
     def _initial_z(self, z: Array | float, friction: bool) -> Array:
         """Return z = lambda + r (u - u_0) of lambda + r u, with u_0 of the iterate."""
-        nodal = self.problem.interface.nodes.apply(self.state.x)
+        nodal = self.problem.interface.nodes.jump(self.state.x)
         return z - self.r * displacement_and_slip(self.problem.interface, nodal, friction)
 
     def _step(self, iteration: int) -> tuple[int, str]:
@@ -262,7 +262,7 @@ class FixedPoint(OuterLoop):
         if friction and self._first == 0 and iteration == 1:
             # Slip and contact without friction are a bad initial guess.
             self._z = self._initial_z(0.0, friction)
-        state, nodal = self.state, interface.nodes.apply(self.state.x)
+        state, nodal = self.state, interface.nodes.jump(self.state.x)
         blocks = augmentation(interface.nodes, self.r, friction)
         if interface.foundation.active:
             blocks = blocks + self._current_block(nodal, interface.pressure(nodal, state.forces))
@@ -276,7 +276,7 @@ class FixedPoint(OuterLoop):
             frozen, self.operator, self._z, self.options, self._norm, self.recorder.poll
         )
         self._stalled = result.stalled and not self._gap_derivative.included
-        x = body.moved(state.x, result.increment)
+        x = body.updated(state.x, result.increment)
         self.state, self._z = replace(state, x=x, forces=result.forces), result.z
         self._secant_at = x
         return result.iterations, "tangent" if kind == "tangent" else ""

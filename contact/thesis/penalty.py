@@ -228,7 +228,7 @@ class PenalisedProblem:
         with lagged laws.
         """
         body, interface = self._body, self._interface
-        nodal = interface.nodes.apply(state.x)
+        nodal = interface.nodes.jump(state.x)
         self._law, self._implicit, self._nodal = law, implicit, nodal
         self._state = state
         self._assembled = body.linear
@@ -243,7 +243,7 @@ class PenalisedProblem:
         on_contact = np.zeros_like(residual)
         interface.add_forces(on_contact, state.x, state.forces)
         norms = body.load_norms(state.time) + body.norms(residual)
-        norms = norms + body.norms(on_contact) + body.exchanged(state)
+        norms = norms + body.norms(on_contact) + body.coupling_norms(state)
         self._units = body.component_norms.spread(np.where(norms > 0, norms, 1.0))
         self.snes.setTolerances(
             rtol=1e-14,
@@ -274,14 +274,16 @@ class PenalisedProblem:
         closest = nodes.maximum(penetration, -np.inf)
         if closest >= 0:
             return np.zeros_like(body.owned_part(state.x))
-        stiffness = (penetration >= closest - 1e-9 * interface.diameter) / self._eps.contact
+        stiffness = (penetration >= closest - 1e-9 * interface.size) / self._eps.contact
         n, d = nodes.normal.shape
         blocks = np.zeros((n, nodes.block_size, nodes.block_size))
         blocks[:, :d, :d] = stiffness[:, None, None] * outer(nodes.normal, nodes.normal)
         blocks[:, :d, :d] += self._law.block(nodal)
         self.operator.update("secant", state, interface.weighted(blocks, state.x))
         rhs = body.external(state.time) - body.internal_forces(state)
-        nodes.transpose(-(nodes.weight * stiffness * penetration)[:, None] * nodes.normal, rhs)
+        nodes.add_jump_transposed(
+            -(nodes.weight * stiffness * penetration)[:, None] * nodes.normal, rhs
+        )
         return self.operator.solve(rhs)
 
     def _unknowns(self, iterate: PETSc.Vec) -> Array:
@@ -290,23 +292,25 @@ class PenalisedProblem:
 
     def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
         body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
-        nodal = nodes.apply(x)
+        nodal = nodes.jump(x)
         secant_at = None if self._implicit else self._state.x
         values = body.internal_forces(replace(self._state, x=x), secant_at)
         values = values - body.external(self._state.time)
-        nodes.transpose(nodes.weight[:, None] * self._law.forces(nodal).vectors(nodes), values)
+        nodes.add_jump_transposed(
+            nodes.weight[:, None] * self._law.forces(nodal).vectors(nodes), values
+        )
         change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
         if self._layer is not None:
             u_n = np.minimum(nodes.normal_component(nodal), self._interface.gap)
             change[:, : nodes.dim] += self._layer.layer(u_n)[:, None] * nodes.normal
-        nodes.transpose(nodes.weight[:, None] * (self._response + change), values)
+        nodes.add_jump_transposed(nodes.weight[:, None] * (self._response + change), values)
         residual.array[:] = self._packed(body.unbalanced(values) / self._units)
 
     def _jacobian(
         self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
     ) -> None:
         body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
-        nodal, d = nodes.apply(x), body.dim
+        nodal, d = nodes.jump(x), body.dim
         blocks = self._current_block.copy()
         blocks[:, :d, :d] += self._law.block(nodal)
         if self._layer is not None:
@@ -394,14 +398,14 @@ class Penalty(OuterLoop):
         self._failed = implicit and bool(fault)
         if self._failed:  # go on with lagged terms
             x, fault = self.state.x, f"implicit: {fault}"
-        forces = PenalisedLaw(interface, self._eps).forces(interface.nodes.apply(x))
+        forces = PenalisedLaw(interface, self._eps).forces(interface.nodes.jump(x))
         self.state = replace(self.state, x=x, forces=forces)
         return inner, fault or ("implicit" if implicit else "")
 
     def _solve(self, implicit: bool) -> tuple[Array, int, str]:
         """Return unknowns, number of iterations, and fault or ""."""
         interface = self.problem.interface
-        nodal = interface.nodes.apply(self.state.x)
+        nodal = interface.nodes.jump(self.state.x)
         law = PenalisedLaw(interface, self._eps) if implicit else self._lagged(nodal)
         symmetric = not (implicit and interface.friction.acts)
         if symmetric not in self._solvers:

@@ -163,7 +163,7 @@ class FrozenProblem:
         """Evaluate the loads and the layer at the iterate. Collective."""
         interface, nodes = self.problem.interface, self.problem.interface.nodes
         self.interface, self.nodes = interface, nodes
-        self.at = nodes.apply(self.state.x)
+        self.at = nodes.jump(self.state.x)
         #: The layer, within the constraint; None without one.
         self.layer = interface.foundation.normal_graph(self.at)
         self.origin = self.r * displacement_and_slip(interface, self.at, self.friction)
@@ -176,7 +176,7 @@ class FrozenProblem:
 
     def _add(self, forces: Array, to: Array) -> None:
         """Add the nodal forces of stresses on Gamma_3, shape (n, d)."""
-        self.nodes.transpose(self.nodes.weight[:, None] * forces, to)
+        self.nodes.add_jump_transposed(self.nodes.weight[:, None] * forces, to)
 
     def displacement_load(self, multipliers: Array, z: Array) -> Array:
         """Return the right-hand side of Step 1, f + r phi - lambda, with r phi = z - lambda."""
@@ -309,7 +309,7 @@ def uzawa_block_relaxation(
         multipliers = frozen.project(z)
         load = frozen.displacement_load(multipliers, z)
         increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
-        moved = nodes.apply(increment)
+        moved = nodes.jump(increment)
         nodal, r_u = frozen.at + moved, frozen.augmented(moved)
         # The contact force of this solve, in equilibrium with u.
         force = 2 * multipliers - z + r_u

@@ -147,7 +147,7 @@ def compare(ours: Solution, seconds: float, kappa: float) -> dict[str, Any]:
     except RuntimeError:
         plain.u.x.array[:], load_steps, steps = np.nan, 0, 0
     taken = time.process_time() - begin
-    nodal = problem.nodes.apply(plain.u.x.array)
+    nodal = problem.nodes.jump(plain.u.x.array)
     depth = np.maximum(-nodal[:, 1], 0.0)
     weight = problem.nodes.weight
 

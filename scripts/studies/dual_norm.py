@@ -29,7 +29,7 @@ class DualNorm:
     def __init__(self, problem: ContactProblem) -> None:
         self.problem = problem
         body, size = problem.equilibrium, problem.interface.nodes.block_size
-        self._rest = body.rest()
+        self._rest = body.zero_displacement()
         coupled = problem.interface.coupled
         self._operator = SparseOperator(body, coupled)
         self._operator.update("secant", BodyState(self._rest), np.zeros((coupled.size, size, size)))
@@ -40,7 +40,7 @@ class DualNorm:
         load = np.zeros(body.owned)
         vectors = np.zeros((q.size, nodes.block_size))
         vectors[:, : nodes.dim] = (nodes.weight * q)[:, None] * nodes.normal
-        nodes.transpose(vectors, load)
+        nodes.add_jump_transposed(vectors, load)
         load = np.where(body.free.ravel(), load, 0.0)
         return self._root(load, self._operator.solve(load))
 

@@ -157,7 +157,7 @@ def constant(kind: Mesh, domain: Domain, degree: int, levels: int) -> tuple[floa
 
     def on_mesh(column: Array) -> Array:
         load = np.zeros(problem.equilibrium.owned)
-        nodes.transpose((nodes.weight * (values @ column))[:, None] * nodes.normal, load)
+        nodes.add_jump_transposed((nodes.weight * (values @ column))[:, None] * nodes.normal, load)
         return load
 
     def on_reference(column: Array) -> Array:

@@ -178,6 +178,6 @@ def _contact(solution: Solution) -> tuple[Array, Array]:
     if table.charge is not None:
         given[:, d] = (table.weight * table.charge)[row]
     spread = np.zeros(solution.state.x.size)
-    nodes.transpose(given, spread)
+    nodes.add_jump_transposed(given, spread)
     spread = body.nodal(spread)
     return spread[:, :d], spread[:, d] if problem.piezoelectric else np.zeros(len(spread))

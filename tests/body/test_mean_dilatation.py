@@ -106,7 +106,7 @@ def test_homogeneous_strains_have_the_forces_of_standard_elements(kind, material
     for element in ("standard", MEAN):
         body = BodyEquilibrium(domain, Body(law, (), piezo=piezo), 2, element)
         r, z = body.space.tabulate_dof_coordinates()[:, :2].T
-        x = body.nodal(body.rest())
+        x = body.nodal(body.zero_displacement())
         x[:, 0], x[:, 1] = 0.02 * r, 0.01 * r - 0.03 * z
         x[:, 2:] = (0.05 * z)[:, None]
         forces.append(body.internal_forces(BodyState(x.ravel())))
@@ -124,7 +124,7 @@ def test_the_tangent_is_symmetric_and_that_of_the_forces(kind, material):
     piezo = piezo and pzt(domain.dim)
     body = BodyEquilibrium(domain, Body(law, (), piezo=piezo), 2, MEAN)
     random = np.random.default_rng(3)
-    x, step = (0.01 * random.standard_normal(body.rest().size) for _ in range(2))
+    x, step = (0.01 * random.standard_normal(body.zero_displacement().size) for _ in range(2))
     matrix = body.create_matrix()
     body.assemble(matrix, "tangent", BodyState(x))
     assert matrix.isSymmetric(1e-12 * matrix.norm())

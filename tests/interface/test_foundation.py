@@ -68,7 +68,7 @@ def assembled(form):
 
 def lumped(problem, vectors):
     total = np.zeros(problem.equilibrium.owned)
-    problem.nodes.transpose(problem.nodes.weight[:, None] * vectors, total)
+    problem.nodes.add_jump_transposed(problem.nodes.weight[:, None] * vectors, total)
     return total
 
 
@@ -78,7 +78,7 @@ def test_augmentation_is_the_form_of_the_augmented_lagrangian(problem, x):
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
     for friction in (True, False):
         blocks = augmentation(nodes, R, friction)
-        total = lumped(problem, np.einsum("nij,nj->ni", blocks, nodes.apply(x)))
+        total = lumped(problem, np.einsum("nij,nj->ni", blocks, nodes.jump(x)))
         form = forms.augmented_lagrangian(body.function(x), v, nu, R, friction) * ds
         assert assembled(form) == pytest.approx(total, abs=1e-15)
 
@@ -98,7 +98,7 @@ def test_auxiliary_load(problem):
     form = forms.auxiliary_load(
         field(problem, phi_c), phi_f, field(problem, lam_c), lam_f, v, normal_of(problem), R
     )
-    tangential = [nodes.tangential_component(nodes.apply(f.x.array)) for f in (phi_f, lam_f)]
+    tangential = [nodes.tangential_component(nodes.jump(f.x.array)) for f in (phi_f, lam_f)]
     vectors = (R * phi_c - lam_c)[:, None] * nodes.normal + R * tangential[0] - tangential[1]
     assert assembled(form * vertex_rule(problem)) == pytest.approx(
         lumped(problem, vectors), abs=1e-14
@@ -109,7 +109,7 @@ def test_auxiliary_load(problem):
 def test_penalty_forms(problem, x):
     body, nodes = problem.equilibrium, problem.nodes
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
-    u, nodal = body.function(x), nodes.apply(x)
+    u, nodal = body.function(x), nodes.jump(x)
     laws = PenalisedLaw(problem.interface, Regularisation(EPS, EPS), nodal)
     forces = laws.forces(nodal)
     gap = field(problem, nodes.gap)

@@ -92,8 +92,8 @@ def test_apply_and_transpose_are_each_other_s_transpose():
     random = np.random.default_rng(0)
     x, y = random.standard_normal(owned), random.standard_normal((nodes.size, 3))
     total = np.zeros(owned)
-    nodes.transpose(y, total)
-    assert total @ x == pytest.approx(np.sum(nodes.apply(x) * y), rel=1e-12)
+    nodes.add_jump_transposed(y, total)
+    assert total @ x == pytest.approx(np.sum(nodes.jump(x) * y), rel=1e-12)
 
 
 def inclined(prescribed, degree):

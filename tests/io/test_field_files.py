@@ -86,7 +86,7 @@ def test_derived_fields_of_a_known_strain(degree: int) -> None:
     """Homogeneous compression: the stress is (1.13), in the cells and at the nodes."""
     problem = build_problem(block(2, degree))
     points = problem.equilibrium.space.tabulate_dof_coordinates()
-    x = problem.equilibrium.rest()
+    x = problem.equilibrium.zero_displacement()
     x[1::2] = -0.05 * points[:, 1]
     fields = DerivedFields(problem.equilibrium, BodyState(x))
     law, t = problem.body.law, 0.05 * np.sqrt(2 / 3)

@@ -99,7 +99,7 @@ def test_forces_that_contact_carries_do_not_blur_the_solution() -> None:
     body, x = problem.equilibrium, problem.start().x
     blocks, force = sliding(problem, MU)
     rhs = body.external()
-    problem.nodes.transpose(1e-3 * force, rhs)
+    problem.nodes.add_jump_transposed(1e-3 * force, rhs)
     solutions = []
     for kind in ("lu", "iterative"):
         operator = operator_of(problem, kind, symmetric=False)
@@ -159,7 +159,7 @@ def test_fixed_unknowns_stay_exactly_where_they_are():
         problem.nodes.nodes, symmetric=True, counters=Counters(), kind="iterative"
     )
     blocks = np.zeros((problem.nodes.nodes.size, 3, 3))
-    operator.update("secant", BodyState(body.rest()), blocks)
+    operator.update("secant", BodyState(body.zero_displacement()), blocks)
     found = operator.solve(1e6 * body.external(), rtol=1e-2)
     assert np.abs(found).max() > 1.0
     assert np.all(found[~body.free.ravel()] == 0.0)
@@ -177,7 +177,9 @@ def test_a_factorisation_takes_the_workspace_it_needs(degree: int) -> None:
     pc.getFactorMatrix().setMumpsIcntl(14, -90)
     sides = np.column_stack([problem.equilibrium.external(), np.ones(problem.equilibrium.owned)])
     for operator in (kept, poor):
-        operator.update("secant", BodyState(problem.equilibrium.rest()), sticking(problem))
+        operator.update(
+            "secant", BodyState(problem.equilibrium.zero_displacement()), sticking(problem)
+        )
     known, found = (operator.solve_all(sides) for operator in (kept, poor))
     np.testing.assert_allclose(found, known, rtol=1e-9, atol=1e-12)
     assert pc.getFactorMatrix().getMumpsIcntl(14) > 0
@@ -191,6 +193,6 @@ def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPat
     operator.ksp.setOperators(operator.matrix)
     operator.ksp.getPC().setFactorSetUpSolverType()
     operator.ksp.getPC().getFactorMatrix().setMumpsIcntl(14, -90)
-    operator.update("secant", BodyState(problem.equilibrium.rest()), sticking(problem))
+    operator.update("secant", BodyState(problem.equilibrium.zero_displacement()), sticking(problem))
     with pytest.raises(InputError, match=r"\[memory\]"):
         operator.solve_all(np.ones((problem.equilibrium.owned, 2)))

@@ -98,7 +98,7 @@ def test_the_energy_norm_knows_the_materials() -> None:
     )
     equilibrium = BodyEquilibrium(two_layers(0.25), body)
     points = equilibrium.space.tabulate_dof_coordinates()
-    x = np.zeros_like(equilibrium.rest())
+    x = np.zeros_like(equilibrium.zero_displacement())
     x[::2] = 0.1 * points[:, 1]
     energy = 0.01 * (0.25 * laws[0].shear + 0.75 * laws[1].shear)
     assert errors(equilibrium, x, None).energy == pytest.approx(np.sqrt(energy), rel=1e-12)
@@ -155,7 +155,7 @@ def test_an_elastic_part_carries_no_field() -> None:
     free = equilibrium.free[:, -1]
     y = equilibrium.layout.points[:, 1]
     np.testing.assert_array_equal(free, (y > 0.49) & (y < 0.99))
-    x = equilibrium.prescribe(equilibrium.rest())
+    x = equilibrium.prescribe(equilibrium.zero_displacement())
     assert np.abs(equilibrium.internal_forces(BodyState(x))).max(initial=0.0) < np.inf
 
 

@@ -42,11 +42,11 @@ def test_the_least_of_all_places():
     ring = int(np.argsort(group.centres[:, 1])[1])
     columns = group.moved[:, 3 * ring : 3 * ring + 3]
     for amounts in ([0.01, 0.0, 0.0], [0.0, 0.02, 0.01], [-0.3, -0.2, 0.1]):
-        elsewhere = replace(state, x=body.moved(state.x, columns @ np.array(amounts)))
+        elsewhere = replace(state, x=body.updated(state.x, columns @ np.array(amounts)))
         found = modes.free_motion(problem, elsewhere)
         assert not found.limited
-        back = body.moved(elsewhere.x, -found.motion)
-        np.testing.assert_allclose(nodes.apply(back), nodes.apply(state.x), rtol=0, atol=1e-9)
+        back = body.updated(elsewhere.x, -found.motion)
+        np.testing.assert_allclose(nodes.jump(back), nodes.jump(state.x), rtol=0, atol=1e-9)
     # Relative to the lid that were half of its way.
     lifted = body.nodal(state.x)[: group.component.size]
     assert (

@@ -35,7 +35,9 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     body, nodes = problem.equilibrium, problem.nodes.nodes
     operator = SparseOperator(body, nodes)
     size = body.block_size
-    operator.update("secant", BodyState(body.rest()), np.zeros((nodes.size, size, size)))
+    operator.update(
+        "secant", BodyState(body.zero_displacement()), np.zeros((nodes.size, size, size))
+    )
     whole = operator.solve(body.external())
 
     kept = (problem.nodes.nodes[:, None] * size + np.arange(size, dtype=np.int32)).ravel()
@@ -64,7 +66,9 @@ def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
     """MUMPS's own estimate of its workspace is too small there."""
     problem = mechanics.bar(SELF, 8, law=Linear(1.0, 0.3))
     matrix = problem.equilibrium.create_matrix()
-    problem.equilibrium.assemble(matrix, "secant", BodyState(problem.equilibrium.rest()))
+    problem.equilibrium.assemble(
+        matrix, "secant", BodyState(problem.equilibrium.zero_displacement())
+    )
     order = np.random.default_rng(1).permutation(problem.equilibrium.owned).astype(np.int32)
     kept, eliminated = np.sort(order[few:]), np.sort(order[:few])
     found = SchurComplement(matrix, kept, "contact_").complement(matrix)
@@ -133,9 +137,9 @@ def test_what_is_left_of_a_problem_has_the_same_residuals():
     assert left is not None
     body = left.equilibrium
     assert evaluate(left, State(body.at, state.forces)).largest < 1e-10
-    x = body.moved(body.at, 1e-3 * np.where(body.free.ravel(), body.at, 0.0))
+    x = body.updated(body.at, 1e-3 * np.where(body.free.ravel(), body.at, 0.0))
     moved = evaluate(left, State(x, state.forces))
-    whole = problem.equilibrium.moved(state.x, condensation.expand(left, x))
+    whole = problem.equilibrium.updated(state.x, condensation.expand(left, x))
     found = evaluate(problem, State(whole, state.forces))
     assert np.isclose(moved.equilibrium, found.equilibrium, rtol=1e-3)
     assert moved.equilibrium > 1e-6
@@ -150,7 +154,8 @@ def test_a_condensed_body_is_no_body_that_has_lost_its_mesh():
     for load in (0.0, 0.5, 1.0):
         assert left.equilibrium.external(load).shape == (left.equilibrium.owned,)
         state = State(
-            left.equilibrium.prescribe(left.equilibrium.rest(), load), left.start().forces
+            left.equilibrium.prescribe(left.equilibrium.zero_displacement(), load),
+            left.start().forces,
         )
         assert np.isfinite(evaluate(left, state).largest)
 

@@ -23,7 +23,7 @@ def test_residuals_of_an_open_body():
     sunk = np.zeros((problem.nodes.size, 2))
     sunk[:, 1] = -0.01
     x = rest.x.copy()
-    problem.nodes.transpose(sunk, x)
+    problem.nodes.add_jump_transposed(sunk, x)
     assert evaluate(problem, State(x, rest.forces)).contact > 0.5
 
 

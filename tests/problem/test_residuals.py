@@ -50,7 +50,7 @@ class Solved:
         """Return the residuals with a displacement added at the contact nodes, or new forces."""
         x = self.state.x.copy()
         if nodal is not None:
-            self.problem.nodes.transpose(nodal, x)
+            self.problem.nodes.add_jump_transposed(nodal, x)
         return evaluate(self.problem, State(x, forces or self.forces))
 
     def along(self, chosen, component):

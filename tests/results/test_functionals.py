@@ -139,7 +139,7 @@ def test_an_integral_of_ones_own(on):
         :, : body.block_size
     ]
     ends = [
-        functional(problem, replace(state, x=body.moved(state.x, 1e-3 * sign * way)))
+        functional(problem, replace(state, x=body.updated(state.x, 1e-3 * sign * way)))
         for sign in (1, -1)
     ]
     assert body.product(by_x, way) == pytest.approx((ends[0] - ends[1]) / 2e-3, rel=1e-8)

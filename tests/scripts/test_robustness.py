@@ -53,7 +53,7 @@ def test_a_node_that_begins_to_slide_goes_on():
     solution = solve(build_problem(case), NewtonOptions())
     assert solution.converged, solution.outcome.reason
     nodes = solution.problem.nodes
-    slip = solution.problem.interface.slip_length(nodes.apply(solution.state.x))
+    slip = solution.problem.interface.slip_length(nodes.jump(solution.state.x))
     slides = (slip > 1e-6) & (solution.pressure > 1e-9)
     ratio = np.linalg.norm(solution.forces.friction, axis=1)[slides] / solution.pressure[slides]
     coefficient = SlipCoefficient(1 / 12, 1 / 30, 6e7)
