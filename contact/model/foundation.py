@@ -133,7 +133,7 @@ class Conductor:
     lagged
         Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
         thesis does: it then converges for small k_e only (Theorem 5.2). Else phi is implicit,
-        as a Robin term in Algorithm 5, and only psi is lagged.
+        as a Robin term in Algorithm 5, and psi is lagged until the residual is small.
     phi_f_at
         phi_f as a function of time; None where it is always the same.
     share
@@ -182,8 +182,9 @@ class Electric(Described):
     """`[electric]`: a conductive foundation, D.nu = psi(u_nu - rho) phi_L(phi - phi_f)."""
 
     law: Literal["shifted", "perfect", "ramp"] = "shifted"
-    """psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e in contact; `ramp`, as
-    the thesis has it, zero where u_nu <= rho, with which no contact conducts."""
+    """psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e where the rigid part or
+    the layer presses; `ramp`, as the thesis has it, zero where u_nu <= rho, with which no contact
+    conducts."""
     k_e: NonNegative
     """k_e of the foundation: a capacitance per area, for D.nu is a charge."""
     phi_f: Timed = ZERO
