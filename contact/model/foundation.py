@@ -182,8 +182,8 @@ class Electric(Described):
     """`[electric]`: a conductive foundation, D.nu = psi(u_nu - rho) phi_L(phi - phi_f)."""
 
     law: Literal["shifted", "perfect", "ramp"] = "shifted"
-    """psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e where the rigid part or
-    the layer presses; `ramp`, as the thesis has it, zero where u_nu <= rho, with which no contact
+    """psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e where rigid part or
+    layer press; `ramp`, as the thesis has it, zero where u_nu <= rho, with which no contact
     conducts."""
     k_e: NonNegative
     """k_e of the foundation: a capacitance per area, for D.nu is a charge."""

@@ -134,7 +134,7 @@ def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
 
 @dataclass
 class FrozenProblem:
-    """The problem of one outer iteration: what Kacanov's method freezes, and the steps on it.
+    """The problem of one outer iteration, with Kacanov's frozen terms, and the steps on it.
 
     Contact forces and jumps are arrays of normal and tangential parts, shape (n, 1 + d).
 

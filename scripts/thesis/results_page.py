@@ -77,10 +77,10 @@ bounds, limits and references. The numbers of every picture are in the CSV file 
   and 8.4 are computed as printed, and with a layer of thickness 0.1 in front of the rigid part.
 - **s₀**, which Algorithm 1 is given, is μ(0) R p of the frictionless solution. With μ at its slip
   the counts of Table 7.1 differ by at most 2.
-- **Friction bound.** s = μ [R p]⁺ with p = −σ_ν, which differs from μ |R σ_ν| on iterates alone. The
-  weights of R are normalised at the ends of Γ₃ too: it leaves a constant pressure as it is.
-- **Penalty.** (4.1) to (4.3) have one ε, and [u_ν]⁺ without the gap; here ε_c and ε_s may differ, and
-  the pressure is [u_ν − ρ]⁺/ε_c plus that of the layer.
+- **Friction bound.** s = μ [R p]⁺ with p = −σ_ν, which differs from μ |R σ_ν| on iterates alone.
+  The weights of R are normalised at the ends of Γ₃ too: a constant pressure stays as it is.
+- **Penalty.** (4.1) to (4.3) have one ε, and [u_ν]⁺ without the gap. Here ε_c and ε_s may differ,
+  and the pressure is [u_ν − ρ]⁺/ε_c plus that of the layer.
 - **Example 7.1.** f₂ = 1600 is a force per area in the text, and a line load in the formulas for p
   and b; here it is the line load. The printed u_τ = 0 on the line of symmetry would support the
   cylinder; here the condition is u_x = 0.
