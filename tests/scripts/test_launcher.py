@@ -29,6 +29,12 @@ def test_runs_directly_where_fenicsx_is(launcher):
     assert launcher.roots() == []
 
 
+def test_contact_that_is_not_installed_is_the_package_of_the_clone(launcher):
+    launcher.fake("python3", '[[ $1 != -m ]] || echo "$PYTHONPATH $*"')
+    status, out, _ = launcher.run("contact", "solve", "a  b")
+    assert (status, out) == (0, f"{launcher.clone} -m contact solve a  b\n")
+
+
 def test_threads_under_mpi_only_where_the_user_set_none(launcher):
     launcher.fake("python3")
     variables = "$OMP_NUM_THREADS $PRTE_MCA_rmaps_default_mapping_policy $OMPI_MCA_topo"
