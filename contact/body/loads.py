@@ -25,7 +25,8 @@ from contact.mesh.geometry import area
 from contact.model.body import Load
 from contact.model.fields import Factor, Field, Moving, at_time, constant
 from contact.model.formula import is_zero
-from contact.ranks import on_all_ranks
+from contact.ranks import on_all_ranks, summed
+from contact.tolerances import HUGE
 from contact.typing import Array
 
 
@@ -172,3 +173,15 @@ def expression(
         if isinstance(found, ScalarValue | ufl.classes.Zero):
             return constant(domain.mesh, float(found))
         return found
+
+
+def wrong_load(loads: Sequence[Load], domain: Domain, time: float) -> str:
+    """Return the key of the first load whose integral is not finite, or too large. Collective."""
+    x = ufl.SpatialCoordinate(domain.mesh)
+    for i, load in enumerate(loads):
+        measure = domain.dx if load.on is None else domain.ds(load.on)
+        for name, field in load.named.items():
+            form = compiled(expression(domain, field, x, time, f"load.{i}.{name}") * measure)
+            if not abs(summed(domain.comm, fem.assemble_scalar(form))) <= HUGE:
+                return f"load.{i}.{name}"
+    return "load"

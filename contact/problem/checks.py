@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import linalg
 
+from contact.body.loads import wrong_load
 from contact.errors import InputError
 from contact.interface.foundation import FoundationLaw
 from contact.model.fields import values_at
@@ -110,9 +111,10 @@ def _check_sizes(problem: ContactProblem) -> None:
     loads = problem.equilibrium.external(problem.time)
     fits = bool(np.isfinite(loads).all()) and np.abs(loads).max(initial=0.0) <= HUGE
     if not problem.comm.allreduce(bool(fits), op=MPI.LAND):
+        key = wrong_load(problem.body.loads, problem.domain, problem.time)
         raise InputError(
-            "load: a load is not finite everywhere on its part, or too large; accepted: formulas "
-            f"and functions that are finite, and units that keep sizes up to {HUGE:g}",
+            f"{key}: not finite everywhere on its part, or too large; accepted: formulas and "
+            f"functions that are finite, and units that keep sizes up to {HUGE:g}",
             "not-finite",
         )
 

@@ -30,8 +30,8 @@ WRONG = {
     ),
     "a formula with a mistake": ("-0.001", '"-0.001*(x"', "load.0.traction"),
     "a formula that would run code": ("-0.001", '"__import__(x)"', "load.0.traction"),
-    "a load that is not finite": ("-0.001", '"log(x-1)"', "load"),
-    "a load that overflows": ("-0.001", "-1e300", "load"),
+    "a load that is not finite": ("-0.001", '"log(x-1)"', "load.0.traction.1"),
+    "a load that overflows": ("-0.001", "-1e300", "load.0.traction.1"),
     "more cells than memory": (
         "[4, 2]",
         "[1000000, 1000000]",
