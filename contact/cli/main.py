@@ -68,16 +68,6 @@ def _check_cache() -> None:
         ) from None
 
 
-def _own_options() -> list[str]:
-    """Return options that keep PETSc from a .petscrc that lies in the working folder.
-
-    It may hold anything, libraries to be loaded among it, and comes with a folder of somebody
-    else's. The user's own, in his home, is read; any other by ``-options_file``.
-    """
-    own = Path.home() / ".petscrc"
-    return ["-skip_petscrc", *(["-options_file", str(own)] if own.is_file() else [])]
-
-
 def _end(comm: MPI.Intracomm, text: str, status: int) -> int:
     """Print the reason for the end on this rank, and end the other ranks too."""
     if comm.size > 1 and comm.rank > 0:
@@ -100,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
                 import petsc4py
 
-                petsc4py.init([sys.argv[0], *_own_options(), *petsc])
+                petsc4py.init([sys.argv[0], *petsc])
                 # PETSc would call it a crash that a reader, such as head, has seen enough.
                 signal.signal(signal.SIGPIPE, signal.SIG_IGN)
                 command = import_module(COMMANDS[options.command])

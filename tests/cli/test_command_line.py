@@ -1,17 +1,12 @@
 """Wrong command lines, and PETSc's options."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from petsc4py import PETSc
 
-from contact.cli.main import BAD_INPUT, CONVERGED
+from contact.cli.main import BAD_INPUT
 from tests.cli.running import BAR, check_identifier, refuse, run, write
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize(
@@ -57,21 +52,3 @@ def test_wrong_petsc_options(
         assert set(options.getAll()) == before
     finally:
         options.delValue(option)
-
-
-@pytest.mark.parametrize(("asked", "status"), [(False, CONVERGED), (True, BAD_INPUT)])
-def test_petsc_obeys_no_file_that_lies_in_the_folder(asked, status, tmp_path):
-    """It comes with a case of somebody else's, and may name libraries to be loaded."""
-    (tmp_path / "case.toml").write_text(BAR)
-    for name in (".petscrc", "petscrc"):
-        (tmp_path / name).write_text("-contact_pc_factor_mat_solver_type nonsense\n")
-    options = ["-options_file", ".petscrc"] if asked else []
-    command = [sys.executable, "-m", "contact", "solve", "case.toml", "--out", "out", *options]
-    done = subprocess.run(
-        command,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == status, done.stderr
