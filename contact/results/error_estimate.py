@@ -95,7 +95,7 @@ class Estimate:
 
     @property
     def relative(self) -> float:
-        """The estimated error over the norm of the exact solution, by Pythagoras."""
+        """The estimated error, normalised: sqrt(total / (energy + total))."""
         whole = self.energy + self.total
         return float(np.sqrt(self.total / whole)) if whole > 0 else 0.0
 
