@@ -142,10 +142,6 @@ WRONG = {
     "slip law of the wrong sign": lambda: problem(Friction(mu=Slipping(-1.0))),
     "slip law off by a factor": lambda: problem(Friction(mu=Slipping(2.0))),
     "law by pressure": lambda: problem(Friction(law=Pressed(-1.0))),
-    "maximum below mu": lambda: problem(Friction(mu=with_constants(Slipping(), maximum=0.25))),
-    "mu falls faster": lambda: problem(Friction(mu=with_constants(Slipping(), lipschitz=0.05))),
-    "maximum below s/p": lambda: problem(Friction(law=with_constants(Pressed(), maximum=0.2))),
-    "s/p falls faster": lambda: problem(Friction(law=with_constants(Pressed(), lipschitz=0.0))),
     "no number for a maximum": lambda: problem(
         Friction(mu=with_constants(Slipping(), maximum="large"))
     ),
