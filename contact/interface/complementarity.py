@@ -12,10 +12,10 @@ evaluates them. `linearise` linearises them node by node for a step of the semis
     lambda_f+ = lambda_f + gamma u_tau+        stick, (19b)
     lambda_f+ = s+ e + theta Q u_tau+          slip, (19c), with the linearised bound s+ (19d)
 
-These are lambda+ = lambda^0 + B T dx (19) with the increment dx of the step, the `multipliers`
-lambda^0 at dx = 0 and the `blocks` B of `LinearisedContact`. With gamma far above the stiffness of
-the body (19a) and (19b) are nearly u_nu = rho and u_tau = 0, and their residuals fall by that
-ratio in every step.
+These are lambda+ = lambda^0 + B T dx (19) with the increment dx of the step. With gamma far above
+the stiffness of the body (19a) and (19b) are nearly u_nu = rho and u_tau = 0, and their residuals
+fall by that ratio in every step. The active set and the derivative of the bound by the slip are
+given: safeguards against cycling belong to the method (`contact.methods.safeguards`).
 
 References
 ----------
@@ -32,7 +32,6 @@ import numpy as np
 from contact.interface.interface import Interface
 from contact.interface.multipliers import ActiveSet, Multipliers
 from contact.interface.nodes import unit_vectors
-from contact.ranks import summed
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -70,7 +69,7 @@ def interface_residuals(
     """Return the relative contact and friction residuals and their floors, (2,). Collective.
 
     The `worst` of the connected components, each relative to max(|p|, 1e-4 c_0 |g|), norms in
-    L2(Gamma_3): g is |g_N|, at most the displacement of the node and the diameter.
+    L2(Gamma_3): g is |g_N|, at most the displacement of the node and the size.
 
     Parameters
     ----------
@@ -79,7 +78,7 @@ def interface_residuals(
     rounding
         Rounding of the pressures of each component, in L2(Gamma_3).
     """
-    # Closing a gap at one node takes a stress of E/h: with stretched cells E/diameter would hide
+    # Closing a gap at one node takes a stress of E/h: with stretched cells E/size would hide
     # errors of the pressure far above the tolerance.
     c = interface.elongation * interface.c_0
     normal_gap = interface.normal_gap(nodal)
@@ -131,7 +130,7 @@ class ComplementarityParameters:
     nodal_stiffness
         Stiffness of the body at one contact node, about E'/h.
     gamma
-        Augmentation parameter of the eliminated constraints, far above the others.
+        Penalty of the eliminated constraints, far above the others.
     """
 
     c: float
@@ -139,120 +138,64 @@ class ComplementarityParameters:
     gamma: float
 
 
-@dataclass(frozen=True)
-class LinearisedContact:
-    """The linearised multipliers lambda+ = lambda^0 + B T dx, (19) of docs/algorithms.md.
-
-    Attributes
-    ----------
-    multipliers
-        lambda^0, those of the residual.
-    blocks
-        B, the derivative by the nodal unknowns, shape (n, block size, block size), without weights.
-    active_set
-        Active set of this step.
-    unchanged
-        Whether it is that of the last step, on all ranks.
-    """
-
-    multipliers: Multipliers
-    blocks: Array
-    active_set: ActiveSet
-    unchanged: bool
-
-
-@np.errstate(over="ignore", invalid="ignore")  # of a body that flies away
 def linearise(
     interface: Interface,
     nodal: Array,
     multipliers: Multipliers,
+    active: ActiveSet,
     parameters: ComplementarityParameters,
-    before: ActiveSet | None,
-    softening: float = np.inf,
-) -> LinearisedContact:
-    """Linearise the complementarity functions at an iterate. Collective.
+    bound_by_slip: Array,
+) -> tuple[Multipliers, Array]:
+    """Linearise the complementarity functions at an iterate, (19a)-(19d). Collective.
 
     Parameters
     ----------
     interface, nodal, multipliers
         The contact nodes with their laws, the unknowns there, and the contact forces.
+    active
+        Active set: the pieces of the functions.
     parameters
         Of the complementarity functions.
-    before
-        Active set of the last step; None in the first one, where closed nodes stick.
-    softening
-        Largest share of a node's stiffness that a falling friction coefficient takes away.
-    """
-    nodes, frictional, c = interface.nodes, interface.friction.acts, parameters.c
-    p, lam, n, d = multipliers.pressure, multipliers.friction, nodes.normal, nodes.dim
-    normal_gap, slip = interface.normal_gap(nodal), interface.slip(nodal)
-    length = np.linalg.norm(slip, axis=1)
-    total = interface.pressure(nodal, multipliers)
-    bound = interface.friction.bound(total, length)
-    if before is None:
-        active = ActiveSet.without_slip(normal_gap <= 1e-12 * interface.size, frictional)
-    else:
-        lam = at_bound(before, lam, slip, bound)
-        raised = Multipliers(p, lam)
-        active = interface.active_set(nodal, raised, bound, c).stopped(before, lam, slip)
-    trial = lam + c * slip
-    norm = np.linalg.norm(trial, axis=1)
-    closed, sticks, slips = active.closed, active.sticks, active.slips
-    changed = before is None or not active.same(before)
-    unchanged = float(summed(interface.comm, changed)) == 0
+    bound_by_slip
+        Derivative of the friction bound by the slip, shape (n,).
 
-    pressure = np.where(closed, p - parameters.gamma * normal_gap, 0.0)
-    blocks = np.zeros((p.size, nodes.block_size, nodes.block_size))
-    slope = np.where(closed, parameters.gamma, 0.0)[:, None] * n
+    Returns
+    -------
+    The multipliers lambda^0, and the blocks B, shape (n, block size, block size), without weights.
+    """
+    nodes, normal_gap, gamma = interface.nodes, interface.normal_gap(nodal), parameters.gamma
+    n, d = nodes.normal, nodes.dim
+    # (19a): p+ = p + gamma (u_nu+ - rho) where closed, 0 where open.
+    pressure = np.where(active.closed, multipliers.pressure - gamma * normal_gap, 0.0)
+    slope = np.where(active.closed, gamma, 0.0)[:, None] * n
+    blocks = np.zeros((pressure.size, nodes.block_size, nodes.block_size))
     blocks[:, :d, :d] = n[:, :, None] * slope[:, None, :]
-    friction = np.zeros_like(lam)
-    if frictional:
-        friction[sticks] = (lam + parameters.gamma * slip)[sticks]
-        blocks[sticks, :d, :d] += parameters.gamma * nodes.tangent[sticks]
+    if not interface.friction.acts:
+        return Multipliers(pressure, np.zeros_like(n)), blocks
 
-        e = trial / np.maximum(norm, 1e-300)[:, None]
-        projector = nodes.tangent - e[:, :, None] * e[:, None, :]
-        # lambda = s z/|z|, z = lambda + c u_tau, linearised and solved for the new lambda:
-        # orthogonal to z it is theta times the new slip, theta = s c/(|z| - s).
-        least = np.maximum(bound * c / parameters.gamma, 1e-300)  # theta is at most gamma
-        theta = bound * c / np.maximum(norm - bound, least)
-        sliding = theta[:, None, None] * projector
-        friction[slips] = (bound[:, None] * e + np.einsum("nij,nj->ni", sliding, slip))[slips]
-        limit = softening * parameters.nodal_stiffness if unchanged else None
-        rate = _bound_gradient(interface, total, slip, length, limit)
-        # The bound follows the pressure of this very step.
-        by_pressure = interface.friction.by_pressure(total, length)
-        bound_shift = -by_pressure * parameters.gamma * np.where(closed, normal_gap, 0.0)
-        rate[:, :d] += by_pressure[:, None] * slope
-        rate += by_pressure[:, None] * interface.foundation.pressure_gradient(nodal)
-        friction[slips] += (bound_shift[:, None] * e)[slips]
-        blocks[slips, :d, :] += e[slips, :, None] * rate[slips, None, :]
-        blocks[slips, :d, :d] += sliding[slips]
-    return LinearisedContact(Multipliers(pressure, friction), blocks, active, unchanged)
+    slip = interface.slip(nodal)
+    total, length = interface.pressure(nodal, multipliers), np.linalg.norm(slip, axis=1)
+    # (19d): s+ = s + ds/dp (p+ - p) + ds/d|u_tau| e_u.(u_tau+ - u_tau), with p+ - p of (19a) where
+    # closed, and of the layer.
+    s = interface.friction.bound(total, length)
+    by_pressure = interface.friction.by_pressure(total, length)
+    bound = s - by_pressure * gamma * np.where(active.closed, normal_gap, 0.0)
+    gradient = by_pressure[:, None] * interface.foundation.pressure_gradient(nodal)
+    gradient[:, :d] += by_pressure[:, None] * slope + bound_by_slip[:, None] * unit_vectors(slip)
 
-
-def at_bound(before: ActiveSet, friction: Array, slip: Array, bound: Array) -> Array:
-    """Return friction, raised to its bound at nodes that go on slipping, shape (n, d).
-
-    The linearised bound of a coefficient that falls with the slip may be far below that of the new
-    slip: active sets would cycle between stick and slip.
-    """
-    norm = np.linalg.norm(friction, axis=1)
-    slides = (
-        before.slips & (np.einsum("ni,ni->n", friction, slip) > 0) & (norm < bound) & (norm > 0)
-    )
-    scale = np.where(slides, bound / np.where(slides, norm, 1.0), 1.0)
-    return friction * scale[:, None]
-
-
-def _bound_gradient(
-    interface: Interface, total: Array, slip: Array, length: Array, limit: float | None
-) -> Array:
-    """Return the derivative of the friction bound by the slip, shape (n, block size)."""
-    # Where friction falls faster than the node's own stiffness, the linearised node would snap.
-    gradient = np.zeros((length.size, interface.nodes.block_size))
-    if limit is None:
-        return gradient
-    fall = np.maximum(interface.friction.by_slip(total, length), -limit)
-    gradient[:, : interface.dim] = fall[:, None] * unit_vectors(slip)
-    return gradient
+    friction, sticks, slips = np.zeros_like(n), active.sticks, active.slips
+    # (19b): lambda+ = lambda + gamma u_tau+ where it sticks.
+    friction[sticks] = (multipliers.friction + gamma * slip)[sticks]
+    blocks[sticks, :d, :d] += gamma * nodes.tangent[sticks]
+    # (19c): lambda+ = s+ e + theta Q u_tau+ where it slips, e = z/|z|, z = lambda + c u_tau.
+    z = multipliers.friction + parameters.c * slip
+    size = np.linalg.norm(z, axis=1)
+    e = z / np.maximum(size, 1e-300)[:, None]
+    least = np.maximum(s * parameters.c / gamma, 1e-300)  # theta is at most gamma
+    theta = s * parameters.c / np.maximum(size - s, least)
+    across = theta[:, None, None] * (nodes.tangent - e[:, :, None] * e[:, None, :])
+    slipping = bound[:, None] * e + np.einsum("nij,nj->ni", across, slip)
+    friction[slips] = slipping[slips]
+    blocks[slips, :d, :] += e[slips, :, None] * gradient[slips, None, :]
+    blocks[slips, :d, :d] += across[slips]
+    return Multipliers(pressure, friction), blocks

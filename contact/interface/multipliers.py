@@ -12,7 +12,7 @@ of the complementarity functions (`contact.interface.complementarity`).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,19 +160,6 @@ class ActiveSet:
     def without_slip(closed: NDArray[np.bool_], friction: bool) -> ActiveSet:
         """Return nodes that stick where they touch, if there is friction."""
         return ActiveSet(closed, closed & friction, np.zeros_like(closed))
-
-    def stopped(self, before: ActiveSet, friction: Array, slip: Array) -> ActiveSet:
-        """Return this set with stick where slip reverses: lambda_f . u_tau < 0 after slip.
-
-        Parameters
-        ----------
-        before
-            Active set of the last step.
-        friction, slip
-            As in `of`.
-        """
-        stops = before.slips & self.slips & (np.einsum("ni,ni->n", friction, slip) < 0)
-        return replace(self, sticks=self.sticks | stops, slips=self.slips & ~stops)
 
     def same(self, other: ActiveSet) -> bool:
         """Return whether another set is the same on this rank."""

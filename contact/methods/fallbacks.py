@@ -1,14 +1,17 @@
-"""The fallbacks of the semismooth Newton method, in their order (`fall_back`).
+"""The strategy: stages of the semismooth Newton method, and its fallbacks (`solve_contact`).
 
-Where Newton's steps have ended without convergence, they are tried in turn:
+1. Steps on the condensed body where that pays, then on the whole one; else on the whole one alone.
+2. Fallbacks, where these end without convergence, in turn (`fall_back`):
 
-- all nodes open, by one linear solve from the best iterate, then a working set from its solution;
-- continuation in the conductivity, of a condensed problem alone, from the initial guess
-  `problem.start()`;
-- a rigid motion that separates the bodies, of a condensed problem alone;
-- proximal points, from that guess;
-- the interior point from that guess, its first slacks from the gaps of the linear solve;
-- steps on the condensed body, of a whole problem alone, from that guess.
+   - all nodes open, by one linear solve from the best iterate, then a working set from there;
+   - continuation in the conductivity, of a condensed problem alone, from the initial guess
+     `problem.start()`;
+   - a rigid motion that separates the bodies, of a condensed problem alone;
+   - proximal points, from that guess;
+   - the interior point from that guess, its first slacks from the gaps of the linear solve;
+   - steps on the condensed body, of a whole problem alone, from that guess.
+
+3. The iterate of least residual.
 
 A condensed problem has fallbacks of its own, all but the last. The notes of the history name them.
 They are also tried where Newton's method has converged to a solution at which a rigid-body
@@ -30,6 +33,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +52,11 @@ from contact.ranks import summed
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
+
+#: Last iterate and outcome of a stage, and a stage from an initial guess and the unknowns of the
+#: first secant.
+End: TypeAlias = tuple[State, Outcome]
+Solver: TypeAlias = Callable[[State, Array | None], End]
 
 #: Notes of steps in the history.
 WORKING_SET, CONTINUATION, PROXIMAL_POINT = "working set", "continuation", "proximal point"
@@ -72,57 +82,75 @@ NEARLY_BALANCED = 0.03
 
 
 def solve_contact(
-    newton: SemismoothNewton, state: State, secant_at: Array | None = None
-) -> tuple[State, Outcome]:
-    """Solve a problem by the semismooth Newton method and its fallbacks. Collective.
+    newton: SemismoothNewton,
+    begin: State,
+    secant_at: Array | None = None,
+    condensed: Solver | None = None,
+    condensation_pays: bool = False,
+) -> End:
+    """Solve by Newton's method and its fallbacks, stage by stage. Collective.
 
     Parameters
     ----------
     newton
         The method on the problem.
-    state, secant_at
+    begin, secant_at
         Initial guess, and unknowns of the first secant.
+    condensed
+        Solver of the same problem on the condensed body; None for none.
+    condensation_pays
+        Whether that is the first stage, or the last one.
     """
-    state, outcome = newton.iterate(state, secant_at, give_up=True)
-    if outcome.converged and newton.modes.unconstrained_at(newton.problem, state):
-        found = fall_back(newton, state, outcome)
-        return found if found[1].converged else (state, outcome)
-    return with_fallbacks(newton, state, outcome)
-
-
-def with_fallbacks(
-    newton: SemismoothNewton, state: State, outcome: Outcome
-) -> tuple[State, Outcome]:
-    """Return the end of an iteration, of a fallback, or the best iterate of all. Collective."""
-    if outcome.converged or outcome.overloaded:
+    if condensed is not None and condensation_pays:
+        state, outcome = condensed(begin, secant_at)
+        if not _final(outcome) and newton.steps_left > 0:
+            logger.info("%s; going on with the whole body", outcome.ended)
+            state, outcome = newton.iterate(state, secant_at if state is begin else None)
+        condensed, unconstrained = None, False
+    else:
+        state, outcome = newton.iterate(begin, secant_at, give_up=True)
+        unconstrained = outcome.converged and newton.modes.unconstrained_at(newton.problem, state)
+    if _final(outcome) and not unconstrained:
         return state, outcome
-    state, outcome = fall_back(newton, state, outcome)
-    if not (outcome.converged or outcome.overloaded) and newton.best.found is not None:
+    found = fall_back(newton, state, outcome, condensed)
+    if unconstrained:  # another solution, if there is one
+        return found if found[1].converged else (state, outcome)
+    if not _final(found[1]) and newton.best.found is not None:
         state = newton.best.found
-        outcome = replace(outcome, residuals=evaluate(newton.problem, state))
-    return state, outcome
+        return state, replace(found[1], residuals=evaluate(newton.problem, state))
+    return found
 
 
-def fall_back(newton: SemismoothNewton, state: State, outcome: Outcome) -> tuple[State, Outcome]:
+def _final(outcome: Outcome) -> bool:
+    """Tell whether no further stage is tried."""
+    return outcome.converged or outcome.overloaded
+
+
+def fall_back(
+    newton: SemismoothNewton, state: State, outcome: Outcome, condensed: Solver | None = None
+) -> End:
     """Try the fallbacks in turn until one converges. Collective."""
+    logger.info(
+        "%s; going on with fallbacks", outcome.ended or "a rigid-body mode is unconstrained"
+    )
     singular = None
+    without_contact = all_open(newton)
     for fallback in (
-        all_open_or_working_set,
-        conductivity_continuation,
-        rigid_motion,
-        proximal_points,
-        interior_points,
-        condensed_body,
+        partial(working_set, newton, without_contact),
+        partial(conductivity_continuation, newton),
+        partial(rigid_motion, newton, outcome),
+        partial(proximal_points, newton),
+        partial(interior_points, newton, without_contact, condensed is not None),
+        partial(condensed_body, newton, condensed),
     ):
         try:
-            found = fallback(newton, outcome)
+            found = fallback()
         except SingularError as error:
-            newton.step.renew()
             singular = error
             continue
         if found is not None:
             state, outcome = found
-            if outcome.converged or outcome.overloaded:
+            if _final(outcome):
                 return found
     # A nonlinear material may be singular at the strains of a step alone.
     if singular is not None and newton.problem.equilibrium.linear and not outcome.converged:
@@ -130,27 +158,40 @@ def fall_back(newton: SemismoothNewton, state: State, outcome: Outcome) -> tuple
     return state, outcome
 
 
-def all_open_or_working_set(
-    newton: SemismoothNewton, outcome: Outcome
-) -> tuple[State, Outcome] | None:
-    """Return a solution with all nodes open, by one linear solve, or by a working set, if any.
+def all_open(newton: SemismoothNewton) -> State | None:
+    """Return the state after one linear solve with all nodes open, from the best iterate.
 
-    Where the supports constrain all rigid-body modes: else friction may have another solution.
-    Active sets may cycle on contact forces that are rounding.
+    None where the supports do not constrain all rigid-body modes: friction may have another
+    solution then. Collective.
     """
     if not newton.modes.constrained_by_supports:
         return None
-    problem, best, allowed = newton.problem, newton.best.found, newton.options.allowed
+    problem, best = newton.problem, newton.best.found
     try:
-        state = newton.step.without_contact(problem, problem.start() if best is None else best)
+        return newton.step.without_contact(problem, problem.start() if best is None else best)
     except SingularError:  # the potential may be floating without contact
-        newton.step.renew()
         return None
-    newton.without_contact = state
-    residuals = evaluate(problem, state)
+
+
+def working_set(newton: SemismoothNewton, without_contact: State | None) -> End | None:
+    """Return a solution with all nodes open, or by a working set, if any. Collective.
+
+    Active sets may cycle on contact forces that are rounding.
+
+    Parameters
+    ----------
+    newton
+        The method on the problem.
+    without_contact
+        State with all nodes open; None for none.
+    """
+    if without_contact is None:
+        return None
+    problem, allowed = newton.problem, newton.options.allowed
+    residuals = evaluate(problem, without_contact)
     if not residuals.excess(allowed):
-        return state, Outcome(residuals, allowed)
-    found = working_set(newton, state)
+        return without_contact, Outcome(residuals, allowed)
+    found = dual_active_set(newton, without_contact)
     if found is None:
         return None
     residuals = evaluate(problem, found)
@@ -158,39 +199,34 @@ def all_open_or_working_set(
     return None if residuals.excess(allowed) else (found, Outcome(residuals, allowed))
 
 
-def interior_points(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Outcome] | None:
+def interior_points(
+    newton: SemismoothNewton, without_contact: State | None, condensable: bool
+) -> End | None:
     """Return the end of the interior-point method (`interior_point`) and Newton's last steps."""
-    if newton.steps_left <= 0:
+    steps = newton.steps_left
+    if steps <= 0:
         return None
-    logger.info("%s; going on with an interior point", outcome.ended)
     # Half of the steps are for the condensed body.
-    newton.reserved = 0 if newton.condensed is None else (newton.steps_left + 1) // 2
-    try:
-        return interior_point(newton, newton.without_contact)
-    finally:
-        newton.reserved = 0
+    return interior_point(newton, without_contact, steps // 2 if condensable else steps)
 
 
-def condensed_body(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Outcome] | None:
+def condensed_body(newton: SemismoothNewton, condensed: Solver | None) -> End | None:
     """Return the end of steps on the condensed body, which has too many nodes for these to pay."""
-    if newton.condensed is None or newton.steps_left <= 0:
+    if condensed is None or newton.steps_left <= 0:
         return None
-    logger.info("%s; going on with the condensed body", outcome.ended)
-    found = newton.condensed(newton.problem.start(), None)
+    found = condensed(newton.problem.start(), None)
     # The reason of the interior point says more, unless no steps are left.
     return found if found[1].converged or newton.steps_left <= 0 else None
 
 
-def rigid_motion(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Outcome] | None:
+def rigid_motion(newton: SemismoothNewton, outcome: Outcome) -> End | None:
     """Return a solution of a condensed body with all nodes open after a rigid motion, if any."""
     problem = newton.problem
     if outcome.converged or newton.modes.constrained_by_supports:
         return None
     if not isinstance(problem, CondensedProblem):
         return None
-    state = newton.modes.separated(
-        problem, newton.step.operator, newton.step.parameters.nodal_stiffness
-    )
+    state = newton.modes.separated(problem, newton.step)
     if state is None:
         return None
     # No force acts there: relative to the forces at zero displacement.
@@ -206,7 +242,7 @@ def rigid_motion(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Out
     return (state, outcome) if outcome.converged else None
 
 
-def working_set(newton: SemismoothNewton, state: State) -> State | None:
+def dual_active_set(newton: SemismoothNewton, state: State) -> State | None:
     """Return a solution by a working set of contact nodes (dual active set method). Collective.
 
     For bodies that touch at one node or two: stops, tips, corners. Without contact most of their
@@ -251,9 +287,7 @@ def _penetrating(
     return deepest, count
 
 
-def continuation(
-    solve: Callable[[float, State], tuple[State, Outcome]], start: State
-) -> tuple[State, Outcome] | None:
+def continuation(solve: Callable[[float, State], End], start: State) -> End | None:
     """Solve by continuation in a parameter from `FIRST_PART` to 1; None on failure. Collective.
 
     After a failure the square root of the factor is taken; after a failure of the first part none.
@@ -281,9 +315,7 @@ def continuation(
     return None
 
 
-def conductivity_continuation(
-    newton: SemismoothNewton, outcome: Outcome
-) -> tuple[State, Outcome] | None:
+def conductivity_continuation(newton: SemismoothNewton) -> End | None:
     """Solve a condensed body by continuation in the conductivity k_e of the foundation, if any.
 
     A foundation of high conductivity fixes the potential of a node that comes near, and releases it
@@ -293,7 +325,7 @@ def conductivity_continuation(
     if not isinstance(problem, CondensedProblem) or interface.foundation.conductor is None:
         return None
 
-    def solve(part: float, state: State) -> tuple[State, Outcome]:
+    def solve(part: float, state: State) -> End:
         less = replace(interface, foundation=interface.foundation.conducting(part))
         method = newton if part == 1.0 else newton.on(problem.with_interface(less))
         return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
@@ -301,7 +333,7 @@ def conductivity_continuation(
     return continuation(solve, problem.start())
 
 
-def proximal_points(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, Outcome] | None:
+def proximal_points(newton: SemismoothNewton) -> End | None:
     """Solve by a proximal-point method where friction has to constrain a rigid-body mode, if any.
 
     For belts, arched leaves, wedges: bodies with a mode that friction alone constrains. The
@@ -325,7 +357,6 @@ def proximal_points(newton: SemismoothNewton, outcome: Outcome) -> tuple[State, 
         try:
             balanced, outcome = method.iterate(state, note=PROXIMAL_POINT)
         except SingularError:  # no contact: a normal motion is unconstrained
-            newton.step.renew()
             return None
         if outcome.converged:
             state, stiffness = balanced, SOFTER * stiffness

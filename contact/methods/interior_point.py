@@ -35,6 +35,7 @@ Methods Appl. Sci. 5 (1983).
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -307,7 +308,9 @@ SHARE_UNSUPPORTED = 0.1
 SHORTEST, LONGEST = 0.9, 0.999
 
 
-def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tuple[State, Outcome]:
+def interior_point(
+    newton: SemismoothNewton, begin: State | None = None, steps: int | None = None
+) -> tuple[State, Outcome]:
     """Solve by the interior point, Newton's last steps and updates of the bound. Collective.
 
     Parameters
@@ -317,25 +320,33 @@ def interior_point(newton: SemismoothNewton, begin: State | None = None) -> tupl
     begin
         State without contact, whose gaps are the first slacks; None where contact has to constrain
         a rigid-body mode or the potential.
+    steps
+        Most steps; those left of the limit by default.
     """
     problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
+    last_step = len(newton.recorder.records) + (newton.steps_left if steps is None else steps)
+
+    def steps_left() -> int:
+        return last_step - len(newton.recorder.records)
+
     bound: Array = np.zeros(interface.nodes.weight.size)
     aside: tuple[State, Outcome] | None = None
     best = 1.0
     for _ in range(UPDATES):
         method = InteriorPoint(newton, bound, begin)
-        outcome, state = method.iterate(), method.state
+        outcome, state = method.iterate(min(LIMIT, steps_left())), method.state
         last = state
-        if not outcome.converged and newton.steps_left > 0:
-            try:
-                last, outcome = newton.iterate(newton.started(state), note=INTERIOR_POINT)
-            except SingularError:  # another bound may constrain the body
-                newton.step.renew()
+        if not outcome.converged and steps_left() > 0:
+            # Another bound may constrain a body whose matrix is singular.
+            with suppress(SingularError):
+                last, outcome = newton.iterate(
+                    newton.started(state), note=INTERIOR_POINT, steps=steps_left()
+                )
         if outcome.converged and modes.unconstrained_at(problem, last):
             aside = last, outcome
         elif outcome.converged or not interface.friction.acts:
             return last, outcome
-        if newton.steps_left <= 0:
+        if steps_left() <= 0:
             break
         # Pressures of Newton's last steps if these have made progress, else of the interior point.
         if aside is None and outcome.residuals.significant < PROGRESS * best:
@@ -402,19 +413,18 @@ class InteriorPoint:
         #: Least reference of the duality gap, where no work is done: all nodes stick.
         self._least_work = CLOSED * self.cones.duality_gap() if begin is None else 0.0
 
-    def iterate(self) -> Outcome:
-        """Take steps until the duality gap is closed. Collective."""
+    def iterate(self, most: int = LIMIT) -> Outcome:
+        """Take steps until the duality gap is closed, or as many as given. Collective."""
         newton = self._newton
         residuals, self._internal = evaluate_forces(self.problem, self.state)
         ended = "the interior point was given no step"
-        for steps in range(1, min(LIMIT, newton.steps_left) + 1):
+        for steps in range(1, most + 1):
             try:
                 taken = self.step()
             except InputError as error:
                 # Near the solution the matrices are singular to rounding.
                 if error.identifier == "memory":
                     raise
-                self._step.renew()
                 taken = False
             residuals, self._internal = evaluate_forces(self.problem, self.state)
             newton.see(self.state, residuals)
@@ -484,7 +494,7 @@ class InteriorPoint:
             at_nodes[frictional] += friction - np.einsum("kij,kj->ki", across, slip)
             rhs = residual.copy()
             nodes.add_jump_transposed(at_nodes, rhs)
-            dx = self._step.operator.solve(rhs, FORCING)
+            dx = self._step.solve(rhs, FORCING)
             moved = nodes.jump(dx)
             closed = slack - nodes.normal_component(moved)[rigid]
             return dx, cones.complete(

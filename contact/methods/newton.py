@@ -6,9 +6,10 @@
    or slip (`contact.interface.multipliers`). On it each has a generalised derivative
    (`contact.interface.complementarity`).
 2. A step linearises material, contact, friction, layer and charge together (`newton_step`). The
-   multipliers are eliminated node by node with the augmentation parameter gamma, so that one
-   linear system in the unknowns of the body is left: with gamma far above the stiffness of the
-   body its solution nearly meets u_nu = rho where a node touches, and u_tau = 0 where it sticks.
+   multipliers are eliminated node by node, so that one linear system in the unknowns of the body
+   is left. The complementarity function of a closed node, -c (u_nu - rho), has no derivative in p.
+   It is perturbed to (c/gamma) dp = c (u_nu+ - rho): one augmented-Lagrangian update, an inexact
+   semismooth Newton step; gamma -> infinity is the primal-dual active set strategy.
    The material is linearised by its tangent while the residual of equilibrium falls, else by its
    secant (Kacanov). Steps are taken whole, without a line search: the residuals may rise while the
    active set changes, and the stagnation limit bounds how long.
@@ -20,8 +21,8 @@
    shows that c is far above the stiffness of the body, as of slender ones; not so on the whole body
    after steps on the condensed one. Loads that friction is found not to balance end the solve,
    without further fallbacks.
-5. Where steps on the condensed body have ended without convergence, those on the whole body follow;
-   then the fallbacks (`fallbacks`).
+5. `contact.methods.fallbacks.solve_contact` has the order of all stages: steps on the condensed
+   body and on the whole one, then the fallbacks.
 
 References
 ----------
@@ -50,7 +51,6 @@ from contact.methods.fallbacks import (
     RIGID_MOTION,
     WORKING_SET,
     solve_contact,
-    with_fallbacks,
 )
 from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED
 from contact.methods.newton_step import NewtonStep
@@ -81,8 +81,8 @@ UNSOLVED = 0.05
 #: Notes of fallbacks on the condensed problem, repeated in the record of the whole one.
 FALLBACKS = WORKING_SET, CONTINUATION, RIGID_MOTION, INTERIOR_POINT, PROXIMAL_POINT
 
-#: Reason of an end without solution of a condensed problem.
-NOT_CONDENSED = "the condensed contact problem is not solved"
+#: Reason of an end without solution of a condensed contact problem.
+UNSOLVED_ON_CONTACT_NODES = "the condensed contact problem is not solved"
 
 #: Cost of a factorisation, in chord steps.
 MOST_STEPS = 10.0
@@ -186,10 +186,7 @@ class Newton:
         self.recorder = Recorder(self.monitor)
         if self.condensation is not None:
             self.condensation.set_load_step(problem)
-        last = self._condensed_steps if self._condenses and not self._pays else None
-        self.whole = SemismoothNewton(
-            problem, self.options, self._step, self._modes, self.recorder, last
-        )
+        self.whole = SemismoothNewton(problem, self.options, self._step, self._modes, self.recorder)
 
     def _newton_step(
         self, problem: AnyProblem, options: NewtonOptions, counters: Counters
@@ -221,14 +218,8 @@ class Newton:
         elif start is None:
             secant_at = body.zero_displacement()
         whole.begin(begin)
-        if self._pays:
-            state, outcome = self._condensed_steps(begin, secant_at)
-            if not (outcome.converged or outcome.overloaded or whole.steps_left <= 0):
-                logger.info("%s; going on with the whole body", outcome.ended)
-                state, outcome = whole.iterate(state, secant_at if state is begin else None)
-            state, outcome = with_fallbacks(whole, state, outcome)
-        else:
-            state, outcome = solve_contact(whole, begin, secant_at)
+        condensed = self._condensed_steps if self._condenses else None
+        state, outcome = solve_contact(whole, begin, secant_at, condensed, self._pays)
         whole.at = state
         return state, outcome
 
@@ -252,19 +243,18 @@ class Newton:
             kind = "tangent" if tangent else "secant"
             condensed = self.condensation.linearise(kind, state, keep, secant_at, internal)
             if condensed is None:
-                return previous, loop.outcome(NOT_CONDENSED)
+                return previous, loop.outcome(UNSOLVED_ON_CONTACT_NODES)
             # Inexact Newton: no more digits than the linearised material has.
             enough = 0.1 * options.tolerance
             if not body.linear and not keep:
                 enough = max(enough, CONTACT_PART * min(largest, 1.0))
-            contact = self._on_contact_nodes(condensed, enough)
-            end, outcome = solve_contact(contact, replace(state, x=condensed.equilibrium.at))
-            records = tuple(contact.recorder.records)
+            begin = replace(state, x=condensed.equilibrium.at)
+            end, outcome, records = self._on_contact_nodes(condensed, begin, enough)
             self.counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
             unsolved = outcome.residuals.significant > max(enough, UNSOLVED * largest)
             if unsolved and not overloaded:
-                return previous, loop.outcome(NOT_CONDENSED)
+                return previous, loop.outcome(UNSOLVED_ON_CONTACT_NODES)
             increment = self.condensation.expand(condensed, end.x)
             state = replace(end, x=body.updated(state.x, increment), history=state.history)
             secant_at = None
@@ -284,10 +274,14 @@ class Newton:
                 return state, stalled
         return state, loop.out_of_steps()
 
-    def _on_contact_nodes(self, problem: CondensedProblem, tolerance: float) -> SemismoothNewton:
-        """Return the semismooth Newton method on a condensed problem."""
+    def _on_contact_nodes(
+        self, problem: CondensedProblem, begin: State, tolerance: float
+    ) -> tuple[State, Outcome, tuple[Record, ...]]:
+        """Solve a condensed problem to a tolerance; return its records too. Collective."""
         # Each stage has a limit of its own.
         options = self.options.model_copy(update={"tolerance": tolerance, "max_outer": sys.maxsize})
         step = self._newton_step(problem, options, Counters())
         recorder = Recorder(lambda _: self.recorder.poll(), logging.DEBUG)
-        return SemismoothNewton(problem, options, step, self._modes, recorder)
+        method = SemismoothNewton(problem, options, step, self._modes, recorder)
+        state, outcome = solve_contact(method, begin)
+        return state, outcome, tuple(recorder.records)

@@ -2,13 +2,11 @@
 
 Multipliers are eliminated node by node (`contact.interface.complementarity.linearise`): the linear
 systems keep the size and pattern of the elastic ones. Iterative solvers stop at a forcing term
-(inexact Newton). `ConductivityDerivative` chooses between Newton's method and Picard's in the
-conductivity.
+(inexact Newton). `safeguards` keep active sets from cycling.
 
 References
 ----------
 Dembo, Eisenstat and Steihaug, Inexact Newton methods, SIAM J. Numer. Anal. 19 (1982).
-Nocedal and Wright, Numerical Optimization, Springer (2006): Levenberg-Marquardt regularisation.
 """
 
 from __future__ import annotations
@@ -17,19 +15,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contact.errors import SingularError
-from contact.interface.complementarity import (
-    ComplementarityParameters,
-    LinearisedContact,
-    linearise,
-)
+from contact.errors import InputError, SingularError
+from contact.interface.complementarity import ComplementarityParameters, linearise
 from contact.interface.interface import Interface
-from contact.interface.multipliers import Multipliers
+from contact.interface.multipliers import ActiveSet, Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.options import NewtonOptions
+from contact.methods.safeguards import (
+    ConductivityDerivative,
+    bound_by_slip,
+    guarded_active_set,
+    regularisation,
+)
 from contact.problem.condensed import AnyProblem
 from contact.problem.residuals import Residuals, residual_forces
 from contact.problem.state import State
+from contact.ranks import summed
 from contact.typing import Array
 
 #: First forcing term of inexact Newton. One by the residuals (Eisenstat and Walker) would ask for
@@ -40,12 +41,34 @@ FORCING = 1e-2
 #: the active set may cycle. Its least value is the tolerance.
 STAGNANT, REDUCTION = 3, 1e-2
 
-#: Levenberg-Marquardt parameter over the stiffness of a node times the residual.
-REGULARISATION = 1e-2
-
 #: Ratio of the equilibrium residual to the largest one below which the linearised material of the
 #: last step is kept: the error is in contact and friction.
 SMALL = 0.1
+
+
+@dataclass(frozen=True)
+class LinearisedLaws:
+    """Contact, friction, layer and charge at the contact nodes, linearised for a step.
+
+    Attributes
+    ----------
+    active_set, unchanged
+        Active set of the step, and whether it is that of the last one, on all ranks.
+    multipliers, contact
+        lambda^0 and the blocks B of (19) of the algorithms page.
+    layer, layer_shift
+        Blocks of the layer, and its linearised pressure at dx = 0 less its pressure, shape (n,).
+    charge
+        Blocks of the charge, or 0.
+    """
+
+    active_set: ActiveSet
+    unchanged: bool
+    multipliers: Multipliers
+    contact: Array
+    layer: Array
+    layer_shift: Array
+    charge: Array | float
 
 
 class NewtonStep:
@@ -90,19 +113,21 @@ class NewtonStep:
         self._kind = ""
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
-    def renew(self) -> None:
-        """Drop the operator: MUMPS does not recover from a failed factorisation."""
-        self._kind, self._operator = "", None
+    def solve(self, rhs: Array, rtol: float | None = None) -> Array:
+        """Solve with the operator; drop it on failure, as MUMPS does not recover. Collective."""
+        try:
+            return self.operator.solve(rhs, rtol)
+        except InputError:
+            self._kind, self._operator = "", None
+            raise
 
     def _forcing_term(self, residual: float) -> float:
         """Return the forcing term of a step from the residual before it."""
         self._stagnant = 0 if residual < self._nearest else self._stagnant + 1
         self._nearest = min(self._nearest, residual)
         if self._stagnant >= STAGNANT:
-            self._stagnant, self._forcing = (
-                0,
-                max(self._forcing * REDUCTION, self.options.tolerance),
-            )
+            self._stagnant = 0
+            self._forcing = max(self._forcing * REDUCTION, self.options.tolerance)
         return self._forcing
 
     @property
@@ -135,7 +160,7 @@ class NewtonStep:
         free = State(state.x, Multipliers.zero(nodes), state.time, state.history)
         size = nodes.block_size
         self.assemble(problem, free, np.zeros((nodes.nodes.size, size, size)))
-        step = self.operator.solve(-residual_forces(problem, free))
+        step = self.solve(-residual_forces(problem, free))
         return replace(free, x=body.prescribe(body.updated(free.x, step), free.time))
 
     def __call__(
@@ -171,70 +196,109 @@ class NewtonStep:
             If the matrix is singular and another iterate does not help: with a linear body, or in
             the first step of an underconstrained one.
         """
-        interface = problem.interface
-        body, nodes = problem.equilibrium, interface.nodes
-        nodal = nodes.jump(state.x)
-        contact = linearise(
-            interface,
-            nodal,
-            state.forces,
-            self.parameters,
-            state.active_set,
-            softening=self.options.softening,
-        )
-        layer, shift = linearised_layer(interface, nodal, state, self.parameters, contact.unchanged)
-        charge = self._charge(interface, nodal, contact, residuals.significant)
-        blocks = contact.blocks + layer + charge
-        kind, last = "tangent" if tangent else "secant", self._kind
-        remains = kind == last and residuals.equilibrium < SMALL * residuals.significant
-        if self._underconstrained and not contact.unchanged:
-            stiffness = (
-                REGULARISATION * min(residuals.significant, 1.0) * self.parameters.nodal_stiffness
-            )
-            along = nodes.normal[:, :, None] * nodes.normal[:, None, :]
-            blocks[:, : body.dim, : body.dim] += stiffness * (along + nodes.tangent)
-        blocks = interface.weighted(blocks, state.x)
-        at = state if secant_at is None else replace(state, x=secant_at)
-        self.operator.update(kind, at, blocks, constant=body.linear or remains)
-        self._kind = kind
-        here = replace(state, forces=contact.multipliers)
-        residual = residual_forces(problem, here, secant_at, internal_forces)
-        nodes.add_jump_transposed((nodes.weight * shift)[:, None] * nodes.normal, residual)
+        body = problem.equilibrium
+        laws = self._linearise(problem.interface, state, residuals.significant)
+        self._update(problem, state, laws, tangent, residuals, secant_at)
+        residual = self._residual(problem, state, laws, secant_at, internal_forces)
         forcing = None if exact else self._forcing_term(residuals.significant)
         try:
-            increment = self.operator.solve(-residual, forcing)
+            increment = self.solve(-residual, forcing)
         except SingularError:
             if body.linear or (self._underconstrained and state.active_set is None):
                 raise
-            self.renew()
             return None
-        moved = nodes.jump(increment)
-        change = np.einsum("nij,nj->ni", contact.blocks, moved)
-        vectors = contact.multipliers.vectors(nodes) + change[:, : interface.dim]
-        forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
-        pressed = nodes.normal_component(np.einsum("nij,nj->ni", layer, moved))
-        layer_pressure = interface.foundation.pressure(nodal) + shift + pressed
-        # Far motions leave nodes of a rigid part off it by rounding.
-        x = body.prescribe(body.updated(state.x, increment), state.time)
-        return replace(
-            state,
-            x=x,
-            forces=forces,
-            active_set=contact.active_set,
-            layer_pressure=layer_pressure,
+        return _moved(problem, state, laws, increment)
+
+    @np.errstate(over="ignore", invalid="ignore")  # diverging iterates overflow
+    def _linearise(self, interface: Interface, state: State, residual: float) -> LinearisedLaws:
+        """Linearise contact, friction, layer and charge. Collective."""
+        parameters, before = self.parameters, state.active_set
+        nodal = interface.nodes.jump(state.x)
+        total, length = interface.pressure(nodal, state.forces), interface.slip_length(nodal)
+        bound = interface.friction.bound(total, length)
+        active, forces = guarded_active_set(
+            interface, nodal, state.forces, bound, parameters.c, before
         )
+        changed = before is None or not active.same(before)
+        unchanged = float(summed(interface.comm, changed)) == 0
+        by_slip = np.zeros_like(bound)
+        if unchanged:
+            limit = self.options.softening * parameters.nodal_stiffness
+            by_slip = bound_by_slip(interface, total, length, limit)
+        multipliers, contact = linearise(interface, nodal, forces, active, parameters, by_slip)
+        layer, shift = linearised_layer(interface, nodal, state, parameters, unchanged)
+        charge = self._charge(interface, nodal, multipliers, unchanged, residual)
+        return LinearisedLaws(active, unchanged, multipliers, contact, layer, shift, charge)
 
     def _charge(
-        self, interface: Interface, nodal: Array, contact: LinearisedContact, residual: float
+        self,
+        interface: Interface,
+        nodal: Array,
+        multipliers: Multipliers,
+        unchanged: bool,
+        residual: float,
     ) -> Array | float:
         """Return the derivative of the charge, with that of psi(u_nu - rho) or psi frozen."""
         law = interface.foundation
         if not law.active:
             return 0.0
-        follow = contact.unchanged
+        follow = unchanged
         if law.follows_gap:
-            follow = self.conductivity_derivative(residual, follow)
-        return law.charge_block(nodal, interface.pressure(nodal, contact.multipliers), follow)
+            follow = self.conductivity_derivative(residual, unchanged)
+        return law.charge_block(nodal, interface.pressure(nodal, multipliers), follow)
+
+    def _update(
+        self,
+        problem: AnyProblem,
+        state: State,
+        laws: LinearisedLaws,
+        tangent: bool,
+        residuals: Residuals,
+        secant_at: Array | None,
+    ) -> None:
+        """Assemble and factorise the operator. Collective."""
+        interface, body = problem.interface, problem.equilibrium
+        blocks = laws.contact + laws.layer + laws.charge
+        if self._underconstrained and not laws.unchanged:
+            blocks[:, : body.dim, : body.dim] += regularisation(
+                interface, residuals.significant, self.parameters.nodal_stiffness
+            )
+        kind, last = "tangent" if tangent else "secant", self._kind
+        remains = kind == last and residuals.equilibrium < SMALL * residuals.significant
+        at = state if secant_at is None else replace(state, x=secant_at)
+        weighted = interface.weighted(blocks, state.x)
+        self.operator.update(kind, at, weighted, constant=body.linear or remains)
+        self._kind = kind
+
+    def _residual(
+        self,
+        problem: AnyProblem,
+        state: State,
+        laws: LinearisedLaws,
+        secant_at: Array | None,
+        internal_forces: Array | None,
+    ) -> Array:
+        """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
+        here, nodes = replace(state, forces=laws.multipliers), problem.interface.nodes
+        residual = residual_forces(problem, here, secant_at, internal_forces)
+        nodes.add_jump_transposed(
+            (nodes.weight * laws.layer_shift)[:, None] * nodes.normal, residual
+        )
+        return residual
+
+
+def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: Array) -> State:
+    """Return the next iterate x + dx, with lambda+ = lambda^0 + B T dx. Collective."""
+    interface, body = problem.interface, problem.equilibrium
+    nodes, moved = interface.nodes, interface.nodes.jump(increment)
+    change = np.einsum("nij,nj->ni", laws.contact, moved)
+    vectors = laws.multipliers.vectors(nodes) + change[:, : interface.dim]
+    forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
+    pressed = nodes.normal_component(np.einsum("nij,nj->ni", laws.layer, moved))
+    layer = interface.foundation.pressure(nodes.jump(state.x)) + laws.layer_shift + pressed
+    # Far motions leave nodes of a rigid part off it by rounding.
+    x = body.prescribe(body.updated(state.x, increment), state.time)
+    return replace(state, x=x, forces=forces, active_set=laws.active_set, layer_pressure=layer)
 
 
 def linearised_layer(
@@ -261,45 +325,3 @@ def linearised_layer(
     block = law.pressure_block(on_graph, full)
     back = nodes.normal_component(np.einsum("nij,nj->ni", block, nodal - on_graph))
     return block, law.pressure(on_graph) + back - layer
-
-
-@dataclass
-class ConductivityDerivative:
-    """Choice between psi'(u_nu - rho) in the tangent (Newton) and psi frozen (Picard).
-
-    With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and steep
-    ramps psi converge fast. But a node that opens draws less charge, and may open further: the
-    linearised charge leads back to contact, the node is then under tension, and the active set
-    cycles. With psi frozen it opens to the other end of the ramp.
-
-    Attributes
-    ----------
-    near
-        Largest residual with the derivative.
-    included
-        Whether the last step had it.
-    """
-
-    near: float = np.inf
-    included: bool = False
-    _limit: float = np.inf
-
-    def worsened(self, residual: float) -> bool:
-        """Tell whether a step with the derivative has raised the residual: it is to be rejected.
-
-        The derivative is taken again below a tenth of the residual before that step.
-        """
-        if not self.included or residual <= self._limit:
-            return False
-        # A step with psi frozen may only undo this one.
-        self._limit *= 0.1
-        self.included = False
-        return True
-
-    def __call__(self, residual: float, allowed: bool = True) -> bool:
-        """Tell whether the next step is to have the derivative, by the residual before it."""
-        self.worsened(residual)
-        self.included = allowed and residual <= min(self.near, self._limit)
-        if self.included:
-            self._limit = residual
-        return self.included

@@ -1,13 +1,11 @@
 """Semismooth Newton method on one problem, the whole body or the condensed one.
 
 Each step linearises all laws together (`newton_step`); the residuals, computed from scratch, end
-the iteration. `iterate` takes no fallback: these are of `fallbacks`, which is given this object,
-and with it the solver on the condensed body as the last one.
+the iteration. `iterate` takes no fallback: these are of `fallbacks`, which is given this object.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -49,16 +47,11 @@ class SemismoothNewton:
         Rigid-body modes of the whole problem.
     recorder
         Recorder of the steps.
-    condensed
-        Solver of the same problem on the condensed body, from an initial guess and the unknowns of
-        the first secant: the last fallback; None for none.
 
     Attributes
     ----------
-    at, best, without_contact
-        Last iterate, iterate of least residual, and the state with all nodes open if it is known.
-    reserved
-        Steps of the limit that are reserved for the condensed body.
+    at, best
+        Last iterate, and iterate of least residual.
     """
 
     def __init__(
@@ -68,22 +61,20 @@ class SemismoothNewton:
         step: NewtonStep,
         modes: UnconstrainedModes,
         recorder: Recorder,
-        condensed: Callable[[State, Array | None], tuple[State, Outcome]] | None = None,
     ) -> None:
         self.problem, self.options, self.step = problem, options, step
-        self.modes, self.recorder, self.condensed = modes, recorder, condensed
+        self.modes, self.recorder = modes, recorder
         self.begin(problem.start())
 
     def begin(self, state: State) -> None:
         """Begin a solve from an initial guess."""
-        self.at, self.reserved = state, 0
+        self.at = state
         self.best: Best[State] = Best()
-        self.without_contact: State | None = None
 
     @property
     def steps_left(self) -> int:
         """Number of steps left of the limit."""
-        return self.options.max_outer - self.reserved - len(self.recorder.records)
+        return self.options.max_outer - len(self.recorder.records)
 
     def see(self, state: State, residuals: Residuals) -> None:
         """Keep an iterate as the last one, and as the best one if it is."""
@@ -92,9 +83,7 @@ class SemismoothNewton:
 
     def on(self, problem: AnyProblem) -> SemismoothNewton:
         """Return the method on a problem with another interface, with the same operator."""
-        other = SemismoothNewton(problem, self.options, self.step, self.modes, self.recorder)
-        other.reserved = self.reserved
-        return other
+        return SemismoothNewton(problem, self.options, self.step, self.modes, self.recorder)
 
     def started(self, start: State) -> State:
         """Return an initial guess with its active set."""
@@ -116,6 +105,7 @@ class SemismoothNewton:
         stagnation_limit: int | None = None,
         give_up: bool = False,
         exact: bool = False,
+        steps: int | None = None,
     ) -> tuple[State, Outcome]:
         """Iterate until the residuals converge or stagnate. Collective.
 
@@ -133,6 +123,8 @@ class SemismoothNewton:
             Whether to end after a first step from zero that shows c to overestimate the stiffness.
         exact
             Whether iterative solvers go to their own tolerance, without a forcing term.
+        steps
+            Most steps; those left of the limit by default.
         """
         problem, options, step = self.problem, self.options, self.step
         linear = problem.equilibrium.linear
@@ -142,7 +134,7 @@ class SemismoothNewton:
         step.begin()
         # At zero strain the secant is the tangent; an initial guess with an active set is near.
         tangent = state.active_set is not None and secant_at is None and not linear
-        for _ in range(min(options.max_iterations, self.steps_left)):
+        for _ in range(min(options.max_iterations, self.steps_left if steps is None else steps)):
             previous, previous_residuals = state, loop.residuals
             internal = loop.internal if secant_at is None else None
             taken = step(problem, state, tangent, previous_residuals, secant_at, internal, exact)

@@ -21,9 +21,9 @@ from scipy.optimize import nnls
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.multipliers import Multipliers
-from contact.linear.operator import Operator
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.geometry import geometry_nodes, integration_weights
+from contact.methods.newton_step import NewtonStep
 from contact.methods.report import Outcome
 from contact.problem.condensed import AnyProblem, CondensedBody, CondensedProblem
 from contact.problem.problem import ContactProblem
@@ -114,9 +114,7 @@ class UnconstrainedModes:
         """Groups of bodies with modes that their supports do not constrain."""
         return [group for group in groups(self.problem) if null_space(group.supports).size > 0]
 
-    def separated(
-        self, problem: CondensedProblem, operator: Operator, stiffness: float
-    ) -> State | None:
+    def separated(self, problem: CondensedProblem, step: NewtonStep) -> State | None:
         """Return a state with all nodes open after a rigid motion; None without one. Collective.
 
         None too where the motion is more than 45 degrees off the normal: out of a wedge, in which
@@ -124,19 +122,17 @@ class UnconstrainedModes:
 
         Parameters
         ----------
-        problem, operator
-            The condensed problem, and its operator.
-        stiffness
-            Stiffness of a node (stress/length). A proximal term of sqrt(EPS) times it makes the
-            system regular; a second step removes its forces.
+        problem, step
+            The condensed problem, and its operator. A proximal term of sqrt(EPS) times the
+            stiffness of a node makes the system regular; a second step removes its forces.
         """
         nodes, start = problem.interface.nodes, problem.start()
         blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))
-        blocks[:] = np.sqrt(EPS) * stiffness * np.eye(nodes.block_size)
-        operator.update("secant", start, problem.interface.weighted(blocks, start.x))
+        blocks[:] = np.sqrt(EPS) * step.parameters.nodal_stiffness * np.eye(nodes.block_size)
+        step.operator.update("secant", start, problem.interface.weighted(blocks, start.x))
         state = start
         for _ in range(2):  # each leaves an error of sqrt(EPS)
-            increment = operator.solve(-residual_forces(problem, state))
+            increment = step.solve(-residual_forces(problem, state))
             state = replace(state, x=problem.equilibrium.updated(state.x, increment))
         found = self.free_motion(problem, state)
         if found is None:

@@ -35,7 +35,7 @@ PHASES = {
     "solves with the factors": ("~", "<method 'matSolve' of 'petsc4py.PETSc.Mat' objects>"),
     "residual forces": ("body/loads.py", "assembled"),
     "contact laws": ("interface/complementarity.py", "linearise"),
-    "iterations on the condensed problem": ("methods/fallbacks.py", "solve_contact"),
+    "iterations on the condensed problem": ("methods/newton.py", "_on_contact_nodes"),
     "transfer from mesh to mesh": ("refining.py", "prolong"),
 }
 

@@ -19,6 +19,7 @@ from contact.methods import (
     load_stepping,
     newton,
     newton_step,
+    safeguards,
     semismooth,
 )
 from contact.methods.options import FixedPointOptions, NewtonOptions
@@ -226,7 +227,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         "below [1/10] of the\n   largest one": newton_step.SMALL == 0.1,
         "the forcing term [10⁻²]": newton_step.FORCING == 1e-2,
         "each three steps": newton_step.STAGNANT == 3,
-        "[10^{-2}]\\,\\kappa$ is added": newton_step.REGULARISATION == 1e-2,
+        "[10^{-2}]\\,\\kappa$ is added": safeguards.REGULARISATION == 1e-2,
         "tolerance is [10⁻³] of the": newton.CONTACT_PART == 1e-3,
         "has not fallen to [1/20]": newton.UNSOLVED == 0.05,
         "below a residual of [0.05]": newton.RADIUS == 0.05,

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.interface.complementarity import ComplementarityParameters, at_bound, linearise
+from contact.interface.complementarity import ComplementarityParameters, linearise
 from contact.interface.multipliers import ActiveSet, Multipliers
+from contact.methods.safeguards import at_bound, bound_by_slip, guarded_active_set
 from contact.model.friction import Friction
 from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
 from tests.problems import mechanics
@@ -32,17 +33,19 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     parameters = ComplementarityParameters(20.0, 20.0, 20.0)
     none = np.zeros(n, dtype=bool)
     before = ActiveSet(none, none, none)
-    base = linearise(interface, nodal, forces, parameters, before, forces.pressure * 0.4)
-    sticks = base.active_set.sticks
-    assert np.any(sticks & base.active_set.closed)
-    assert np.any(base.active_set.slips & base.active_set.closed)
+    bound = interface.bound(nodal, forces)
+    active, forces = guarded_active_set(interface, nodal, forces, bound, parameters.c, before)
+    sticks = active.sticks
+    assert np.any(sticks & active.closed)
+    assert np.any(active.slips & active.closed)
     # a sticking node pushes with lambda + gamma u_tau, a pressed one with p - gamma (gap - u_nu)
-    direction = 1e-6 * rng.standard_normal(nodal.shape)
-    moved = linearise(
-        interface, nodal + direction, forces, parameters, before, forces.pressure * 0.4
+    direction, zero = 1e-6 * rng.standard_normal(nodal.shape), np.zeros(n)
+    (base, blocks), (moved, _) = (
+        linearise(interface, at, forces, active, parameters, zero)
+        for at in (nodal, nodal + direction)
     )
-    difference = moved.multipliers.vectors(problem.nodes) - base.multipliers.vectors(problem.nodes)
-    predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
+    difference = moved.vectors(nodes) - base.vectors(nodes)
+    predicted = np.einsum("nij,nj->ni", blocks, direction)[:, :dimension]
     assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
     normal = nodes.normal_component(difference)
     assert np.allclose(normal, nodes.normal_component(predicted), rtol=1e-6, atol=1e-12)
@@ -61,16 +64,21 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     parameters = ComplementarityParameters(200.0, 20.0, 1e6)
     every = np.ones(nodes.nodes.size, dtype=bool)
     before = ActiveSet(every, ~every, every)
-    base = linearise(problem.interface, nodal, forces, parameters, before, softening=softening)
-    assert base.unchanged
+    interface, limit = problem.interface, softening * parameters.nodal_stiffness
+
+    def linearised(nodal):
+        bound, length = interface.bound(nodal, forces), interface.slip_length(nodal)
+        active, raised = guarded_active_set(interface, nodal, forces, bound, parameters.c, before)
+        assert active.same(before)
+        by_slip = bound_by_slip(interface, pressure, length, limit)
+        return linearise(interface, nodal, raised, active, parameters, by_slip)
+
     step = np.array([1e-8, 0.0])
-    moved = linearise(
-        problem.interface, nodal + step, forces, parameters, before, softening=softening
-    )
-    change = (moved.multipliers.friction - base.multipliers.friction)[:, 0] / step[0]
+    (base, blocks), (moved, _) = linearised(nodal), linearised(nodal + step)
+    change = (moved.friction - base.friction)[:, 0] / step[0]
     assert np.all(change < -0.25 * 20.0)
     expected = np.maximum(change, -softening * parameters.nodal_stiffness)
-    assert np.allclose(base.blocks[:, 0, 0], expected, rtol=1e-4)
+    assert np.allclose(blocks[:, 0, 0], expected, rtol=1e-4)
 
 
 @pytest.mark.core

@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from contact.methods.newton import Newton
-from contact.methods.newton_step import ConductivityDerivative
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.safeguards import ConductivityDerivative
 from contact.model.friction import Friction
 from contact.thesis.fixed_point import FixedPoint
 from forms.laws import SlipCoefficient

@@ -25,13 +25,13 @@ import numpy as np
 
 from contact import Solution, load_case, refining, solve
 from contact.case.file import Case, parse_case
-from contact.interface import complementarity
 from contact.linear import multigrid, schur
 from contact.linear.operator import BlockPreconditioner
 from contact.methods import (
     fallbacks,
     interior_point,
     newton_step,
+    safeguards,
     semismooth,
 )
 from contact.methods.newton import Chord, Newton
@@ -309,7 +309,7 @@ DEVICES = (
            (semismooth._overestimates_stiffness,), "-",
            ((semismooth, "_overestimates_stiffness", lambda *_: False),), (), _own("stop")),
     Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
-           ((newton_step, "REGULARISATION", 0.0),), (), _own("two-spheres")),
+           ((safeguards, "REGULARISATION", 0.0),), (), _own("two-spheres")),
     Device("forcing term that tightens", (newton_step.NewtonStep._forcing_term,),
            "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "STAGNANT", 10**9),), (),
            _own("piezoelectric-pair")),
@@ -317,19 +317,20 @@ DEVICES = (
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
     Device("limited softening", (), "-", (), (("softening", float("inf")),),
            _finer("block-33", (24, 12, 12))),
-    Device("sliding nodes at their bound", (complementarity.at_bound,), "-",
-           ((complementarity, "at_bound", lambda _, friction, *__: friction),), (),
+    Device("sliding nodes at their bound", (safeguards.at_bound,), "-",
+           ((safeguards, "at_bound", lambda _, friction, *__: friction),), (),
            _finer("bar-67", (640, 160))),
-    Device("derivative of the conductivity by the gap", (newton_step.ConductivityDerivative,), "-",
-           ((newton_step.ConductivityDerivative, "__call__", lambda *_: False),)),
+    Device("derivative of the conductivity by the gap", (safeguards.ConductivityDerivative,), "-",
+           ((safeguards.ConductivityDerivative, "__call__", lambda *_: False),)),
     Device("stagnation limit of the continuation", (), "-",
            ((fallbacks, "CONTINUATION_LIMIT", None),), (), _conducting),
     Device("zero displacement where nothing acts", (undeformed_equilibrium,), "-",
            ((semismooth.Iteration, "_loss_of_contact", _nothing),), (),
            _own("two-blocks-unloaded")),
     Device("working set of contact nodes, from all open",
-           (fallbacks.all_open_or_working_set, fallbacks.working_set), "Goldfarb and Idnani 1983",
-           ((fallbacks, "all_open_or_working_set", _nothing),), (), _own("stop")),
+           (fallbacks.all_open, fallbacks.working_set, fallbacks.dual_active_set),
+           "Goldfarb and Idnani 1983",
+           ((fallbacks, "all_open", _nothing),), (), _own("stop")),
 )  # fmt: skip
 
 #: Ways to solve the linear systems: one with a problem of its own is needed from SLOW_LINEAR on.
