@@ -76,7 +76,7 @@ def pays(case: Case, problem: ContactProblem) -> bool:
     is condensed onto its contact nodes the steps are few where it is linear, and in 3-D; in the
     plane the tangent of a nonlinear one is then factorised near the solution, once.
     """
-    body, kind = problem.equilibrium, case.solver.linear
+    body, kind = problem.body, case.solver.linear
     if body.layout.dim == 3:
         slow, many = multigrid.is_large(body.layout) and kind != "lu", MANY["whole"]
     else:
@@ -109,7 +109,7 @@ def nested_start(
 
     Collective.
     """
-    layout, solver = problem.equilibrium.layout, case.solver
+    layout, solver = problem.body.layout, case.solver
     newton = solver if isinstance(solver, NewtonOptions) else NewtonOptions()
     levels, linear = newton.nested_levels, solver.linear
     if levels is None and layout.dim == 2 and not newton.nested:
@@ -130,7 +130,7 @@ def nested_start(
 
 def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State:
     """Carry a state of a coarse problem, in a static step, to a finer one. Collective."""
-    body, before = fine.equilibrium, coarse.equilibrium
+    body, before = fine.body, coarse.body
     x = carry(before.function(state.x), body.space).x.array.copy()
     if coarse.piezoelectric:
         x[coarse.dim :: body.block_size] *= before.phi_scale / body.phi_scale
@@ -220,7 +220,7 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
     domain, solution, rows = case.mesh.build(comm), None, []
     while True:
         problem = build_problem(case, comm, domain=domain)
-        unknowns = problem.equilibrium.layout.unknowns
+        unknowns = problem.body.layout.unknowns
         if solution is not None and unknowns > asked.max_unknowns:
             break
         start = None
@@ -246,7 +246,7 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
             break
         goal = (asked.error / error) ** 2 if asked.error is not None and seen else 0.0
         room = asked.max_unknowns / unknowns
-        finer = grown(domain, squares, asked.fraction, goal, room, problem.equilibrium.degree)
+        finer = grown(domain, squares, asked.fraction, goal, room, problem.body.degree)
         if _cells(finer) < LEAST * _cells(domain):
             break
         domain = finer

@@ -223,7 +223,7 @@ def evolve(
     expect("before", before, "the state before start", earlier)
     begin = 0.0 if start is None else start.time
     ends = _checked_times(problem, times, begin)
-    check_variables(problem.equilibrium)
+    check_variables(problem.body)
     settings = settings or NewtonOptions()
     method = METHODS[settings.method](problem, settings, monitor)
     for state, outcome in LoadStepping(problem, method, start, before).steps(ends, begin):
@@ -259,7 +259,7 @@ def solve_problem(
         Records of the steps of an earlier run, to continue from; called with that of each step.
     """
     clock = time.perf_counter()
-    check_variables(problem.equilibrium)
+    check_variables(problem.body)
     start = None if start is None else _prescribed(problem, start)
     records = list(kept)
     with stop_on_signal(problem.comm, monitor) as stop:
@@ -366,7 +366,7 @@ def _prescribed(problem: ContactProblem, start: State) -> State:
             "and contact nodes, on the same ranks",
             "start",
         )
-    x = problem.equilibrium.prescribe(start.x, problem.time)
+    x = problem.body.prescribe(start.x, problem.time)
     return State(x, start.forces, problem.time, problem.history)
 
 

@@ -52,9 +52,9 @@ class ForceBalance:
 
 def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     """Return the resultant forces at a state. Collective."""
-    body, d = problem.equilibrium, problem.dim
+    body, d = problem.body, problem.dim
     residual = body.nodal(residual_forces(problem, state))[:, :d]
-    supports = np.where(problem.equilibrium.free[:, :d], 0.0, residual).sum(axis=0)
+    supports = np.where(problem.body.free[:, :d], 0.0, residual).sum(axis=0)
     stress = problem.interface.stress(problem.nodal(state), state.forces)
     given = body.nodal(body.external(state.time))[:, :d].sum(axis=0)
     pushes = np.zeros_like(body.external(state.time))

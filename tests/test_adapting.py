@@ -41,7 +41,7 @@ def test_the_error_of_the_bar_falls_like_one_over_the_root_of_unknowns():
     # Uniform meshes, here 24 cells a unit, need more than twice the unknowns for the same error.
     uniform = solve(parse_case(changed(mesh__cells=[96, 24], **LINEAR)))
     needed = np.interp(-np.log(uniform.error.relative), -np.log(error), np.log(unknowns))
-    assert uniform.problem.equilibrium.layout.unknowns > 2 * np.exp(needed)
+    assert uniform.problem.body.layout.unknowns > 2 * np.exp(needed)
 
 
 @pytest.mark.parametrize(("degree", "asked"), [(1, 0.01), (2, 2e-3)])
@@ -171,7 +171,7 @@ def test_the_steps_of_an_evolution_have_one_mesh():
 def test_revolution_and_two_bodies(name):
     path = f"scripts/cases/{name}.toml"
     first = solve(load_case(path))
-    unknowns = first.problem.equilibrium.layout.unknowns
+    unknowns = first.problem.body.layout.unknowns
     limit = [f"mesh.adapt.max_unknowns={3 * unknowns}"]
     solution = solve(load_case(path, limit))
     assert solution.converged and len(solution.adaptation) > 1

@@ -523,7 +523,7 @@ def test_coarse_levels_that_are_new_are_not_renewed_for_a_correction(monkeypatch
 
     monkeypatch.setattr(multigrid, "refine", correct)
     problem = build_problem(block(6))
-    body, nodes = problem.equilibrium, problem.nodes.nodes
+    body, nodes = problem.body, problem.nodes.nodes
     operator, x = SparseOperator(body, nodes), problem.start().x
     blocks = np.zeros((nodes.size, body.block_size, body.block_size))
     for stiffness, made in ((0.0, 1), (1.0, 2)):
@@ -546,7 +546,7 @@ def test_the_iterations_a_digit_are_those_that_were_gained(monkeypatch, rtol):
         ksp.setTolerances(rtol=asked_for)
 
     problem = build_problem(block(6))
-    body, nodes = problem.equilibrium, problem.nodes.nodes
+    body, nodes = problem.body, problem.nodes.nodes
     operator, x = SparseOperator(body, nodes), problem.start().x
     for stiffness in (0.0, 1.0):
         operator.update(
@@ -570,7 +570,7 @@ def test_counts_do_not_grow_with_the_number_of_sliding_nodes(mu: float) -> None:
         for blocks in (0 * sticking(problem), sticking(problem), sliding(problem, mu)[0]):
             operator = operator_of(problem, "iterative", symmetric=mu == 0)
             operator.update("secant", BodyState(x), weight * blocks)
-            operator.solve(problem.equilibrium.external(), 1e-6)
+            operator.solve(problem.body.external(), 1e-6)
             counts.append(operator.counters.linear_iterations)
         assert max(counts) <= counts[0] + 3, counts
 
@@ -579,7 +579,7 @@ def test_counts_do_not_grow_with_the_number_of_sliding_nodes(mu: float) -> None:
 def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
     """Where little changes they stay; where much does the solve goes on with new ones."""
     problem = leaning_block(COMM, 12)
-    body, weight = problem.equilibrium, problem.nodes.weight[:, None, None]
+    body, weight = problem.body, problem.nodes.weight[:, None, None]
     x, load, sticks = problem.start().x, body.external(), weight * sticking(problem)
     operator = operator_of(problem, "iterative")
     operator.update("secant", BodyState(x), sticks)

@@ -238,9 +238,7 @@ def test_a_problem_in_python_and_a_function():
         return build_problem(with_number(case, "material.young", value), SELF)
 
     parameter = {"E": Parameter(1.0, at)}
-    work = {
-        "compliance": lambda problem, state: -0.01 * float(problem.equilibrium.motion(state.x)[1])
-    }
+    work = {"compliance": lambda problem, state: -0.01 * float(problem.body.motion(state.x)[1])}
     found = sensitivity(run, work, parameter)
     named = sensitivity(run, ["rigid_y"], parameter, "adjoint")
     assert found.method == "tangent"

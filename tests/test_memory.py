@@ -66,7 +66,7 @@ def growth(action: Callable[[ContactProblem], object]) -> float:
             peaks.append(tracemalloc.get_traced_memory()[1])
         finally:
             tracemalloc.stop()
-        unknowns.append(problem.equilibrium.layout.unknowns)
+        unknowns.append(problem.body.layout.unknowns)
     return float(np.diff(peaks)[0] / np.diff(unknowns)[0])
 
 

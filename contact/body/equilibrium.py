@@ -182,7 +182,7 @@ class BodyEquilibrium:
     ) -> None:
         body.check(domain.dim)
         check_element(element, degree, shape_of(domain.mesh), domain.order)
-        self.domain, self.body, self.degree, self.element = domain, body, degree, element
+        self.domain, self.description, self.degree, self.element = domain, body, degree, element
         self.dim, self.phi_scale = domain.dim, body.phi_scale
         self.block_size = self.dim + (body.piezo is not None)
         self.space = fem.functionspace(domain.mesh, ("Lagrange", degree, (self.block_size,)))
@@ -251,17 +251,17 @@ class BodyEquilibrium:
     @property
     def linear(self) -> bool:
         """True if the operator is the same at all states."""
-        return self.body.linear
+        return self.description.linear
 
     @property
     def symmetric(self) -> bool:
         """True if the tangent is a symmetric matrix."""
-        return self.body.symmetric
+        return self.description.symmetric
 
     @property
     def piezoelectric(self) -> bool:
         """True if there is a potential."""
-        return self.body.piezo is not None
+        return self.description.piezo is not None
 
     def split(self, x: Expr) -> tuple[Expr, Expr | None]:
         """Split a function or argument into displacement and scaled-back potential."""

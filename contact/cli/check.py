@@ -78,7 +78,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
     """Return the text. Collective; the same on all ranks."""
     domain, comm = problem.domain, problem.comm
     cells = domain.mesh.topology.index_map(domain.dim).size_global
-    layout = problem.equilibrium.layout
+    layout = problem.body.layout
     library, path = _compat.blas()
     end = 1.0 if case.evolution is None else case.evolution.ends[-1]
     lines = [
@@ -132,12 +132,12 @@ def expectations(problem: ContactProblem) -> list[str]:
 
 def _locking(problem: ContactProblem) -> list[str]:
     """Say which materials resist some strains so much that elements of degree 1 lock."""
-    body = problem.equilibrium
+    body = problem.body
     remedy = unlocked(body.element, body.degree, shape_of(body.domain.mesh))
     if remedy is None:
         return []
     # In plane stress volumes are free to change.
-    laws = [m.law for m in problem.body.materials if not m.in_plane_stress]
+    laws = [m.law for m in problem.description.materials if not m.in_plane_stress]
     ratios = [float(law.poisson) for law in laws]
     crystals = [law.eigenvalues for law in laws if isinstance(law, Anisotropic)]
     stiffer = [values[-1] / values[0] for values in crystals]
@@ -234,7 +234,7 @@ def regions(domain: Domain) -> list[str]:
 
 def acting(problem: ContactProblem) -> list[str]:
     """Return lines on all that acts at the time of a problem, and warnings of it. Collective."""
-    body, comm, size, time = problem.equilibrium, problem.comm, problem.domain.size, problem.time
+    body, comm, size, time = problem.body, problem.comm, problem.domain.size, problem.time
     gap = problem.interface.gap
     gap = np.where(np.abs(gap) < NEGLIGIBLE * size, 0.0, gap)  # rounding is no gap
     least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
@@ -270,7 +270,7 @@ def acting(problem: ContactProblem) -> list[str]:
 
 def _resultants(problem: ContactProblem, external: Array, prescribed: Array) -> list[list[str]]:
     """Return the loads, charges, and values of supports, as far as they are not 0. Collective."""
-    body, comm, d = problem.equilibrium, problem.comm, problem.dim
+    body, comm, d = problem.body, problem.comm, problem.dim
     tied = body.global_unknowns.tied
     loads, given = body.nodal(external), body.nodal(prescribed)[: len(tied)]
     given = np.where(tied, 0.0, given)
@@ -298,7 +298,7 @@ def _resultants(problem: ContactProblem, external: Array, prescribed: Array) -> 
 def _members(problem: ContactProblem) -> list[list[str]]:
     """Return the given motions and forces of rigid bodies, electrodes and bolts."""
     rows = []
-    for member in problem.equilibrium.global_unknowns.members:
+    for member in problem.body.global_unknowns.members:
         given, d = member.description, problem.dim
         names = ["shortening", "force"]
         where = f"{given.name} {given.on!r}"

@@ -91,7 +91,7 @@ def _parts(case: Case, problem: ContactProblem) -> Iterator[Part]:
     for key in ("fixed", "elastic", "bolt", "electrode", "rigid"):
         for section in getattr(case, key):
             yield f"{key} {section.on}", facets(section.on), None
-    for load in problem.body.loads:
+    for load in problem.description.loads:
         if load.on is None:
             continue
         corners = facets(load.on)

@@ -116,7 +116,7 @@ def field_gradient(
     >>> gradient = field_gradient(solution, "max_pressure")  # doctest: +SKIP
     >>> gradient.x.array  # doctest: +SKIP
     """
-    whole = not solution.problem.body.bolts
+    whole = not solution.problem.description.bolts
     expect("field_gradient: problem", "bolts", "a body without bolts", whole)
     expect("field_gradient: degree", degree, "0 (cells) or 1 (vertices)", degree in (0, 1))
     key = parameter if isinstance(parameter, str) else "parameter"
@@ -128,10 +128,10 @@ def field_gradient(
     family, element = family_of(key, made, path.steps), ("Lagrange" if degree else "DG", degree)
     gradient = fem.Function(fem.functionspace(path.base.domain.mesh, element), name="gradient")
     space = gradient.function_space
-    works = [_FieldWork(there.equilibrium, space) for there in family.problems]
+    works = [_FieldWork(there.body, space) for there in family.problems]
     found = np.zeros(space.dofmap.index_map.size_local)
     for linearised, adjoints in backwards(path, asked):
-        state, scale = linearised.state, linearised.problem.equilibrium.phi_scale
+        state, scale = linearised.state, linearised.problem.body.phi_scale
         for one in adjoints.values():
             weights = None if one.after is None else one.after.get(VARIABLES)
             assert weights is None or isinstance(weights, InternalVariables)

@@ -316,11 +316,7 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
             problems[other] = parameter.problem(parameter.value + other)
     for problem in problems.values():
         same = np.array_equal(base.nodes.nodes, problem.nodes.nodes)
-        same = (
-            same
-            and base.equilibrium.zero_displacement().size
-            == problem.equilibrium.zero_displacement().size
-        )
+        same = same and base.body.zero_displacement().size == problem.body.zero_displacement().size
         same = same and base.initial.arrays().keys() == problem.initial.arrays().keys()
         if not base.comm.allreduce(same, op=MPI.LAND):
             raise InputError(
@@ -340,7 +336,7 @@ def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> fl
             equations(*at(problem, state), active)
             for problem in (family.problems[0], family.problems[-1])
         )
-        forces = base.equilibrium.norm(one.forces - other.forces) / norms[0]
+        forces = base.body.norm(one.forces - other.forces) / norms[0]
         conditions = base.nodes.norm(one.conditions - other.conditions) / norms[1]
         found = max(found, forces, conditions)
         if found >= LEAST:  # large enough: no earlier steps
@@ -351,7 +347,7 @@ def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> fl
 def at(problem: ContactProblem, state: State) -> tuple[ContactProblem, State]:
     """Return step and state of another problem, with its prescribed values. Collective."""
     here = problem.at(state.time, state.history)
-    return here, replace(state, x=here.equilibrium.prescribe(state.x, state.time))
+    return here, replace(state, x=here.body.prescribe(state.x, state.time))
 
 
 class LoadPath:
@@ -377,7 +373,7 @@ class LoadPath:
                 "penalised",
             )
         base = solution.problem
-        body = base.equilibrium
+        body = base.body
         if not body.symmetric and body.global_unknowns.free.any():
             raise InputError(
                 "sensitivity: the stiffness of the material is not symmetric, and a foundation or "
@@ -461,7 +457,7 @@ def _tangent(
     first = path.steps[0][0].history
     histories = dict.fromkeys(families, _sum(first, -1.0, first))
     for index, (problem, state) in enumerate(path.steps):
-        linearised, body = path.linearised(index), problem.equilibrium
+        linearised, body = path.linearised(index), problem.body
         gradients = {
             name: given.gradient(problem, state)
             for name, given in _with_gradients(quantities).items()
@@ -542,7 +538,7 @@ def _adjoint(
         for key, family in families.items():
             change, sides = _explicit(family, state, linearised)
             for name, one in adjoints.items():
-                found[name][key] -= problem.equilibrium.product(one.x, change.forces)
+                found[name][key] -= problem.body.product(one.x, change.forces)
                 found[name][key] -= _total(problem, one.conditions, change.conditions)
                 if one.after is None:
                     quantity = _located(quantities[name], problem, state)

@@ -256,7 +256,7 @@ def _check_rim(
     """Refuse supports on facets, not only on a rim, where the other side is free. Collective."""
     lost = [slave.owners.among(nodes, slave.nodes.ravel()) for nodes in lost]
     facets, filled = body.domain.facets(part), False
-    for support in body.body.fixed:
+    for support in body.description.fixed:
         supported = np.isin(facets, body.domain.facets_anywhere(support.on))
         for given, nodes in zip(support.displacement or (), lost, strict=False):
             if given is not None:

@@ -206,13 +206,13 @@ def _gathered(problem: ContactProblem, state: State) -> Arrays:
         shares = comm.gather(values)
         if shares is not None:
             found[name] = np.concatenate(shares)
-    once = {"motion": problem.equilibrium.motion(state.x), "t": np.array(state.time)}
+    once = {"motion": problem.body.motion(state.x), "t": np.array(state.time)}
     return found | once if comm.rank == 0 else {}
 
 
 def _values(problem: ContactProblem, state: State) -> Arrays:
     """Return the arrays of a state on this rank."""
-    body, history = problem.equilibrium, state.history or problem.initial
+    body, history = problem.body, state.history or problem.initial
     return {
         "x": body.nodal(state.x)[: body.owned // body.block_size],
         "pressure": state.forces.pressure,
@@ -262,7 +262,7 @@ class _Reader:
             rows = self._found[place][1] if stored else ()
             own[name] = problem.comm.scatter([stored[name][row] for row in rows] or None)
         state = State(
-            problem.equilibrium.local(np.concatenate([own["x"].ravel(), motion])),
+            problem.body.local(np.concatenate([own["x"].ravel(), motion])),
             Multipliers.of(problem.nodes, own["pressure"], own["friction"]),
             time,
             initial.replaced({name: own[HISTORY + name] for name in initial.arrays()}),
@@ -271,7 +271,7 @@ class _Reader:
 
     def _check(self, path: Path, stored: Arrays) -> None:
         """Refuse arrays of other names, or with rows of other shapes."""
-        motion = self._problem.equilibrium.motion(self._initial.x)
+        motion = self._problem.body.motion(self._initial.x)
         given = {k: v.shape[1:] for k, v in stored.items() if k in self._shapes or HISTORY in k}
         for name in {**given, **self._shapes}:
             if given.get(name) != self._shapes.get(name) or stored["motion"].shape != motion.shape:
@@ -304,7 +304,7 @@ def _nodes(problem: ContactProblem) -> Array:
 
     Nodes of two bodies that touch have one point, but not the same cells. Shape (nodes, 2 d).
     """
-    body, d = problem.equilibrium, problem.dim
+    body, d = problem.body, problem.dim
     mesh, space = body.domain.mesh, body.space
     cells = mesh.topology.index_map(d).size_local
     corners = geometry_nodes(body.domain)

@@ -95,8 +95,8 @@ def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> 
     These are ``fields.pvd`` and ``contact.pvd``.
     """
     problem = solution.problem
-    derived = DerivedFields(problem.equilibrium, frames[0][1])
-    names = (*SERIES, *problem.equilibrium.laws.names)
+    derived = DerivedFields(problem.body, frames[0][1])
+    names = (*SERIES, *problem.body.laws.names)
     lines: dict[str, list[str]] = {"fields": [], "contact": []}
     for k, (time, state) in enumerate(frames):
         derived.move_to(state)
@@ -128,7 +128,7 @@ def body_share(
 
     `derived` are the derived fields at the state, where they are at hand.
     """
-    body, d = problem.equilibrium, problem.dim
+    body, d = problem.body, problem.dim
     space, derived = body.space, derived or DerivedFields(body, state)
     links, index_map = space.dofmap.list, space.dofmap.index_map
     owned = body.domain.mesh.topology.index_map(d).size_local
@@ -200,7 +200,7 @@ def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -
             '"vtu", "xdmf" or "none"',
             "vtx",
         )
-    derived = DerivedFields(problem.equilibrium, frames[0][1])
+    derived = DerivedFields(problem.body, frames[0][1])
     at_nodes, in_cells = _at_nodes(problem, frames[0][1], derived), list(derived.cells().values())
     comm, nodal, cellwise = problem.comm, folder / "fields.bp", folder / "cells.bp"
     with (
@@ -222,7 +222,7 @@ def _copy(given: Iterable[fem.Function], into: Iterable[fem.Function]) -> None:
 
 
 def _write_xdmf(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
-    derived = DerivedFields(problem.equilibrium, frames[0][1])
+    derived = DerivedFields(problem.body, frames[0][1])
     path = folder / "fields.xdmf"
     with _os_errors(path), io.XDMFFile(problem.comm, path, "w") as file:
         file.write_mesh(problem.domain.mesh)
@@ -234,7 +234,7 @@ def _write_xdmf(problem: ContactProblem, frames: Sequence[Frame], folder: Path) 
 
 def _at_nodes(problem: ContactProblem, state: State, derived: DerivedFields) -> list[fem.Function]:
     """Return all fields at the nodes, all discontinuous where the derived ones are."""
-    found = unknowns(problem.equilibrium, state.x, "DG" if derived.group_count > 1 else "Lagrange")
+    found = unknowns(problem.body, state.x, "DG" if derived.group_count > 1 else "Lagrange")
     return list((found | derived.nodes()).values())
 
 
@@ -244,7 +244,7 @@ def _at_corners(
     """Return the fields for XDMF: of several regions the derived ones are the cells' means."""
     if derived.group_count == 1:
         return [linear(f) for f in _at_nodes(problem, state, derived)]
-    found = [linear(f) for f in unknowns(problem.equilibrium, state.x).values()]
+    found = [linear(f) for f in unknowns(problem.body, state.x).values()]
     for name, function in derived.cells().items():
         space = function.function_space
         made = fem.Function(fem.functionspace(space.mesh, ("DG", 0, derived.shapes[name])))

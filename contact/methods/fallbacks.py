@@ -153,7 +153,7 @@ def fall_back(
             if _final(outcome):
                 return found
     # A nonlinear material may be singular at the strains of a step alone.
-    if singular is not None and newton.problem.equilibrium.linear and not outcome.converged:
+    if singular is not None and newton.problem.body.linear and not outcome.converged:
         raise singular
     return state, outcome
 
@@ -230,7 +230,7 @@ def rigid_motion(newton: SemismoothNewton, outcome: Outcome) -> End | None:
     if state is None:
         return None
     # No force acts there: relative to the forces at zero displacement.
-    body = problem.equilibrium
+    body = problem.body
     left, first = (
         body.norm(body.unbalanced(residual_forces(problem, at))) for at in (state, problem.start())
     )

@@ -457,7 +457,7 @@ class InteriorPoint:
 
     def relative_gap(self) -> float:
         """Return the duality gap over the work of loads and contact. Collective."""
-        body, interface, x = self.problem.equilibrium, self.problem.interface, self._state.x
+        body, interface, x = self.problem.body, self.problem.interface, self._state.x
         nodes, cones, nodal = interface.nodes, self.cones, interface.nodes.jump(x)
         ways = np.abs(interface.gap) + np.abs(nodes.normal_component(nodal))
         slips = interface.slip_length(nodal)[self._frictional]
@@ -474,7 +474,7 @@ class InteriorPoint:
         if not cones.interior():
             return False
         nodes, rigid, frictional = interface.nodes, self._rigid, self._frictional
-        body, d = self.problem.equilibrium, nodes.dim
+        body, d = self.problem.body, nodes.dim
         nodal = nodes.jump(state.x)
         residual = -residual_forces(self.problem, state, internal=self._internal)
         slack = interface.normal_gap(nodal)[rigid] - cones.slack

@@ -200,7 +200,7 @@ def solve_step(
 
 def evaluated(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:
     """Evaluate the residuals of a state at the time and history of a problem. Collective."""
-    x = problem.equilibrium.prescribe(state.x, problem.time)
+    x = problem.body.prescribe(state.x, problem.time)
     state = replace(state, x=x, time=problem.time, history=problem.history)
     return state, replace(outcome, residuals=evaluate(problem, state))
 
@@ -225,7 +225,7 @@ def predicted(
     ends
         The last solution, behind the one before it if there is one, with their problems.
     """
-    last, body, factor = ends[-1][1], problem.equilibrium, 0.0
+    last, body, factor = ends[-1][1], problem.body, 0.0
     x = last.x
     if len(ends) > 1:
         factor = _extrapolation(problem, ends)
@@ -236,7 +236,7 @@ def predicted(
 
 def _extrapolation(problem: ContactProblem, ends: Sequence[tuple[ContactProblem, State]]) -> float:
     """Return the least of df.df0/df0.df0: increments of loads and prescribed values."""
-    product, factors = problem.equilibrium.product, []
+    product, factors = problem.body.product, []
     before, last = (_given(there, state.time) for there, state in ends[-2:])
     now = _given(problem, problem.time)
     for first, second, third in zip(before, last, now, strict=True):
@@ -249,5 +249,5 @@ def _extrapolation(problem: ContactProblem, ends: Sequence[tuple[ContactProblem,
 
 def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:
     """Return the owned loads and prescribed values at a time."""
-    body = problem.equilibrium
+    body = problem.body
     return body.external(time), body.owned_part(body.prescribe(body.zero_displacement(), time))

@@ -208,7 +208,7 @@ class Newton:
         self, start: State | None = None, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence or the limit; the best iterate on failure; see `Method`."""
-        whole, problem, body = self.whole, self.problem, self.problem.equilibrium
+        whole, problem, body = self.whole, self.problem, self.problem.body
         self.recorder.begin = time.perf_counter()
         if self.options.keep != "across":
             self._chord.drop()
@@ -229,7 +229,7 @@ class Newton:
         """Iterate over the material; contact is solved on the Schur complement. Collective."""
         if self.condensation is None:
             self.condensation = Condensation(self.problem, self.counters)
-        options, body = self.options, self.problem.equilibrium
+        options, body = self.options, self.problem.body
         loop, chord = Iteration(self.whole, state), self._chord
         if loop.starts_converged:
             return state, loop.outcome()
@@ -248,7 +248,7 @@ class Newton:
             enough = 0.1 * options.tolerance
             if not body.linear and not keep:
                 enough = max(enough, CONTACT_PART * min(largest, 1.0))
-            begin = replace(state, x=condensed.equilibrium.at)
+            begin = replace(state, x=condensed.body.at)
             end, outcome, records = self._on_contact_nodes(condensed, begin, enough)
             self.counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear

@@ -134,7 +134,7 @@ class NewtonStep:
     def operator(self) -> Operator:
         """The operator of the linear systems."""
         if self._operator is None:
-            interface, body = self._problem.interface, self._problem.equilibrium
+            interface, body = self._problem.interface, self._problem.body
             asymmetric = (
                 interface.friction.acts or interface.foundation.active or not body.symmetric
             )
@@ -145,7 +145,7 @@ class NewtonStep:
 
     def assemble(self, problem: AnyProblem, state: State, blocks: Array) -> None:
         """Assemble the operator with nodal blocks and those of layer and charge. Collective."""
-        interface, body = problem.interface, problem.equilibrium
+        interface, body = problem.interface, problem.body
         if interface.foundation.active:
             nodal = interface.nodes.jump(state.x)
             blocks = blocks + interface.foundation.block(
@@ -156,7 +156,7 @@ class NewtonStep:
 
     def without_contact(self, problem: AnyProblem, state: State) -> State:
         """Return the state after one linear solve with all nodes open. Collective."""
-        nodes, body = problem.interface.nodes, problem.equilibrium
+        nodes, body = problem.interface.nodes, problem.body
         free = State(state.x, Multipliers.zero(nodes), state.time, state.history)
         size = nodes.block_size
         self.assemble(problem, free, np.zeros((nodes.nodes.size, size, size)))
@@ -196,7 +196,7 @@ class NewtonStep:
             If the matrix is singular and another iterate does not help: with a linear body, or in
             the first step of an underconstrained one.
         """
-        body = problem.equilibrium
+        body = problem.body
         laws = self._linearise(problem.interface, state, residuals.significant)
         self._update(problem, state, laws, tangent, residuals, secant_at)
         residual = self._residual(problem, state, laws, secant_at, internal_forces)
@@ -257,7 +257,7 @@ class NewtonStep:
         secant_at: Array | None,
     ) -> None:
         """Assemble and factorise the operator. Collective."""
-        interface, body = problem.interface, problem.equilibrium
+        interface, body = problem.interface, problem.body
         blocks = laws.contact + laws.layer + laws.charge
         if self._underconstrained and not laws.unchanged:
             blocks[:, : body.dim, : body.dim] += regularisation(
@@ -289,7 +289,7 @@ class NewtonStep:
 
 def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: Array) -> State:
     """Return the next iterate x + dx, with lambda+ = lambda^0 + B T dx. Collective."""
-    interface, body = problem.interface, problem.equilibrium
+    interface, body = problem.interface, problem.body
     nodes, moved = interface.nodes, interface.nodes.jump(increment)
     change = np.einsum("nij,nj->ni", laws.contact, moved)
     vectors = laws.multipliers.vectors(nodes) + change[:, : interface.dim]

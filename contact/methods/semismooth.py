@@ -127,7 +127,7 @@ class SemismoothNewton:
             Most steps; those left of the limit by default.
         """
         problem, options, step = self.problem, self.options, self.step
-        linear = problem.equilibrium.linear
+        linear = problem.body.linear
         loop = Iteration(self, state, note, stagnation_limit)
         if loop.starts_converged:
             return state, loop.outcome()
@@ -265,7 +265,7 @@ def _overestimates_stiffness(problem: AnyProblem, c: float, state: State) -> boo
     interface = problem.interface
     penetration = np.maximum(-interface.normal_gap(interface.nodes.jump(state.x)), 0.0)
     forces = np.abs(residual_forces(problem, problem.start()))
-    on_nodes, on_global = np.split(forces, [problem.equilibrium.owned])
+    on_nodes, on_global = np.split(forces, [problem.body.owned])
     loads = float(summed(interface.comm, on_nodes.sum())) + on_global.sum()
     # A given motion of the foundation alone is no load to compare with.
     return bool(c * interface.nodes.sum(penetration) > OVERESTIMATE * loads > 0)

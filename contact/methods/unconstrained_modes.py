@@ -133,7 +133,7 @@ class UnconstrainedModes:
         state = start
         for _ in range(2):  # each leaves an error of sqrt(EPS)
             increment = step.solve(-residual_forces(problem, state))
-            state = replace(state, x=problem.equilibrium.updated(state.x, increment))
+            state = replace(state, x=problem.body.updated(state.x, increment))
         found = self.free_motion(problem, state)
         if found is None:
             return None
@@ -165,7 +165,7 @@ class UnconstrainedModes:
             return None
         moved, whole = np.concatenate(columns, axis=2), np.hstack(motions)
         if isinstance(problem, ContactProblem):
-            body = problem.equilibrium
+            body = problem.body
             vectors = [*(body.local(column) for column in whole.T), state.x]
             rows, weights = _by_volume(problem, vectors)
         else:  # of a condensed body the jumps alone are known
@@ -203,7 +203,7 @@ def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array
 
     A foundation that moves counts as the whole body. Some weights are negative.
     """
-    body, domain = problem.equilibrium, problem.domain
+    body, domain = problem.body, problem.domain
     shape, nodes = shape_of(domain.mesh), geometry_nodes(domain)
     straight = shape.simplex and domain.order == 1
     points, weights = rule(shape, 2 * body.degree + (1 if straight else 3 * domain.order))
@@ -225,7 +225,7 @@ def with_least_displacements(
     Without convergence nothing is changed, unless the bodies are in equilibrium without contact
     forces. Collective.
     """
-    problem, body = modes.problem, modes.problem.equilibrium
+    problem, body = modes.problem, modes.problem.body
     if outcome.signal or modes.constrained_by_supports:
         return state, outcome
     if not outcome.converged:
@@ -270,7 +270,7 @@ def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -
 
 def all_loads(problem: AnyProblem) -> float:
     """Return the sum of |load| over the unknowns, at zero displacement. Collective."""
-    body = problem.equilibrium
+    body = problem.body
     return sum_of_forces(body, body.unbalanced(residual_forces(problem, problem.start())))
 
 

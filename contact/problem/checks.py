@@ -38,7 +38,7 @@ def expected_displacements(
     And the largest prescribed displacement; of owned nodal loads, and local unknowns with the
     prescribed values. Collective.
     """
-    body, scales = problem.equilibrium, problem.scales
+    body, scales = problem.body, problem.scales
     nodal = np.abs(body.nodal(loads)[:, : body.dim]).sum()
     motions = body.global_unknowns.mechanical
     force = body.comm.allreduce(float(nodal), op=MPI.SUM)
@@ -66,8 +66,8 @@ def check_problem(problem: ContactProblem) -> None:
 
 def _check_plane_stress(problem: ContactProblem) -> None:
     """Refuse plane stress but for all materials of a plane body."""
-    body = problem.equilibrium
-    thin = [material.in_plane_stress for material in problem.body.materials]
+    body = problem.body
+    thin = [material.in_plane_stress for material in problem.description.materials]
     if not any(thin):
         return
     plane = problem.dim == 2 and not problem.domain.revolved
@@ -88,14 +88,14 @@ def _shared(problem: ContactProblem, one: str, other: str) -> tuple[NDArray[np.i
 
 def _check_loads(problem: ContactProblem) -> None:
     """Refuse loads and elastic supports on Gamma_3."""
-    for contact, (i, load) in product(problem.contacts, enumerate(problem.body.loads)):
+    for contact, (i, load) in product(problem.contacts, enumerate(problem.description.loads)):
         if load.on is not None and _shared(problem, load.on, contact.on)[1]:
             raise InputError(
                 f"load.{i}.on: {load.on} shares facets with the contact part {contact.on}; "
                 "accepted: parts beside it, or body forces",
                 "load-on-contact",
             )
-    for contact, (i, support) in product(problem.contacts, enumerate(problem.body.elastic)):
+    for contact, (i, support) in product(problem.contacts, enumerate(problem.description.elastic)):
         sides = [contact.on] if contact.against is None else [contact.on, contact.against]
         if any([_shared(problem, support.on, side)[1] for side in sides]):
             raise InputError(
@@ -108,10 +108,10 @@ def _check_loads(problem: ContactProblem) -> None:
 
 def _check_sizes(problem: ContactProblem) -> None:
     """Refuse loads that are not finite, or too large. Collective."""
-    loads = problem.equilibrium.external(problem.time)
+    loads = problem.body.external(problem.time)
     fits = bool(np.isfinite(loads).all()) and np.abs(loads).max(initial=0.0) <= HUGE
     if not problem.comm.allreduce(bool(fits), op=MPI.LAND):
-        key = wrong_load(problem.body.loads, problem.domain, problem.time)
+        key = wrong_load(problem.description.loads, problem.domain, problem.time)
         raise InputError(
             f"{key}: not finite everywhere on its part, or too large; accepted: formulas and "
             f"functions that are finite, and units that keep sizes up to {HUGE:g}",
@@ -127,9 +127,9 @@ def check_supports(problem: ContactProblem) -> None:
     InputError
         If they differ at the time of the problem by more than rounding.
     """
-    space, time = problem.equilibrium.space, problem.time
-    for i, j in combinations(range(len(problem.body.fixed)), 2):
-        first, last = problem.body.fixed[i], problem.body.fixed[j]
+    space, time = problem.body.space, problem.time
+    for i, j in combinations(range(len(problem.description.fixed)), 2):
+        first, last = problem.description.fixed[i], problem.description.fixed[j]
         facets, shared = _shared(problem, first.on, last.on)
         if not shared:
             continue
@@ -147,9 +147,9 @@ def check_supports(problem: ContactProblem) -> None:
 
 def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterator[str]:
     """Say where the edges of two supports meet with different values. Collective."""
-    d, space = problem.dim, problem.equilibrium.space
-    for i, j in combinations(range(len(problem.body.fixed)), 2):
-        first, last = problem.body.fixed[i], problem.body.fixed[j]
+    d, space = problem.dim, problem.body.space
+    for i, j in combinations(range(len(problem.description.fixed)), 2):
+        first, last = problem.description.fixed[i], problem.description.fixed[j]
         names = sorted(first.given.keys() & last.given.keys() - {"normal"})
         if not names or _shared(problem, first.on, last.on)[1]:
             continue
@@ -180,15 +180,15 @@ def _differing(
 
     `pair`, `name`: numbers of the supports, and component. Collective.
     """
-    points = problem.equilibrium.space.tabulate_dof_coordinates()[nodes, : problem.dim]
+    points = problem.body.space.tabulate_dof_coordinates()[nodes, : problem.dim]
     values = np.zeros((len(points), 2))
     for k, number in enumerate(pair):
-        fixed, key = problem.body.fixed[number], f"fixed.{number}.{name}"
+        fixed, key = problem.description.fixed[number], f"fixed.{number}.{name}"
         given = values_at(fixed.given[name], points, problem.time, key, problem.comm)
         values[:, k] = fixed.factor(problem.time) * given
     size = problem.comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX)
     # sin(pi) is 0.
-    unit = problem.equilibrium.phi_scale if name == "potential" else 1.0
+    unit = problem.body.phi_scale if name == "potential" else 1.0
     rounding = EPS * problem.domain.size
     differ = np.ptp(values, axis=1) > NEGLIGIBLE * size + unit * rounding
     points = np.where(np.abs(points) < rounding, 0.0, points)
@@ -267,7 +267,7 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     """
     if not problem.piezoelectric:
         return
-    body, interface = problem.equilibrium, problem.interface
+    body, interface = problem.body, problem.interface
     component, count = body.components
     # Constants that may be added to the potential: of each component, and of each electrode.
     raised = np.zeros((*body.free.shape, count))

@@ -150,14 +150,14 @@ class CondensedBody:
 class CondensedProblem:
     """A contact problem of a condensed body."""
 
-    equilibrium: CondensedBody
+    body: CondensedBody
     interface: Interface
     scales: Scales
     time: float = 1.0
 
     def start(self) -> State:
         """Return the zero initial guess."""
-        x = self.equilibrium.prescribe(self.equilibrium.zero_displacement())
+        x = self.body.prescribe(self.body.zero_displacement())
         return State(x, Multipliers.zero(self.interface.nodes), self.time)
 
     def with_interface(self, interface: Interface) -> CondensedProblem:
@@ -166,7 +166,7 @@ class CondensedProblem:
 
     def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> DenseOperator:
         """Return the dense operator, with blocks at all nodes."""
-        body = self.equilibrium
+        body = self.body
         return DenseOperator(body.comm, body.free, body.stiffness, counters, body.inclined)
 
 
@@ -208,7 +208,7 @@ class Condensation:
         self.counters = counters
         self.nodes = full.interface.coupled
         self.set_load_step(full)
-        body = full.equilibrium
+        body = full.body
         none = Constraint(body.layout, None, body.global_unknowns.ties, body.global_unknowns.free)
         self._constraint = full.constraint or none
         self._bulk = ConstrainedBulk(body, self._constraint, BodyState(body.zero_displacement()))
@@ -259,7 +259,7 @@ class Condensation:
         InputError
             If numbers overflow.
         """
-        body = self.full.equilibrium
+        body = self.full.body
         if not 0 < self._schur.size <= min(LARGEST, body.layout.unknowns - 1):
             return None
         if not self._kind or not (keep or (body.linear and kind == self._kind)):
@@ -308,7 +308,7 @@ class Condensation:
 
         Of the last linearisation, or else the tangent at a state. Collective.
         """
-        if not 0 < self._schur.size <= min(LARGEST, self.full.equilibrium.layout.unknowns - 1):
+        if not 0 < self._schur.size <= min(LARGEST, self.full.body.layout.unknowns - 1):
             return None
         if not self._kind:
             self._factorise("tangent", state)
@@ -316,7 +316,7 @@ class Condensation:
 
     def _factorise(self, kind: str, state: State) -> None:
         """Factorise at a state, and eliminate q from the Schur complement. Collective."""
-        body, schur = self.full.equilibrium, self._schur
+        body, schur = self.full.body, self._schur
         self._rows = np.zeros((0, 0))
         self._stiffness = DenseStiffness(self._rows)  # room for a new one
         # The symmetric part of a tangent converges linearly, as chord steps.
@@ -364,7 +364,7 @@ class Condensation:
         """
         self.counters.linear_solves += 1
         self.counters.linear_iterations += 1
-        kept = np.concatenate(self.full.comm.allgather(x - condensed.equilibrium.at))
+        kept = np.concatenate(self.full.comm.allgather(x - condensed.body.at))
         q = np.zeros(self._constraint.free.size)
         q[self._free] = self._bordered.inverse @ (self._on_q - self._border @ kept)
         rhs = self._rhs - self._bulk.columns @ q
@@ -378,7 +378,7 @@ def condensation_pays(problem: ContactProblem, kind: str) -> bool:
     unknowns and fronts of b: in 2-D the body's depth, n/k nodes, in 3-D some n^(1/2). Large bodies
     in 3-D are left to multigrid, unless `kind` is a direct solver.
     """
-    layout = problem.equilibrium.layout
+    layout = problem.body.layout
     if not condensable(problem, kind) or (kind == "auto" and multigrid.is_large(layout)):
         return False
     kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
@@ -391,7 +391,7 @@ def condensable(problem: ContactProblem, kind: str) -> bool:
     options = PETSc.Options(PREFIX)
     names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
     chosen = any(options.hasName(name) for name in names)
-    layout = problem.equilibrium.layout
+    layout = problem.body.layout
     large = kind == "auto" and layout.dim == 3 and layout.unknowns > multigrid.DIRECT
     many = problem.nodes.size * layout.block_size > LARGEST
     return not (chosen or kind == "iterative" or large or many)

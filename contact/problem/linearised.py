@@ -86,13 +86,13 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     normal = np.where(active.closed, closing, nodes.normal_component(vectors))
     conditions = normal[:, None] * nodes.normal + tangential
     # Forces on nodes of a rigid part as forces on it: a parameter may be its moment arm.
-    forces = problem.equilibrium.unbalanced(residual_forces(problem, state))
+    forces = problem.body.unbalanced(residual_forces(problem, state))
     return Equations(forces, conditions)
 
 
 def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float]:
     """Return reference norms of forces and, in L2(Gamma_3), of conditions. Collective."""
-    body, nodes, scales = problem.equilibrium, problem.nodes, problem.scales
+    body, nodes, scales = problem.body, problem.nodes, problem.scales
     least = WEAK * scales.young * scales.area
     forces = body.norm(body.internal_forces(state)) + body.norm(body.external(state.time))
     moved = problem.interface.c_0 * problem.nodal(state)[:, : problem.dim]
@@ -160,7 +160,7 @@ class Linearised:
         self._regular = np.linalg.inv(regular)
         d = nodes.dim
         law[:, :d] -= self._regular @ self._by_jump
-        kind = "auto" if multigrid.is_large(problem.equilibrium.layout) else "lu"
+        kind = "auto" if multigrid.is_large(problem.body.layout) else "lu"
         self._operator = problem.operator(symmetric=False, counters=counters, kind=kind)
         self._operator.update("tangent", state, interface.weighted(law, state.x))
 
@@ -212,7 +212,7 @@ class Linearised:
             known = np.einsum("nij,nj->ni", self._regular, left)
             nodes.add_jump_transposed(-nodes.weight[:, None] * known, rhs)
             dx = self._operator.solve(rhs, EPS)
-            moved = nodes.jump(self.problem.equilibrium.local(dx))
+            moved = nodes.jump(self.problem.body.local(dx))
             df = known - np.einsum(
                 "nij,nj->ni", self._regular, np.einsum("nij,nj->ni", self._by_jump, moved)
             )
@@ -233,7 +233,7 @@ class Linearised:
             known = np.einsum("nji,nj->ni", self._regular, left)
             nodes.add_jump_transposed(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
             dx = self._operator.solve_transposed(rhs)
-            moved = weight * nodes.jump(self.problem.equilibrium.local(dx))[:, : nodes.dim]
+            moved = weight * nodes.jump(self.problem.body.local(dx))[:, : nodes.dim]
             dc = known - np.einsum("nji,nj->ni", self._regular, moved)
             x, c = x + dx, c + dc
             by_jump, by_own = self._smoothed_transposed(dc)
@@ -249,7 +249,7 @@ class Linearised:
         nodes, d = self.problem.nodes, self.problem.dim
         by_normal = np.einsum("nij,nj->ni", self._by_jump[:, :, :d], nodes.normal)
         found = np.einsum("ni,ni->n", conditions, by_normal)
-        moved = nodes.jump(self.problem.equilibrium.local(x))
+        moved = nodes.jump(self.problem.body.local(x))
         pressed = nodes.weight * nodes.normal_component(moved)
         return found + pressed * np.einsum("ni,ni->n", self._layer[:, :d], nodes.normal)
 
@@ -289,7 +289,7 @@ class Linearised:
 
     def _norm(self, x: Array, nodal: Array) -> float:
         """Return |x| + EPS |f|."""
-        return self.problem.equilibrium.norm(x) + EPS * self.problem.nodes.norm(nodal)
+        return self.problem.body.norm(x) + EPS * self.problem.nodes.norm(nodal)
 
 
 def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> State:
@@ -297,19 +297,19 @@ def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> St
     nodes = problem.nodes
     vectors = state.forces.vectors(nodes) + f
     forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
-    return replace(state, x=problem.equilibrium.updated(state.x, x), forces=forces)
+    return replace(state, x=problem.body.updated(state.x, x), forces=forces)
 
 
 def commit_along(linearised: Linearised, x: Array, change: History) -> History:
     """Return dh' = dH/dx dx + dH/dh dh, given dx of the owned unknowns and dh. Collective."""
     problem, state = linearised.problem, linearised.state
     slip, variables = _parts(change)
-    along = problem.equilibrium.local(x)
+    along = problem.body.local(x)
     jump = problem.nodes.tangential_component(problem.nodes.jump(along))
     longer = np.einsum("ni,ni->n", _direction(problem, problem.nodal(state)), jump - slip.jump)
     parts: dict[str, Part] = {SLIP: SlipHistory(jump, slip.accumulated + longer)}
     if variables is not None:
-        parts[VARIABLES] = problem.equilibrium.laws.commit_along(state, along, variables)
+        parts[VARIABLES] = problem.body.laws.commit_along(state, along, variables)
     return History(parts)
 
 
@@ -320,18 +320,18 @@ def before_along(linearised: Linearised, change: History) -> Equations:
     conditions = linearised.by_length * slip.accumulated[:, None]
     conditions -= np.einsum("nij,nj->ni", linearised.by_slip, slip.jump)
     if variables is None:
-        return Equations(np.zeros_like(problem.equilibrium.owned_part(state.x)), conditions)
-    problem.equilibrium.laws.before_along(state, variables)
-    return Equations(problem.equilibrium.forces_of_laws(), conditions)
+        return Equations(np.zeros_like(problem.body.owned_part(state.x)), conditions)
+    problem.body.laws.before_along(state, variables)
+    return Equations(problem.body.forces_of_laws(), conditions)
 
 
 def commit_transposed(problem: ContactProblem, state: State, after: History) -> Array:
     """Return (dH/dx)^T g on the owned unknowns, given g by h'. Collective."""
     slip, variables = _parts(after)
-    by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+    by_x = np.zeros_like(problem.body.owned_part(state.x))
     if variables is not None:
-        problem.equilibrium.laws.commit_transposed(state, variables)
-        by_x += problem.equilibrium.forces_of_laws()
+        problem.body.laws.commit_transposed(state, variables)
+        by_x += problem.body.forces_of_laws()
     nodes, nodal = problem.nodes, problem.nodal(state)
     by_jump = np.zeros_like(nodal)
     by_jump[:, : nodes.dim] = nodes.tangential_component(slip.jump)
@@ -362,8 +362,8 @@ def before_transposed(
         jump -= slip.accumulated[:, None] * _direction(problem, problem.nodal(state))
         accumulated += slip.accumulated
     parts: dict[str, Part] = {SLIP: SlipHistory(jump, accumulated)}
-    local = problem.equilibrium.local(along)
-    before = problem.equilibrium.laws.before_transposed(state, local, variables)
+    local = problem.body.local(along)
+    before = problem.body.laws.before_transposed(state, local, variables)
     return History(parts if before is None else {**parts, VARIABLES: before})
 
 

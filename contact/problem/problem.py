@@ -120,8 +120,10 @@ class ContactProblem:
     ----------
     contacts
         The contacts, each with its friction and conductor.
-    equilibrium
-        The body: its space, forms, forces and operators.
+    description
+        Material, supports and loads, with the rigid foundations that move.
+    body
+        The bodies: their space, forms, forces and operators.
     placements, geometries
         Of each contact: which nodes, and their geometry where the bodies are: in the reference
         configuration, but of `with_geometry`.
@@ -161,7 +163,7 @@ class ContactProblem:
         check_laws("Problem", friction, conductor)
         moving = [Rigid(c.on, c.rigid, foundation=True) for c in given if c.rigid is not None]
         body = body.in_space(domain.dim)
-        self.body = replace(body, rigid=(*moving, *body.rigid)) if moving else body
+        self.description = replace(body, rigid=(*moving, *body.rigid)) if moving else body
         self.contacts = tuple(one.filled(domain, friction, conductor) for one in given)
         names = [contact.name for contact in self.contacts]
         for name in names:
@@ -170,7 +172,7 @@ class ContactProblem:
                     f"contact.name: {name!r} is that of several contacts; accepted: one each",
                     "contact-name",
                 )
-        self.equilibrium = BodyEquilibrium(domain, self.body, degree, element)
+        self.body = BodyEquilibrium(domain, self.description, degree, element)
         one = len(self.contacts) == 1
         placed = [
             self._placed("contact" if one else f"contact.{i}", contact)
@@ -184,7 +186,7 @@ class ContactProblem:
         self.time = 1.0
         self.since: float | None = None
         #: The history of a body to which nothing has been done.
-        self.initial = self._history(self.interface.friction.history, self.equilibrium.laws.initial)
+        self.initial = self._history(self.interface.friction.history, self.body.laws.initial)
         self.history = self.initial
 
     def at(
@@ -244,7 +246,7 @@ class ContactProblem:
         """
         here = self.at(state.time, state.history)
         slip = here.interface.commit(here.nodal(state))
-        variables = self.equilibrium.laws.commit(replace(state, history=here.history))
+        variables = self.body.laws.commit(replace(state, history=here.history))
         return self._history(slip, variables)
 
     @staticmethod
@@ -255,7 +257,7 @@ class ContactProblem:
 
     def points(self, place: str) -> Array:
         """Return the points of the places of a history that this rank owns, shape (n, d)."""
-        return self.nodes.points if place == CONTACT_NODES else self.equilibrium.laws.places
+        return self.nodes.points if place == CONTACT_NODES else self.body.laws.places
 
     def _placed(self, key: str, contact: Contact) -> tuple[Placement, Geometry]:
         """Return the placement of a contact, and its geometry in the reference configuration."""
@@ -266,7 +268,7 @@ class ContactProblem:
             with on_all_ranks(self.comm):
                 contact.conductor.check()
         assert contact.friction is not None  # filled in above
-        body, given = self.equilibrium, (contact.obstacle, key, contact.press)
+        body, given = self.body, (contact.obstacle, key, contact.press)
         if contact.against is not None:
             return find_pair(body, contact.on, contact.against, *given, contact.friction.acts)
         conducts = contact.conductor is not None and self.piezoelectric
@@ -274,10 +276,10 @@ class ContactProblem:
 
     def _interface(self) -> Interface:
         """Return the laws of all contacts at their geometries. Collective."""
-        body, geometries = self.equilibrium, self.geometries
+        body, geometries = self.body, self.geometries
         nodes = joined_nodes(geometries, [contact.on for contact in self.contacts], body)
         # The softer side where bodies touch: parts far from there may be softer by far.
-        where = self.domain, self.body.materials, body.cells
+        where = self.domain, self.description.materials, body.cells
         sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
         young = max(min(young_behind(*where, side) for side in both) for both in sides)
         stiffness = young / self.domain.size
@@ -308,7 +310,7 @@ class ContactProblem:
 
     def _check_cuts(self) -> None:
         """Refuse contact at nodes of a bolt's cut that moves across it. Collective."""
-        body, nodes = self.equilibrium, self.nodes
+        body, nodes = self.body, self.nodes
         if body.cuts is None:
             return
         acting = [nodes.normal]
@@ -326,7 +328,7 @@ class ContactProblem:
         return sum(area(domain, contact.on) for contact in self.contacts)
 
     def _scales(self) -> Scales:
-        domain, law, d = self.domain, self.body.law, self.dim
+        domain, law, d = self.domain, self.description.law, self.dim
         own = self._area(domain)
         # Of the mesh itself, which may be but the half plane of the body.
         mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else own
@@ -350,7 +352,7 @@ class ContactProblem:
     @cached_property
     def constraint(self) -> Constraint | None:
         """The constraint of its linear systems; None where there is none. Collective."""
-        body, nodes = self.equilibrium, self.nodes
+        body, nodes = self.body, self.nodes
         unknowns, motions = body.global_unknowns, body.global_unknowns.ties
         if nodes.coupling is None and unknowns.size == 0:
             return None
@@ -363,7 +365,7 @@ class ContactProblem:
         self, *, symmetric: bool, counters: Counters, kind: str
     ) -> SparseOperator | ConstrainedOperator:
         """Return the operator of its linear systems; see `BodyEquilibrium.operator`. Collective."""
-        return self.equilibrium.operator(
+        return self.body.operator(
             self.interface.coupled,
             self.constraint,
             symmetric=symmetric,
@@ -379,20 +381,20 @@ class ContactProblem:
     @property
     def dim(self) -> int:
         """Space dimension."""
-        return self.equilibrium.dim
+        return self.body.dim
 
     @property
     def kinematics(self) -> str:
         """The kinematics of the body as the case file names it; "solid" in 3-D."""
         if self.domain.revolved or self.dim == 3:
             return "axisymmetric" if self.domain.revolved else "solid"
-        thin = any(material.in_plane_stress for material in self.body.materials)
+        thin = any(material.in_plane_stress for material in self.description.materials)
         return "plane_stress" if thin else "plane_strain"
 
     @property
     def piezoelectric(self) -> bool:
         """Whether there is a potential."""
-        return self.equilibrium.piezoelectric
+        return self.body.piezoelectric
 
     @property
     def frictional(self) -> bool:
@@ -414,11 +416,11 @@ class ContactProblem:
         Where no potential is prescribed, it starts from that of the first conductive foundation,
         as these alone determine it: far from phi_F a truncated charge has no derivative.
         """
-        body, time = self.equilibrium, self.time if time is None else time
+        body, time = self.body, self.time if time is None else time
         x = body.zero_displacement()
         conductors = [c.conductor for c in self.contacts if c.conductor is not None]
         if self.piezoelectric and conductors:
-            if all(fixed.potential is None for fixed in self.body.fixed):
+            if all(fixed.potential is None for fixed in self.description.fixed):
                 body.nodal(x)[:, -1] = conductors[0].at(self.time).phi_f / body.phi_scale
         x = approached(self.interface, body.prescribe(x, time), body.global_unknowns, time)
         return State(x, Multipliers.zero(self.nodes), time, self.history)

@@ -138,7 +138,7 @@ def residual_forces(
     internal
         Internal forces F(x), if known.
     """
-    body = problem.equilibrium
+    body = problem.body
     if internal is None:
         internal = body.internal_forces(state, secant_at)
     residual = internal - body.external(state.time)
@@ -165,7 +165,7 @@ def force_rounding(
     bodies, after far motions, or in potentials across a contact of high conductivity. No backward
     stable method leaves less (Rigal and Gaches, J. ACM 14 (1967) 543).
     """
-    body, (moved, there) = problem.equilibrium, perturbed or _perturbed(problem, state)
+    body, (moved, there) = problem.body, perturbed or _perturbed(problem, state)
     change = there - internal
     problem.interface.add_charge(change, state.x, moved - state.x, state.forces)
     return MARGIN * EPS / PERTURBATION * body.norms(body.unbalanced(change))
@@ -173,7 +173,7 @@ def force_rounding(
 
 def _perturbed(problem: AnyProblem, state: State) -> _Perturbed:
     """Return perturbed unknowns, and the internal forces there. Collective."""
-    body, own = problem.equilibrium, problem.equilibrium.owned_part(state.x)
+    body, own = problem.body, problem.body.owned_part(state.x)
     # Global unknowns, behind those of the nodes, have the same sign on all ranks.
     step = np.full(own.size, PERTURBATION)
     step[: body.owned] = _random_signs(body.owned)
@@ -189,7 +189,7 @@ def _as_pressures(interface: Interface, forces: Array) -> Array:
 
 def residual_as_pressures(problem: AnyProblem, state: State, residual: Array) -> float:
     """Return the residual forces as pressures, over the contact pressures. Collective."""
-    body, interface = problem.equilibrium, problem.interface
+    body, interface = problem.body, problem.interface
     left = body.norms(body.unbalanced(residual))[0]
     return _over_pressed(interface, state, _as_pressures(interface, left))
 
@@ -215,7 +215,7 @@ def evaluate(problem: AnyProblem, state: State) -> Residuals:
 @np.errstate(over="ignore", invalid="ignore")
 def evaluate_forces(problem: AnyProblem, state: State) -> tuple[Residuals, Array]:
     """Return the residuals of a state, and the internal forces there. Collective."""
-    body, interface = problem.equilibrium, problem.interface
+    body, interface = problem.body, problem.interface
     loads = body.load_norms(state.time)
     # First, as laws with history keep their last response: it is to be that of the state.
     perturbed = None if (loads > 0).all() else _perturbed(problem, state)
@@ -298,14 +298,14 @@ class Balance:
     @staticmethod
     def rest(problem: ContactProblem) -> Balance:
         """Return that of the reference configuration."""
-        x = problem.equilibrium.zero_displacement()
-        zero = np.zeros_like(problem.equilibrium.owned_part(x))
+        x = problem.body.zero_displacement()
+        zero = np.zeros_like(problem.body.owned_part(x))
         return Balance(0.0, 0.0, 0.0, None, 0.0, x, zero, zero)
 
 
 def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]:
     """Return external forces and charges on the owned unknowns, and internal ones. Collective."""
-    body, interface = problem.equilibrium, problem.interface
+    body, interface = problem.body, problem.interface
     external = body.external(state.time)
     residual = residual_forces(problem, state)
     foundation = np.zeros_like(residual)
@@ -335,7 +335,7 @@ def stored(problem: ContactProblem, state: State) -> float:
     The work of the stresses on a straight path; for materials with internal variables the energy
     that they state, NaN if they do not.
     """
-    body, x = problem.equilibrium, problem.equilibrium.owned_part(state.x)
+    body, x = problem.body, problem.body.owned_part(state.x)
     own = 0.0
     if body.laws.initial is not None:
         stated = body.laws.energies(state)[1]
@@ -352,7 +352,7 @@ def stored(problem: ContactProblem, state: State) -> float:
 
 def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
     """Return the energies of a step that follows another one. Collective."""
-    body = problem.equilibrium
+    body = problem.body
     given, internal = working_forces(problem, state)
     x, x_before = body.owned_part(state.x), body.owned_part(before.x)
     plastic, stored = body.laws.energies(state)

@@ -89,7 +89,7 @@ class Group:
 
     @cached_property
     def _at_contact(self) -> Array:
-        body, nodes = self.problem.equilibrium, self.problem.nodes
+        body, nodes = self.problem.body, self.problem.nodes
         moved = [nodes.jump(body.local(column))[:, : body.dim] for column in self.moved.T]
         return np.stack(moved, axis=2)
 
@@ -115,7 +115,7 @@ class Group:
 def groups(problem: ContactProblem) -> Iterator[Group]:
     """Yield the groups of a problem: single components, and one of all joined ones. Collective."""
     pieces = _pieces(problem)
-    whole = problem.equilibrium.components
+    whole = problem.body.components
     component, count = whole if pieces is None else (pieces.component, pieces.count)
     joined = _joined(problem, component, count)
     for k in map(int, np.flatnonzero(~joined)):
@@ -133,7 +133,7 @@ def constrained_by_supports(problem: ContactProblem) -> bool:
 
 def _free_motions(problem: ContactProblem) -> dict[int, str]:
     """Return the free motions among the global unknowns, with their names."""
-    members = problem.equilibrium.global_unknowns.members
+    members = problem.body.global_unknowns.members
     rigid = {
         member.begin + k: f"{NAMES[problem.dim][k]} of the rigid part"
         for member in members
@@ -149,7 +149,7 @@ def _free_motions(problem: ContactProblem) -> dict[int, str]:
 
 def _pieces(problem: ContactProblem) -> Pieces | None:
     """Return the components between cuts under given forces; None without cuts. Collective."""
-    cuts = problem.equilibrium.cuts
+    cuts = problem.body.cuts
     return None if cuts is None else cuts.pieces
 
 
@@ -158,7 +158,7 @@ def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -
     free, nodes, ties = (
         [*_free_motions(problem)],
         problem.nodes,
-        problem.equilibrium.global_unknowns.ties,
+        problem.body.global_unknowns.ties,
     )
     pieces = _pieces(problem)
     touched = np.zeros(count, dtype=np.intc)
@@ -166,7 +166,7 @@ def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -
         moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
         touched[component[nodes.nodes[moves]]] = 1
         rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
-        touched[component[rows // problem.equilibrium.block_size]] = 1
+        touched[component[rows // problem.body.block_size]] = 1
     if nodes.coupling is not None and nodes.coupling.between:
         touched[component[nodes.coupling.local]] = 1
     if pieces is not None:
@@ -183,7 +183,7 @@ def _group(
     moving: Mapping[int, str] = MappingProxyType({}),
 ) -> Group:
     """Return a group with its modes; `moving`: global unknowns among these. Collective."""
-    body, d = problem.equilibrium, problem.dim
+    body, d = problem.body, problem.dim
     points, global_unknowns = body.layout.points, body.global_unknowns
     names: list[str] = []
     # Rotations about the mean of the contact nodes: well scaled.
@@ -235,8 +235,8 @@ def _group(
 
 def _elastic_gram(problem: ContactProblem, moved: Array) -> Array:
     """Return the stiffness of elastic supports against the modes, scaled to 1. Collective."""
-    body, size = problem.equilibrium, moved.shape[1]
-    if not problem.body.elastic:
+    body, size = problem.body, moved.shape[1]
+    if not problem.description.elastic:
         return np.zeros((size, size))
     tied = body.global_unknowns.tied.ravel()
     follows = body.global_unknowns.ties @ moved[body.owned :]
@@ -455,7 +455,7 @@ def _most_power(
 
 def _work(group: Group, free: Array, time: float) -> tuple[Array, float]:
     """Return the power of the loads on free modes, (k,), and the sum of |loads|. Collective."""
-    body, comm, moved = group.problem.equilibrium, group.problem.comm, group.moved
+    body, comm, moved = group.problem.body, group.problem.comm, group.moved
     loads = body.external(time)
     on_global = loads[body.owned :]
     own = np.where(group.inside[:, None], body.nodal(loads), 0.0).ravel()

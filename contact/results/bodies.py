@@ -89,7 +89,7 @@ def sides(solution: Solution) -> Iterator[Remark]:
 def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return which of the owned contact nodes are among `nodes` and carry pressure. Collective."""
     contact = problem.nodes
-    _, local = owned_among(problem.equilibrium.layout.index_map, nodes)
+    _, local = owned_among(problem.body.layout.index_map, nodes)
     pressure = problem.interface.pressure(problem.nodal(state), state.forces)
     # Residuals at open nodes are no pressure, and a thousandth of the rest decides nothing.
     pressed = pressure > PRESSED * contact.maximum(pressure)
@@ -104,14 +104,14 @@ def _slip(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> fl
 
 def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
     """Return the mean size of a part's facets, and the least of Young's moduli behind them."""
-    domain, body = problem.domain, problem.equilibrium
+    domain, body = problem.domain, problem.body
     d, facets = domain.dim, domain.facets(part)
     sizes = domain.mesh.h(d - 1, facets) if facets.size else np.zeros(0)
     total = problem.comm.allreduce(np.array([sizes.sum(), sizes.size]), op=MPI.SUM)
     cells, _ = cells_at(domain.mesh, facets)
     youngs = [
         float(material.law.young)
-        for material, own in zip(body.body.materials, body.cells, strict=True)
+        for material, own in zip(body.description.materials, body.cells, strict=True)
         if np.isin(cells, own).any()
     ]
     least = problem.comm.allreduce(min(youngs, default=np.inf), op=MPI.MIN)
@@ -120,11 +120,11 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
 
 def apart(problem: ContactProblem) -> Iterator[Remark]:
     """Warn of connected components of the mesh that no contact keeps apart. Collective."""
-    piece, count = problem.equilibrium.components
+    piece, count = problem.body.components
     if count == 1:
         return
     met = np.zeros(count, dtype=np.intc)
-    owners = Owners.of(problem.equilibrium.layout.index_map, problem.comm)
+    owners = Owners.of(problem.body.layout.index_map, problem.comm)
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         if contact.against is not None and geometry.jumps is not None:
             both = np.concatenate([geometry.jumps.slaves, geometry.jumps.masters])
@@ -146,7 +146,7 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     along the normal where something presses, along the surface where it sticks, and across the
     friction where it slips.
     """
-    problem, body = solution.problem, solution.problem.equilibrium
+    problem, body = solution.problem, solution.problem.body
     if not solution.converged:
         return
     modes = [(group, null_space(group.supports)) for group in groups(problem)]
@@ -183,7 +183,7 @@ def _named(group: Group, motions: Array) -> str:
     problem, names = group.problem, group.problem.domain.regions
     if group.count == 1 or len(names) == 1:
         return "the body"
-    component, dofs = group.component, problem.equilibrium.space.dofmap.list
+    component, dofs = group.component, problem.body.space.dofmap.list
     amounts = np.linalg.norm(group.of_components(motions), axis=(1, 2))
     moved = np.array(group.components)[amounts >= amounts.max() / 2]
     found = []
@@ -247,7 +247,7 @@ def _least_constrained(
 
 def _reach(group: Group, motion: Array) -> float:
     """Return how far a motion moves a node at most. Collective."""
-    body = group.problem.equilibrium
+    body = group.problem.body
     moved = body.nodal(group.moved @ motion)[:, : body.dim]
     here = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
     return float(group.problem.comm.allreduce(here, op=MPI.MAX))

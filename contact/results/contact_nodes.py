@@ -229,7 +229,7 @@ class ContactResult:
         values, domain = known[name], self._problem.domain
         facets = np.concatenate([domain.facets(contact.on) for contact in self._problem.contacts])
         surface = dmesh.create_submesh(domain.mesh, domain.dim - 1, np.unique(facets))[0]
-        element = ("Lagrange", self._problem.equilibrium.degree, values.shape[1:])
+        element = ("Lagrange", self._problem.body.degree, values.shape[1:])
         made = fem.Function(fem.functionspace(surface, element), name=name)
         places = made.function_space.tabulate_dof_coordinates()[:, : domain.dim]
         distance, nearest = KDTree(self.points).query(places)
@@ -258,10 +258,10 @@ def contact_result(solved: Solved) -> ContactResult:
         "friction_bound": solved.friction_bound,
         "status": solved.status,
         "entry": problem.entry_numbers,
-        "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
+        "node": problem.body.layout.index_map.local_to_global(nodes.nodes),
     }
     if problem.piezoelectric:
-        own["potential"] = problem.equilibrium.phi_scale * solved.nodal[:, -1]
+        own["potential"] = problem.body.phi_scale * solved.nodal[:, -1]
         own["charge"] = problem.interface.foundation.charge(solved.nodal, solved.pressure)
     own = {name: nodes.gather(values) for name, values in own.items()}
     order = _by_position(problem, nodes.gather(nodes.points))
@@ -280,7 +280,7 @@ def _by_position(problem: ContactProblem, points: Array) -> NDArray[np.intp]:
 
 def _links(problem: ContactProblem) -> NDArray[np.int64]:
     """Return the global numbers of neighbours on the owned facets of Gamma_3, shape (m, 2)."""
-    space = problem.equilibrium.space
+    space = problem.body.space
     parts = [surface_of(problem.domain, space, contact.on).nodes for contact in problem.contacts]
     nodes = np.concatenate(parts)
     # Both ends, then the middle node if there is one.
@@ -375,7 +375,7 @@ def contact_table(solution: Solved) -> Table:
 def contact_surface(solution: Solved) -> Grid:
     """Return this rank's share of the contact part. Collective."""
     problem, d = solution.problem, solution.problem.dim
-    body = problem.equilibrium
+    body = problem.body
     owners = Owners.of(body.layout.index_map, problem.comm)
     parts = [surface_of(problem.domain, body.space, contact.on) for contact in problem.contacts]
     # A node of two contacts is one of each.
@@ -416,7 +416,7 @@ def _numbered(
 
 def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return points and unknowns, (n, d) and (n, k), of nodes of this rank."""
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     return body.layout.points[nodes], body.nodal(solution.state.x)[nodes]
 
 
@@ -442,7 +442,7 @@ def opposite_surface(solution: Solved) -> Grid | None:
     None where all obstacles are rigid.
     """
     problem, d = solution.problem, solution.problem.dim
-    body = problem.equilibrium
+    body = problem.body
     owners = Owners.of(body.layout.index_map, problem.comm)
     stresses = np.column_stack([solution.pressure, solution.forces.vectors(problem.nodes)])
     ends = np.cumsum([own.nodes.nodes.size for own in problem.geometries])[:-1]

@@ -104,7 +104,7 @@ def estimated(
     problem: ContactProblem, state: State, fields: DerivedFields | None = None
 ) -> Estimate:
     """Estimate the error of a state, whose fields may be known already. Collective."""
-    body, shape = problem.equilibrium, shape_of(problem.domain.mesh)
+    body, shape = problem.body, shape_of(problem.domain.mesh)
     if body.degree == 1 and not shape.simplex:
         # Stresses vary in the cell, and are most exact in its middle.
         fields = DerivedFields(body, state, shape.nodes(1))
@@ -118,7 +118,7 @@ def estimated(
     linear, shapes = shape.lagrange(1, at), shape.lagrange(shape.degree_of(flux.shape[1]), at)
     apart, modulus = _acting_inside(problem), np.ones(len(flux))
     squares, sums, volume = np.zeros(len(flux)), np.zeros(3), 0.0
-    for material, cells in zip(body.body.materials, body.cells, strict=True):
+    for material, cells in zip(body.description.materials, body.cells, strict=True):
         law = material.law
         if isinstance(law, Anisotropic | HistoryLaw):
             shear = secant[cells]
@@ -178,9 +178,9 @@ def estimated(
 def _acting_inside(problem: ContactProblem) -> list[str]:
     """Return the parts inside of the body at which something acts, and stresses jump."""
     # At cuts of bolts it is the displacement that jumps.
-    body = problem.equilibrium
+    body = problem.body
     unknown = [member.description for member in body.global_unknowns.members]
-    acting = [*body.body.fixed, *(one for one in unknown if not isinstance(one, Bolt))]
+    acting = [*body.description.fixed, *(one for one in unknown if not isinstance(one, Bolt))]
     parts = dict.fromkeys(name for one in acting for name in members(one.on))
     return [name for name in parts if name in problem.domain.inside]
 
@@ -188,7 +188,7 @@ def _acting_inside(problem: ContactProblem) -> list[str]:
 def _rounding(problem: ContactProblem, state: State, volume: float) -> float:
     """Return the energy of strains that a rigid motion leaves by rounding. Collective."""
     # They are differences of displacements over the size of a cell, in all directions.
-    body, comm, topology = problem.equilibrium, problem.comm, problem.domain.mesh.topology
+    body, comm, topology = problem.body, problem.comm, problem.domain.mesh.topology
     moved = float(np.abs(body.nodal(state.x)[:, : body.dim]).max(initial=0.0))
     size = body.domain.size / topology.index_map(body.dim).size_global ** (1 / body.dim)
     strain = ROUNDING * comm.allreduce(moved, op=MPI.MAX) / size
@@ -303,7 +303,7 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     """Return the share of contact in eta_K^2 of the owned cells, shape (cells,). Collective."""
     # Between its nodes, all values linear: p |u_n - g| and s |u_t| - lambda_f . u_t, where
     # complementarity holds at the nodes alone.
-    body, interface = problem.equilibrium, problem.interface
+    body, interface = problem.body, problem.interface
     domain, d, nodal = body.domain, body.dim, problem.nodal(state)
     sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
     squares = np.zeros(domain.mesh.topology.index_map(d).size_local)
@@ -356,7 +356,7 @@ def oscillation(problem: ContactProblem, time: float) -> Array:
     whole = shape_of(mesh)
     facets, x, now = whole.facet_corners, ufl.SpatialCoordinate(mesh), constant(mesh, time)
     vertices = _compat.geometry_dofmap(mesh)[:, : whole.corners]
-    for number, load in enumerate(problem.equilibrium.body.loads):
+    for number, load in enumerate(problem.body.description.loads):
         varying = {
             name: field
             for name, field in load.named.items()

@@ -100,7 +100,7 @@ def check_variables(body: BodyEquilibrium) -> None:
     """
     taken = [*(each.name for each in quantities(BODY) if each.value is not of_law), ACROSS]
     words = f"{NAME} that is the name of no other field ({', '.join(taken)})"
-    for law in (material.law for material in body.body.materials):
+    for law in (material.law for material in body.description.materials):
         within = law.base if isinstance(law, PlaneStressHistory) else law
         for name in body.laws.variables(within):
             place = f"{name_of(within)}: variables: the name"
@@ -189,7 +189,7 @@ class DerivedFields:
         #: Reference points of a cell at which the fields are evaluated.
         self.points = _usual_points(body) if points is None else points
         self.move_to(state)
-        at = fields_of(body, body.body.materials[0], fem.Function(body.space))
+        at = fields_of(body, body.description.materials[0], fem.Function(body.space))
         self.shapes: dict[str, tuple[int, ...]] = {
             name: expression.ufl_shape for name, expression in values_of(BODY, at).items()
         }
@@ -224,7 +224,7 @@ class DerivedFields:
     def of_material(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield owned cells of a material, by its number, and the values as `chunks`."""
         body, cells = self.body, self.body.cells[material]
-        expression = partial(self._expression, body.body.materials[material])
+        expression = partial(self._expression, body.description.materials[material])
         name = "fields", material, self.points.tobytes()
         body.laws.fit(self._state)
         if body.cuts is not None:
@@ -254,7 +254,7 @@ class DerivedFields:
         strain, mises = self.columns["dev_strain"], self.columns["von_mises"]
         laws, comm = self.body.laws, self.body.comm
         after = laws.commit(self._state)
-        for index, material in enumerate(self.body.body.materials):
+        for index, material in enumerate(self.body.description.materials):
             limit = getattr(material.law, "first_yield", np.inf)
             flows = EQUIVALENT in laws.variables(material.law)
             largest, sums = np.zeros(3), np.zeros(2)
@@ -416,8 +416,8 @@ def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
     |dev eps| decreases in the plastic range, its results are no longer those of plasticity. The
     states are those at the ends of all steps. Collective.
     """
-    body = problem.equilibrium
-    laws = [material.law for material in body.body.materials]
+    body = problem.body
+    laws = [material.law for material in body.description.materials]
     if not states or all(is_linear(law) or isinstance(law, HistoryLaw) for law in laws):
         return 0.0
     fields = DerivedFields(body, BodyState(body.zero_displacement()))

@@ -82,16 +82,16 @@ class Integral:
     def _form(self, problem: ContactProblem, at: fem.Function) -> ufl.Form:
         domain = problem.domain
         measure = domain.dx if self.on is None else domain.ds(self.on)
-        return self.density(*problem.equilibrium.split(at)) * measure
+        return self.density(*problem.body.split(at)) * measure
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
-        form = compiled(self._form(problem, problem.equilibrium.function(state.x)))
+        form = compiled(self._form(problem, problem.body.function(state.x)))
         return float(summed(problem.comm, fem.assemble_scalar(form)))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        body, by_x = problem.equilibrium, _no_weights(problem)
+        body, by_x = problem.body, _no_weights(problem)
         at = body.function(state.x)
         by_x[: body.owned] = assembled(
             compiled(ufl.derivative(self._form(problem, at), at)), body.owned
@@ -140,7 +140,7 @@ class ContactForce:
         by_force = np.zeros_like(nodes.normal)
         by_force[:, self.axis] = turn * nodes.weight
         layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
-        by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+        by_x = np.zeros_like(problem.body.owned_part(state.x))
         nodes.add_jump_transposed(
             (turn * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x
         )
@@ -189,7 +189,7 @@ class MaxPressure(Largest):
         nodes = problem.nodes
         at = _largest(problem, self.values(problem, state))
         layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
-        by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+        by_x = np.zeros_like(problem.body.owned_part(state.x))
         nodes.add_jump_transposed(at[:, None] * layer, by_x)
         return by_x, at[:, None] * nodes.normal
 
@@ -204,12 +204,12 @@ class MaxDisplacement(Largest):
 
     @staticmethod
     def _nodal(problem: ContactProblem, state: State) -> Array:
-        body = problem.equilibrium
+        body = problem.body
         return body.nodal(body.owned_part(state.x))[:, : problem.dim]
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        body, u = problem.equilibrium, self._nodal(problem, state)
+        body, u = problem.body, self._nodal(problem, state)
         length = np.linalg.norm(u, axis=1)
         at = _largest(problem, length) / np.maximum(length, np.finfo(float).tiny)
         by_x = np.zeros_like(body.owned_part(state.x))
@@ -231,7 +231,7 @@ class Weighted:
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
-        body = problem.equilibrium
+        body = problem.body
         return body.product(self.weights(problem), body.owned_part(state.x))
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
@@ -258,11 +258,11 @@ class Reaction:
         """Return it. Collective."""
         residual = residual_forces(problem, state)
         given = 0.0 if self.given is None else self.given(problem, state)
-        return problem.equilibrium.product(self.weights(problem), residual) + given
+        return problem.body.product(self.weights(problem), residual) + given
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        body, interface, nodes = problem.equilibrium, problem.interface, problem.nodes
+        body, interface, nodes = problem.body, problem.interface, problem.nodes
         weights = self.weights(problem)
         by_x = body.tangent_transposed(state, weights)
         seen = nodes.jump(body.local(weights))
@@ -289,7 +289,7 @@ class FoundationCharge:
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+        by_x = np.zeros_like(problem.body.owned_part(state.x))
         for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
             full = law is problem.interface.foundation
             slope = -law.charge_block(nodal, pressure, full)[:, -1] / law.phi_scale
@@ -325,13 +325,13 @@ def dissipations(problem: ContactProblem, contact: int | None = None) -> Functio
 
 def plastic_dissipations(problem: ContactProblem) -> Functionals:
     """Return the dissipation by plastic flow, of bodies with internal variables."""
-    return {"plastic_dissipation": _lost} if problem.equilibrium.laws.initial is not None else {}
+    return {"plastic_dissipation": _lost} if problem.body.laws.initial is not None else {}
 
 
 def reactions(problem: ContactProblem) -> Functionals:
     """Return the components of the reactions of supports. Collective."""
     # Forces of elastic supports are no reactions: a part with both is left out.
-    elastic = {support.on for support in problem.body.elastic}
+    elastic = {support.on for support in problem.description.elastic}
     return {
         f"reaction_{axis}_{part}": Reaction(partial(_on_support, part=part, axis=i))
         for i, axis in enumerate(AXES[: problem.dim])
@@ -402,13 +402,13 @@ def rigid_forces(problem: ContactProblem) -> Functionals:
 
 def _members(problem: ContactProblem, kind: type) -> list[tuple[int, str]]:
     """Return numbers and parts of the global unknowns of a kind."""
-    members = problem.equilibrium.global_unknowns.members
+    members = problem.body.global_unknowns.members
     return [(i, m.description.on) for i, m in enumerate(members) if isinstance(m.description, kind)]
 
 
 def _rigid_columns(problem: ContactProblem, *keys: str) -> Iterator[tuple[str, int, int]]:
     """Yield the columns of rigid bodies, and member and component of each."""
-    members, rigid = problem.equilibrium.global_unknowns.members, _members(problem, Rigid)
+    members, rigid = problem.body.global_unknowns.members, _members(problem, Rigid)
     foundations = [part for i, part in rigid if members[i].foundation]
     parts = [part for i, part in rigid if not members[i].foundation]
     for (index, _), end in zip(rigid, name_ends(foundations, parts), strict=True):
@@ -429,7 +429,7 @@ def _rubbed(problem: ContactProblem, state: State, contact: int | None) -> float
 
 def _lost(problem: ContactProblem, state: State) -> float:
     """Return the energy that plastic flow takes in the step of a state. Collective."""
-    return problem.equilibrium.laws.energies(state)[0]
+    return problem.body.laws.energies(state)[0]
 
 
 def _driving(problem: ContactProblem, state: State, axis: int) -> float:
@@ -443,13 +443,13 @@ def _mean(problem: ContactProblem, part: str, axis: int) -> Array:
     """Return the weights of a component of the mean displacement of a part. Collective."""
     weights, nodes = _no_weights(problem), nodes_of(problem, part)
     count = problem.comm.allreduce(nodes.size, op=MPI.SUM)
-    problem.equilibrium.nodal(weights)[nodes, axis] = 1 / max(count, 1)
+    problem.body.nodal(weights)[nodes, axis] = 1 / max(count, 1)
     return weights
 
 
 def _unknown(problem: ContactProblem, index: int, i: int, turns: bool = False) -> Array:
     """Return the weights of a global unknown; those of rotations in degrees."""
-    body, weights = problem.equilibrium, _no_weights(problem)
+    body, weights = problem.body, _no_weights(problem)
     member = body.global_unknowns.members[index]
     unit = float(member.units[i]) * (np.rad2deg(1.0) if turns else 1.0)
     body.motion(weights)[member.begin + i] = unit
@@ -461,21 +461,21 @@ def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:
     nodes, held = holding(problem, electric=False)[part]
     weights = _no_weights(problem)
     turn = float(problem.domain.resultant(np.eye(problem.dim)[axis])[axis])
-    problem.equilibrium.nodal(weights)[nodes, : problem.dim] = turn * held[:, axis]
+    problem.body.nodal(weights)[nodes, : problem.dim] = turn * held[:, axis]
     return weights
 
 
 def _on_electrode(problem: ContactProblem, part: str) -> Array:
     """Return the weights of the charge of a prescribed potential. Collective."""
     nodes, held = holding(problem, electric=True)[part]
-    body, weights = problem.equilibrium, _no_weights(problem)
+    body, weights = problem.body, _no_weights(problem)
     body.nodal(weights)[nodes, -1] = held[:, 0, 0] / body.phi_scale
     return weights
 
 
 def _on_member(problem: ContactProblem, index: int, i: int) -> Array:
     """Return the weights of a force on a rigid body, or of the charge of an electrode."""
-    body, weights = problem.equilibrium, _no_weights(problem)
+    body, weights = problem.body, _no_weights(problem)
     member = body.global_unknowns.members[index]
     if problem.domain.revolved and isinstance(member.description, Rigid) and i != 1:
         return weights  # over the full turn it cancels
@@ -487,10 +487,10 @@ def _on_member(problem: ContactProblem, index: int, i: int) -> Array:
 
 def _given(problem: ContactProblem, state: State, index: int, i: int) -> float:
     """Return the given force on a rigid body, or charge of an electrode, where that is free."""
-    member = problem.equilibrium.global_unknowns.members[index]
+    member = problem.body.global_unknowns.members[index]
     return float(member.forces(state.time)[i] / member.units[i])
 
 
 def _no_weights(problem: ContactProblem) -> Array:
-    body = problem.equilibrium
+    body = problem.body
     return np.zeros(body.owned + body.global_unknowns.size)

@@ -132,7 +132,7 @@ class LocalProblems:
     """
 
     def __init__(self, problem: ContactProblem, state: State, flux: Array) -> None:
-        body = self._body = problem.equilibrium
+        body = self._body = problem.body
         self._flux, self._nodes = flux, geometry_nodes(body.domain)
         shape = self._shape = shape_of(body.domain.mesh)
         #: The nodes of each facet, as nodes of its cell.
@@ -197,17 +197,17 @@ class LocalProblems:
         )
         touch &= slave | master
         # The traction of an elastic support is none of the loads either, nor is that of a roller.
-        rollers = [fixed.on for fixed in body.body.fixed if fixed.normal is not None]
-        for part in [*(support.on for support in body.body.elastic), *rollers]:
+        rollers = [fixed.on for fixed in body.description.fixed if fixed.normal is not None]
+        for part in [*(support.on for support in body.description.elastic), *rollers]:
             touch |= np.isin(facets, body.domain.facets(part))
         own = np.zeros(body.owned + body.global_unknowns.size)
         own[: body.owned] = body.free.ravel()
         free = body.nodal(body.local(own))[nodes].any(axis=2)
-        loads = [body.domain.facets(load.on) for load in body.body.loads if load.on]
+        loads = [body.domain.facets(load.on) for load in body.description.loads if load.on]
         loaded = np.isin(facets, np.concatenate([[], *loads]))
         # Facets inside that are fixed, or an electrode, have a jump, of charges for instance.
         names = [
-            *(fixed.on for fixed in body.body.fixed),
+            *(fixed.on for fixed in body.description.fixed),
             *(member.description.on for member in body.global_unknowns.members),
         ]
         parts = [body.domain.facets_anywhere(name) for name in names]
@@ -315,7 +315,7 @@ class LocalProblems:
 def _contact_traction(problem: ContactProblem, state: State) -> Array:
     """Return the traction of the multipliers and layers at the nodes, shape (n, d). Collective."""
     # Weiss and Wohlmuth, Math. Comp. 78, 2009. No numbers at nodes without a multiplier.
-    body, interface = problem.equilibrium, problem.interface
+    body, interface = problem.body, problem.interface
     pressure = interface.pressure(problem.nodal(state), state.forces)
     found = la.vector(body.space.dofmap.index_map, body.dim)
     found.array[:] = np.nan

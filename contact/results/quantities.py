@@ -421,7 +421,7 @@ _RUN = (
         "kinematics", "", "`plane_strain`, `plane_stress`, `axisymmetric` or `solid`.",
         lambda r: r.problem.kinematics,
     ),
-    Quantity("dofs", "", "Number of unknowns.", lambda r: r.problem.equilibrium.layout.unknowns),
+    Quantity("dofs", "", "Number of unknowns.", lambda r: r.problem.body.layout.unknowns),
     Quantity(
         "cells", "", "Number of cells of the mesh.",
         lambda r: r.problem.domain.mesh.topology.index_map(r.problem.dim).size_global,
@@ -432,7 +432,7 @@ _RUN = (
     ),
     Quantity(
         "unknowns", "", "Number of unknowns of a mesh of `[mesh.adapt]`, a row each.",
-        lambda r: r.problem.equilibrium.layout.unknowns, (ADAPT,),
+        lambda r: r.problem.body.layout.unknowns, (ADAPT,),
     ),
     Quantity("error", "", "`energy` of `error`.", _error, (ADAPT,)),
     Quantity(

@@ -93,7 +93,7 @@ def evaluate_extremes(solution: Solution, whole: bool = True) -> list[float]:
 
     `whole`: it is given deformation and error estimate too. Collective.
     """
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     fields = DerivedFields(body, solution.state)
     extremes = fields.extremes()
     strains = [largest.strain for largest in extremes]
@@ -154,7 +154,7 @@ def unloading(solution: Solution) -> Iterator[Remark]:
 def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remark]:
     """Tell of strong monotonicity, (h1), on the strains in Hencky's materials, and of g(0)."""
     dim = 3 if solution.problem.domain.revolved else solution.problem.dim
-    for material, strain in zip(solution.problem.body.materials, strains, strict=True):
+    for material, strain in zip(solution.problem.description.materials, strains, strict=True):
         law = material.law
         if not np.isfinite(strain) or isinstance(law, Anisotropic | HistoryLaw):
             continue
@@ -215,7 +215,7 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     its loads.
     """
     problem, state, outcome = solution.problem, solution.state, solution.outcome
-    body, asked, larger = problem.equilibrium, outcome.allowed.equilibrium, "far larger forces act"
+    body, asked, larger = problem.body, outcome.allowed.equilibrium, "far larger forces act"
     if solution.rounding > asked:
         yield f"rounding decides how well the forces balance, to {solution.rounding:.1e}: {larger}"
     if not solution.converged:
@@ -309,11 +309,11 @@ def unstable_charge(solution: Solution) -> Iterator[str]:
     delta |phi - phi_F| (e/C) Bi/(1 + Bi) exceeds 1: several solutions may then exist.
     """
     problem, width = solution.problem, solution.conduction_ramp
-    piezo, scales = problem.body.piezo, problem.scales
+    piezo, scales = problem.description.piezo, problem.scales
     conductor = problem.interface.foundation.conductor
     if width is None or piezo is None or conductor is None or conductor.psi.k_e == 0:
         return
-    potential = problem.equilibrium.phi_scale * solution.nodal[:, -1]
+    potential = problem.body.phi_scale * solution.nodal[:, -1]
     largest = problem.nodes.maximum(np.abs(conductor.phi_l(potential - conductor.phi_f)))
     permittivity = float(np.trace(np.asarray(piezo.beta))) / 3
     biot = conductor.psi.k_e * scales.height / permittivity
@@ -328,7 +328,7 @@ def unstable_charge(solution: Solution) -> Iterator[str]:
 
 def locks(solution: Solution) -> bool:
     """Whether elements of degree 1 may be much too stiff, for volumes hardly change."""
-    error, body = solution.error, solution.problem.equilibrium
+    error, body = solution.error, solution.problem.body
     if error is None or error.stiffness_ratio is None:
         return False
     remedy = unlocked(body.element, body.degree, shape_of(body.domain.mesh))
@@ -337,7 +337,7 @@ def locks(solution: Solution) -> bool:
 
 def locking(solution: Solution) -> Iterator[Remark]:
     """Warn of volumetric locking, or that of stiff fibres."""
-    error, body = solution.error, solution.problem.equilibrium
+    error, body = solution.error, solution.problem.body
     if error is not None and locks(solution):
         yield (
             f"the mesh may lock, displacements may be too small, and the estimated error a lower "
@@ -426,7 +426,7 @@ def beyond_part(solution: Solution) -> Iterator[Remark]:
     states = [record.state for record in solution.steps] or [solution.state]
     sizes = [record.row["max_displacement"] for record in solution.steps]
     largest = max(sizes or [solution.max_displacement])
-    body, tiny = problem.equilibrium, NEGLIGIBLE * problem.domain.size
+    body, tiny = problem.body, NEGLIGIBLE * problem.domain.size
     for part, shape in facing:
         # Along the body's normal, which is not known there, those to the nearest point.
         seen = shape if shape.direction == "axis" else replace(shape, direction="foundation")
@@ -452,7 +452,7 @@ def beyond_part(solution: Solution) -> Iterator[Remark]:
 
 def _beside(problem: ContactProblem, parts: list[str]) -> tuple[Array, NDArray[np.int32]]:
     """Return the owned nodes of the boundary beside some parts, and their points. Collective."""
-    domain, space = problem.domain, problem.equilibrium.space
+    domain, space = problem.domain, problem.body.space
     taken = np.concatenate([domain.facets(part) for part in parts])
     rest = np.setdiff1d(exterior_facets(domain.mesh), taken).astype(np.int32)
     found, own = (fem.locate_dofs_topological(space, domain.dim - 1, f) for f in (rest, taken))
@@ -497,7 +497,7 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
                 f"nothing touches, but straight facets deviate by up to {uncertainty:.3g} from a "
                 f"curved contact surface, and the least gap is {least:.3g}; accepted: {FINER}"
             )
-    elif problem.equilibrium.degree == 2 and problem.domain.levels == 0:
+    elif problem.body.degree == 2 and problem.domain.levels == 0:
         yield from _straight_edges(solution, closed)
     else:
         size = nodes.maximum(np.where(closed, np.abs(problem.interface.gap), 0.0))
@@ -539,7 +539,7 @@ def _of_edges(solution: Solution, closed: NDArray[np.bool_]) -> tuple[float, flo
     """Return largest turn, waves, least cosine of directions along straight edges. Collective."""
     # Where the curvature varies the deviation of the curve from an edge of the length h is known to
     # some u: waves of this height and the length 2 h take pressures E' pi u/(4 h).
-    domain, space = solution.problem.domain, solution.problem.equilibrium.space
+    domain, space = solution.problem.domain, solution.problem.body.space
     nodes = solution.problem.nodes
     numbers = nodes.nodes + space.dofmap.index_map.local_range[0]
 
@@ -572,7 +572,7 @@ def _touching(
     """Give the contact parts, and which of their facets on this rank touch. Collective."""
     problem, points = solution.problem, solution.problem.nodes.points[closed]
     for part in dict.fromkeys(p for c in problem.contacts for p in (c.on, c.against) if p):
-        side = surface_of(problem.domain, problem.equilibrium.space, part)
+        side = surface_of(problem.domain, problem.body.space, part)
         yield part, side, nearest(problem.comm, side.centres, points) <= side.radii
 
 
@@ -583,11 +583,11 @@ def _of_chords(solution: Solution, closed: NDArray[np.bool_]) -> float:
     # (rings on a rigid shaft) to .5 (rings in rings, on the finer side) on triangles, a third less
     # on quadrilaterals, whatever the stiffness of the other side. Both sides' add up; where they
     # cancel, since both move alike, edges that do not meet leave half of one.
-    domain, body = solution.problem.domain, solution.problem.equilibrium
+    domain, body = solution.problem.domain, solution.problem.body
     fields = DerivedFields(body, solution.state)
     strain, d = fields.columns["strain"], domain.dim
     stresses = np.zeros((domain.mesh.topology.index_map(d).size_local, d, d))
-    for material, own in enumerate(body.body.materials):
+    for material, own in enumerate(body.description.materials):
         modulus = own.law.young / (1 - own.law.poisson**2)
         for cells, values in fields.of_material(material):
             mean = values[..., strain].mean(axis=1).reshape(-1, 3, 3)

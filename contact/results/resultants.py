@@ -74,7 +74,7 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
     They balance with loads and contact. A component of a node on two parts counts for the one that
     stands first.
     """
-    d, body = problem.dim, problem.equilibrium
+    d, body = problem.dim, problem.body
     residual = body.nodal(residual_forces(problem, state))[:, :d]
     points = body.space.tabulate_dof_coordinates()[:, :d]
     found = {
@@ -83,7 +83,7 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
     }
     owned = body.owned // body.block_size
     forces_of = body.elastic_forces(state.x)
-    for support, forces in zip(problem.body.elastic, forces_of, strict=True):
+    for support, forces in zip(problem.description.elastic, forces_of, strict=True):
         on_body = -forces.reshape(-1, body.block_size)[:, :d]
         own = resultant(problem, points[:owned], on_body)
         other = found.get(support.on, Resultant(0 * own.force, 0 * own.moment))
@@ -101,10 +101,10 @@ def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[
     Part -> its nodes, and the matrices from residuals there to its forces, shape (n, d, d), or
     charges, (n, 1, 1). A roller bears forces along its normal alone.
     """
-    d, body = problem.dim, problem.equilibrium
+    d, body = problem.dim, problem.body
     found: dict[str, tuple[NDArray[np.int32], Array]] = {}
     left = ~body.unsupported[:, slice(d, None) if electric else slice(d)]
-    for number, fixed in enumerate(problem.body.fixed):
+    for number, fixed in enumerate(problem.description.fixed):
         held = np.isin(np.arange(d), [*fixed.components])
         if electric:
             held = np.array([fixed.potential is not None])
@@ -126,7 +126,7 @@ def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[
 
 def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
     """Return the owned nodes of a part of the boundary."""
-    body = problem.equilibrium
+    body = problem.body
     facets = problem.domain.facets_anywhere(part)
     nodes = fem.locate_dofs_topological(body.space, problem.dim - 1, facets)
     return np.asarray(nodes[nodes < body.owned // body.block_size])
@@ -160,24 +160,24 @@ class DrivenPart:
         It is the first one whose displacement is prescribed as a function of time, or the first
         one with a load.
         """
-        on = _driven(problem.body)
+        on = _driven(problem.description)
         if on is None:
             return None
-        parts, body = set(members(on)), problem.equilibrium
+        parts, body = set(members(on)), problem.body
         held = [at for part, at in holding(problem, electric=False).items() if part in parts]
-        within = [load.on for load in problem.body.loads if load.on]
+        within = [load.on for load in problem.description.loads if load.on]
         within = [name for name in within if parts >= set(members(name))]
         return DrivenPart(on, nodes_of(problem, on), held, body.loads_along(body.space, within))
 
     def way(self, problem: ContactProblem, state: State) -> Array:
         """Return the mean displacement of its nodes, shape (d,). Collective."""
-        x = problem.equilibrium.nodal(state.x)[self.nodes, : problem.dim]
+        x = problem.body.nodal(state.x)[self.nodes, : problem.dim]
         total = problem.comm.allreduce(np.append(x.sum(axis=0), len(x)), op=MPI.SUM)
         return np.asarray(total[:-1] / max(total[-1], 1.0))
 
     def force(self, problem: ContactProblem, state: State) -> Array:
         """Return the force on it, of its own supports and loads, shape (d,). Collective."""
-        d, body = problem.dim, problem.equilibrium
+        d, body = problem.dim, problem.body
         residual = body.nodal(residual_forces(problem, state))[:, :d]
         total = self.loads.at(state.time).reshape(-1, body.block_size)[:, :d].sum(axis=0)
         for nodes, held in self.held:
@@ -251,17 +251,19 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
         If the body is not piezoelectric.
     """
     _demand_potential(problem)
-    equilibrium, time = problem.equilibrium, state.time
+    equilibrium, time = problem.body, state.time
     d, bs = problem.dim, equilibrium.block_size
     residual = equilibrium.nodal(residual_forces(problem, state))[:, d:]
     residual = np.asarray(residual / equilibrium.phi_scale)
     parts = holding(problem, electric=True)
     on_parts = {part: held[:, 0] * residual[nodes] for part, (nodes, held) in parts.items()}
-    on_parts |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.body.electrodes}
+    on_parts |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.description.electrodes}
     electrodes = {part: _sum(problem, charges) for part, charges in on_parts.items()}
     magnitude = sum(_sum(problem, np.abs(charges)) for charges in on_parts.values())
     given: dict[str | None, float] = {}
-    loads = [load for load in problem.body.loads if {"charge", "body_charge"} & load.named.keys()]
+    loads = [
+        load for load in problem.description.loads if {"charge", "body_charge"} & load.named.keys()
+    ]
     for on in dict.fromkeys(load.on for load in loads):  # None is the whole body
         acting = equilibrium.loads_along(equilibrium.space, [on]).at(time)
         nodal = acting.reshape(-1, bs)[:, d]
@@ -276,7 +278,7 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
 
 def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     """Return the charges that leave the owned nodes through contact; between bodies they cancel."""
-    body = problem.equilibrium
+    body = problem.body
     leaving = np.zeros_like(body.external(state.time))
     for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
         density = np.zeros((nodal.shape[0], body.block_size))
@@ -294,7 +296,7 @@ def mean_potential(problem: ContactProblem, state: State, part: str) -> float:
         If the body is not piezoelectric or has no such part.
     """
     _demand_potential(problem)
-    body = problem.equilibrium
+    body = problem.body
     _, phi = body.split(body.function(state.x))
     ds = problem.domain.ds(part)
     integral = problem.comm.allreduce(fem.assemble_scalar(compiled(phi * ds)), op=MPI.SUM)
@@ -335,7 +337,7 @@ def movements(problem: ContactProblem, state: State) -> Movements:
     act from outside: those given, or the reactions of components that are given.
     """
     foundations, parts, electrodes, bolts = (dict[str, Any]() for _ in range(4))
-    body = problem.equilibrium
+    body = problem.body
     global_unknowns, q = body.global_unknowns, body.motion(state.x)
     if global_unknowns.size == 0:
         return {}

@@ -220,7 +220,7 @@ class Solution(Solved):
 
     @cached_property
     def _derived(self) -> dict[str, fem.Function]:
-        return DerivedFields(self.problem.equilibrium, self.state).cells()
+        return DerivedFields(self.problem.body, self.state).cells()
 
     @property
     def stress(self) -> fem.Function:
@@ -284,7 +284,7 @@ class Solution(Solved):
 
     @cached_property
     def _unknowns(self) -> dict[str, fem.Function]:
-        return unknowns(self.problem.equilibrium, self.state.x)
+        return unknowns(self.problem.body, self.state.x)
 
     @property
     def displacement(self) -> fem.Function:
@@ -299,7 +299,7 @@ class Solution(Solved):
     @property
     def plastic_dissipation(self) -> float | None:
         """The energy that plastic flow took, in a step or in all of them. Collective."""
-        body = self.problem.equilibrium
+        body = self.problem.body
         if self.energies is not None or body.laws.initial is None:
             return None if self.energies is None else self.energies.plastic
         if not self.steps:
@@ -423,7 +423,7 @@ class Solution(Solved):
         """The least and the largest potential at a node. Collective."""
         if not self.problem.piezoelectric:
             return None
-        comm, body = self.problem.comm, self.problem.equilibrium
+        comm, body = self.problem.comm, self.problem.body
         scaled = self.state.x[: body.owned].reshape(-1, body.block_size)[:, -1]
         phi = body.phi_scale * scaled
         return (

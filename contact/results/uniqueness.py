@@ -79,7 +79,7 @@ def uniqueness(
     stiffness = condensation.stiffness(state)
     if stiffness is None:
         return np.inf, False
-    columns, body = [], problem.equilibrium
+    columns, body = [], problem.body
     balanced = nodes.maximum(pressure) > interface.rounding(nodal)
     external = body.external(state.time)
     for group in groups(problem):

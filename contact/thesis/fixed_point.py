@@ -78,7 +78,7 @@ class OuterLoop(ABC):
     def __post_init__(self) -> None:
         """Start from zero with an empty history."""
         thesis = self.options.stopping == "thesis"
-        self._norm = self.problem.equilibrium.l2_norm() if thesis else None
+        self._norm = self.problem.body.l2_norm() if thesis else None
         self.set_load_step(self.problem)
 
     def set_load_step(self, problem: ContactProblem) -> None:
@@ -167,7 +167,7 @@ class OuterLoop(ABC):
     def _thesis_criterion(self, change: float, previous: State) -> bool:
         """Tell whether (4.38) or (6.40) is met, on the change of the displacement."""
         assert self._norm is not None
-        own = self.problem.equilibrium.owned_part
+        own = self.problem.body.owned_part
         now, before = own(self.state.x), own(previous.x)
         return self._norm(now - before) < self.options.eps_fp * self._norm(now)
 
@@ -197,7 +197,7 @@ def sticking_bound(problem: ContactProblem) -> Array | None:
     if not (problem.frictional and (modes.friction_alone or modes.overloaded(0 * weight))):
         return None
     # Friction need not bear the forces of prescribed displacements.
-    loads = sum_of_forces(problem.equilibrium, problem.equilibrium.external(problem.time))
+    loads = sum_of_forces(problem.body, problem.body.external(problem.time))
     return np.asarray(STUCK * (loads or all_loads(problem)) / weight, dtype=float)
 
 
@@ -231,7 +231,7 @@ class FixedPoint(OuterLoop):
         frictional = interface.friction.acts
         if start is None:
             # Secant at zero strain: prescribed values so far strain only the elements beside them.
-            self.state, self._secant_at = problem.start(), problem.equilibrium.zero_displacement()
+            self.state, self._secant_at = problem.start(), problem.body.zero_displacement()
             stuck = sticking_bound(problem)
             # Iteration 0 is the frictionless problem of the thesis: not with single_loop, nor where
             # friction alone constrains a rigid-body mode.
@@ -258,7 +258,7 @@ class FixedPoint(OuterLoop):
     def _step(self, iteration: int) -> tuple[int, str]:
         """Freeze, and solve by the Uzawa block relaxation."""
         problem, interface = self.problem, self.problem.interface
-        friction, body = interface.friction.acts and iteration > 0, problem.equilibrium
+        friction, body = interface.friction.acts and iteration > 0, problem.body
         if friction and self._first == 0 and iteration == 1:
             # Slip and contact without friction are a bad initial guess.
             self._z = self._initial_z(0.0, friction)
@@ -298,7 +298,7 @@ class FixedPoint(OuterLoop):
     def _adapt(self, residual: float, best: float) -> None:
         """Choose the tangent of the material near the solution."""
         choice = self.options.material_step
-        if choice == "auto" and not self.problem.equilibrium.linear:
+        if choice == "auto" and not self.problem.body.linear:
             self._tangent = residual < (2 * best if self._tangent else NEAR)
         else:
             self._tangent = choice == "tangent"

@@ -151,7 +151,7 @@ class PenalisedProblem:
         self._options, self._eps = options, eps
         self._error: InputError | Interrupted | None = None
         self._problem = problem
-        self._body, self._interface = problem.equilibrium, problem.interface
+        self._body, self._interface = problem.body, problem.interface
         self.operator = problem.operator(
             symmetric=symmetric, counters=counters, kind=options.linear
         )
@@ -339,7 +339,7 @@ def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regulari
     length is a hundredth of the displacement of a block of the body's size under the loads, or
     under their increment in a load step.
     """
-    body, scales = problem.equilibrium, problem.scales
+    body, scales = problem.body, problem.scales
     loads, prescribed = body.external(problem.time), problem.start().x
     displacement = max(expected_displacements(problem, loads, prescribed))
     if problem.since is not None:

@@ -262,7 +262,7 @@ class ThesisCriterion:
         if before is None:
             return False, None
         norm, nodal = self.domain_norm, self.frozen.nodes.norm
-        own = self.frozen.problem.equilibrium.owned_part(self.frozen.state.x)
+        own = self.frozen.problem.body.owned_part(self.frozen.state.x)
         change = norm(increment - before[0]) ** 2 + nodal(phi - before[1]) ** 2
         size = norm(own + increment) ** 2 + nodal(phi) ** 2
         return change < self.eps**2 * size, float(np.sqrt(change / size)) if size > 0 else 0.0
@@ -299,7 +299,7 @@ def uzawa_block_relaxation(
     stress_unit: Array = np.ones_like(nodes.weight)
     criterion = None if domain_norm is None else ThesisCriterion(frozen, domain_norm, options.eps)
     rtol = max(SHARE * options.inner, ROUNDING)
-    increment: Array = np.zeros(frozen.problem.equilibrium.owned)
+    increment: Array = np.zeros(frozen.problem.body.owned)
     stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
     for iteration in range(1, options.max_inner + 1):
         poll()

@@ -74,12 +74,12 @@ def memory() -> float:
 
 def unknowns(problem: ContactProblem) -> int:
     """Return the number of unknowns over all ranks."""
-    return problem.equilibrium.layout.unknowns
+    return problem.body.layout.unknowns
 
 
 def described(solution: Solution) -> dict[str, Any]:
     """Return the columns of a solution in the tables."""
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     u = solution.state.x.reshape(-1, body.block_size)[:, : body.dim]
     largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
     return {
@@ -124,7 +124,7 @@ def block_with_constant_friction(n: str, mu: str) -> dict[str, Any]:
 
 def one_linear_solve(problem: ContactProblem) -> tuple[float, int]:
     """Return the CPU seconds and iterations of a linear elasticity solve, setup included."""
-    body, nodes = problem.equilibrium, problem.nodes.nodes
+    body, nodes = problem.body, problem.nodes.nodes
     COMM.Barrier()
     begin = time.process_time()
     operator = SparseOperator(body, nodes)

@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         rows.append(
             {
                 "bodies": name,
-                "unknowns": problem.equilibrium.layout.unknowns,
+                "unknowns": problem.body.layout.unknowns,
                 "converged": solution.converged,
                 "solves": counters.linear_solves,
                 "iterations": counters.linear_iterations,

@@ -110,7 +110,7 @@ def compare(mu: float, finer: int) -> dict[str, Any]:
         apart = max(apart, float(difference / np.abs(values).max()))
     return {
         "mu": mu,
-        "unknowns": own_problem.equilibrium.layout.free.size,
+        "unknowns": own_problem.body.layout.free.size,
         "apart": apart,
         "GetFEM: steps": int(steps),
         "seconds": seconds,

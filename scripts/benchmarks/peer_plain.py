@@ -61,7 +61,7 @@ class Plain:
     """
 
     def __init__(self, problem: ContactProblem, kappa: float) -> None:
-        domain, space = problem.domain, problem.equilibrium.space
+        domain, space = problem.domain, problem.body.space
         self.u = u = fem.Function(space)
         v = ufl.TestFunction(space)
         self.load = fem.Constant(domain.mesh, 0.0)

@@ -85,7 +85,7 @@ SOLVERS: Mapping[str, Mapping[str, str]] = {
 
 def measured(problem: ContactProblem, options: Mapping[str, str]) -> dict[str, Any]:
     """Solve with some options, and return the costs. Collective."""
-    body, layout = problem.equilibrium, problem.equilibrium.layout
+    body, layout = problem.body, problem.body.layout
     matrix = body.create_matrix()
     body.assemble(matrix, "secant", problem.start())
     balance(matrix, layout)
@@ -135,7 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     made.add_argument("--cells", type=int, default=24)
     given = made.parse_args(arguments)
     problem = build_problem(block(6 if given.coarse else given.cells, LINEAR))
-    unknowns = problem.equilibrium.layout.unknowns
+    unknowns = problem.body.layout.unknowns
     names = ("solver", "iterations", "residual", "set-up", "solve", "in all", "over this code")
     columns: dict[str, list[Any]] = {name: [] for name in names}
     first = np.nan

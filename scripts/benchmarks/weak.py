@@ -196,7 +196,7 @@ def measure(comm: MPI.Intracomm, n: int, bodies: int) -> dict[str, Any]:
         Domain.comm = whole  # type: ignore[method-assign]
     found: dict[str, Any] = {
         "ranks": comm.size,
-        "unknowns": problem.equilibrium.layout.unknowns,
+        "unknowns": problem.body.layout.unknowns,
         "contact nodes": problem.nodes.size,
         "python": comm.allreduce(peak, op=MPI.MAX),
         "coupling": comm.allreduce(held(problem), op=MPI.MAX),
@@ -231,7 +231,7 @@ def timed(comm: MPI.Intracomm, n: int, bodies: int, length: int) -> dict[str, An
     counters = solution.counters
     return {
         "ranks": comm.size,
-        "unknowns": problem.equilibrium.layout.unknowns,
+        "unknowns": problem.body.layout.unknowns,
         "contact nodes": problem.nodes.size,
         "coupling": comm.allreduce(held(problem), op=MPI.MAX),
         "converged": solution.converged,

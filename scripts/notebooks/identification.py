@@ -151,7 +151,7 @@ class Misfit:
         """Return the derivatives by the unknowns, none, and by the contact forces."""
         difference, size = self.difference(problem, state)
         by_pressure = problem.nodes.weight * difference / size
-        by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+        by_x = np.zeros_like(problem.body.owned_part(state.x))
         return by_x, by_pressure[:, None] * problem.nodes.normal
 
 

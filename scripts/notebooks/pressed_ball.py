@@ -44,7 +44,7 @@ assert force[-1] == 0 and plastic > 0
 # The surface after the ball is lifted: the impression, and the rim around it.
 
 # %%
-nodes, body = solution.problem.nodes, solution.problem.equilibrium
+nodes, body = solution.problem.nodes, solution.problem.body
 radius = nodes.points[:, 0]
 order = np.argsort(radius)
 height = 1e3 * body.nodal(solution.state.x)[nodes.nodes, 1]

@@ -106,7 +106,7 @@ def agreement(report: Report, compared: Sequence[Compared]) -> None:
     for one in compared:
         newton, uzawa = one.runs["newton"], one.runs["uzawa"]
         apart = one.branches.difference(uzawa, newton)
-        dofmap = one.branches.problem.equilibrium.space.dofmap
+        dofmap = one.branches.problem.body.space.dofmap
         append(
             columns,
             one.example.label,

@@ -185,7 +185,7 @@ class Branches:
 
     def disturbed(self, found: Solution) -> State:
         """Return a start beside a solution, off by up to `DISTURBANCE` at each node."""
-        problem, body = self.problem, self.problem.equilibrium
+        problem, body = self.problem, self.problem.body
         points = body.space.tabulate_dof_coordinates() / problem.domain.size
         wave = 1 + DISTURBANCE * np.cos(points @ [70.0, 30.0, 50.0])
         x = found.state.x.copy()
@@ -195,7 +195,7 @@ class Branches:
         return State(body.prescribe(x), disturbed)
 
     def _nodal(self, x: Array) -> Array:
-        return self.problem.equilibrium.nodal(x)
+        return self.problem.body.nodal(x)
 
     def _largest(self, values: Array) -> float:
         largest = float(np.abs(values).max(initial=0.0))

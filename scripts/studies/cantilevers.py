@@ -69,7 +69,7 @@ def cantilever(
 
 def plain(problem: ContactProblem, load: dict[str, Any]) -> fem.Function:
     """Solve for the beam without contact, as a user of dolfinx does."""
-    domain, degree = problem.domain, problem.equilibrium.degree
+    domain, degree = problem.domain, problem.body.degree
     space = fem.functionspace(domain.mesh, ("Lagrange", degree, (2,)))
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     shear, lame = 1 / 2.6, 0.3 / (1.3 * 0.4)

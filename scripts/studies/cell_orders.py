@@ -128,7 +128,7 @@ def l2_error(
     above
         Height from which on the body counts.
     """
-    body = problem.equilibrium
+    body = problem.body
     domain, space, degree = body.domain, body.space, body.degree
     shape, of = shape_of(domain.mesh), geometry_nodes(domain)
     points, weights = rule(shape, 8)
@@ -252,8 +252,8 @@ def _measured(make: Callable[[int], tuple[ContactProblem, Any]], n: int) -> tupl
     problem, exact = make(n)
     state = solved(problem)
     seconds = time.process_time() - begin
-    norms = [errors(problem.equilibrium, state.x, other).energy for other in (exact, None)]
-    return norms[0] / norms[1], seconds, problem.equilibrium.layout.unknowns
+    norms = [errors(problem.body, state.x, other).energy for other in (exact, None)]
+    return norms[0] / norms[1], seconds, problem.body.layout.unknowns
 
 
 def times(report: Report, coarse: bool) -> dict[tuple[str, str, int, int], float]:

@@ -128,7 +128,7 @@ def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
                 raise NotConvergedError(f"{label}, 1/h = {n}: {outcome.reason}")
             residuals.append(outcome.residuals.largest)
             if dim:
-                e, largest = errors(problem.equilibrium, state.x, exact(dim)), np.nan
+                e, largest = errors(problem.body, state.x, exact(dim)), np.nan
             else:
                 e, largest = singular.errors(problem, state)
             found.append((e.l2, e.h1, e.energy, largest))

@@ -80,7 +80,7 @@ def two_rings(domain: Domain, degree: int, on: str = "outer0") -> ContactProblem
 def solved(problem: ContactProblem) -> tuple[float, Array]:
     """Return the error of the displacements in L2, and the pressures of all ranks."""
     state = cell_orders.solved(problem, 1e-11)
-    size = error(problem.equilibrium.space, state.x, LAME)
+    size = error(problem.body.space, state.x, LAME)
     return size, problem.nodes.gather(state.forces.pressure)
 
 
@@ -102,7 +102,7 @@ def rim(report: Report, coarse: bool) -> dict[str, float]:
         for kind, make in (("shaft", on_a_shaft), ("load", under_pressure)):
             problem = make(domain, 2)
             columns.setdefault(kind, []).append(solved(problem)[0])
-        columns["unknowns"].append(3 * problem.equilibrium.layout.index_map.size_global)
+        columns["unknowns"].append(3 * problem.body.layout.index_map.size_global)
     for kind in ("shaft", "load"):
         sizes = 1 / np.array(columns["across"])
         columns[f"order, {kind}"] = observed_orders(sizes, columns[kind])
@@ -130,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, in
                     size, pressure = solved(problem)
                     rate = None if last is None else float(np.log2(last / size))
                     last, off = size, float(np.abs(pressure / exact - 1).max())
-                    unknowns = problem.equilibrium.layout.index_map.size_global * shape.dim
+                    unknowns = problem.body.layout.index_map.size_global * shape.dim
                     shown = "" if rate is None else f"{rate:.2f}"
                     row = (kind, shape.name, order, degree, n, unknowns, f"{size:.2e}", shown)
                     append(columns, *row, f"{off:.1e}")

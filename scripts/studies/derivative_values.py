@@ -198,7 +198,7 @@ def products(solution: Solution) -> float:
     from contact.problem.linearised import Equations
 
     linearised = LoadPath(solution).linearised(-1)
-    body, rng = solution.problem.equilibrium, np.random.default_rng(0)
+    body, rng = solution.problem.body, np.random.default_rng(0)
     shapes = body.owned_part(solution.state.x).shape, solution.problem.nodes.normal.shape
     mask = np.concatenate([body.free.ravel(), np.ones(body.global_unknowns.size)])
     a, b = ([rng.standard_normal(shape) for shape in shapes] for _ in range(2))
@@ -252,7 +252,7 @@ def cost(report: Report, coarse: bool) -> None:
         begin = time.process_time()
         solution = solved(parse_case(data))
         seconds, summary = time.process_time() - begin, solution.counters
-        size = solution.problem.equilibrium.layout.unknowns
+        size = solution.problem.body.layout.unknowns
         append(columns, title, size, 0, "solution", summary.factorizations,
                summary.linear_solves, seconds)  # fmt: skip
         name, nodes = "contact_force_x", solution.problem.nodes.size

@@ -205,7 +205,7 @@ def per_second(report: Report, coarse: bool) -> None:
             solution = solve(case)
             seconds = time.perf_counter() - begin
             assert solution.error is not None
-            append(columns, name, label, solution.problem.equilibrium.layout.unknowns, seconds,
+            append(columns, name, label, solution.problem.body.layout.unknowns, seconds,
                    solution.error.relative, solution.max_displacement)  # fmt: skip
     report.table(
         "per-second",
@@ -230,7 +230,7 @@ def adaptive(report: Report, coarse: bool) -> None:
         found = {"adapted": [(row["unknowns"], row["error"]) for row in rows], "uniform": []}
         for problem in uniform:
             estimate = estimated(problem, state_of(problem)).relative
-            found["uniform"].append((problem.equilibrium.layout.unknowns, estimate))
+            found["uniform"].append((problem.body.layout.unknowns, estimate))
         for kind, line in (("adapted", "o-"), ("uniform", "s--")):
             unknowns, errors = np.array(found[kind]).T
             label = f"P{degree}, {kind}"

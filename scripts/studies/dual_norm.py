@@ -28,7 +28,7 @@ class DualNorm:
 
     def __init__(self, problem: ContactProblem) -> None:
         self.problem = problem
-        body, size = problem.equilibrium, problem.interface.nodes.block_size
+        body, size = problem.body, problem.interface.nodes.block_size
         self._rest = body.zero_displacement()
         coupled = problem.interface.coupled
         self._operator = SparseOperator(body, coupled)
@@ -36,7 +36,7 @@ class DualNorm:
 
     def pressure(self, q: Array) -> float:
         """Return the norm of nodal pressures, shape (n,). Collective."""
-        body, nodes = self.problem.equilibrium, self.problem.interface.nodes
+        body, nodes = self.problem.body, self.problem.interface.nodes
         load = np.zeros(body.owned)
         vectors = np.zeros((q.size, nodes.block_size))
         vectors[:, : nodes.dim] = (nodes.weight * q)[:, None] * nodes.normal
@@ -46,7 +46,7 @@ class DualNorm:
 
     def compliance(self, loads: Sequence[Array]) -> Array:
         """Return the work of loads on each other's displacements, shape (n, n). Collective."""
-        free = self.problem.equilibrium.free.ravel()
+        free = self.problem.body.free.ravel()
         acting = np.array([np.where(free, load, 0.0) for load in loads])
         moved = np.array([self._operator.solve(load) for load in acting])
         work = self.problem.comm.allreduce(acting @ moved[:, : free.size].T, op=MPI.SUM)
@@ -54,7 +54,7 @@ class DualNorm:
 
     def displacement(self, x: Array, other: Array) -> float:
         """Return |u - v|_V of local unknowns, the energy of the linear body. Collective."""
-        body = self.problem.equilibrium
+        body = self.problem.body
         forces = (body.internal_forces(BodyState(y), self._rest) for y in (x, other))
         difference = (x - other)[: body.owned]
         free = np.where(body.free.ravel(), np.subtract(*forces), 0.0)

@@ -188,7 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             n = cells // share if cells > 8 else cells
             problem = one.make(n, degree)
             x = state_of(problem)
-            error = errors(problem.equilibrium, x.x, one.solution(problem)).energy
+            error = errors(problem.body, x.x, one.solution(problem)).energy
             _append(columns, (name, one.source, f"P{degree}", n), problem, x, error)
     for name, (make, looked_at, most) in beside().items():
         fine = make(most // share, 2)
@@ -196,8 +196,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for degree, n in looked_at:
             problem = make(n, degree)
             x = state_of(problem)
-            other = carry(problem.equilibrium.function(x.x), fine.equilibrium.space)
-            error = errors(fine.equilibrium, best.x, other).energy
+            other = carry(problem.body.function(x.x), fine.body.space)
+            error = errors(fine.body, best.x, other).energy
             _append(columns, (name, f"P2, {most // share}", f"P{degree}", n), problem, x, error)
     report.table(
         "effectivity",
@@ -227,7 +227,7 @@ def _append(
     error: float,
 ) -> None:
     found = estimated(problem, state)
-    norm = errors(problem.equilibrium, state.x, None).energy
+    norm = errors(problem.body, state.x, None).energy
     estimate = float(np.sqrt(found.total))
     ratio = estimate / error
     why = "" if WITHIN[0] <= ratio <= WITHIN[1] else WHY.get((row[0], row[2]), "?")

@@ -87,7 +87,7 @@ def errors(
 
     body.laws.fit(BodyState(x))
     totals, gradient, field = np.zeros(3), slice(d, d + 9), slice(d + 9, 9 + bs * d)
-    for material, cells_of in zip(body.body.materials, body.cells, strict=True):
+    for material, cells_of in zip(body.description.materials, body.cells, strict=True):
         chunks = (
             body.pointwise.values("errors", linear, at, values, cells_of)
             for values in (solution, error)

@@ -259,7 +259,7 @@ class Singular:
 
     def errors(self, problem: ContactProblem, state: State) -> tuple[Errors, float]:
         """Return the norms of a state's error, and the largest one at the nodes. Collective."""
-        body = problem.equilibrium
+        body = problem.body
         points = body.space.tabulate_dof_coordinates()[:, :2]
         given = np.column_stack([self.numpy(i, points) for i in range(2)])
         largest = np.abs(state.x.reshape(-1, 2) - given).max(initial=0.0)

@@ -68,7 +68,7 @@ def watched(iteration: Iteration, n: int) -> tuple[Array, float, float]:
     found, _, outcome = iterates(problem, _settings(iteration))
     if not outcome.converged:
         raise NotConvergedError(f"{iteration.label}: {outcome.reason}")
-    body, last, kkt = problem.equilibrium, found[-1].x, outcome.residuals
+    body, last, kkt = problem.body, found[-1].x, outcome.residuals
     distances = [errors(body, last, body.function(state.x)).energy for state in found[:-1]]
     residual = kkt.largest if iteration.eps is None else kkt.equilibrium
     return (

@@ -169,7 +169,7 @@ def sphere(
 
 def at_the_equator(solution: Solution, step: int) -> list[float]:
     """Return u(1), u(2) and the hoop stresses there, nodal means, at the end of a step."""
-    body, state = solution.problem.equilibrium, solution.steps[step].state
+    body, state = solution.problem.body, solution.steps[step].state
     stress = DerivedFields(body, state).nodes()["stress"]
     found = []
     for values, space, column in (
@@ -189,7 +189,7 @@ def most_strained(solution: Solution, step: int) -> tuple[float, float]:
     strain = solution.problem.at(state.time, state.history).commit(state).arrays()
     strain = strain["material.equivalent_plastic_strain"]
     at = int(np.argmax(strain))
-    place = solution.problem.equilibrium.laws.places[at]
+    place = solution.problem.body.laws.places[at]
     return float(np.linalg.norm(place)), float(strain[at])
 
 

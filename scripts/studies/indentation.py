@@ -185,7 +185,7 @@ def measure(setting: Setting, solution: Solution) -> Found:
         charge = -charge_balance(problem, solution.state).foundation / exact.charge
     else:
         inner = r < 0.3 * radius
-        phi = problem.equilibrium.phi_scale * solution.nodal[:, -1]
+        phi = problem.body.phi_scale * solution.nodal[:, -1]
         # phi is (M_21/M_11) u_z everywhere beneath the indenter.
         expected = half_space.potential_beneath(setting.body, 1.0) * setting.surface(r)
         ratio = np.where(inner, phi / unit / expected, 0.0)
@@ -196,7 +196,7 @@ def measure(setting: Setting, solution: Solution) -> Found:
         float(charge),
         float(potential),
         radius,
-        problem.equilibrium.layout.unknowns,
+        problem.body.layout.unknowns,
     )
 
 
@@ -277,7 +277,7 @@ def units_and_poling(report: Report, fineness: float) -> None:
             solution, unit = solved(setting.case(20.0)), 1e9 if units == "SI" else 1.0
             problem, sign = solution.problem, -np.sign(poling)
             force = float(solution.contact_force[1]) / unit
-            phi = sign * solution.nodal[:, -1] * problem.equilibrium.phi_scale / unit
+            phi = sign * solution.nodal[:, -1] * problem.body.phi_scale / unit
             other = sign * charge_balance(problem, solution.state).foundation
             if potential is None:
                 # Beneath the tip it is largest.

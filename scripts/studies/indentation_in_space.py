@@ -74,7 +74,7 @@ def measured(space: bool, n: float, conducting: bool, degree: int = 1) -> Array:
     if conducting:
         return np.array([force, turn * charge_balance(problem, solution.state).foundation])
     # The tip is the first that touches, and the potential is largest there.
-    phi = problem.equilibrium.phi_scale * solution.nodal[:, -1]
+    phi = problem.body.phi_scale * solution.nodal[:, -1]
     r = np.linalg.norm(problem.nodes.points, axis=1)
     near = problem.comm.allgather((r.min(initial=np.inf), phi[r.argmin()] if r.size else 0.0))
     return np.array([force, min(near)[1]])
@@ -131,7 +131,7 @@ def tilted_punch(report: Report, coarse: bool) -> None:
             begin = time.process_time()
             solution = solved(punch(n, *more, f"solver.linear={linear}"))
             took += [solution.counters.linear_solves, time.process_time() - begin]
-        unknowns = solution.problem.equilibrium.layout.unknowns
+        unknowns = solution.problem.body.layout.unknowns
         rows.append((n, extent, unknowns, rotation(solution), took))
     errors = [1 - row[3] for row in rows[:-1]]
     orders = observed_orders([1 / n for n in sizes], errors)

@@ -144,24 +144,24 @@ def constant(kind: Mesh, domain: Domain, degree: int, levels: int) -> tuple[floa
     for _ in range(levels):
         fine = refined(fine)
     reference = kind.problem(fine, degree)
-    slave = surface_of(domain, problem.equilibrium.space, kind.part)
-    master = surface_of(fine, reference.equilibrium.space, kind.part)
+    slave = surface_of(domain, problem.body.space, kind.part)
+    master = surface_of(fine, reference.body.space, kind.part)
     # As if the finer mesh were the body opposite.
     opposite = replace(master, normal=-master.normal)
     without = np.setdiff1d(slave.nodes, problem.nodes.nodes)
-    coupling = couple(slave, opposite, 1e-6, without=without)
+    coupling = couple(slave, opposite, 1e-6, no_multiplier=without)
     integrals = (coupling.M.T * coupling.weight).toarray()
     nodes = problem.interface.nodes
     values = np.eye(coupling.nodes.size)[np.searchsorted(coupling.nodes, nodes.nodes)]
     normal = coupling.normal[0]
 
     def on_mesh(column: Array) -> Array:
-        load = np.zeros(problem.equilibrium.owned)
+        load = np.zeros(problem.body.owned)
         nodes.add_jump_transposed((nodes.weight * (values @ column))[:, None] * nodes.normal, load)
         return load
 
     def on_reference(column: Array) -> Array:
-        load = np.zeros((reference.equilibrium.owned // domain.dim, domain.dim))
+        load = np.zeros((reference.body.owned // domain.dim, domain.dim))
         load[coupling.masters] = (integrals @ column)[:, None] * normal
         return load.ravel()
 

@@ -120,7 +120,7 @@ def with_layer(problem: ContactProblem, c: float, thickness: float = np.inf) -> 
     foundation = GapFunction(lambda points: np.full(len(points), gap))
     layer = Layer(thickness, Compliance(np.inf), PotentialFactor(c))
     contact = Contact(problem.contacts[0].on, foundation, layer)
-    return ContactProblem(problem.domain, problem.body, contact)
+    return ContactProblem(problem.domain, problem.description, contact)
 
 
 def stiffness_limit(

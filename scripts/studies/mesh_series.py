@@ -74,13 +74,13 @@ def measure(variant: Variant) -> tuple[Array, list[float]]:
     """Return relative errors, shape (meshes, 3), and the residuals of the solves. Collective."""
     nested = not variant.penalised and variant.power == 1.0
     reference = variant.solve(variant.reference, nested)
-    body, x = reference.problem.equilibrium, reference.state.x
+    body, x = reference.problem.body, reference.state.x
     scale = errors(body, x, None)
     found, residuals = [], [_residual(reference.outcome, variant)]
     for n in variant.cells:
         solution = variant.solve(n)
         residuals.append(_residual(solution.outcome, variant))
-        coarse = solution.problem.equilibrium.function(solution.state.x)
+        coarse = solution.problem.body.function(solution.state.x)
         e = errors(body, x, carry(coarse, body.space)) / scale
         found.append((e.l2, e.h1, e.energy))
     return np.array(found), residuals

@@ -69,7 +69,7 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         solution = solved(bar(n, load, RHO, change))
         local = local or solution
         # Each problem has a mesh of its own, with the same numbering.
-        nodes, body, x = solution.problem.nodes, solution.problem.equilibrium, solution.state.x
+        nodes, body, x = solution.problem.nodes, solution.problem.body, solution.state.x
         relative = errors(body, x, body.function(local.state.x)) / errors(body, x, None)
         status = nodes.gather(solution.status)
         records = uzawa.history

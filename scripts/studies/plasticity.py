@@ -99,7 +99,7 @@ def prandtl(report: Report, coarse: bool) -> None:
         for size in (0.2,) if coarse else (0.2, 0.1, 0.05):
             solution = solved(punch(size, element))
             force = abs(float(solution.steps[-1].row["contact_force_y"])) / YIELD
-            unknowns = solution.problem.equilibrium.layout.unknowns
+            unknowns = solution.problem.body.layout.unknowns
             row = element, size, unknowns, len(solution.steps), force, force / limit - 1
             append(columns, *row)
     report.table(
@@ -209,7 +209,7 @@ def first_yield(shape: str, fineness: float, poisson: float = POISSON) -> tuple[
         },
     )
     solution = solved(case)
-    laws = solution.problem.equilibrium.laws
+    laws = solution.problem.body.laws
     for k, step in enumerate(solution.steps):
         # The history of a state is that before its step.
         after = solution.problem.at(step.state.time, step.state.history).commit(step.state)
@@ -326,7 +326,7 @@ def unloading(solution: Solution, turn: int) -> tuple[float, float, float]:
     Depth of the mark over that of the ball at its deepest, exponent of the force in the rise of the
     ball above the mark, and the whole rise over 3 P/(4 E* a).
     """
-    nodes, body = solution.problem.nodes, solution.problem.equilibrium
+    nodes, body = solution.problem.nodes, solution.problem.body
     places = nodes.points[:, 0]
     mark = -float(body.nodal(solution.state.x)[nodes.nodes[np.argmin(places)], 1])
     rows = [step.row for step in solution.steps[turn:]]

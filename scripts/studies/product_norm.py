@@ -21,7 +21,7 @@ class ProductNorm:
     """
 
     def __init__(self, problem: ContactProblem) -> None:
-        body = self._body = problem.equilibrium
+        body = self._body = problem.body
         self._x = fem.Function(body.space)
         u, phi = body.split(self._x)
         parts = [ufl.inner(strain(u), strain(u))]

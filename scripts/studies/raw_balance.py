@@ -57,14 +57,14 @@ class Imbalance:
 def imbalance(solution: Solution) -> Imbalance:
     """Return the imbalance of the numbers of a solution."""
     problem = solution.problem
-    body, d = problem.equilibrium, problem.dim
+    body, d = problem.body, problem.dim
     nodal = body.nodal(solution.state.x)
     phi = body.phi_scale * nodal[:, d] if problem.piezoelectric else np.zeros(len(nodal))
     inner, charges = _internal(solution, nodal[:, :d], phi)
     loads, (touch, flux) = _tractions(solution), _contact(solution)
     left, charge = inner - loads + touch, charges - flux
     free, floating = np.ones(left.shape, dtype=bool), np.full(len(phi), problem.piezoelectric)
-    for fixed in problem.body.fixed:
+    for fixed in problem.description.fixed:
         facets = problem.domain.facets(fixed.on)
         nodes = fem.locate_dofs_topological(body.space, d - 1, facets)
         free[np.ix_(nodes, [*fixed.components])] = False
@@ -94,8 +94,8 @@ def imbalance(solution: Solution) -> Imbalance:
 def _internal(solution: Solution, u: Array, phi: Array) -> tuple[Array, Array]:
     """Return the nodal forces of the stresses, and the nodal charges of D."""
     problem = solution.problem
-    body, mesh, d = problem.equilibrium, problem.domain.mesh, problem.dim
-    (material,) = problem.body.materials
+    body, mesh, d = problem.body, problem.domain.mesh, problem.dim
+    (material,) = problem.description.materials
     nodes = body.space.dofmap.list
     corners = mesh.geometry.x[mesh.geometry.dofmap][:, :, :d]
     edges = corners[:, 1:] - corners[:, :1]
@@ -141,7 +141,7 @@ def _material(material: Material, strain: Array, field: Array) -> tuple[Array, A
 def _tractions(solution: Solution) -> Array:
     """Return the nodal forces of the tractions."""
     problem = solution.problem
-    body, mesh, d = problem.equilibrium, problem.domain.mesh, problem.dim
+    body, mesh, d = problem.body, problem.domain.mesh, problem.dim
     space, x = body.space, mesh.geometry.x
     forces = np.zeros((len(body.nodal(solution.state.x)), d))
     points, weights = basix.make_quadrature(FACETS[d], 6)
@@ -152,7 +152,7 @@ def _tractions(solution: Solution) -> Array:
     mesh.topology.create_connectivity(d, d - 1)
     cells_of = mesh.topology.connectivity(d - 1, d)
     facets_of = mesh.topology.connectivity(d, d - 1)
-    for load in problem.body.loads:
+    for load in problem.description.loads:
         for facet in problem.domain.facets(load.on):
             cell = cells_of.links(facet)[0]
             which = int(np.flatnonzero(facets_of.links(cell) == facet)[0])
@@ -171,7 +171,7 @@ def _tractions(solution: Solution) -> Array:
 def _contact(solution: Solution) -> tuple[Array, Array]:
     """Return the body's forces on the foundation at its nodes, and the charge that leaves it."""
     problem, table = solution.problem, solution.contact
-    body, nodes, d = problem.equilibrium, problem.nodes, problem.dim
+    body, nodes, d = problem.body, problem.nodes, problem.dim
     _, row = KDTree(table.points).query(nodes.points)
     given = np.zeros((len(row), body.block_size))
     given[:, :d] = (table.weight[:, None] * table.traction)[row]

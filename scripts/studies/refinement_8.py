@@ -85,7 +85,7 @@ def measured(solution: Solution) -> dict[str, object]:
     order = np.argsort(where)
     closed = touching[order] > 0
     charges = charge_balance(problem, solution.state)
-    phi = problem.equilibrium.phi_scale * solution.nodal[:, -1]
+    phi = problem.body.phi_scale * solution.nodal[:, -1]
     conductor = problem.interface.foundation.conductor
     return {
         "1/delta": np.nan if conductor is None else 1 / conductor.psi.delta,

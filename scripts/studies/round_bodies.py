@@ -123,7 +123,7 @@ def solution(dim: int, cell: str, order: int, degree: int, n: int, depth: float)
     state = solved(of)
     pressure = np.zeros(len(state.x) // dim)
     pressure[of.nodes.nodes] = state.forces.pressure
-    x = of.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
+    x = of.body.space.tabulate_dof_coordinates()[:, :dim]
     return Solution(x, state.x.reshape(-1, dim), pressure, of.nodes.sum(state.forces.pressure))
 
 

@@ -145,11 +145,11 @@ def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
     found = {}
     for label, name in (("Example 8.1", "piezo-8-1-conductive"), ("Example 8.2", "piezo-8-2")):
         reference = solution_of(name, (last, last // 2))
-        x, body = reference.state.x, reference.problem.equilibrium
+        x, body = reference.state.x, reference.problem.body
         measure, rows = norms(body), []
         for n in cells:
             solution = solution_of(name, (n, n // 2))
-            other = carry(solution.problem.equilibrium.function(solution.state.x), body.space)
+            other = carry(solution.problem.body.function(solution.state.x), body.space)
             rows.append(measure(other.x.array - x) / measure(x))
         errors, h = np.array(rows), 4.0 / (np.array(cells) / 2)
         found[label] = errors

@@ -220,7 +220,7 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
 
 def approach(solution: Solution) -> float:
     """Return how far the middle of the cut, at the depth R, has come down. Collective."""
-    body, hertz = solution.problem.equilibrium, Sphere()
+    body, hertz = solution.problem.body, Sphere()
     points = body.space.tabulate_dof_coordinates()[: len(body.free)]
     u = solution.state.x[: body.owned].reshape(-1, body.block_size)
     middle = np.linalg.norm(points - [0.0, 0.0, hertz.radius], axis=1) < 1e-6 * hertz.radius
@@ -246,7 +246,7 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
     ratios: dict[str, list[float]] = {"radius": [], "peak": [], "approach": [], "force": []}
     for fineness, degree in levels:
         solution, found = run(sphere(fineness, degree), hertz.force / 4)
-        space = solution.problem.equilibrium.space
+        space = solution.problem.body.space
         values = {
             "radius": found.moment / hertz.contact_radius,
             "peak": found.centre / hertz.peak,

@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for rule, changes in RULES.items():
             case = case_of(name, cells, *LAGGED[:1], *LAGGED[2:], *stopping, *changes)
             problem = build_problem(case)
-            body = problem.equilibrium
+            body = problem.body
             # From zero; the iteration after which nothing moves is the last that counts.
             states, solves, outcome = iterates(problem, case.solver)
             counts = [count(body, states, scale) for scale in (1.0, body.phi_scale)]

@@ -39,7 +39,7 @@ class Distance:
 
 def distance(reference: Solution, penalty: Solution) -> Distance:
     """Measure a penalty solution, whose problem is that of the reference. Collective."""
-    body, x = penalty.problem.equilibrium, penalty.state.x
+    body, x = penalty.problem.body, penalty.state.x
     relative = errors(body, x, body.function(reference.state.x)) / errors(body, x, None)
     norm = penalty.problem.nodes.norm
     pressure = norm(penalty.pressure - reference.pressure) / norm(reference.pressure)

@@ -143,7 +143,7 @@ def table_8_4(
 
 def difference(a: Solution, b: Solution) -> float:
     """Return the relative difference of two solutions. Collective."""
-    body = a.problem.equilibrium
+    body = a.problem.body
     x, y = (solution.state.x[: body.owned] for solution in (a, b))
     return body.norm(x - y) / body.norm(x)
 
@@ -171,7 +171,7 @@ def examples(report: Report, cells: tuple[int, int]) -> None:
 
 def values(solution: Solution) -> tuple[object, ...]:
     """Return the columns of `examples`. Collective."""
-    body, interface = solution.problem.equilibrium, solution.problem.interface
+    body, interface = solution.problem.body, solution.problem.interface
     nodes, opening = interface.nodes, interface.normal_gap(solution.nodal)
     rigid = nodes.gather(solution.forces.pressure - interface.c_0 * opening > 0)
     touching = nodes.gather(solution.status != "open")

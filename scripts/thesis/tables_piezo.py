@@ -176,7 +176,7 @@ def series(report: Report, number: str, cells: tuple[int, int]) -> None:
 def values(solution: Solution) -> tuple[object, ...]:
     """Return the columns of `series`. Collective."""
     problem, nodes, state = solution.problem, solution.problem.nodes, solution.state
-    body = problem.equilibrium
+    body = problem.body
     phi = body.phi_scale * solution.nodal[:, -1]
     u = state.x.reshape(-1, body.block_size)[:, : body.dim]
     charges = charge_balance(problem, state)
@@ -204,7 +204,7 @@ def linear_iterations(problem: ContactProblem) -> int:
     nodal = problem.nodal(state)
     blocks = augmentation(problem.nodes, problem.scales.augmentation, problem.frictional)
     blocks = blocks + interface.foundation.charge_block(nodal, np.ones(len(nodal)))
-    operator = SparseOperator(problem.equilibrium, interface.coupled, kind="iterative")
+    operator = SparseOperator(problem.body, interface.coupled, kind="iterative")
     operator.update("secant", state, interface.weighted(blocks, state.x))
     operator.solve(-residual_forces(problem, state))
     return operator.counters.linear_iterations
@@ -221,7 +221,7 @@ def iterative(report: Report, coarse: bool) -> None:
             problem = build_problem(load_case(CASES / f"{name}.toml", [grid]))
             columns["body"].append(name)
             columns["cells"].append(" x ".join(map(str, cells)))
-            dofmap = problem.equilibrium.space.dofmap
+            dofmap = problem.body.space.dofmap
             columns["unknowns"].append(dofmap.index_map.size_global * dofmap.index_map_bs)
             columns["iterations"].append(linear_iterations(problem))
     report.table(

@@ -42,17 +42,17 @@ NAMES += ["norm in space P2", "norm in space P1"]
 
 def scattered(problem, seed):
     """Return a random displacement with strains around and beyond yield, and a direction."""
-    random, unknowns = np.random.default_rng(seed), problem.equilibrium.owned
+    random, unknowns = np.random.default_rng(seed), problem.body.owned
     size = 3 * XI / problem.domain.mesh.geometry.x.max()
     x = size * random.standard_normal(unknowns)
-    direction = random.standard_normal(unknowns) * problem.equilibrium.free.ravel()
+    direction = random.standard_normal(unknowns) * problem.body.free.ravel()
     return x, direction / np.linalg.norm(direction)
 
 
 def operator_at(problem, kind, x):
     """Return the operator of the body, linearised at unknowns, without any blocks."""
-    nodes, bs = problem.nodes.nodes, problem.equilibrium.block_size
-    operator = SparseOperator(problem.equilibrium, nodes)
+    nodes, bs = problem.nodes.nodes, problem.body.block_size
+    operator = SparseOperator(problem.body, nodes)
     operator.update(kind, BodyState(x), np.zeros((nodes.size, bs, bs)))
     return operator
 
@@ -61,13 +61,13 @@ def operator_at(problem, kind, x):
 @pytest.mark.parametrize("case", NAMES)
 def test_internal_forces_are_the_derivative_of_the_assembled_energy(cases, case):
     """B(u; u, v) = d/dt M(u + t v), with shear strains and all."""
-    problem, body = cases[case], cases[case].equilibrium
+    problem, body = cases[case], cases[case].body
     base, direction = scattered(problem, 1)
     at = body.function(base)
     u, _ = body.split(at)
     degree = 1 if body.degree == 1 else 4
     dx = problem.domain.dx(metadata={"quadrature_degree": degree})
-    stored = fem.form(energy_density(problem.body.law, strain(u)) * dx)
+    stored = fem.form(energy_density(problem.description.law, strain(u)) * dx)
     work, h = float(body.internal_forces(BodyState(base)) @ direction), 1e-5 * XI
     energies = []
     for t in (2, 1, -1, -2):
@@ -80,7 +80,7 @@ def test_internal_forces_are_the_derivative_of_the_assembled_energy(cases, case)
 @pytest.mark.core
 @pytest.mark.parametrize("case", NAMES)
 def test_tangent_is_the_derivative_of_the_internal_forces(cases, case):
-    problem, body = cases[case], cases[case].equilibrium
+    problem, body = cases[case], cases[case].body
     base, direction = scattered(problem, 2)
     matrix = operator_at(problem, "tangent", base).matrix
     vector, product = matrix.createVecs()
@@ -88,19 +88,19 @@ def test_tangent_is_the_derivative_of_the_internal_forces(cases, case):
     matrix.mult(vector, product)
     h = 1e-6 * XI
     forces = [body.internal_forces(BodyState(base + t * h * direction)) for t in (1, -1)]
-    slope = np.where(problem.equilibrium.free.ravel(), (forces[0] - forces[1]) / (2 * h), 0.0)
+    slope = np.where(problem.body.free.ravel(), (forces[0] - forces[1]) / (2 * h), 0.0)
     assert np.linalg.norm(product.array - slope) < 2e-4 * np.linalg.norm(slope)
 
 
 @pytest.mark.parametrize("case", ["norm P1", "norm P2", "norm in space P2"])
 def test_the_secant_form_with_frozen_modulus(cases, case):
     """B(u; v, w) is linear and symmetric in v and w; B(u; u, w) are the internal forces."""
-    problem, body = cases[case], cases[case].equilibrium
+    problem, body = cases[case], cases[case].body
     x, _ = scattered(problem, 3)
     forces = body.internal_forces(BodyState(x))
     matrix = operator_at(problem, "secant", x).matrix
     assert matrix.isSymmetric(1e-12)
-    free = problem.equilibrium.free.ravel()
+    free = problem.body.free.ravel()
     vector, product = matrix.createVecs()
     # Columns of fixed unknowns are eliminated: take their displacement as 0.
     vector.array[:] = np.where(free, x, 0.0)

@@ -41,7 +41,7 @@ def column(elastic, **more):
 
 def extremes(solution):
     """Return the largest |u_x|, and u_y at the bottom and at the top. Collective."""
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     u = body.nodal(solution.state.x)[: body.owned // body.block_size, : body.dim]
     y = body.layout.points[:, 1]
     here = [np.abs(u[:, 0]).max(initial=0.0)]
@@ -101,7 +101,7 @@ def test_a_normal_stiffness_on_an_inclined_face_is_that_of_the_turned_problem(an
     straight, turned = made(0.0), made(angle)
     sizes = []
     for solution in (straight, turned):
-        body = solution.problem.equilibrium
+        body = solution.problem.body
         u = body.nodal(solution.state.x)[: body.owned // 2]
         sizes.append(np.sort(np.concatenate(COMM.allgather(np.linalg.norm(u, axis=1)))))
     assert np.allclose(*sizes, rtol=0, atol=1e-12 * sizes[0].max() + 1e-13)

@@ -54,7 +54,7 @@ def pressed(domain, materials, degree=1):
 def results(solution):
     """Return contact forces, von Mises stresses, and the estimated error with its norm."""
     forces = solution.state.forces
-    fields = DerivedFields(solution.problem.equilibrium, solution.state)
+    fields = DerivedFields(solution.problem.body, solution.state)
     error = estimated(solution.problem, solution.state)
     return [
         forces.pressure,
@@ -105,7 +105,7 @@ def test_a_column_whose_modulus_grows_with_the_height():
     for degree, cells in ((1, 8), (1, 16), (2, 8)):
         problem = Problem(block(cells), body, Contact("right", 1.0), degree=degree)
         solution = solve(problem, TIGHT)
-        top = problem.equilibrium.space.tabulate_dof_coordinates()[:, 1] > 1 - 1e-9
-        moved = problem.equilibrium.nodal(solution.state.x)[top, 1].mean()
+        top = problem.body.space.tabulate_dof_coordinates()[:, 1] > 1 - 1e-9
+        moved = problem.body.nodal(solution.state.x)[top, 1].mean()
         errors.append(abs(moved / (-0.01 * np.log(2)) - 1))
     assert errors[0] > 3.5 * errors[1] and errors[2] < 1e-4

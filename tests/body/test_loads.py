@@ -23,7 +23,7 @@ DOWN = -0.03
 
 def external(problem, time=1.0):
     """Return the resultant of the loads. Collective."""
-    body = problem.equilibrium
+    body = problem.body
     nodal = body.nodal(body.external(time))[:, : body.dim]
     return body.comm.allreduce(nodal.sum(axis=0), op=MPI.SUM)
 
@@ -50,7 +50,7 @@ def test_a_force_is_the_resultant_and_a_traction_is_per_area(dim):
     # Evenly: the traction of that resultant, on the same mesh, which ranks may share otherwise.
     evenly = Load("top", traction=[f / area for f in force])
     even = block(evenly, dim, domain=found.domain)
-    loads = (p.equilibrium.external(1.0) for p in (found, even))
+    loads = (p.body.external(1.0) for p in (found, even))
     assert np.allclose(*loads, rtol=0, atol=1e-15)
 
 

@@ -187,7 +187,7 @@ def test_multigrid_in_space(n):
 
 def test_the_stress_has_a_constant_mean_in_each_cell():
     solution = bar(MEAN)
-    stress = DerivedFields(solution.problem.equilibrium, solution.state).cells()["stress"]
+    stress = DerivedFields(solution.problem.body, solution.state).cells()["stress"]
     trace = np.einsum("cpii->cp", stress.x.array[:].reshape(-1, 3, 3, 3))
     assert np.abs(np.ptp(trace, axis=1)).max() < 1e-12 * np.abs(trace).max()
     assert np.abs(np.ptp(trace, axis=0)).max() > 0.1 * np.abs(trace).max()
@@ -209,8 +209,8 @@ def test_a_nearly_incompressible_tube():
     for n, element in ((4, "mean_dilatation"), (8, "mean_dilatation"), (8, "standard")):
         problem = tube.problem(n, 2, element=element)
         state = Newton(problem, NewtonOptions(tolerance=1e-10)).solve(problem.start())[0]
-        known = errors(problem.equilibrium, state.x, None)
-        found.append((errors(problem.equilibrium, state.x, tube.displacement) / known).l2)
+        known = errors(problem.body, state.x, None)
+        found.append((errors(problem.body, state.x, tube.displacement) / known).l2)
     assert found[1] < 4e-5 and found[1] < found[2] / 5
     assert found[0] > 6 * found[1]
 

@@ -42,7 +42,7 @@ def test_parts_add_up_to_the_body(
     for size in (materials.CHUNK, 5):
         monkeypatch.setattr(materials, "CHUNK", size)
         problem = build_problem(case(**material), COMM)
-        body, state = problem.equilibrium, problem.start()
+        body, state = problem.body, problem.start()
         x = np.sin(17.0 * body.layout.points).ravel() * 0.02
         state = type(state)(body.local(x), state.forces, state.time, state.history)
         matrix = body.create_matrix()

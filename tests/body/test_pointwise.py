@@ -13,7 +13,7 @@ from tests.problems import mechanics
 
 @pytest.fixture
 def body():
-    return mechanics.bar(MPI.COMM_WORLD, 4, law=Linear(1.0, 0.3)).equilibrium
+    return mechanics.bar(MPI.COMM_WORLD, 4, law=Linear(1.0, 0.3)).body
 
 
 def stretched(body, by: float) -> np.ndarray:

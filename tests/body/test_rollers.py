@@ -51,7 +51,7 @@ def block(angle, dim=2, given=0.0, sides=("left",), **more):
 
 def lengths(solution):
     """Return the lengths of all displacements, sorted. Collective."""
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     u = body.nodal(solution.state.x)[: body.owned // body.block_size, : body.dim]
     found = np.concatenate(COMM.allgather(np.column_stack([body.layout.points, u])))
     return np.sort(np.linalg.norm(found[:, body.dim :], axis=1))
@@ -117,7 +117,7 @@ def test_nodes_of_two_inclined_faces_are_held_by_both(law, order):
         comm=COMM,
     )
     assert solution.converged
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     u = body.nodal(solution.state.x)[: body.owned // 2] @ np.array(turned([1, 0], 30.0))
     assert np.abs(u).max(initial=0.0) < 1e-13
     assert solution.reaction("bottom") == pytest.approx(turned([0.0, 0.075], 30.0), abs=1e-12)
@@ -154,7 +154,7 @@ def test_a_circle_pressed_in_is_the_closed_form_of_a_ring(degree, bound, order):
     for around in (8, 16) if degree == 1 else (3, 6):
         solution = shrunk(sector(COMM, around), degree, amount)
         assert solution.converged
-        body = solution.problem.equilibrium
+        body = solution.problem.body
         u, x = body.nodal(solution.state.x)[: body.owned // 2], body.layout.points
         r = np.linalg.norm(x, axis=1)
         error = np.abs(u - (a + a * b / r**2)[:, None] * x).max(initial=0.0)

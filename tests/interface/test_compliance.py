@@ -48,7 +48,7 @@ def check_solution(column: LayerColumn, loop: FixedPoint | Newton) -> None:
     )
     assert np.abs(loop.state.forces.pressure - rest).max() < 1e-10 * max(layer + rest, 1)
     if column.piezo:
-        assert np.abs(problem.equilibrium.phi_scale * nodal[:, -1] - potential).max() < 1e-10
+        assert np.abs(problem.body.phi_scale * nodal[:, -1] - potential).max() < 1e-10
 
 
 @pytest.mark.core
@@ -180,7 +180,7 @@ def test_ranks_agree_on_a_layer_in_space():
         bare = leaning_block(comm, 3)
         layer = Layer(0.004, Compliance(0.003), PotentialFactor(4.0))
         contact = bare.contacts[0].model_copy(update={"foundation": flat(0.005), "layer": layer})
-        return ContactProblem(bare.domain, bare.body, contact)
+        return ContactProblem(bare.domain, bare.description, contact)
 
     def quantities(loop):
         nodal, nodes = loop.problem.nodal(loop.state), loop.problem.nodes

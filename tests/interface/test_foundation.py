@@ -31,7 +31,7 @@ def turned(dim):
         domain = box(
             MPI.COMM_SELF, [0] * 3, [1] * 3, [3, 2, 1], rotation=25.0, axis=(1.0, 2.0, 0.5)
         )
-    body = example.body
+    body = example.description
     held = type(body)(body.law, [type(body.fixed[0])("top", body.fixed[0].displacement)])
     friction = Friction(ConstantCoefficient(0.4))
     gap = GapFunction(lambda points: 0.02 * np.sin(5 * points[:, 0]))
@@ -46,7 +46,7 @@ def problem(request):
 @pytest.fixture(scope="module")
 def x(problem):
     """Return random unknowns, also where they are fixed."""
-    return 0.03 * np.random.default_rng(5).standard_normal(problem.equilibrium.owned)
+    return 0.03 * np.random.default_rng(5).standard_normal(problem.body.owned)
 
 
 def vertex_rule(problem):
@@ -67,14 +67,14 @@ def assembled(form):
 
 
 def lumped(problem, vectors):
-    total = np.zeros(problem.equilibrium.owned)
+    total = np.zeros(problem.body.owned)
     problem.nodes.add_jump_transposed(problem.nodes.weight[:, None] * vectors, total)
     return total
 
 
 @pytest.mark.core
 def test_augmentation_is_the_form_of_the_augmented_lagrangian(problem, x):
-    body, nodes = problem.equilibrium, problem.nodes
+    body, nodes = problem.body, problem.nodes
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
     for friction in (True, False):
         blocks = augmentation(nodes, R, friction)
@@ -90,9 +90,9 @@ def normal_of(problem):
 @pytest.mark.core
 def test_auxiliary_load(problem):
     random = np.random.default_rng(6)
-    nodes, v = problem.nodes, ufl.TestFunction(problem.equilibrium.space)
+    nodes, v = problem.nodes, ufl.TestFunction(problem.body.space)
     phi_c, lam_c = random.standard_normal((2, nodes.size))
-    phi_f, lam_f = fem.Function(problem.equilibrium.space), fem.Function(problem.equilibrium.space)
+    phi_f, lam_f = fem.Function(problem.body.space), fem.Function(problem.body.space)
     for function in (phi_f, lam_f):
         function.x.array[:] = random.standard_normal(function.x.array.size)
     form = forms.auxiliary_load(
@@ -107,7 +107,7 @@ def test_auxiliary_load(problem):
 
 @pytest.mark.core
 def test_penalty_forms(problem, x):
-    body, nodes = problem.equilibrium, problem.nodes
+    body, nodes = problem.body, problem.nodes
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
     u, nodal = body.function(x), nodes.jump(x)
     laws = PenalisedLaw(problem.interface, Regularisation(EPS, EPS), nodal)
@@ -175,6 +175,6 @@ def test_a_foundation_that_no_node_can_reach_is_refused():
     with pytest.raises(InputError, match=r"\[foundation-missed\]"):
         ContactProblem(
             example.domain,
-            example.body,
+            example.description,
             Contact("bottom", Plane((0, 9), (0, -1), direction="body")),
         )

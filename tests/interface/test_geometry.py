@@ -58,7 +58,7 @@ def on_a_ball(domain, degree):
 
 def displaced(problem, motion):
     """Return the geometry at a motion of the bodies."""
-    body = problem.equilibrium
+    body = problem.body
     x = body.space.tabulate_dof_coordinates()[: body.layout.index_map.size_local, : body.dim]
     (placement,) = problem.placements
     return placement.at(motion(x) - x)
@@ -132,9 +132,9 @@ def test_moment_arms_on_a_moving_foundation_are_those_of_the_place(motion) -> No
     body = Body(Linear(1.0, 0.3), [Fixed("top", [constant(0.0, 2)] * 2)])
     problem = ContactProblem(domain, body, Contact("bottom", ball, rigid=moving))
     nodes = displaced(problem, motion).nodes
-    (member,) = problem.equilibrium.global_unknowns.members
+    (member,) = problem.body.global_unknowns.members
     force = np.random.default_rng(nodes.size).standard_normal(nodes.normal.shape)
-    into = np.zeros_like(problem.equilibrium.zero_displacement())
+    into = np.zeros_like(problem.body.zero_displacement())
     nodes.add_jump_transposed(force, into)
     arm = motion(nodes.points) - centre
     moment = COMM.allreduce(float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum()))

@@ -115,7 +115,7 @@ def test_what_rounding_leaves_of_a_multiplier_conducts_nothing():
 def test_the_forms_j_1_and_l_are_the_nodal_force_and_charge():
     column = replace(PIEZO_REGIMES["linear"], delta=4.0)
     problem = column.problem()
-    body, state = problem.equilibrium, solve(problem).state
+    body, state = problem.body, solve(problem).state
     u, phi = body.split(body.function(state.x))
     v, xi = body.split(ufl.TestFunction(body.space))
     nu = ufl.FacetNormal(problem.domain.mesh)

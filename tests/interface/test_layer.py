@@ -55,7 +55,7 @@ def test_what_is_no_layer_is_refused(layer):
     bare = leaning_block(MPI.COMM_SELF, 2)
     contact = bare.contacts[0].model_copy(update={"layer": layer})
     with pytest.raises(InputError, match=r"\[layer-law\]"):
-        ContactProblem(bare.domain, bare.body, contact)
+        ContactProblem(bare.domain, bare.description, contact)
 
 
 def hump(s):

@@ -88,7 +88,7 @@ def test_tangents_project_onto_the_free_tangential_directions():
 @pytest.mark.core
 def test_apply_and_transpose_are_each_other_s_transpose():
     problem = leaning_block(MPI.COMM_SELF, 2)
-    nodes, owned = problem.nodes, problem.equilibrium.owned
+    nodes, owned = problem.nodes, problem.body.owned
     random = np.random.default_rng(0)
     x, y = random.standard_normal(owned), random.standard_normal((nodes.size, 3))
     total = np.zeros(owned)
@@ -138,7 +138,7 @@ def test_a_direction_that_is_partly_fixed(prescribed, degree):
 def test_nodes_that_cannot_reach_the_foundation_are_left_out():
     away = GapFunction(lambda p: np.where(p[:, 0] > 2, np.inf, 0.0))
     example = bar(MPI.COMM_SELF, 4)
-    nodes = ContactProblem(example.domain, example.body, Contact("bottom", away)).nodes
+    nodes = ContactProblem(example.domain, example.description, Contact("bottom", away)).nodes
     assert nodes.points[:, 0].max() <= 2.0
     assert np.all(np.isfinite(nodes.gap))
 

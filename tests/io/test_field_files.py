@@ -85,11 +85,11 @@ def test_a_failed_write_leaves_the_earlier_results(
 def test_derived_fields_of_a_known_strain(degree: int) -> None:
     """Homogeneous compression: the stress is (1.13), in the cells and at the nodes."""
     problem = build_problem(block(2, degree))
-    points = problem.equilibrium.space.tabulate_dof_coordinates()
-    x = problem.equilibrium.zero_displacement()
+    points = problem.body.space.tabulate_dof_coordinates()
+    x = problem.body.zero_displacement()
     x[1::2] = -0.05 * points[:, 1]
-    fields = DerivedFields(problem.equilibrium, BodyState(x))
-    law, t = problem.body.law, 0.05 * np.sqrt(2 / 3)
+    fields = DerivedFields(problem.body, BodyState(x))
+    law, t = problem.description.law, 0.05 * np.sqrt(2 / 3)
     g = float(law.secant_modulus(t**2))
     across = -0.05 * (law.bulk - 2 * g / 3)
     stress = np.diag([across, across - 0.1 * g, across]).ravel()

@@ -24,7 +24,7 @@ WORLD = MPI.COMM_WORLD
 
 def level_of(problem: ContactProblem, steps: int = 1) -> tuple[PETSc.Mat, Aggregation]:
     """Return the stiffness of a body, and its first coarse level. Collective."""
-    body = problem.equilibrium
+    body = problem.body
     matrix = body.create_matrix()
     body.assemble(matrix, "secant", problem.start())
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -134,7 +134,7 @@ def test_the_coarse_operator_of_wider_interpolation_is_that_of_petsc() -> None:
 @pytest.mark.parallel
 def test_entries_may_be_zero_where_others_are_later() -> None:
     """The pattern of the coarse operator lacked those that the first values made zero."""
-    body = (problem := mechanics.leaning_block(WORLD, 4)).equilibrium
+    body = (problem := mechanics.leaning_block(WORLD, 4)).body
     coupled = body.create_matrix()
     body.assemble(coupled, "secant", problem.start())
     matrix = coupled.copy()
@@ -156,7 +156,7 @@ def test_entries_may_be_zero_where_others_are_later() -> None:
 @pytest.mark.parallel
 def test_rounding_on_one_side_of_a_symmetric_matrix() -> None:
     """With a threshold of zero one rank broke off, and the others waited for it."""
-    body = (problem := mechanics.leaning_block(WORLD, 8)).equilibrium
+    body = (problem := mechanics.leaning_block(WORLD, 8)).body
     matrix = body.create_matrix()
     body.assemble(matrix, "secant", problem.start())
     starts, columns, values = matrix.getValuesCSR()
@@ -190,10 +190,10 @@ def test_multigrid_knows_rigid_motions_with_inclined_supports() -> None:
     problem = ContactProblem(domain, body, Contact("bottom", plane))
     found, blocks = {}, np.tile(np.eye(3), (problem.nodes.nodes.size, 1, 1))
     for kind in ("iterative", "lu"):
-        operator = SparseOperator(problem.equilibrium, problem.nodes.nodes, kind=kind)
+        operator = SparseOperator(problem.body, problem.nodes.nodes, kind=kind)
         operator.update("secant", problem.start(), blocks)
-        found[kind] = operator.solve(problem.equilibrium.external())
-    norm = problem.equilibrium.norm
+        found[kind] = operator.solve(problem.body.external())
+    norm = problem.body.norm
     assert norm(found["iterative"] - found["lu"]) <= 1e-8 * norm(found["lu"])
 
 

@@ -25,7 +25,7 @@ GAMMA, MU = 1e4, 0.4
 
 def operator_of(problem: ContactProblem, kind: str, *, symmetric: bool = True) -> SparseOperator:
     """Return the operator with blocks at the contact nodes."""
-    body, nodes = problem.equilibrium, problem.nodes.nodes
+    body, nodes = problem.body, problem.nodes.nodes
     return SparseOperator(body, nodes, symmetric=symmetric, kind=kind)
 
 
@@ -47,7 +47,7 @@ def sliding(problem: ContactProblem, mu: float) -> tuple[Array, Array]:
 def test_no_solve_takes_more_iterations_than_are_allowed() -> None:
     """The limit of the first solve was forgotten in those that follow it."""
     problem, most = mechanics.leaning_block(WORLD, 12), 5
-    body, weight = problem.equilibrium, problem.nodes.weight[:, None, None]
+    body, weight = problem.body, problem.nodes.weight[:, None, None]
     x, load, sticks = problem.start().x, body.external(), weight * sticking(problem)
     options = PETSc.Options()
     options["contact_ksp_max_it"] = most
@@ -71,7 +71,7 @@ def test_aggregates_that_are_too_small_are_no_fault_of_the_body() -> None:
         operator = operator_of(problem, "iterative")
         operator.update("secant", problem.start(), sticking(problem))
         with pytest.raises(InputError, match=r"\[multigrid\]"):
-            operator.solve(problem.equilibrium.external(), 1e-6)
+            operator.solve(problem.body.external(), 1e-6)
     finally:
         options.delValue("contact_pc_gamg_aggressive_coarsening")
 
@@ -81,7 +81,7 @@ def test_an_operator_is_freed_at_once() -> None:
     problem = mechanics.leaning_block(SELF, 4)
     operator = operator_of(problem, "iterative")
     operator.update("secant", problem.start(), sticking(problem))
-    operator.solve(problem.equilibrium.external(), 1e-6)
+    operator.solve(problem.body.external(), 1e-6)
     left = weakref.ref(operator)
     gc.disable()
     try:
@@ -96,7 +96,7 @@ def test_an_operator_is_freed_at_once() -> None:
 def test_forces_that_contact_carries_do_not_blur_the_solution() -> None:
     """The tolerance is one on the solution, however large the contact forces on the right are."""
     problem = mechanics.leaning_block(WORLD, 4)
-    body, x = problem.equilibrium, problem.start().x
+    body, x = problem.body, problem.start().x
     blocks, force = sliding(problem, MU)
     rhs = body.external()
     problem.nodes.add_jump_transposed(1e-3 * force, rhs)
@@ -112,7 +112,7 @@ def test_forces_that_contact_carries_do_not_blur_the_solution() -> None:
 def test_a_tolerance_is_that_of_one_solve() -> None:
     """A solve to the solver's own tolerance was one to that of the solve before."""
     problem = mechanics.leaning_block(SELF, 4)
-    operator, rhs = operator_of(problem, "iterative"), problem.equilibrium.external()
+    operator, rhs = operator_of(problem, "iterative"), problem.body.external()
     operator.update("secant", problem.start(), sticking(problem))
     first = operator.solve(rhs)
     rough = operator.solve(rhs, 1e-2)
@@ -154,7 +154,7 @@ def test_contact_alone_may_hold_the_body(dim: int) -> None:
 def test_fixed_unknowns_stay_exactly_where_they_are():
     """An iterative solver leaves them to its tolerance: a body that flew first kept 2e-5 of it."""
     problem = mechanics.leaning_block(MPI.COMM_SELF, 4)
-    body = problem.equilibrium
+    body = problem.body
     operator = body.operator(
         problem.nodes.nodes, symmetric=True, counters=Counters(), kind="iterative"
     )
@@ -175,11 +175,9 @@ def test_a_factorisation_takes_the_workspace_it_needs(degree: int) -> None:
     pc = poor.ksp.getPC()
     pc.setFactorSetUpSolverType()
     pc.getFactorMatrix().setMumpsIcntl(14, -90)
-    sides = np.column_stack([problem.equilibrium.external(), np.ones(problem.equilibrium.owned)])
+    sides = np.column_stack([problem.body.external(), np.ones(problem.body.owned)])
     for operator in (kept, poor):
-        operator.update(
-            "secant", BodyState(problem.equilibrium.zero_displacement()), sticking(problem)
-        )
+        operator.update("secant", BodyState(problem.body.zero_displacement()), sticking(problem))
     known, found = (operator.solve_all(sides) for operator in (kept, poor))
     np.testing.assert_allclose(found, known, rtol=1e-9, atol=1e-12)
     assert pc.getFactorMatrix().getMumpsIcntl(14) > 0
@@ -193,6 +191,6 @@ def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPat
     operator.ksp.setOperators(operator.matrix)
     operator.ksp.getPC().setFactorSetUpSolverType()
     operator.ksp.getPC().getFactorMatrix().setMumpsIcntl(14, -90)
-    operator.update("secant", BodyState(problem.equilibrium.zero_displacement()), sticking(problem))
+    operator.update("secant", BodyState(problem.body.zero_displacement()), sticking(problem))
     with pytest.raises(InputError, match=r"\[memory\]"):
-        operator.solve_all(np.ones((problem.equilibrium.owned, 2)))
+        operator.solve_all(np.ones((problem.body.owned, 2)))

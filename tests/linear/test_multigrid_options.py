@@ -20,19 +20,19 @@ def solved(given: dict[str, str]) -> tuple[SparseOperator, PETSc.PC, int]:
     """
     problem = mechanics.leaning_block(WORLD, 8)
     blocks = np.tile(np.eye(3), (problem.nodes.nodes.size, 1, 1))
-    rhs = problem.equilibrium.layout.mask(problem.equilibrium.external())
+    rhs = problem.body.layout.mask(problem.body.external())
     known = PETSc.Options("contact_")
     for name, value in given.items():
         known[name] = value
     try:
-        operator = SparseOperator(problem.equilibrium, problem.nodes.nodes, kind="iterative")
+        operator = SparseOperator(problem.body, problem.nodes.nodes, kind="iterative")
         operator.update("secant", problem.start(), blocks)
         found = operator.solve(rhs)
     finally:
         for name in given:
             known.delValue(name)
-    residual = problem.equilibrium.norm(operator.multiply(found) - rhs)
-    assert residual <= 1e-7 * problem.equilibrium.norm(rhs)
+    residual = problem.body.norm(operator.multiply(found) - rhs)
+    assert residual <= 1e-7 * problem.body.norm(rhs)
     return operator, operator.ksp.getPC(), operator.counters.linear_iterations
 
 

@@ -68,14 +68,14 @@ def test_layers_in_series(law: str, degree: int) -> None:
     solution = solve(given, domain=two_layers())
     assert solution.converged
     problem = solution.problem
-    laws = [material.law for material in problem.body.materials]
+    laws = [material.law for material in problem.description.materials]
     moduli = [float(law.bulk + 4 / 3 * law.shear) for law in laws]
     assert problem.scales.young == LOWER
-    y = problem.equilibrium.space.tabulate_dof_coordinates()[:, 1]
+    y = problem.body.space.tabulate_dof_coordinates()[:, 1]
     depth = 0.1 * (np.minimum(y, 0.5) / moduli[0] + np.maximum(y - 0.5, 0) / moduli[1])
     u = solution.state.x.reshape(-1, 2)
     np.testing.assert_allclose(u[:, 1], -depth, rtol=0, atol=1e-10)
-    across = DerivedFields(problem.equilibrium, solution.state).cells()["stress"]
+    across = DerivedFields(problem.body, solution.state).cells()["stress"]
     expected = [
         -0.1 * float(law.bulk - 2 / 3 * law.shear) / m for law, m in zip(laws, moduli, strict=True)
     ]
@@ -83,7 +83,7 @@ def test_layers_in_series(law: str, degree: int) -> None:
     nearest = np.abs(stress[:, :1] - expected).min(axis=1, initial=np.inf)
     assert nearest.max(initial=0.0) < 1e-9
     np.testing.assert_allclose(stress[:, 4], -0.1, rtol=1e-8)
-    fields = DerivedFields(problem.equilibrium, solution.state)
+    fields = DerivedFields(problem.body, solution.state)
     strains = [largest.strain for largest in fields.extremes()]
     np.testing.assert_allclose(strains, 0.1 / np.array(moduli) * np.sqrt(2 / 3), rtol=1e-8)
 

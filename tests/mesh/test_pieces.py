@@ -56,9 +56,9 @@ def squares(folder: Path, *, share: bool, friction: bool = True) -> dict:
 @pytest.mark.parametrize("share", [True, False])
 def test_nodes_of_one_piece(share: bool, shared_tmp_path: Path) -> None:
     problem = build_problem(parse_case(squares(shared_tmp_path, share=share)), COMM)
-    labels, count = connected_components(problem.equilibrium.space)
+    labels, count = connected_components(problem.body.space)
     assert count == (1 if share else 2)
-    x = problem.equilibrium.space.tabulate_dof_coordinates()[: labels.size, 0]
+    x = problem.body.space.tabulate_dof_coordinates()[: labels.size, 0]
     inner = np.abs(x - 1) > 1e-9
     found = COMM.allgather(set(zip((x[inner] > 1).tolist(), labels[inner].tolist(), strict=True)))
     assert len(set().union(*found)) == 2, "left and right of the edge: one label each"

@@ -33,7 +33,7 @@ def test_the_least_of_all_places():
     motions = "translation along x, translation along y, rotation"
     assert f"nothing holds ring against rigid motions ({motions})" in said
 
-    modes, body = UnconstrainedModes(problem), problem.equilibrium
+    modes, body = UnconstrainedModes(problem), problem.body
     found = modes.free_motion(problem, state)
     assert not found.limited
     assert np.abs(found.motion).max() < 1e-9
@@ -224,7 +224,7 @@ def test_two_pads_that_a_lid_pushes_go_no_farther_than_they_must(method, tmp_pat
     }  # fmt: skip
     solution = solve(parse_case(case), comm=MPI.COMM_SELF)
     assert solution.converged, solution.outcome.reason
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     heights, moved = body.space.tabulate_dof_coordinates()[:, 1], body.nodal(solution.state.x)
     for low, high, way in ((0.04, 0.555, -0.02), (0.555, 1.01, -0.03)):
         own = moved[(heights > low) & (heights < high), :2]
@@ -249,7 +249,7 @@ def test_least_displacements_are_orthogonal_to_rigid_motions(degree, tmp_path):
         "friction": {"law": "coulomb", "mu": 0.3},
     }
     solution = solve(parse_case(case), comm=MPI.COMM_SELF)
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     u = fem.Function(body.space)
     u.x.array[:] = solution.state.x[: u.x.array.size]
     x = ufl.SpatialCoordinate(body.space.mesh)

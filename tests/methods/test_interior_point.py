@@ -236,7 +236,7 @@ def test_no_friction_is_solved_like_none(law):
     # The upper half rolls on the lower one at next to no force: two runs whose residuals are 2e-12
     # differ by 5e-6, and pressures, which are up to 27, by 1e-6 with it; by elastic strains less.
     assert np.allclose(state.forces.pressure, found.forces.pressure, rtol=0, atol=1e-5)
-    body = method.problem.equilibrium
+    body = method.problem.body
     points, component = body.layout.points, body.components[0]
     upper = component == component[points[:, 1].argmax()]
     rigid = rigid_motions(points[upper]).reshape(-1, 3)

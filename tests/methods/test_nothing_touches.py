@@ -53,7 +53,7 @@ def test_an_approach_of_two_blocks():
     problem = build_problem(parse_case(APPROACH), SELF)
     steps = stepped(problem, TENTHS)
     assert steps[-1][1].reason == "all residuals <= 1e-08"
-    top = problem.equilibrium.nodal(steps[-1][0].x)[:, 1].min()
+    top = problem.body.nodal(steps[-1][0].x)[:, 1].min()
     assert np.isclose(top, -0.001)
 
 

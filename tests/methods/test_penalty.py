@@ -42,7 +42,7 @@ def relative(problem: ContactProblem, a, b) -> float:
 @pytest.mark.parametrize("load", [-0.005, -0.05])
 def test_error_and_pressure_fall_like_eps(load):
     problem = bar(load=load, coefficient=ConstantCoefficient(0.5))
-    owned = problem.equilibrium.owned
+    owned = problem.body.owned
     reference, outcome = FixedPoint(problem, FixedPointOptions(tolerance=1e-11)).solve()
     assert outcome.converged
     x = reference.x[:owned]
@@ -84,7 +84,7 @@ def test_all_ways_lead_to_the_same_solution(material_step):
         options = PenaltyOptions(eps_contact=1e-3, material_step=step, tolerance=1e-10)
         state, outcome = Penalty(problem, options).solve()
         assert outcome.converged, outcome.reason
-        solutions.append(state.x[: problem.equilibrium.owned])
+        solutions.append(state.x[: problem.body.owned])
     assert relative(problem, solutions[1], solutions[0]) < 1e-8
 
 
@@ -120,7 +120,7 @@ def test_the_two_parameters_are_separate():
         options = PenaltyOptions(eps_contact=contact, eps_slip=slip)
         state, outcome = Penalty(problem, options).solve()
         assert outcome.converged
-        solutions[contact, slip] = state.x[: problem.equilibrium.owned]
+        solutions[contact, slip] = state.x[: problem.body.owned]
     same, other = solutions[1e-4, None], solutions[1e-4, 1e-6]
     assert relative(problem, same, solutions[1e-4, 1e-4]) < 1e-12
     assert relative(problem, other, same) > 1e-3
@@ -155,7 +155,7 @@ def test_smoothed_pressure(radius):
     assert outcome.converged
     state, outcome = Penalty(problem, PenaltyOptions(eps_contact=1e-8)).solve()
     assert outcome.converged, outcome.reason
-    owned = problem.equilibrium.owned
+    owned = problem.body.owned
     assert relative(problem, state.x[:owned], reference.x[:owned]) < 1e-4
 
 

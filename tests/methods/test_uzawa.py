@@ -221,12 +221,12 @@ def test_nothing_to_do():
     """No load: a body at rest on its foundation, and one that does not touch it."""
     for gap in (0.0, 1.0):
         example = bar(MPI.COMM_SELF, 4)
-        body = Body(example.body.law, example.body.fixed)
+        body = Body(example.description.law, example.description.fixed)
         contact = example.contacts[0].model_copy(update={"foundation": flat(gap)})
         problem = ContactProblem(example.domain, body, contact)
         loop = solve(problem)
         assert np.abs(loop.state.x).max() < 1e-14
         assert np.abs(loop.state.forces.pressure).max() < 1e-14
     lifted = bar(MPI.COMM_SELF, 4, 0.005)
-    gapped = ContactProblem(lifted.domain, lifted.body, Contact("bottom", flat(5.0)))
+    gapped = ContactProblem(lifted.domain, lifted.description, Contact("bottom", flat(5.0)))
     assert np.abs(solve(gapped).state.forces.pressure).max() < 1e-13

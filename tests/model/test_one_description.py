@@ -106,7 +106,7 @@ def test_foundations_move_by_the_contact() -> None:
     plane = Plane((0.0, 0.0), (0.0, 1.0))
     first = Problem(block(), body, Contact("bottom", plane, rigid=motion), Friction(mu=0.1))
     moved = Body(body.law, body.fixed, rigid=Rigid("bottom", motion, foundation=True))
-    again = Problem(first.domain, first.body, first.contacts)
+    again = Problem(first.domain, first.description, first.contacts)
     second = Problem(first.domain, moved, Contact("bottom", plane), Friction(mu=0.1))
     forces = [solve(problem).contact_force for problem in (first, again, second)]
     assert forces[0][1] < -0.01

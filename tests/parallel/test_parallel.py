@@ -101,7 +101,7 @@ def tower_with_friction(comm):
     plain = tower(comm)
     friction = Friction(SlipCoefficient(0.3, 0.2, 10.0), radius=0.4)
     contact = plain.contacts[0].model_copy(update={"friction": friction})
-    return ContactProblem(plain.domain, plain.body, contact, degree=2)
+    return ContactProblem(plain.domain, plain.description, contact, degree=2)
 
 
 @pytest.mark.core
@@ -203,7 +203,7 @@ def test_every_node_has_one_owner_and_full_weight(comm):
 def test_prescribed_values_reach_ghosts(comm):
     problem = idle(comm)
     x = problem.start().x
-    height = fem.Function(problem.equilibrium.space)
+    height = fem.Function(problem.body.space)
     height.interpolate(lambda x: np.vstack([x[1], x[1]]))
     top = np.isclose(height.x.array, 1.0)
     assert set(np.unique(x[top]).tolist()) <= {0.02, -0.03}

@@ -35,7 +35,7 @@ def in_use() -> int:
 def test_the_matrix_of_jumps_is_kept_alone() -> None:
     """Beside K and Q^T K Q, 12 bytes an entry, PETSc's default keeps twice as much again."""
     problem = problem_of(COMM, 10, 2)
-    body, constraint = problem.equilibrium, problem.constraint
+    body, constraint = problem.body, problem.constraint
     rest = BodyState(body.zero_displacement())
     plain = body.create_matrix()
     body.assemble(plain, "secant", rest)

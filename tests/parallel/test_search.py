@@ -124,15 +124,15 @@ def test_the_mortar_operator_of_shares(kind, held):
     slave, x = flat(kind, 7, 0.0, 1.0, 1)
     master, y = flat(kind, 5, 0.05, -1.0, 2, FIRST, size=0.61)
     without = np.flatnonzero(x[:, 0] < 0.35) if held else np.zeros(0, dtype=np.int64)
-    whole = couple(slave, master, 1.0, without=without)
+    whole = couple(slave, master, 1.0, no_multiplier=without)
     owners = owners_of(len(x))
     begin, end = owners.begins[COMM.rank : COMM.rank + 2]
     mine = share(slave, owners, 5)
     known = np.intersect1d(without, np.union1d(mine.nodes, np.arange(begin, end)))
-    found = couple(mine, share(master, owners, 6), 1.0, without=known)
+    found = couple(mine, share(master, owners, 6), 1.0, no_multiplier=known)
     own = (whole.nodes >= begin) & (whole.nodes < end)
     np.testing.assert_array_equal(found.nodes, whole.nodes[own])
-    for name in ("weight", "normal", "gap", "apart", "covered"):
+    for name in ("weight", "normal", "gap", "gap_positive_part", "covered"):
         np.testing.assert_allclose(
             getattr(found, name), getattr(whole, name)[own], rtol=0, atol=1e-13
         )

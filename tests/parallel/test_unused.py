@@ -14,7 +14,7 @@ from tests.problems.bar import changed
 def test_vectors_are_destroyed_as_the_forces_are_asked_for():
     """Petsc4py keeps those of several ranks: 1.6 MB each time, 160 MB in all."""
     problem = build_problem(parse_case(changed()), MPI.COMM_WORLD)
-    body, state = problem.equilibrium, problem.start()
+    body, state = problem.body, problem.start()
     sizes = []
     for _ in range(100):
         for comm in (body.comm, problem.domain.mesh.comm):

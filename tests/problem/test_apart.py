@@ -62,7 +62,7 @@ def beside():
 def test_where_nothing_touches_is_no_solution(beside):
     """At rest the second block does not touch: nothing is in balance with its loads."""
     problem, state = beside.problem, beside.state
-    kept = problem.equilibrium.layout.points[:, 0] < 1.5
+    kept = problem.body.layout.points[:, 0] < 1.5
     x = np.where(np.repeat(kept, 2), state.x, 0.0)
     pressed_nodes = problem.nodes.points[:, 0] < 1.5
     forces = replace(
@@ -106,7 +106,7 @@ def test_charges_of_each_body():
     )
     found = solve(problem, comm=MPI.COMM_SELF)
     assert found.converged, found.outcome.reason
-    x, body = found.state.x.copy(), problem.equilibrium
+    x, body = found.state.x.copy(), problem.body
     wrong = body.free[:, -1] & (body.layout.points[:, 0] > 1.5)
     body.nodal(x)[wrong, -1] = 0.0
     assert evaluate(problem, State(x, found.state.forces)).equilibrium > 0.01
@@ -117,9 +117,9 @@ def test_charges_of_each_body():
 def test_what_is_left_of_a_body_that_is_no_longer_loaded(method, linear):
     """Nothing acts on it any more: what a solver leaves of its displacements is not its scale."""
     given = pressed(blocks(MPI.COMM_SELF), 0.01, 0.01, gap=0.001)
-    first, second = given.body.loads
+    first, second = given.description.loads
     loads = (first, second.model_copy(update={"amplitude": lambda t: float(t == 1)}))
-    body = replace(given.body, loads=loads)
+    body = replace(given.description, loads=loads)
     problem = ContactProblem(given.domain, body, given.contacts)
     found = solve_steps(problem, [1.0, 2.0], METHODS[method](linear=linear))
     assert found.converged, found.outcome.reason
@@ -129,17 +129,17 @@ def test_what_is_left_of_a_body_that_is_no_longer_loaded(method, linear):
 def test_forces_that_are_rounding_do_not_press():
     """Nodes with pressures of 6e-30 stuck, and 3.1 of all forces were out of balance."""
     given = pressed(blocks(MPI.COMM_SELF), -0.01, 0.01)
-    first, second = given.body.loads
+    first, second = given.description.loads
     loads = (first, second.model_copy(update={"amplitude": lambda t: 1.0 if t <= 1 else 0.0}))
-    problem = ContactProblem(given.domain, replace(given.body, loads=loads), given.contacts)
+    problem = ContactProblem(given.domain, replace(given.description, loads=loads), given.contacts)
     found = solve_steps(problem, [1.0, 2.0])
     rng, nodes = np.random.default_rng(1), found.problem.nodes
     on_second = nodes.points[:, 0] > 1.5
     x, forces = found.state.x.copy(), found.state.forces
-    loaded = found.problem.equilibrium.layout.points[:, 0] > 1.5
-    body = found.problem.equilibrium.nodal(x)
+    loaded = found.problem.body.layout.points[:, 0] > 1.5
+    body = found.problem.body.nodal(x)
     body[loaded] = 1e-29 * rng.standard_normal(body[loaded].shape)
-    body[~found.problem.equilibrium.free] = 0.0
+    body[~found.problem.body.free] = 0.0
     pressure = np.where(on_second, 6e-30 * rng.random(on_second.size), 0.0)
     found.state = replace(found.state, x=x, forces=replace(forces, pressure=pressure))
     assert np.abs(found.displacement.x.array).max() > 1e-3
@@ -153,9 +153,9 @@ def test_forces_that_are_rounding_do_not_press():
 def test_what_presses_no_longer_is_not_unknown(method, remaining, gap):
     """Multipliers of 1e-25 and less on open nodes: contact forces were "known to 400 of them"."""
     given = pressed(blocks(MPI.COMM_SELF), 0.01, 0.01, mu=0.0, gap=gap)
-    first, second = given.body.loads
+    first, second = given.description.loads
     loads = (first, second.model_copy(update={"amplitude": lambda t: 1.0 if t <= 1 else remaining}))
-    problem = ContactProblem(given.domain, replace(given.body, loads=loads), given.contacts)
+    problem = ContactProblem(given.domain, replace(given.description, loads=loads), given.contacts)
     for linear in ("lu", "iterative"):
         options = method(linear=linear)
         found = solve_steps(problem, [0.5, 1.0, 2.0, 3.0], options)
@@ -171,7 +171,7 @@ def test_what_moves_freely_joins_bodies(given):
     motion = Motion([0.0, height], [0.0], [0.0, 0.0 if given else 0.01], [0.0], [0.0, 0.0])
     pushed = Rigid("bottom", motion, foundation=True)
     problem = pressed(blocks(MPI.COMM_SELF), 0.0, 0.0, mu=0.0, rigid=[pushed])
-    shares = problem.equilibrium.component_norms
+    shares = problem.body.component_norms
     assert shares.count == (3 if given else 1)
     assert len(set(shares.component)) == (2 if given else 1)
     assert set(shares.behind) == {*range(shares.count)} - {*shares.component} or not given
@@ -184,6 +184,6 @@ def test_sizes_do_not_depend_on_ranks():
     for comm in (MPI.COMM_SELF, COMM):
         problem = pressed(blocks(comm, (1.0, 3.0, 2.0)), 1.0, 1e-5, 0.0)
         residual = residual_forces(problem, problem.start())
-        sizes.append(np.sort(problem.equilibrium.norms(residual)[0]))
+        sizes.append(np.sort(problem.body.norms(residual)[0]))
     assert np.allclose(*sizes, rtol=1e-12, atol=0)
     assert np.count_nonzero(sizes[0]) == 2

@@ -77,7 +77,7 @@ def test_a_bar_between_walls(given, dim, degree, linear):
 
 def stresses(solution):
     """Return the stresses at points of the owned cells, shape (n, 3, 3)."""
-    fields = DerivedFields(solution.problem.equilibrium, solution.state)
+    fields = DerivedFields(solution.problem.body, solution.state)
     rows = [values.reshape(-1, values.shape[-1]) for _, values in fields.chunks()]
     every = np.concatenate(rows) if rows else np.zeros((0, 40))
     return every[:, fields.columns["stress"]].reshape(-1, 3, 3)
@@ -310,7 +310,7 @@ def test_two_bolts_beside_a_column_that_bears_them():
     solution = solve(Problem(frame((0, 1, 2)), body, Contact("head", gap=1.0)))
     assert solution.converged
     problem = solution.problem
-    fields = DerivedFields(problem.equilibrium, solution.state)
+    fields = DerivedFields(problem.body, solution.state)
     borne = []
     for cells, values in fields.chunks():
         middles = dmesh.compute_midpoints(problem.domain.mesh, 2, cells)

@@ -32,7 +32,7 @@ def bar(comm: MPI.Intracomm, **options) -> ContactProblem:
 @pytest.mark.parametrize("cells", [8, 1])
 def test_condensing_and_expanding_solves_the_whole_system(cells):
     problem = mechanics.bar(WORLD, cells, law=Linear(1.0, 0.3))
-    body, nodes = problem.equilibrium, problem.nodes.nodes
+    body, nodes = problem.body, problem.nodes.nodes
     operator = SparseOperator(body, nodes)
     size = body.block_size
     operator.update(
@@ -65,11 +65,9 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
 def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
     """MUMPS's own estimate of its workspace is too small there."""
     problem = mechanics.bar(SELF, 8, law=Linear(1.0, 0.3))
-    matrix = problem.equilibrium.create_matrix()
-    problem.equilibrium.assemble(
-        matrix, "secant", BodyState(problem.equilibrium.zero_displacement())
-    )
-    order = np.random.default_rng(1).permutation(problem.equilibrium.owned).astype(np.int32)
+    matrix = problem.body.create_matrix()
+    problem.body.assemble(matrix, "secant", BodyState(problem.body.zero_displacement()))
+    order = np.random.default_rng(1).permutation(problem.body.owned).astype(np.int32)
     kept, eliminated = np.sort(order[few:]), np.sort(order[:few])
     found = SchurComplement(matrix, kept, "contact_").complement(matrix)
     dense = matrix[:, :]
@@ -84,7 +82,7 @@ def test_the_first_rank_alone_holds_the_dense_matrix_and_factors():
     problem = bar(WORLD, law=Linear(1.0, 0.3))
     left = condensed.Condensation(problem, Counters()).linearise("secant", problem.start())
     assert left is not None
-    body = left.equilibrium
+    body = left.body
     operator = left.operator(symmetric=False, counters=Counters(), kind="auto")
     blocks = np.tile(np.eye(body.block_size), (len(body.free), 1, 1))
     operator.update("secant", BodyState(body.at), blocks)
@@ -135,11 +133,11 @@ def test_what_is_left_of_a_problem_has_the_same_residuals():
     condensation = condensed.Condensation(problem, Counters())
     left = condensation.linearise("secant", state)
     assert left is not None
-    body = left.equilibrium
+    body = left.body
     assert evaluate(left, State(body.at, state.forces)).largest < 1e-10
     x = body.updated(body.at, 1e-3 * np.where(body.free.ravel(), body.at, 0.0))
     moved = evaluate(left, State(x, state.forces))
-    whole = problem.equilibrium.updated(state.x, condensation.expand(left, x))
+    whole = problem.body.updated(state.x, condensation.expand(left, x))
     found = evaluate(problem, State(whole, state.forces))
     assert np.isclose(moved.equilibrium, found.equilibrium, rtol=1e-3)
     assert moved.equilibrium > 1e-6

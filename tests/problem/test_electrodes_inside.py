@@ -78,7 +78,7 @@ def bimorph(kind, voltage, length=24.0, half=0.5, rotation=0.0, degree=2):
 
 def tip(solution, length=24.0, rotation=0.0):
     """Return the mean deflection of the tip across the beam. Collective."""
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     u = body.nodal(solution.state.x)[: body.owned // body.block_size, :2]
     c, s = np.cos(np.deg2rad(rotation)), np.sin(np.deg2rad(rotation))
     end = np.isclose(body.layout.points @ [c, s], length)
@@ -150,7 +150,7 @@ def constants(dim):
 
 def rise(solution):
     """Return the displacement of the top. Collective."""
-    body, d = solution.problem.equilibrium, solution.problem.dim
+    body, d = solution.problem.body, solution.problem.dim
     u = body.nodal(solution.state.x)[: body.owned // body.block_size, d - 1]
     top = np.isclose(body.layout.points[:, d - 1], LAYERS * THICKNESS)
     return np.concatenate(COMM.allgather(u[top]))
@@ -180,8 +180,8 @@ def test_a_stack_driven_by_a_charge():
     charge = -LAYERS * permittivity * voltage / THICKNESS * 0.3
     solution = solve(stack(2, {"electrode": [{"on": "hot", "charge": charge}]}), comm=COMM)
     assert rise(solution) == pytest.approx(-LAYERS * d33 * voltage, rel=1e-9)
-    member = solution.problem.equilibrium.motion(solution.state.x)
-    assert member * solution.problem.body.phi_scale == pytest.approx(voltage, rel=1e-9)
+    member = solution.problem.body.motion(solution.state.x)
+    assert member * solution.problem.description.phi_scale == pytest.approx(voltage, rel=1e-9)
 
 
 def test_the_error_estimate_knows_that_charges_of_electrodes_are_jumps():
@@ -257,7 +257,7 @@ def test_a_plane_inside_may_be_a_rigid_part():
         "contact": {"on": "top", "gap": 1.0},
     }
     solution = solve(parse_case(case), comm=COMM)
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     u = body.nodal(solution.state.x)[: body.owned // 2, 1]
     above = body.layout.points[:, 1] > 0.49
     assert np.allclose(u[above], -0.005, rtol=0, atol=1e-12)

@@ -53,7 +53,7 @@ def test_each_field_is_out_of_balance_by_itself(top):
     """Without a given potential the strain alone charges the body, by a part in 1e9."""
     found = solved("newton", top=top)
     problem, state = found.problem, found.state
-    body = problem.equilibrium
+    body = problem.body
     free = np.concatenate([body.free.ravel(), np.zeros(body.global_unknowns.size, dtype=bool)])
     shake = np.random.default_rng(0).choice((-1.0, 1.0), free.size) * free
     for field in (body.component_norms.mechanical, ~body.component_norms.mechanical):

@@ -101,7 +101,7 @@ def test_unloading_goes_back_along_the_secant(degree):
     assert kappa_after(solution) == pytest.approx(known[-1][1], rel=1e-6)
     places = solution.problem.points(QUADRATURE_POINTS)
     assert len(places) == kappa_after(solution).size
-    fields = DerivedFields(solution.problem.equilibrium, solution.state).cells()
+    fields = DerivedFields(solution.problem.body, solution.state).cells()
     assert fields["kappa"].x.array == pytest.approx(known[-1][1], rel=1e-6)
     stress = fields["stress"].x.array.reshape(-1, 9)[:, 4]
     assert stress == pytest.approx(-known[-1][0] / WIDTH, rel=1e-6)
@@ -135,7 +135,7 @@ def test_a_restart_goes_on_with_the_same_history(tmp_path):
 def test_a_state_without_its_history_is_of_another_step():
     problem = build_problem(case(), MPI.COMM_SELF, law=Damage(YOUNG, POISSON))
     first, second = evolve(problem, [1.0, 2.0])
-    body = problem.equilibrium
+    body = problem.body
     virgin = replace(second, history=problem.initial)
     forces = [np.abs(body.internal_forces(state)).max() for state in (second, virgin)]
     ratio = 1 - damage(expected([1.0])[0][1])

@@ -79,7 +79,7 @@ def test_a_stack_presses_a_metal_beyond_yield_and_lets_it_go(element):
         space["element"] = "mean_dilatation"
     solution = solve(pressed(space=space))
     assert solution.converged and len(solution.steps) == 3
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     bottom = np.abs(body.layout.points[:, 1]) < 1e-9
     for step, (stress, w, surface) in zip(solution.steps, column(), strict=True):
         assert step.row["contact_force_y"] == pytest.approx(2.0 * stress, abs=1e-8)
@@ -134,7 +134,7 @@ def test_without_coupling_the_field_changes_nothing():
         )
         solution = solve(given)
         assert solution.converged and solution.equivalent_plastic_strain > 5e-4
-        body = solution.problem.equilibrium
+        body = solution.problem.body
         found.append([body.nodal(step.state.x)[:, :2] for step in solution.steps])
     assert np.abs(np.array(found[0]) - found[1]).max() < 1e-10 * np.abs(found[0]).max()
 

@@ -91,7 +91,7 @@ def test_a_restart_goes_on_with_the_same_history(tmp_path, hardening):
 def accumulated(problem, state):
     """Return the integral of the equivalent plastic strain over the cells of this rank."""
     a = problem.commit(state).arrays()["material.equivalent_plastic_strain"]
-    return float(problem.equilibrium.laws.volumes @ a)
+    return float(problem.body.laws.volumes @ a)
 
 
 @pytest.mark.core("voce-2")

@@ -21,7 +21,7 @@ SELF = MPI.COMM_SELF
 def test_a_plate_stays_plane_and_balances_force_and_moment(condense):
     solution, moved = solved(plate(), SELF, NewtonOptions(tolerance=1e-10, condense=condense))
     part, problem = moved["rigid_parts"]["top"], solution.problem
-    points, u = problem.equilibrium.layout.points, problem.equilibrium.nodal(solution.state.x)
+    points, u = problem.body.layout.points, problem.body.nodal(solution.state.x)
     top = points[:, 1] > 1.0 - 1e-9
     angle = np.deg2rad(part["rotation"])
     assert u[top, 1] == pytest.approx(part["displacement"][1] + angle * (points[top, 0] - 1.0))
@@ -67,7 +67,7 @@ def test_a_plate_in_python_is_that_of_a_case():
 def built_of(case, rigid):
     """Return the problem of a case with other rigid parts."""
     problem = build_problem(case, SELF)
-    body = replace(problem.body, rigid=(rigid,))
+    body = replace(problem.description, rigid=(rigid,))
     return ContactProblem(problem.domain, body, problem.contacts)
 
 
@@ -188,7 +188,7 @@ def test_an_open_electrode_reads_the_potential_of_a_column(charge, solver):
     found = moved["electrodes"]["top"]
     assert found["potential"] == pytest.approx(2.0 * slope, rel=1e-8)
     assert found["charge"] == pytest.approx(charge, rel=1e-8, abs=1e-12)
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     top = body.nodal(solution.state.x)[body.layout.points[:, 1] > 2.0 - 1e-9, 1]
     assert top == pytest.approx(2.0 * strain, abs=1e-10)
     charges = charge_balance(solution.problem, solution.state)

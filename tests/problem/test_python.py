@@ -39,7 +39,7 @@ def test_an_interference_by_a_gap() -> None:
 def test_steps_of_a_problem() -> None:
     """They are those that `evolve` gives, and their rows say what they have come to."""
     made = problem(Fixed("top", [lambda x: 1e-3 * x[0], -0.005]))
-    friction = Problem(made.domain, made.body, Contact("bottom"), Friction(mu=0.2))
+    friction = Problem(made.domain, made.description, Contact("bottom"), Friction(mu=0.2))
     times = [0.5, 1.0]
     states = list(evolve(friction, times))
     solution = solve_steps(friction, np.array(times))

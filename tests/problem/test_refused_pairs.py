@@ -72,8 +72,8 @@ def test_overlapping_bodies_are_refused():
         domain, body, Contact("left", GapFunction(lambda p: np.full(len(p), 9.0)))
     )
     with pytest.raises(InputError, match=r"\[overlap\]"):
-        find_pair(problem.equilibrium, "under", "over", NOTHING)
-    _, geometry = find_pair(problem.equilibrium, "under", "over", NOTHING, press=True)
+        find_pair(problem.body, "under", "over", NOTHING)
+    _, geometry = find_pair(problem.body, "under", "over", NOTHING, press=True)
     np.testing.assert_allclose(geometry.nodes.gap, -0.2, atol=1e-12)
 
 

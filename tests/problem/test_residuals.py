@@ -91,7 +91,7 @@ def test_zero_at_the_solution(solved):
 def test_a_wrong_displacement_is_out_of_equilibrium(solved):
     problem = solved.problem
     random = np.random.default_rng(0)
-    body = problem.equilibrium
+    body = problem.body
     shake = 1e-4 * random.standard_normal(body.owned) * body.free.ravel()
     shake.reshape(-1, body.block_size)[problem.nodes.nodes] = 0.0
     found = evaluate(problem, State(solved.state.x + shake, solved.forces))
@@ -103,7 +103,7 @@ def test_a_wrong_displacement_is_out_of_equilibrium(solved):
 def test_rounding_is_a_small_part_of_the_loads(solved, monkeypatch):
     """Of a body that has flown away, or is far softer than at rest."""
     problem = solved.problem
-    body = problem.equilibrium
+    body = problem.body
     shake = np.random.default_rng(0).standard_normal(body.owned) * body.free.ravel()
     shake.reshape(-1, body.block_size)[problem.nodes.nodes] = 0.0
     strict = evaluate(problem, State(solved.state.x + 1e-4 * shake, solved.forces))
@@ -126,7 +126,7 @@ def test_rounding_is_what_no_solve_gets_rid_of(degree):
     }
     solution = solve_case(parse_case({**section, "fixed": held, "load": load}), comm=MPI.COMM_SELF)
     problem, state = solution.problem, solution.state
-    body, found = problem.equilibrium, solution.outcome.residuals
+    body, found = problem.body, solution.outcome.residuals
     stalled = body.norm(body.unbalanced(residual_forces(problem, state)))
     assert solution.converged
     assert found.equilibrium_rounding > 1e-11  # beside loads and reactions
@@ -203,7 +203,7 @@ def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
     problem = solved.problem
     friction = Friction(SlipCoefficient(0.15, 0.1, 10.0))
     contact = problem.contacts[0].model_copy(update={"friction": friction})
-    other = ContactProblem(problem.domain, problem.body, contact)
+    other = ContactProblem(problem.domain, problem.description, contact)
     assert evaluate(other, solved.state).friction > 1e-4
     assert evaluate(problem, solved.state).largest <= SMALL
 
@@ -211,7 +211,7 @@ def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
 @pytest.mark.core
 def test_a_query_changes_nothing(solved):
     """Residuals, forces and operators are those of the state that is asked for, in any order."""
-    problem, body = solved.problem, solved.problem.equilibrium
+    problem, body = solved.problem, solved.problem.body
     other = State(0.3 * solved.state.x, solved.forces, 0.5)
     matrices = [body.create_matrix() for _ in range(2)]
     body.assemble(matrices[0], "secant", solved.state)
@@ -230,7 +230,7 @@ def test_a_query_changes_nothing(solved):
 
 def test_a_node_without_numbers_far_from_all_others_is_no_equilibrium(solved):
     """Neither supports nor contact nodes see it: the residual was said to be 0."""
-    body, x = solved.problem.equilibrium, solved.state.x.copy()
+    body, x = solved.problem.body, solved.state.x.copy()
     points = body.space.tabulate_dof_coordinates()
     middle = np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))
     body.nodal(x)[middle, 0] = np.nan

@@ -109,7 +109,7 @@ def test_residuals_see_an_indenter_out_of_balance():
     assert outcome.converged
     less = Multipliers(0.9 * state.forces.pressure, 0.9 * state.forces.friction)
     residual = residual_forces(problem, State(state.x, less))
-    q = problem.equilibrium.motion(problem.equilibrium.unbalanced(residual))
+    q = problem.body.motion(problem.body.unbalanced(residual))
     # A tenth of the force is missing, and what is given bears its reaction.
     assert q == pytest.approx([0.0, 0.1 * 0.01, 0.0], abs=1e-14)
     assert evaluate(problem, State(state.x, less)).equilibrium > 1e-3

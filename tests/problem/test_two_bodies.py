@@ -52,9 +52,9 @@ def test_another_geometry_has_its_own_constraint():
     """A copy of the problem kept the constraint of the first one, once that had been asked for."""
     problem = pushed(MPI.COMM_SELF)
     swapped = ContactProblem(
-        problem.domain, problem.body, Contact("over", NOTHING, against="under")
+        problem.domain, problem.description, Contact("over", NOTHING, against="under")
     )
-    jumps = np.random.default_rng(1).standard_normal(problem.equilibrium.owned)
+    jumps = np.random.default_rng(1).standard_normal(problem.body.owned)
     first = problem.constraint.expand(jumps)
     other = problem.with_geometry(swapped.geometries).constraint.expand(jumps)
     np.testing.assert_array_equal(other, swapped.constraint.expand(jumps))
@@ -260,7 +260,7 @@ def test_a_rigid_plate_presses_a_block_on_another(comm):
     del free["load"]
     pressed = solve(parse_case(free), comm=comm)
     assert pressed.converged
-    depth = float(pressed.problem.equilibrium.motion(pressed.state.x)[1])
+    depth = float(pressed.problem.body.motion(pressed.state.x)[1])
     assert depth < 0
     top = {"on": "upper_top", "displacement": [0.0, depth]}
     given = case(fixed=[roller, top], **common)

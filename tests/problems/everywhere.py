@@ -26,7 +26,7 @@ def agree(make, quantities, rtol=1e-8, atol=0.0):
 
 def displacements(loop):
     """Return the displacements of all nodes, shape (nodes, d), on every rank. Collective."""
-    body = loop.problem.equilibrium
+    body = loop.problem.body
     u = loop.state.x[: body.owned].reshape(-1, body.block_size)[:, : body.dim]
     return at_all(body.comm, body.layout.points, u)
 

@@ -84,7 +84,7 @@ def bar(
     if friction is None:
         return built
     contact = built.contacts[0].model_copy(update={"friction": friction})
-    return ContactProblem(built.domain, built.body, contact, degree=degree)
+    return ContactProblem(built.domain, built.description, contact, degree=degree)
 
 
 def leaning_block(comm: MPI.Comm, n: int = 3, degree: int = 1, mu: float = 0.3) -> ContactProblem:

@@ -180,4 +180,4 @@ def hencky(xi_0: float = 1.8) -> Log:
 def potential(problem: ContactProblem, state: State) -> Array:
     """Return the potential at the owned contact nodes."""
     nodal = problem.nodal(state)
-    return problem.equilibrium.phi_scale * nodal[:, -1]
+    return problem.body.phi_scale * nodal[:, -1]

@@ -77,7 +77,7 @@ def path(*ends, steps):
 def homogeneous_values(solution, step=-1):
     """Return stress, equivalent plastic strain, and the relative range of both over the cells."""
     problem, state = solution.problem, solution.steps[step].state
-    cells = DerivedFields(problem.equilibrium, state).cells()
+    cells = DerivedFields(problem.body, state).cells()
     stress = cells["stress"].x.array.reshape(-1, 3, 3)
     a = cells["equivalent_plastic_strain"].x.array
     mean, most = stress.mean(axis=0), max(a.max(), 1e-12)

@@ -72,13 +72,13 @@ class SteppedBlock:
         """Return the problem, whose supports know the time."""
         every = [step.problem(comm, dim, degree) for step in self.steps]
         fixed = []
-        for k, given in enumerate(every[0].body.fixed):
+        for k, given in enumerate(every[0].description.fixed):
             moving = [
                 component
                 if isinstance(component, str)
                 else Between(
                     {
-                        time: problem.body.fixed[k].displacement[i]
+                        time: problem.description.fixed[k].displacement[i]
                         for time, problem in zip(self.times, every, strict=True)
                     }
                 )
@@ -88,7 +88,7 @@ class SteppedBlock:
         first = every[0]
         return ContactProblem(
             first.domain,
-            replace(first.body, fixed=fixed),
+            replace(first.description, fixed=fixed),
             first.contacts,
             degree=degree,
         )

@@ -49,7 +49,7 @@ def test_given_charges_balance():
     charges = [Load("right", charge=constant(0.7, 2)), Load(None, charge=constant(-0.2, 2))]
     problem = ContactProblem(
         problem.domain,
-        replace(problem.body, loads=[*problem.body.loads, *charges]),
+        replace(problem.description, loads=[*problem.description.loads, *charges]),
         problem.contacts,
     )
     solver = solve(problem)

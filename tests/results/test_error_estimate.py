@@ -84,8 +84,8 @@ def test_effectivity(name, degree):
     one = known()[name]
     problem = one.make(KNOWN[name][degree - 1], degree)
     state = state_of(problem)
-    error = errors(problem.equilibrium, state.x, one.solution(problem)).energy
-    norm = errors(problem.equilibrium, state.x, None).energy
+    error = errors(problem.body, state.x, one.solution(problem)).energy
+    norm = errors(problem.body, state.x, None).energy
     found = estimated(problem, state)
     assert found.energy == pytest.approx(norm**2, rel=2e-3)
     assert 0.75 < np.sqrt(found.total) / error < 1.15
@@ -112,7 +112,7 @@ def test_wrong_pressures_in_the_fluxes_are_overestimated():
     """
     tube = Tube(law=Linear(1.0, 0.4999))
     problem = tube.problem(8, 2)
-    body, state, law = problem.equilibrium, state_of(problem), tube.law
+    body, state, law = problem.body, state_of(problem), tube.law
     error = errors(body, state.x, tube.displacement).energy
     assert np.sqrt(estimated(problem, state).total) > 2 * error
     flux = sampled(DerivedFields(body, state))[0]
@@ -254,7 +254,7 @@ def test_the_energy_of_a_piezoelectric_body(dim):
     material = Material(Linear(58.7, 0.39), pzt(dim))
     held = Fixed("top", [0.0] * dim, potential=0.0)
     problem = ContactProblem(domain, Body(material, held), Contact("bottom", flat()), degree=2)
-    body, start = problem.equilibrium, problem.start()
+    body, start = problem.body, problem.start()
     x = np.random.default_rng(1).standard_normal(start.x.size)
     at = fields_of(body, material, body.function(x))
     field = -ufl.grad(body.split(body.function(x))[1])

@@ -124,7 +124,7 @@ def test_an_integral_of_ones_own(on):
         run = solve(family("evolution, electrode"), comm=MPI.COMM_WORLD)
     else:
         run = solve(plate(), comm=MPI.COMM_WORLD)
-    problem, state, body = run.problem, run.state, run.problem.equilibrium
+    problem, state, body = run.problem, run.state, run.problem.body
 
     def density(u, phi):
         found = ufl.div(u) ** 2 + u[0] * u[1] + u[1]

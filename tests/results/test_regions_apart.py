@@ -82,7 +82,7 @@ def test_averages_stay_inside_a_region(degree):
 def test_one_region_has_a_point_a_node():
     case = load_case(CASES / "bar.toml", ["mesh.cells=[8, 4]"])
     solution = solve(case, comm=COMM)
-    derived = DerivedFields(solution.problem.equilibrium, solution.state)
+    derived = DerivedFields(solution.problem.body, solution.state)
     assert derived.group_count == 1 and (derived.groups == 0).all()
     grid = gathered(COMM, body_share(solution.problem, solution.state))
     if COMM.rank == 0:
@@ -93,7 +93,7 @@ def test_one_region_has_a_point_a_node():
 @pytest.mark.parallel
 def test_functions_at_the_nodes_are_discontinuous_between_regions_alone():
     solution = solve(parse_case(coated()), domain=domain(), comm=COMM)
-    fields = DerivedFields(solution.problem.equilibrium, solution.state)
+    fields = DerivedFields(solution.problem.body, solution.state)
     found = fields.nodes()["stress"].x.array.reshape(-1, 9)[:, 0]
     assert {*np.round(found, 8).tolist()} <= {0.05, 1.25}
 
@@ -127,7 +127,7 @@ def test_the_smallest_of_several_regions_is_the_one_of_a_cell():
 @pytest.mark.core
 def test_strains_and_principal_stresses():
     solution = solve(load_case(CASES / "hertz-small.toml"))
-    fields = DerivedFields(solution.problem.equilibrium, solution.state)
+    fields = DerivedFields(solution.problem.body, solution.state)
     found, averaged = fields.cells(), fields.nodes()
     nodal = averaged["stress"].x.array.reshape(-1, 3, 3)
     known = np.linalg.eigvalsh(nodal)[:, ::-1].ravel()
@@ -140,7 +140,7 @@ def test_strains_and_principal_stresses():
     principal = found["principal_stress"].x.array.reshape(-1, 3)
     known = np.linalg.eigvalsh(stress)[:, ::-1]
     assert np.allclose(principal, known, rtol=0, atol=1e-7 * np.abs(known).max())
-    law = solution.problem.body.law
+    law = solution.problem.description.law
     trace = np.einsum("cii->c", strain)[:, None, None] * np.eye(3)
     hooke = (law.bulk - 2 * law.shear / 3) * trace + 2 * law.shear * strain
     assert np.allclose(hooke, stress, rtol=0, atol=1e-9 * np.abs(stress).max())

@@ -93,7 +93,7 @@ def test_prescribed_values_in_t():
     case = case_of(load__0__amplitude="constant", fixed__0__displacement=["0.001*t*y", 0.0])
     solution = solve(case, comm=SELF)
     problem = solution.problem
-    x = problem.equilibrium.space.tabulate_dof_coordinates()
+    x = problem.body.space.tabulate_dof_coordinates()
     left = np.flatnonzero(x[:, 0] == 0)
     for record in solution.steps:
         found = record.state.x.reshape(-1, 2)[left, 0]

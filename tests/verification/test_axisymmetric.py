@@ -49,7 +49,7 @@ def orders(make, cells, degree):
     for n in cells:
         problem = make.problem(n, degree)
         solution = solved(problem)
-        e = errors(problem.equilibrium, solution.state.x, make.displacement)
+        e = errors(problem.body, solution.state.x, make.displacement)
         found.append((e.h1, e.energy, e.l2))
     return np.log2(np.array(found[-2]) / np.array(found[-1])), solution
 
@@ -70,7 +70,7 @@ def test_a_hencky_cylinder_with_its_axis(degree, cells):
     order, solution = orders(drum, cells, degree)
     assert np.all(order > np.array([degree, degree, degree + 1]) - 0.15), order
     problem = solution.problem
-    strains = DerivedFields(problem.equilibrium, solution.state).cells()["dev_strain"].x.array
+    strains = DerivedFields(problem.body, solution.state).cells()["dev_strain"].x.array
     comm = problem.comm
     assert comm.allreduce(strains.min(initial=np.inf), MPI.MIN) < 0.9 * drum.law.yield_strain
     assert comm.allreduce(strains.max(initial=0.0), MPI.MAX) > 1.25 * drum.law.yield_strain
@@ -88,7 +88,7 @@ def test_a_poled_cylinder(degree):
     assert balance.electrodes["top"] == pytest.approx(column.charge, rel=1e-8)
     assert balance.imbalance < 1e-12
     assert force_balance(solution.problem, solution.state).imbalance < 1e-12
-    stress = DerivedFields(solution.problem.equilibrium, solution.state).nodes()["stress"]
+    stress = DerivedFields(solution.problem.body, solution.state).nodes()["stress"]
     hoop = stress.x.array.reshape(-1, 3, 3)[:, 2, 2]
     assert np.abs(hoop).max(initial=0.0) < 1e-8 * column.force
 
@@ -210,9 +210,9 @@ def test_the_iterative_solver_knows_the_one_rigid_motion(comm):
 def test_strain_on_the_axis(comm):
     """Where r = 0 the hoop strain is the radial one, at the nodes of P2 elements too."""
     problem = Drum().problem(4, 2)
-    x = fem.Function(problem.equilibrium.space)
+    x = fem.Function(problem.body.space)
     x.interpolate(lambda x: np.array([0.3 * x[0] * (1 + x[0]), 0 * x[0]]))
-    stress = DerivedFields(problem.equilibrium, BodyState(x.x.array)).cells()["stress"]
+    stress = DerivedFields(problem.body, BodyState(x.x.array)).cells()["stress"]
     points = stress.function_space.tabulate_dof_coordinates()
     sigma = stress.x.array.reshape(-1, 3, 3)
     on_axis = points[:, 0] < 1e-12
@@ -224,8 +224,8 @@ def test_strain_on_the_axis(comm):
 def test_the_radial_gradient_is_part_of_norms(comm):
     problem = Tube().problem(8)
     e = errors(
-        problem.equilibrium,
-        problem.equilibrium.zero_displacement(),
+        problem.body,
+        problem.body.zero_displacement(),
         lambda x: ufl.as_vector([x[0], 0]),
     )
     measure = np.pi * 0.5 * (2.0**2 - 1.0)

@@ -58,7 +58,7 @@ def nodal_displacement(loop):
 def test_sliding_block(name, dim, degree):
     block = BLOCKS[name]
     loop = solved(block, dim, degree)
-    x = loop.problem.equilibrium.space.tabulate_dof_coordinates()
+    x = loop.problem.body.space.tabulate_dof_coordinates()
     height = x[:, dim - 1]
     exact = np.zeros((len(x), dim))
     exact[:, 0], exact[:, -1] = block.slip + block.shear * height, -block.squeeze * height

@@ -80,7 +80,7 @@ def test_layer_without_stiffness_is_signorini(name, method):
     soft = build_problem(case)
     bare = ContactProblem(
         soft.domain,
-        soft.body,
+        soft.description,
         soft.contacts[0].model_copy(update={"layer": None}),
     )
     a, b = (solve(problem, case.solver) for problem in (soft, bare))
@@ -179,7 +179,7 @@ def test_other_friction_laws_on_a_layer(law):
     }
     problem = ContactProblem(
         problem.domain,
-        problem.body,
+        problem.description,
         problem.contacts[0].model_copy(update={"friction": laws[law]}),
     )
     solution = solve(problem, case.solver)

@@ -57,14 +57,14 @@ def test_non_matching_meshes_keep_polynomials(comm):
 @pytest.mark.parallel
 def test_norms(comm):
     problem = bar(comm, 4)
-    body = problem.equilibrium
+    body = problem.body
     u = fem.Function(body.space)
     u.interpolate(lambda x: np.vstack([0.01 * x[0], 0 * x[0]]))
     norm = errors(body, u.x.array, None)
     assert norm.l2 == pytest.approx(0.01 * np.sqrt(64 / 3))
     assert norm.h1 == pytest.approx(0.02)
     # Within the elastic limit B(u; u, u) is twice the energy.
-    density = energy_density(problem.body.law, strain(u))
+    density = energy_density(problem.description.law, strain(u))
     energy = fem.assemble_scalar(fem.form(density * problem.domain.dx))
     assert norm.energy**2 == pytest.approx(2 * comm.allreduce(energy))
     assert errors(body, u.x.array, u).h1 == 0.0

@@ -100,7 +100,7 @@ def test_pressures_on_straight_cells_are_off_by_the_displacements_of_chords() ->
 
     def with_exact_jump(problem):
         """Return the problem with the jump of the exact displacements for the gap."""
-        x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :2]
+        x = problem.body.space.tabulate_dof_coordinates()[:, :2]
         radius = np.linalg.norm(x, axis=1)
         u = (LAME.displacement(radius) / radius)[:, None] * x
         (geometry,) = problem.geometries
@@ -197,7 +197,7 @@ def test_the_error_in_l2_is_that_of_ufl(name: str, order: int) -> None:
         radius = np.hypot(x[0], x[1])
         return LAME.displacement(radius) / radius * x * np.array([1, 1, 0])[: len(x), None]
 
-    known = error(problem.equilibrium.space, state.x, LAME)
+    known = error(problem.body.space, state.x, LAME)
     assert cell_orders.l2_error(problem, state.x, exact) == pytest.approx(known, rel=1e-3)
 
 

@@ -93,7 +93,7 @@ def test_hertz_ball_with_few_unknowns():
         changes = [f"mesh.extent={extent}", f"mesh.size={extent / 8}"]
         solution = solve(load_case(CASES / "indent-ball.toml", changes))
         problem, nodes, pressure = solution.problem, solution.problem.nodes, solution.pressure
-        assert problem.equilibrium.layout.unknowns <= 20_000
+        assert problem.body.layout.unknowns <= 20_000
         r = nodes.points[:, 0]
         a = np.sqrt(2.5 * nodes.sum(pressure * r**2) / nodes.sum(pressure))
         closed = np.max(r[solution.status != "open"])
@@ -159,7 +159,7 @@ def gap_beyond(share: float) -> tuple[float, bool]:
     data = setting.case(30.0, f"mesh.radius={radius}").model_dump(exclude_unset=True)
     data["electric"] = {"law": "perfect", "k_e": 1e6, "phi_f": 0.002}
     solution = solve(parse_case(data))
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     points, u = body.layout.points, body.nodal(solution.state.x)[:, 1]
     beyond = (points[:, 1] > -1e-12) & (points[:, 0] > radius * (1 + 1e-9))
     gap = points[beyond, 0] ** 2 / (2 * CURVATURE) - setting.depth - u[beyond]

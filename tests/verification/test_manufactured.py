@@ -30,9 +30,9 @@ def test_hencky_orders(dim, degree, cells):
     for n in cells:
         problem = manufactured(dim, degree, n)
         x = solve(problem).state.x
-        e = errors(problem.equilibrium, x, exact(dim))
+        e = errors(problem.body, x, exact(dim))
         found.append((e.h1, e.energy, e.l2))
-    strains = DerivedFields(problem.equilibrium, BodyState(x)).cells()["dev_strain"].x.array
+    strains = DerivedFields(problem.body, BodyState(x)).cells()["dev_strain"].x.array
     assert strains.min() < 0.9 * HENCKY.yield_strain
     assert strains.max() > 1.25 * HENCKY.yield_strain
     orders = np.log2(np.array(found[-2]) / np.array(found[-1]))

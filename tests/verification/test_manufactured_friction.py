@@ -33,7 +33,7 @@ def test_orders_of_sliding_blocks(name, degree, cells):
         problem = block.problem(n, degree)
         state = solved(problem)
         u = block.exact(problem.domain)
-        e = errors(problem.equilibrium, state.x, lambda _, u=u: u)
+        e = errors(problem.body, state.x, lambda _, u=u: u)
         found.append((e.energy, e.l2))
     orders = np.log2(np.divide(*found))
     assert np.all(orders > np.array([degree, degree + 1]) - 0.15), orders
@@ -77,7 +77,7 @@ def test_layers_with_current():
         pressure = state.forces.pressure[1:-1]
         assert pressure == pytest.approx(layers.PRESSURE * layers.law.young, rel=0.02)
         assert problem.interface.slip_length(problem.nodal(state)) == pytest.approx(layers.SLIP)
-        e = errors(problem.equilibrium, state.x, layers.fields)
+        e = errors(problem.body, state.x, layers.fields)
         at_contact = potential(problem, state) - layers.at_bottom
         found.append((e.energy, e.l2, np.abs(at_contact).max()))
     orders = np.log2(np.divide(*found))

@@ -45,7 +45,7 @@ def test_normals_are_the_body_s_own_for_a_given_gap():
         with_plane = block.problem(MPI.COMM_SELF, dim, 2, 30.0)
         with_gap = ContactProblem(
             with_plane.domain,
-            with_plane.body,
+            with_plane.description,
             Contact("bottom", flat()),
             with_plane.contacts[0].friction,
             degree=2,
@@ -58,7 +58,7 @@ def test_normals_are_the_body_s_own_for_a_given_gap():
 @pytest.mark.core
 def test_a_fixed_node_carries_no_contact_and_a_fixed_direction_slips_as_given():
     domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [1.0, 1.0], [4, 4])
-    zero = pressed_block(MPI.COMM_SELF, 2).body.fixed[0].displacement[0]
+    zero = pressed_block(MPI.COMM_SELF, 2).description.fixed[0].displacement[0]
     clamped = Body(Linear(1.0, 0.3), [Fixed("left", [zero, zero])])
     symmetric = Body(Linear(1.0, 0.3), [Fixed("left", [zero, None])])
     assert ContactProblem(domain, clamped, Contact("bottom", flat())).nodes.size == 4

@@ -52,7 +52,7 @@ def test_uniform_pressure(cell: str, degree: int, element: str, condense: bool) 
     )
     state = state_of(problem, condense=condense)
     np.testing.assert_allclose(state.forces.pressure, 0.02, rtol=1e-12)
-    stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
+    stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(stress[:, 4 * (dim - 1)], -0.02, rtol=1e-10)
     assert problem.nodes.weight.min(initial=1.0) > 1e-3
     assert force_balance(problem, state).imbalance < 1e-12
@@ -82,7 +82,7 @@ def test_constant_shear_under_stick(cell: str, degree: int, element: str) -> Non
     body, contact = Body(law, fixed, loads), Contact("bottom", ground(dim))
     problem = ContactProblem(domain, body, contact, friction, degree=degree, element=element)
     state = state_of(problem, 1e-13)
-    x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
+    x = problem.body.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ gradient.T, rtol=0, atol=1e-12)
     vectors = state.forces.vectors(problem.nodes)
     np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
@@ -107,7 +107,7 @@ def test_discs_about_an_axis(degree: int, element: str, law: str) -> None:
     problem = ContactProblem(domain, body, contact, degree=degree, element=element)
     state = state_of(problem, 1e-12)
     assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
-    stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
+    stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(np.delete(stress, 4, axis=1), 0, atol=1e-10)
     pressure = problem.nodes.gather(state.forces.pressure)
     np.testing.assert_allclose(pressure, -stress[0, 4] if len(stress) else pressure, atol=1e-10)

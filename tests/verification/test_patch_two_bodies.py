@@ -100,7 +100,7 @@ def check_constant_pressure(
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
     state = state_of(problem, condense=dense)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
-    stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
+    stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     k = 4 * (dim - 1)
     np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
     assert force_balance(problem, state).imbalance < 1e-12
@@ -168,7 +168,7 @@ def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
     state = state_of(problem)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-11)
     assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
-    stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
+    stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(stress[:, 4], -0.01, rtol=1e-9)
     np.testing.assert_allclose(np.delete(stress, 4, axis=1), 0, atol=1e-11)
 
@@ -208,7 +208,7 @@ def check_constant_stress(given: Blocks, degree: int, pair: Sequence[str]) -> No
     body = Body(law, [Fixed("bottom", linear)], loads)
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
     state = state_of(problem, 1e-12)
-    x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
+    x = problem.body.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
     traction = -problem.nodes.normal @ stress
     vectors = state.forces.vectors(problem.nodes)
@@ -232,7 +232,7 @@ def test_a_rim_that_is_held_carries_no_multiplier(
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
     # The rim has no jump of its own, and the gap of the others is that of the linear field.
     state = state_of(problem, 1e-12)
-    x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
+    x = problem.body.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
 
 
@@ -254,7 +254,7 @@ def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int, cell: str) 
         given.domain(COMM), Body(law, fixed, loads), contact("under", "over", 2.0), degree=degree
     )
     state = state_of(problem, 1e-12)
-    x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
+    x = problem.body.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
     vectors = state.forces.vectors(problem.nodes)
     np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
@@ -278,7 +278,7 @@ def test_matching_meshes_are_one_body(dim: int, degree: int, cell: str) -> None:
     far = GapFunction(lambda points: np.full(len(points), 1e3))
     one = ContactProblem(joined, body, Contact("top", far), degree=degree)
     alone = state_of(one, 1e-12)
-    spaces = [problem.equilibrium.space for problem in (two, one)]
+    spaces = [problem.body.space for problem in (two, one)]
     points, others = (space.tabulate_dof_coordinates()[:, :dim] for space in spaces)
     distance, nearest = cKDTree(others).query(points)
     assert distance.max() < 1e-12

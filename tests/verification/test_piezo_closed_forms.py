@@ -30,7 +30,7 @@ def solve(problem: ContactProblem, options: FixedPointOptions = TIGHT) -> FixedP
 def errors(solver: FixedPoint, column: Column, units):
     """Return the largest relative errors of displacement and potential over all nodes."""
     s, phi_b = column.solution()
-    body = solver.problem.equilibrium
+    body = solver.problem.body
     dim, height = body.dim, body.layout.points[:, -1]
     x = solver.state.x[: body.owned].reshape(-1, body.block_size)
     exact_u = s * height[:, None] * np.eye(dim)[-1]

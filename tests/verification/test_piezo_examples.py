@@ -34,7 +34,7 @@ def extremes(solver):
     """Return phi on Gamma_3, largest displacement component and pressure, over all ranks."""
     problem, state = solver.problem, solver.state
     nodes, phi = problem.nodes, potential(problem, state)
-    u = state.x.reshape(-1, problem.equilibrium.block_size)[:, : problem.dim]
+    u = state.x.reshape(-1, problem.body.block_size)[:, : problem.dim]
     return (
         -nodes.maximum(-phi, -np.inf),
         nodes.maximum(phi, -np.inf),
@@ -136,9 +136,7 @@ def first_solve(problem, symmetric=True, compare=True):
     blocks = interface.weighted(blocks, state.x)
     found = []
     for kind in ("lu", "iterative") if compare else ("iterative",):
-        operator = SparseOperator(
-            problem.equilibrium, interface.coupled, symmetric=symmetric, kind=kind
-        )
+        operator = SparseOperator(problem.body, interface.coupled, symmetric=symmetric, kind=kind)
         operator.update("secant", state, blocks)
         increment = operator.solve(-residual_forces(problem, state))
         found.append((increment, operator.counters.linear_iterations))

@@ -23,7 +23,7 @@ def errors(dim: int, degree: int, n: int, law: Hencky) -> np.ndarray:
     *u, phi = exact(dim, charged=True)(ufl.SpatialCoordinate(problem.domain.mesh))
     state, outcome = FixedPoint(problem, FixedPointOptions(tolerance=1e-11)).solve()
     assert outcome.converged, outcome.reason
-    body, mesh, shape = problem.equilibrium, problem.domain.mesh, shape_of(problem.domain.mesh)
+    body, mesh, shape = problem.body, problem.domain.mesh, shape_of(problem.domain.mesh)
     u_h, phi_h = body.split(body.function(state.x))
     off = ufl.as_vector([*(u_h[i] - u[i] for i in range(dim)), phi_h - phi])
     slopes = ufl.grad(off)

@@ -77,8 +77,8 @@ def test_columns_in_series(how):
     assert abs(charges.electrodes["top"]) == pytest.approx(current, rel=1e-10)
     lost = charges.electrodes["top"] + charges.electrodes["bottom"]
     assert abs(lost) < 1e-12 * current
-    points, phi = problem.equilibrium.layout.points, problem.equilibrium.nodal(state.x)[:, 2]
-    volts = problem.equilibrium.phi_scale * phi
+    points, phi = problem.body.layout.points, problem.body.nodal(state.x)[:, 2]
+    volts = problem.body.phi_scale * phi
     upper = points[:, 1] > 1.5
     slope = np.polyfit(points[upper, 1], volts[upper], 1)[0]
     assert slope == pytest.approx(current / UPPER, rel=1e-9)

@@ -46,7 +46,7 @@ def strip(material, pull=1.2, kinematics="plane_stress", degree=1, **more):
 
 def corner(solution):
     """Return the displacement of the corner far from the supports. Collective."""
-    body = solution.problem.equilibrium
+    body = solution.problem.body
     u = body.nodal(solution.state.x)[: body.owned // body.block_size, :2]
     there = np.isclose(body.layout.points.sum(axis=1), 3.0)
     return np.concatenate(COMM.allgather(u[there]))[0]
@@ -86,7 +86,7 @@ def test_a_strip_is_a_bar(name, degree):
 
 def tensors(solution):
     """Return strains and stresses at points of the owned cells, shape (n, 3, 3) each."""
-    fields = DerivedFields(solution.problem.equilibrium, solution.state)
+    fields = DerivedFields(solution.problem.body, solution.state)
     rows = [values.reshape(-1, values.shape[-1]) for _, values in fields.chunks()]
     every = np.concatenate(rows) if rows else np.zeros((0, 40))
     return [every[:, fields.columns[name]].reshape(-1, 3, 3) for name in ("strain", "stress")]
@@ -104,7 +104,7 @@ def test_a_ring_pressed_inside_is_lames_in_plane_stress():
         domain = sector(COMM, around, 90.0)
         solution = solve(Problem(domain, body, Contact("right", 10.0), degree=2))
         assert solution.problem.kinematics == "plane_stress"
-        equilibrium = solution.problem.equilibrium
+        equilibrium = solution.problem.body
         u, x = (
             equilibrium.nodal(solution.state.x)[: equilibrium.owned // 2],
             equilibrium.layout.points,
@@ -132,7 +132,7 @@ def test_cooks_membrane():
     material = Material(Linear(1.0, 1 / 3)).plane_stress()
     body = Body(material, Fixed("left", [0.0, 0.0]), Load("right", traction=[0.0, 1 / 16]))
     solution = solve(Problem(membrane(COMM, 16), body, Contact("top", 1e3), degree=2))
-    equilibrium = solution.problem.equilibrium
+    equilibrium = solution.problem.body
     u = equilibrium.nodal(solution.state.x)[: equilibrium.owned // 2, 1]
     end = np.all(np.isclose(equilibrium.layout.points, [48.0, 52.0]), axis=1)
     assert np.concatenate(COMM.allgather(u[end]))[0] == pytest.approx(23.96, rel=2e-3)

@@ -94,7 +94,7 @@ def test_plane_strain_between_plates(law):
         assert stress[2, 2] == pytest.approx(expected[1], abs=1e-8)
         assert a == pytest.approx(expected[-1], abs=2e-9) or len(expected) == 2
         assert abs(stress[0, 0]) < 1e-9
-    body, state = solution.problem.equilibrium, solution.steps[49].state
+    body, state = solution.problem.body, solution.steps[49].state
     assert body.nodal(state.x)[:, 0].max() == pytest.approx(ACROSS[law], abs=1e-9)
     # Work is stored, or lost to plastic flow; the trapezoidal rule meets the corners of a curve.
     rows = [step.row for step in solution.steps]
@@ -310,7 +310,7 @@ def test_j2_is_hencky_s_law_in_proportional_loading(kind):
         assert solution.converged and len(solution.steps) == len(values)
         stresses = []
         for step in solution.steps:
-            cells = DerivedFields(solution.problem.equilibrium, step.state).cells()
+            cells = DerivedFields(solution.problem.body, step.state).cells()
             stresses.append(cells["stress"].x.array.reshape(-1, 3, 3)[:, up, up].mean())
         found.append(np.array(stresses))
     flow, theory = found
@@ -345,7 +345,7 @@ def test_the_mean_dilatation_is_p2_p0_with_the_return_map_at_the_points():
     problem = sphere(4, young, limit, pressure=lambda t: pressure * t, element="mean_dilatation")
     solution = solve_steps(problem, [1.0], NewtonOptions(tolerance=1e-11))
     assert solution.converged and len(solution.steps) == 1
-    body = problem.equilibrium
+    body = problem.body
     u, mesh = body.function(solution.state.x), body.domain.mesh
     dx = ufl.dx(mesh, metadata={"quadrature_degree": 3})
     r, n = ufl.SpatialCoordinate(mesh)[0], ufl.FacetNormal(mesh)

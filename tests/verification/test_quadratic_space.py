@@ -56,7 +56,7 @@ def test_no_node_is_in_the_ball():
         domain, Body(Linear(1.0, 0.3), [lifted]), Contact("top", ball), degree=2
     )
     solution = solve(problem, NewtonOptions(tolerance=1e-10))
-    points = problem.equilibrium.space.tabulate_dof_coordinates()
+    points = problem.body.space.tabulate_dof_coordinates()
     top = np.abs(points[:, 2]) < 1e-9
     u = solution.state.x.reshape(-1, 3)[top]
     direction, gap = ball.measure(points[top], np.tile([0.0, 0.0, 1.0], (len(u), 1)))
