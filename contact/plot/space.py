@@ -118,7 +118,7 @@ def rendered(
 
 def triad(ax: Axes, camera: Camera) -> None:
     """Draw the directions of the coordinates into a corner."""
-    inset = ax.inset_axes((-0.04, -0.1, 0.16, 0.16))
+    inset = ax.inset_axes((0.0, -0.1, 0.16, 0.16))
     inset.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
     inset.axis("off")
     for name, step in zip("xyz", camera.flat(np.eye(3)), strict=True):
@@ -370,7 +370,7 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
     words = [""] if columns == 1 else [" (front)", " (back)"]
     shades = scene.shades | {"nan_color": ZONES["open"][0]}
     figure = sheet(2.1 if narrow else 0.7 if rows == 2 else 0.95)
-    figure.set_layout_engine("compressed")
+    figure.set_layout_engine("constrained")
     grid = (
         figure.add_gridspec(1 + rows, columns, height_ratios=[1.6] + rows * [1.0])
         if narrow
@@ -386,6 +386,7 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
         front = seen(run, run.surface, side * zone.normal, camera)
         meshes = [front, *(seen(run, other, None, camera) for other in others)]
         titles = ["contact pressure", *["pressure on the other side"] * len(others), "status"]
+        titles = [title + which for title in titles]
         panels = [
             figure.add_subplot(grid[1 + r, k] if narrow else grid[r, 1 + k]) for r in range(rows)
         ]
@@ -395,9 +396,9 @@ def contact_figure(run: Run, look: Look) -> Figure | None:
         longest = _show_friction(panels[-1], front, camera) if frictional else 0.0
         if longest:
             unit = f" {run.units.stress}" if run.units.stress else ""
-            titles[-1] = f"status, friction\n(longest arrow {longest:.3g}{unit})"
+            titles[-1] = f"status, friction{which}\nlongest arrow {longest:.3g}{unit}"
         for panel, title in zip(panels, titles, strict=True):
-            panel.set_title(title + which, fontsize="medium")
+            panel.set_title(title, fontsize="medium")
             _frame(panel, camera, run, last=panel is panels[-1])
         axes += panels
     if touching:

@@ -171,12 +171,11 @@ def colour_bar(
     figure: Figure, axes: Sequence[Axes], norm: Normalize, colours: Any, label: str
 ) -> None:
     """Add a bar of colours below axes."""
-    bar = {"location": "bottom", "label": label, "aspect": 40, "shrink": 0.8}
+    bar = {"location": "bottom", "aspect": 40, "shrink": 0.8}
     made = figure.colorbar(ScalarMappable(norm, colours), ax=axes, **bar)
+    made.set_label(label, loc="left")  # a power of ten stands below the right end
     made.formatter.set_powerlimits((-2, 4))  # long numbers would meet
     made.locator = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10])
-    text = made.ax.xaxis.get_offset_text()
-    text.set(x=1.02, horizontalalignment="left")  # a power of ten, beside the bar
 
 
 def uniform(low: float, high: float) -> bool:
