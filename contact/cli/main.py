@@ -7,16 +7,13 @@ by SIGTERM (the results so far are written).
 
 from __future__ import annotations
 
-import io
 import os
 import signal
 import sys
-import tempfile
 import time
 import traceback
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 from typing import NoReturn
 
 from mpi4py import MPI
@@ -30,7 +27,7 @@ from contact.methods.signals import (
     ending_on_signal,
     signals_held,
 )
-from contact.ranks import on_root, refused
+from contact.ranks import refused
 
 CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 #: EX_SOFTWARE: a fault of the program.
@@ -52,22 +49,6 @@ COMMANDS = {
 }
 
 
-def _check_cache() -> None:
-    """Raise an InputError if compiled forms cannot be kept. On one rank."""
-    from dolfinx.jit import get_options
-
-    cache = Path(get_options()["cache_dir"])
-    try:
-        cache.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=cache).close()
-    except OSError as error:
-        raise InputError(
-            f"{cache}: {error.strerror or error}; accepted: a folder to keep compiled forms in, "
-            "by HOME or XDG_CACHE_HOME",
-            "cannot-write",
-        ) from None
-
-
 def _end(comm: MPI.Intracomm, text: str, status: int) -> int:
     """Print the reason for the end on this rank, and end the other ranks too."""
     if comm.size > 1 and comm.rank > 0:
@@ -81,9 +62,6 @@ def _end(comm: MPI.Intracomm, text: str, status: int) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     comm = MPI.COMM_WORLD
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # names of files may be any bytes
     try:
         with ending_on_signal():
             with signals_held():  # C++ libraries that are being loaded take no exceptions
@@ -94,8 +72,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 # PETSc would call it a crash that a reader, such as head, has seen enough.
                 signal.signal(signal.SIGPIPE, signal.SIG_IGN)
                 command = import_module(COMMANDS[options.command])
-                if options.command in ("check", "solve", "sweep", "identify", "demo"):
-                    on_root(comm, _check_cache)
             status = int(command.run(options, comm))
             sys.stdout.flush()  # it has been read: else it is a broken pipe
             return status
