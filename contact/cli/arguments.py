@@ -117,15 +117,39 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
     whole.add_argument("--help", action="help", help="show this help and leave")
     whole.add_argument("--version", action="version", version=version, help="show the version")
 
-    def command(usage: str, text: str, epilog: str | None = None) -> Parser:
+    def common(*names: str, **about: Any) -> Parser:
+        made = Parser()
+        made.add_argument(*names, **about)
+        return made
+
+    case = common("case", metavar="CASE.toml", help="case file (TOML)")
+    replaced = common(
+        "--set",
+        metavar="KEY=VALUE",
+        **MANY,
+        help="replace a value of the case file, for instance load.0.traction='[0, -1]'; "
+        "may be repeated",
+    )
+    quiet = common("--quiet", **FLAG, help="show no progress")
+    told = [
+        quiet,
+        common("--verbose", **FLAG, help="-v: show all iterations and remarks, with the time"),
+        common("--log", metavar="FILE", help="write a log to the end of a file"),
+    ]
+    overwrite = common(
+        "--overwrite", **FLAG, help="replace results or checkpoints of another case, if DIR has any"
+    )
+
+    def command(usage: str, text: str, **more: Any) -> Parser:
         name, usage = usage.partition(" ")[0], f"contact {usage}"
-        made = commands.add_parser(name, help=text, description=text, epilog=epilog, usage=usage)
+        made = commands.add_parser(name, help=text, description=text, usage=usage, **more)
         made.add_argument("--help", action="help", help="show this help and leave")
         return made
 
     demo = command(
         "demo [--out DIR] [options]",
         "solve an example, a bar pressed on a foundation, with its figures",
+        parents=[replaced, *told, overwrite],
     )
     demo.add_argument("--out", metavar="DIR", help="folder for results; contact-demo by default")
     new = command(
@@ -146,15 +170,18 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
     check = command(
         "check CASE.toml [options] [PETSc options]",
         "validate a case and print it with its mesh parts and unknowns",
+        parents=[case, replaced],
     )
     solve = command(
         "solve CASE.toml --out DIR [options] [PETSc options]",
         "solve a case and write the results",
-        PETSC,
+        parents=[replaced, *told, overwrite],
+        epilog=PETSC,
     )
     sweep = command(
         "sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]",
         "solve a case for several values of some keys: sweep.csv, one row per value",
+        parents=[case, replaced, *told],
     )
     plot = command(
         "plot DIR [options]", "draw the figures of a run from its files, or the figure of a sweep"
@@ -166,6 +193,7 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
     identify = command(
         "identify CASE.toml DATA.csv --for KEY,... [options]",
         "find the parameters with which a case fits measured columns of steps.csv best",
+        parents=[case, replaced, quiet],
     )
     materials = command(
         "materials [NAME] [--file FILE]",
@@ -174,19 +202,10 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
     schema = command(
         "schema",
         "print the JSON schema of the case file, by which editors complete and check TOML",
-        "contact schema > contact.schema.json, and as the first line of a case file\n"
+        epilog="contact schema > contact.schema.json, and as the first line of a case file\n"
         "#:schema ./contact.schema.json",
     )
-    for one, nargs in ((check, None), (solve, "?"), (sweep, None), (identify, None)):
-        one.add_argument("case", metavar="CASE.toml", help="case file (TOML)", nargs=nargs)
-    for one in (demo, check, solve, sweep, identify):
-        one.add_argument(
-            "--set",
-            metavar="KEY=VALUE",
-            **MANY,
-            help="replace a value of the case file, for instance load.0.traction='[0, -1]'; "
-            "may be repeated",
-        )
+    solve.add_argument("case", metavar="CASE.toml", help="case file (TOML)", nargs="?")
     check.add_argument(
         "--plot", **FLAG, help="draw the set-up too: CASE-setup.png and .pdf in the present folder"
     )
@@ -215,19 +234,6 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
     sweep.add_argument(
         "--cold", **FLAG, help="start each solve from the zero initial guess, without a warm start"
     )
-    for one in (demo, solve, sweep, identify):
-        one.add_argument("--quiet", **FLAG, help="show no progress")
-    for one in (demo, solve, sweep):
-        one.add_argument(
-            "--verbose", **FLAG, help="-v: show all iterations and remarks, with the time"
-        )
-        one.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
-    for one in (demo, solve):
-        one.add_argument(
-            "--overwrite",
-            **FLAG,
-            help="replace results or checkpoints of another case, if DIR has any",
-        )
     plot.add_argument(
         "folder", metavar="DIR", help="folder with the results of a run, or of a sweep"
     )
