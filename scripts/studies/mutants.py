@@ -184,9 +184,9 @@ MUTANTS = (
     Mutant(
         "tangent-without-slope",
         "the derivative of mu(slip) in Newton's matrix",
-        "contact/interface/complementarity.py",
-        "fall = np.maximum(interface.friction.by_slip(total, length), -limit)",
-        "fall = np.zeros_like(length)",
+        "contact/methods/safeguards.py",
+        "return np.maximum(interface.friction.by_slip(total, length), -limit)",
+        "return np.zeros_like(length)",
         ("tests/interface/test_complementarity.py",),
     ),
     Mutant(

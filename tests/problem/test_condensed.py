@@ -148,11 +148,11 @@ def test_a_condensed_body_is_no_body_that_has_lost_its_mesh():
     problem = bar(SELF, law=Linear(1.0, 0.3))
     left = condensed.Condensation(problem, Counters()).linearise("secant", problem.start())
     assert left is not None
-    assert not hasattr(left.equilibrium, "__dict__") or "space" not in vars(left.equilibrium)
+    assert not hasattr(left.body, "__dict__") or "space" not in vars(left.body)
     for load in (0.0, 0.5, 1.0):
-        assert left.equilibrium.external(load).shape == (left.equilibrium.owned,)
+        assert left.body.external(load).shape == (left.body.owned,)
         state = State(
-            left.equilibrium.prescribe(left.equilibrium.zero_displacement(), load),
+            left.body.prescribe(left.body.zero_displacement(), load),
             left.start().forces,
         )
         assert np.isfinite(evaluate(left, state).largest)
