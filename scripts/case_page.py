@@ -67,15 +67,7 @@ def page() -> str:
 
 
 def _describe(key: str, section: type, elsewhere: Collection[type]) -> Iterator[str]:
-    """Describe a section and those in it. Its docstring is ``heading: text``.
-
-    Parameters
-    ----------
-    key, section
-        The section and its key.
-    elsewhere
-        Sections that have a place of their own.
-    """
+    """Describe a section and those in it. Its docstring is ``heading: text``."""
     text = re.split(r"\n\n(?:Attributes|Parameters)\n", inspect.getdoc(section) or "")[0]
     name, kinds = kinds_of([section])
     if is_dataclass(section):

@@ -366,13 +366,7 @@ def _solved(names: Sequence[str], processes: int) -> Iterator[tuple[str, dict[st
 
 
 def chosen(patterns: Sequence[str], known: Sequence[str]) -> list[str]:
-    """Return the problems of some names or patterns; all of them without.
-
-    Raises
-    ------
-    ValueError
-        If there is no problem of a name.
-    """
+    """Return the problems of some names or patterns; all of them without."""
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in known):
             raise ValueError(f"--only {pattern}: no such problem; accepted: {', '.join(known)}")

@@ -175,13 +175,7 @@ def parser(text: str, script: str) -> argparse.ArgumentParser:
 
 
 def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
-    """Solve a case, or stop the script. Collective.
-
-    Raises
-    ------
-    NotConvergedError
-        If it does not converge: no table or figure shows such numbers.
-    """
+    """Solve a case, or stop the script. Collective."""
     solution = solve(case) if problem is None else solve(problem, case.solver)
     solution.units = case.case.units
     if not solution.converged:
@@ -201,13 +195,6 @@ def iterates(
     """Return the states that the outer iterations have left, their solves, and how they ended.
 
     Collective.
-
-    Parameters
-    ----------
-    problem, settings
-        The problem, and the method with its tolerances.
-    first
-        The first iteration that counts; the frictionless start is number 0.
     """
     found: list[State] = []
     solves: list[int] = []

@@ -28,13 +28,7 @@ def _own_cache() -> tempfile.TemporaryDirectory[str]:
 def started(
     words: Sequence[str], ranks: int = 1, limit: float | None = None, **variables: str
 ) -> str:
-    """Return the output of a process, within a limit (seconds), with environment variables.
-
-    Raises
-    ------
-    RuntimeError
-        If it fails.
-    """
+    """Return the output of a process, within a limit (seconds), with environment variables."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
     environment |= variables
     parallel = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []

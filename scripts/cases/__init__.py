@@ -14,19 +14,7 @@ TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
 
 
 def bar(n: int, load: float = -0.005, rho: float = 1e5, *changes: str) -> Case:
-    """Return Example 7.2 with n cells per unit length, solved by Newton's method.
-
-    Parameters
-    ----------
-    n
-        Cells per unit length.
-    load
-        Vertical traction on the right half of the top.
-    rho
-        How fast the coefficient of friction falls with the slip, (7.16).
-    *changes
-        Further keys, ``section.key=value`` as after ``--set``.
-    """
+    """Return Example 7.2 with n cells per unit length, solved by Newton's method."""
     return load_case(
         CASES / "bar.toml",
         [

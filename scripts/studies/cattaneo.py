@@ -155,22 +155,6 @@ def run(
 
     Bodies yield elsewhere too, in proportion to Q: the displacement is that beyond the straight
     line on which all would stick.
-
-    Parameters
-    ----------
-    case, way
-        The case, and a first guess of the way.
-    unit
-        Returns that of the displacement, given the normal force of the mesh.
-    exact
-        The closed form at Q/(mu P).
-    line
-        Displacement over mu Q/(mu P) on the line on which all stick, in that unit.
-
-    Returns
-    -------
-    The closed form at SHARE times the mean ratio of values to it over the steps about SHARE, and
-    the standard deviation of the ratio of the derivative of the displacement.
     """
     share = 0.0
     while abs(share - SHARE) > NEAR:

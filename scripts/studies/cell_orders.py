@@ -79,21 +79,7 @@ def grid(
     n: int,
     image: Callable[[Array], Array] = moved,
 ) -> Domain:
-    """Return an image of the unit square or cube, with the sides of a rectangle or box.
-
-    Parameters
-    ----------
-    comm
-        Communicator.
-    cell
-        Shape of the cells.
-    order
-        Degree of their geometry.
-    n
-        Squares or cubes along each edge.
-    image
-        From points of the square or cube to those of the body; by default cells are moved.
-    """
+    """Return an image of the unit square or cube, with the sides of a rectangle or box."""
     d = Shape(cell).dim
     make, name = (rectangle, "rectangle") if d == 2 else (box, "box")
     regular = make(MPI.COMM_SELF, (0.0,) * d, (1.0,) * d, (n,) * d, cell=cell).mesh
@@ -117,17 +103,7 @@ def grid(
 def l2_error(
     problem: ContactProblem, x: Array, exact: Callable[[Array], Array], above: float = 0.0
 ) -> float:
-    """Return the relative error of displacements in L2. Collective.
-
-    Parameters
-    ----------
-    problem, x
-        The problem and its unknowns.
-    exact
-        From points (d, k) to displacements (d, k).
-    above
-        Height from which on the body counts.
-    """
+    """Return the relative error of displacements in L2. Collective."""
     body = problem.body
     domain, space, degree = body.domain, body.space, body.degree
     shape, of = shape_of(domain.mesh), geometry_nodes(domain)
@@ -173,13 +149,7 @@ CELLS = {(2, 1): (8, 16, 32, 64), (2, 2): (8, 16, 32, 64), (3, 1): (4, 8, 16), (
 
 
 def solved(problem: ContactProblem, tolerance: float = 1e-10) -> State:
-    """Return the solution.
-
-    Raises
-    ------
-    RuntimeError
-        If it does not converge.
-    """
+    """Return the solution."""
     state, outcome = Newton(problem, NewtonOptions(tolerance=tolerance)).solve()
     if not outcome.converged:
         raise RuntimeError(outcome.reason)

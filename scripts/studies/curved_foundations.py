@@ -329,17 +329,7 @@ def _away(profile: Profile, k: int, at: Array) -> float:
 
 
 def hydrostatic(name: str, h: float, degree: int, kind: str, order: int = 1) -> Array:
-    """Return the pressures over the exact one, and the weights of the nodes. Collective.
-
-    Parameters
-    ----------
-    name, h, degree
-        Shape, mesh size, degree.
-    kind
-        "2-D", "revolution" or "3-D".
-    order
-        Degree of the cells' edges.
-    """
+    """Return the pressures over the exact one, and the weights of the nodes. Collective."""
     dim, profile = 3 if kind == "3-D" else 2, PROFILES[name]
     domain = mesh(profile, h, dim, order=order)
     given: list[Any] = [

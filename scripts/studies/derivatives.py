@@ -300,18 +300,6 @@ def differences(
     Where the active sets of the ends differ in a step, the difference goes across a kink of
     the results: it is taken over a smaller part of the way then. It is central, or
     of second order on one side where no number is accepted on the other.
-
-    Parameters
-    ----------
-    solution, names
-        The solution, and results of it.
-    way
-        Key -> change of the parameter, relative to its `size_of`.
-
-    Returns
-    -------
-    The derivatives, and over which relative change they were taken; 0 where there is a kink between
-    the ends of the smallest.
     """
     comm, case = solution.problem.comm, solution.source
     for step in STEPS:
@@ -369,16 +357,7 @@ def by_both(
 
 
 def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
-    """Compare the derivatives of a random problem by all of its parameters. Collective.
-
-    Parameters
-    ----------
-    seed, comm
-        Number of the problem, and the ranks.
-    each
-        Solutions beside each parameter; else along one random way of all at once, beside which two
-        are enough. Tangent and adjoint are those of each in both cases.
-    """
+    """Compare the derivatives of a random problem by all of its parameters. Collective."""
     family, data = problem(seed)
     solution = solve(parse_case(data), comm=comm)
     given = keys(solution.source, every=family in FURTHER)

@@ -56,16 +56,7 @@ def errors(
     x: Array,
     other: fem.Function | Callable[[ufl.SpatialCoordinate], Expr] | None,
 ) -> Errors:
-    """Return the norms of the displacement's distance to another one. Collective.
-
-    Parameters
-    ----------
-    body, x
-        The body on the finer mesh, and its unknowns: the solution.
-    other
-        A function in `body.space`, or the displacement, with the potential of a piezoelectric body,
-        as a UFL vector of the coordinates; None for the norms of the solution itself.
-    """
+    """Return the norms of the displacement's distance to another one. Collective."""
     domain, d, bs = body.domain, body.dim, body.block_size
     mesh, shape, kinematics = domain.mesh, shape_of(domain.mesh), domain.kinematics
     own = kinematics_of(domain, body.element)

@@ -87,27 +87,7 @@ def manufactured(
     parts: Sequence[Callable[[Any], Any]] | None = None,
     plane_stress: bool = False,
 ) -> ContactProblem:
-    """Return a Hencky body with a given displacement, loaded at the bottom. Collective.
-
-    Parameters
-    ----------
-    dim, degree
-        Of space and of the elements.
-    n
-        Cells along each edge of the unit square or cube.
-    law
-        The material.
-    cell
-        Shape of the cells; by default triangles or tetrahedra.
-    piezo
-        Of a piezoelectric body, whose potential is `electric`.
-    element
-        "standard" or "mean_dilatation".
-    parts
-        Components of the displacement; by default those of `smooth`.
-    plane_stress
-        Whether no stress acts across a plane body.
-    """
+    """Return a Hencky body with a given displacement, loaded at the bottom. Collective."""
     make, usual = (rectangle, "triangle") if dim == 2 else (box, "tetrahedron")
     domain = make(MPI.COMM_WORLD, [0.0] * dim, [1.0] * dim, [n] * dim, cell=cell or usual)
     x = ufl.SpatialCoordinate(domain.mesh)
@@ -163,15 +143,7 @@ def _without_stress_across(
 def interpolated(
     space: fem.FunctionSpace, expressions: Sequence[ufl.core.expr.Expr]
 ) -> list[fem.Function]:
-    """Return the interpolants of expressions, compiled together. Collective.
-
-    Parameters
-    ----------
-    space
-        Discontinuous functions of Lagrange.
-    expressions
-        The expressions, of the coordinates.
-    """
+    """Return the interpolants of expressions, compiled together. Collective."""
     points, mesh = space.element.basix_element.points, space.mesh
     index_map = mesh.topology.index_map(mesh.topology.dim)
     cells = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)

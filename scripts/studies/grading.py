@@ -23,15 +23,6 @@ def grade(domain: Domain, power: float, places: Sequence[Sequence[float]]) -> Do
     elements are of the size r^(1 - 1/power) h at the distance r. For u ~ r^lambda they do away
     with the singularity, for elements of degree k, where power > k/lambda (Babuska, Kellogg and
     Pitkaranta, Numer. Math. 33 (1979) 447).
-
-    Parameters
-    ----------
-    domain
-        Of a rectangle, with vertices on the lines.
-    power
-        1 for the grid as it is.
-    places
-        Where the lines are, for each coordinate: both sides and the middle.
     """
     points = domain.mesh.geometry.x
     for axis, lines in enumerate(places):

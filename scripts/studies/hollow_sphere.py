@@ -134,19 +134,7 @@ def sphere(
     degree: int = 2,
     element: str = "standard",
 ) -> Problem:
-    """Return the sphere under a pressure, or with a radial displacement of its inside.
-
-    Parameters
-    ----------
-    cells
-        Along the radius, and along the quarter of a circle.
-    young, limit
-        Young's modulus and yield stress.
-    pressure, displacement
-        Functions of the time.
-    degree, element
-        Of the space.
-    """
+    """Return the sphere under a pressure, or with a radial displacement of its inside."""
     ends = [[INNER, 0.0], [OUTER, np.pi / 2]]
     grid = create_rectangle(MPI.COMM_SELF, ends, [cells] * 2, diagonal=DiagonalType.crossed)
     where = {"inner": (0, INNER), "outer": (0, OUTER), "base": (1, 0.0)}

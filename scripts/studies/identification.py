@@ -39,17 +39,7 @@ def fretting() -> Case:
 
 
 def measurement(solution: Solution, seed: int, noise: float = NOISE) -> dict[str, Array]:
-    """Return t and the measured columns of a run with noise.
-
-    Parameters
-    ----------
-    solution
-        The run.
-    seed
-        Of the random numbers.
-    noise
-        Standard deviation over the largest value of a column.
-    """
+    """Return t and the measured columns of a run with noise."""
     rows, rng = [record.row for record in solution.steps], np.random.default_rng(seed)
     data = {"t": np.array([row["t"] for row in rows])}
     for name in MEASURED:

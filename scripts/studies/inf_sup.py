@@ -130,15 +130,7 @@ SERIES: dict[str, tuple[Mesh, dict[int, tuple[tuple[int, ...], int]]]] = {
 
 
 def constant(kind: Mesh, domain: Domain, degree: int, levels: int) -> tuple[float, int]:
-    """Return beta on a mesh, and the number of nodes that carry a multiplier. Serial.
-
-    Parameters
-    ----------
-    kind, domain, degree
-        The problem.
-    levels
-        Refinements that make V of V_h.
-    """
+    """Return beta on a mesh, and the number of nodes that carry a multiplier. Serial."""
     problem = kind.problem(domain, degree)
     fine = domain
     for _ in range(levels):

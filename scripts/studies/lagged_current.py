@@ -47,19 +47,7 @@ def errors(
     exact: bool = True,
     changes: Sequence[str] = (),
 ) -> tuple[Array, bool]:
-    """Return |x_n - x| in X over the iterations, and whether they converged. Collective.
-
-    Parameters
-    ----------
-    name, cells, k_e, lagged
-        Of the case.
-    steps
-        Iterations at most.
-    exact
-        Whether x is the solution; else |x_n - x_n-1| is returned.
-    changes
-        Of the case.
-    """
+    """Return |x_n - x| in X over the iterations, and whether they converged. Collective."""
     problem = build_problem(case_of(name, cells, k_e, lagged, changes))
     norm = ProductNorm(problem)
     settings = FixedPointOptions(

@@ -74,19 +74,6 @@ def rings(
 
     In 3-D they are one deep. The others are `left` on x = 0, `bottom` on y = 0, `front` on z = 0
     and `back`; regions are `ring0`, ...
-
-    Parameters
-    ----------
-    comm
-        Communicator.
-    cell
-        Shape of the cells.
-    order
-        Degree of their geometry.
-    radii
-        Those between which rings are, ascending.
-    cells
-        Cells across each ring; around there are twice as many.
     """
     shape = Shape(cell)
     d, places, rows, count = shape.dim, [], [], 0

@@ -56,17 +56,7 @@ def case_of(name: str, cells: Sequence[int], changes: Sequence[str] = ()) -> Cas
 def theorem_6_3(
     layer: bool, cells: Sequence[int] = (96, 16), values: Sequence[float] = VALUES
 ) -> Errors:
-    """Return |x(mu, k_e) - x(0, 0)| for mu = k_e, by Algorithms 6 and 8. Collective.
-
-    Parameters
-    ----------
-    layer
-        Whether the layer of thickness 0.1 is there; else Example 8.4 as printed.
-    cells
-        Of the mesh.
-    values
-        mu = k_e.
-    """
+    """Return |x(mu, k_e) - x(0, 0)| for mu = k_e, by Algorithms 6 and 8. Collective."""
     suffix = "-layer" if layer else ""
     limit_case = case_of(f"compliance-8-3{suffix}", cells)
     problem = build_problem(limit_case)
@@ -83,17 +73,7 @@ def theorem_6_3(
 def fixed_point_errors(
     name: str, cells: Sequence[int] = (96, 16), changes: Sequence[str] = ()
 ) -> Array:
-    """Return |x_n - x| in X over the outer iterations of a lagged fixed point. Collective.
-
-    Parameters
-    ----------
-    name
-        Case file; its layer and its charge are taken from the previous iterate.
-    cells
-        Of the mesh.
-    changes
-        Overrides of the case.
-    """
+    """Return |x_n - x| in X over the outer iterations of a lagged fixed point. Collective."""
     lagged = ["contact.lagged=true", "solver.material_step=secant", *changes]
     case = case_of(name, cells, lagged)
     problem = build_problem(case)
@@ -105,17 +85,7 @@ def fixed_point_errors(
 
 
 def with_layer(problem: ContactProblem, c: float, thickness: float = np.inf) -> ContactProblem:
-    """Return the problem without friction and charge, on a layer that is touched at TOUCH.
-
-    Parameters
-    ----------
-    problem
-        Whose body and contact part are taken.
-    c
-        Stiffness of the law (1.28), p = c [r]^+.
-    thickness
-        Distance of the rigid part behind; infinity for none.
-    """
+    """Return the problem without friction and charge, on a layer that is touched at TOUCH."""
     gap = TOUCH + (thickness if np.isfinite(thickness) else 0.0)
     foundation = GapFunction(lambda points: np.full(len(points), gap))
     layer = Layer(thickness, Compliance(np.inf), PotentialFactor(c))

@@ -126,17 +126,7 @@ class Loop:
 
 
 def write_mesh(path: Path, width: float, elements: float, sectors: int) -> None:
-    """Write the halves y > 0 of two half balls.
-
-    Parameters
-    ----------
-    path
-        A file for Gmsh.
-    width, elements
-        Radius a of the contact, and the number of elements in it, of the size of the smallest.
-    sectors
-        Of the half turn.
-    """
+    """Write the halves y > 0 of two half balls."""
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -164,19 +154,7 @@ def write_mesh(path: Path, width: float, elements: float, sectors: int) -> None:
 def turn(
     poisson: float, elements: float, sectors: int, press: float = PRESS, steps: int = 3
 ) -> Loop:
-    """Press, push, and move there and back. Serial.
-
-    Parameters
-    ----------
-    poisson
-        Of both balls.
-    elements, sectors
-        As of `write_mesh`.
-    press
-        How far the cuts approach each other.
-    steps
-        From the middle to an end of the way.
-    """
+    """Press, push, and move there and back. Serial."""
     shear = SHEAR * press
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "balls.msh"
@@ -227,13 +205,6 @@ def turn_of_cylinders(elements: float, steps: int, degree: int = 1) -> float:
     The tangential force is Q = mu (P - P_c), at the way mu (d(P) - d(P_c)) of the normal problem
     (Jaeger, Ciavarella), whose stiffness is constant but for -ln(P)/(pi E*): the loop is eight
     times mu^2 the area between d(P) and its chord (Masing).
-
-    Parameters
-    ----------
-    elements
-        In Hertz's a, or about.
-    steps, degree
-        As of `turn`.
     """
     width, young = 0.52, 1000.0
     sizes = {"contact_size": width / elements, "contact_width": 1.3 * width}

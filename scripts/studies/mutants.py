@@ -66,13 +66,7 @@ class Mutant:
     ranks: int = 1
 
     def apply(self, tree: Path) -> None:
-        """Put it into a tree.
-
-        Raises
-        ------
-        InputError
-            If the text does not stand there once.
-        """
+        """Put it into a tree."""
         path = tree / self.file
         text = path.read_text() if path.exists() else ""
         count = text.count(self.old)
@@ -303,13 +297,7 @@ def core_files(tree: Path, mutant: Mutant) -> tuple[list[str], list[str]]:
 
 
 def found_by(tree: Path, files: Sequence[str], ranks: int) -> str:
-    """Return the first core test of files that fails on some ranks; nothing where all pass.
-
-    Raises
-    ------
-    RuntimeError
-        If the tests do not run at all.
-    """
+    """Return the first core test of files that fails on some ranks; nothing where all pass."""
     options = ["--short", "-x", "-q", "--tb=no", "-rfE", "--color=no", "-p", "no:cacheprovider"]
     run = [sys.executable, "-m", "pytest", *files, *options, "-m", "core", "-n", "0"]
     if ranks > 1:

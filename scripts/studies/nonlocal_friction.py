@@ -35,15 +35,7 @@ def radii(n: int) -> dict[str, float]:
 
 
 def study(report: Report, n: int, load: float) -> dict[str, Solution]:
-    """Tabulate and draw the solutions over the radius. Collective.
-
-    Parameters
-    ----------
-    n
-        Cells per unit length.
-    load
-        Vertical traction f_2.
-    """
+    """Tabulate and draw the solutions over the radius. Collective."""
     names = (
         "radius",
         "Newton steps",

@@ -42,15 +42,7 @@ BALL = {
 
 
 def indentation(foundation: dict[str, Any], rigid: dict[str, Any], **more: Any) -> Case:
-    """Return the case of a rigid foundation on the middle of a half plane that is meshed in half.
-
-    Parameters
-    ----------
-    foundation, rigid
-        Keys of the contact.
-    more
-        Other sections.
-    """
+    """Return the case of a rigid foundation on the middle of a half plane, meshed in half."""
     return parse_case(
         {
             "material": STEEL,
@@ -117,13 +109,6 @@ def hertz_first_yield(shape: str, poisson: float = POISSON) -> tuple[float, floa
 
     It yields where von Mises' stress on the axis is largest: of a ball |s_z - s_r|, of a cylinder
     that of plane strain (Johnson, Contact Mechanics, 1985, sections 3.4 and 4.2).
-
-    Parameters
-    ----------
-    shape
-        "ball" or "cylinder".
-    poisson
-        Of the half space.
     """
 
     def mises(z: float) -> float:
@@ -167,15 +152,6 @@ def first_yield(shape: str, fineness: float, poisson: float = POISSON) -> tuple[
     """Return the largest pressure at first yield over Y, and the depth over the contact radius.
 
     The force grows in steps of 0.01 Y of the largest Hertzian pressure, whose middle counts.
-
-    Parameters
-    ----------
-    shape
-        "ball" or "cylinder".
-    fineness
-        Elements on the contact radius.
-    poisson
-        Of the body.
     """
     known, _ = hertz_first_yield(shape, poisson)
     pressures = known - 0.105 + 0.01 * np.arange(22)
@@ -314,18 +290,7 @@ def pressed_ball(report: Report, coarse: bool) -> None:
 
 
 def unloading(solution: Solution, turn: int) -> tuple[float, float, float]:
-    """Return how a ball is lifted off; Hertz has 1.5 and 1 for the last two. Serial.
-
-    Parameters
-    ----------
-    solution, turn
-        The steps, and the last one of the loading.
-
-    Returns
-    -------
-    Depth of the mark over that of the ball at its deepest, exponent of the force in the rise of the
-    ball above the mark, and the whole rise over 3 P/(4 E* a).
-    """
+    """Return how a ball is lifted off; Hertz has 1.5 and 1 for the last two. Serial."""
     nodes, body = solution.problem.nodes, solution.problem.body
     places = nodes.points[:, 0]
     mark = -float(body.nodal(solution.state.x)[nodes.nodes[np.argmin(places)], 1])

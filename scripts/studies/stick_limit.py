@@ -38,15 +38,7 @@ def _ends(count: int) -> Array:
 
 @lru_cache
 def plane(count: int, poisson: float) -> tuple[Array, ...]:
-    """Return the middles of elements, and w and t of an even p and an odd q, times pi E*/2.
-
-    Parameters
-    ----------
-    count
-        Elements of constant tractions in [0, 1].
-    poisson
-        Poisson's ratio.
-    """
+    """Return the middles of elements, and w and t of an even p and an odd q, times pi E*/2."""
     ends = _ends(count)
     x = (ends[1:] + ends[:-1]) / 2
     ratio = np.pi / 4 * (1 - 2 * poisson) / (1 - poisson)  # b/c
@@ -89,17 +81,7 @@ def axisymmetric(count: int, poisson: float) -> tuple[Array, ...]:
 def stick_ratio(
     kind: Callable[[int, float], tuple[Array, ...]], mu: float, poisson: float, count: int = 400
 ) -> float:
-    """Return c/a.
-
-    Parameters
-    ----------
-    kind
-        `plane` or `axisymmetric`.
-    mu, poisson
-        Coefficient of friction, and Poisson's ratio.
-    count
-        Elements in the contact.
-    """
+    """Return c/a."""
     x, wp, wq, tp, tq = kind(count, poisson)
     excess = partial(_excess, wp, wq, tp, tq, mu)
     low, high = 1, count - 1

@@ -132,17 +132,7 @@ class Pressed:
 
 
 def pressed(kinematics: str, degree: int, push: float, elements: float) -> Pressed:
-    """Press two balls ("axisymmetric") or cylinders ("plane_strain") on each other.
-
-    Parameters
-    ----------
-    kinematics, degree
-        Of the space.
-    push
-        How far each cut is moved.
-    elements
-        In the half width that the push has on half spaces, or about.
-    """
+    """Press two balls ("axisymmetric") or cylinders ("plane_strain") on each other."""
     balls = kinematics == "axisymmetric"
     width = np.sqrt(BALL * push) if balls else 0.8 * np.sqrt(BALL * push)
     up, down = ({"on": f"{name}_cut", "displacement": ["free", sign * push]}

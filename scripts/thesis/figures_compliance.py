@@ -128,25 +128,7 @@ def example(
     changes: Sequence[str] = (),
     note: str = "",
 ) -> None:
-    """Draw both parts of Figure 8.9 or 8.10, or of a variant of it. Collective.
-
-    Parameters
-    ----------
-    report
-        Where to.
-    number, name
-        Of the figure, with a hyphen, and of the case file.
-    topic
-        Its title, for the captions.
-    cells
-        Of the mesh.
-    variant
-        Appended to the names of the files.
-    changes
-        Overrides of the case.
-    note
-        Appended to the remark on the stresses.
-    """
+    """Draw both parts of Figure 8.9 or 8.10, or of a variant of it. Collective."""
     solution = solution_of(name, cells, *changes)
     run, table, share = run_of(solution), contact_table(solution), solution.plastic_share
     if run is None:

@@ -174,15 +174,7 @@ def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
 
 
 def error_figure(h: Array, found: Mapping[str, Array]) -> Figure:
-    """Return errors over the mesh size, one curve a problem and norm.
-
-    Parameters
-    ----------
-    h
-        Mesh sizes, shape (n,).
-    found
-        Problem -> its errors in `NORMS`, shape (n, 4).
-    """
+    """Return errors over the mesh size, one curve a problem and norm."""
     figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.4))
     for line, (label, errors) in zip(("o-", "x-"), found.items(), strict=True):
         for k, symbol in enumerate(("$u$", r"$\varphi$") * 2):

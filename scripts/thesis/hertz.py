@@ -78,15 +78,7 @@ def measure(solution: Solution, load: float) -> Found:
 
 
 def run(case: Case, load: float) -> tuple[Solution, Found]:
-    """Solve a case with the traction scaled to the load on the polygonal body. Collective.
-
-    Parameters
-    ----------
-    case
-        The case; its first load is vertical and on ``top``.
-    load
-        Vertical force on the meshed part of the body.
-    """
+    """Solve a case with the traction scaled to the load on the polygonal body. Collective."""
     domain = case.mesh.build(MPI.COMM_WORLD)
     first = case.load[0]
     assert first.traction is not None

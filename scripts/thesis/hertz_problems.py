@@ -90,24 +90,7 @@ def cylinder(
     fineness: float = 20.0,
     degree: int = 1,
 ) -> Case:
-    """Return Example 7.1 with another load, friction, contact direction and shape.
-
-    Parameters
-    ----------
-    load
-        Line load of the whole cylinder.
-    mu
-        Coefficient of friction, as in a case file.
-    direction
-        Of contact: "foundation" or "body".
-    shape
-        Mesh generator: "quarter_disc", "half_disc" or "disc". The latter two are pressed by a
-        platen that they stick to sideways: nothing else holds them there.
-    fineness
-        Elements on Hertz's half-width.
-    degree
-        Of the elements.
-    """
+    """Return Example 7.1 with another load, friction, contact direction and shape."""
     hertz = Cylinder(load)
     b = hertz.half_width
     changes = [

@@ -124,17 +124,7 @@ def fragments(folder: Path) -> list[Path]:
 
 
 def section(part: Part, folder: Path, place: str) -> str:
-    """Return a section of the page.
-
-    Parameters
-    ----------
-    part
-        The script.
-    folder
-        Its results.
-    place
-        Folder of the pictures, relative to the page.
-    """
+    """Return a section of the page."""
     pieces = [f"## {part.heading}\n"]
     for path in fragments(folder):
         if path.suffix == ".md":
@@ -182,18 +172,7 @@ def address(part: Part) -> str:
 
 
 def gather(results: Path, page: Path, only: Sequence[str] | None = None) -> None:
-    """Write the pages, and copy pictures and numbers beside them.
-
-    Parameters
-    ----------
-    results
-        Results of scripts, a folder each.
-    page
-        The summary; the pages of chapters are beside it, and their sections on scripts that are
-        not gathered stay.
-    only
-        Names of the scripts to gather; all by default.
-    """
+    """Write the pages, and copy pictures and numbers beside them."""
     place = page.with_suffix("")
     said, renewed = sections(page.parent), wanted(only)
     written = {name: [f"# {title}\n"] for name, title in PAGES.items()}
@@ -218,15 +197,7 @@ def gather(results: Path, page: Path, only: Sequence[str] | None = None) -> None
 
 
 def overview(results: Path, made: str) -> str:
-    """Return the summary page.
-
-    Parameters
-    ----------
-    results
-        Folder with the files of all scripts.
-    made
-        Versions of the libraries.
-    """
+    """Return the summary page."""
     links = {part.script: address(part) for part in PARTS}
     contents = CONTENTS % "\n".join(PAGES)
     pieces = (INTRODUCTION, table(results, links), contents, READING, f"## Versions\n\n{made}\n")

@@ -34,16 +34,7 @@ CASES = {"as printed": "compliance-8-3", "layer of 0.1": "compliance-8-3-layer"}
 
 
 def count(body: BodyEquilibrium, states: Sequence[State], phi_scale: float) -> float:
-    """Return after how many iterations (6.40) holds, NaN for never. Collective.
-
-    Parameters
-    ----------
-    body, states
-        The body, and the iterate of each iteration.
-    phi_scale
-        Unit of the potential in the norm: that of the unknowns for our norm of scaled potentials,
-        1 for that of the thesis, in which u and phi are added as they are.
-    """
+    """Return after how many iterations (6.40) holds, NaN for never. Collective."""
     norm, factor = body.l2_norm(), np.ones(body.block_size)
     factor[-1] = body.phi_scale / phi_scale
     unknowns = [

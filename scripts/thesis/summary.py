@@ -40,15 +40,7 @@ class Row:
     ours: str = ""
 
     def cells(self, results: Path, link: str) -> list[str]:
-        """Return the cells of the row.
-
-        Parameters
-        ----------
-        results
-            Folder of the results of all scripts.
-        link
-            The address of the section.
-        """
+        """Return the cells of the row."""
         numbers = ["—", "—"]
         if self.file and (results / self.script / self.file).is_file():
             with (results / self.script / self.file).open() as stream:
@@ -213,15 +205,7 @@ ROWS = (
 
 
 def table(results: Path, links: dict[str, str]) -> str:
-    """Return the table of the summary.
-
-    Parameters
-    ----------
-    results
-        Folder of the results of all scripts.
-    links
-        Address of the section of each script.
-    """
+    """Return the table of the summary."""
     lines = ["| thesis | content | thesis's numbers | ours | comparison |", "|---|---|---|---|---|"]
     for row in ROWS:
         lines.append("| " + " | ".join(row.cells(results, links[row.script])) + " |")

@@ -52,21 +52,7 @@ def problems(
     seed: int | None = None,
     folder: Path | None = None,
 ) -> Iterator[Problem]:
-    """Draw problems.
-
-    Parameters
-    ----------
-    kind
-        Key of `KINDS`.
-    only
-        A family, or one problem such as bar-7.
-    coarse
-        Draw a tenth of each family.
-    seed
-        Another seed.
-    folder
-        Place of the mesh file of problems of several bodies; each replaces the one before.
-    """
+    """Draw problems."""
     families, (usual, *more) = KINDS[kind]
     for number, (family, (draw, count)) in enumerate(families.items()):
         if only is not None and only.rsplit("-", 1)[0] != family:
