@@ -1,8 +1,8 @@
 """The action of the foundation on the body: pointwise laws and boundary integrands.
 
-The pointwise laws serve UFL and NumPy alike; the solver applies them at the contact nodes.
-The integrands are those of the weak forms, to be integrated over Gamma_3 with the vertex
-rule, which makes them equal to the nodal ones for P1.
+The solver takes `penalty_pressure` and `penalty_friction_modulus` alone, at the contact nodes. The
+integrands are the reference for tests and notebooks: those of the weak forms, to be integrated over
+Gamma_3 with the vertex rule, which makes them equal to the nodal ones for P1.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def penalty_friction_modulus(bound: Value, slip: Value, eps: Value) -> Value:
     return bound / (slip + eps)
 
 
-def augmented_lagrangian(u: Expr, v: Expr, nu: Expr, r: Value, friction: bool = True) -> Expr:
+def augmentation_form(u: Expr, v: Expr, nu: Expr, r: Value, friction: bool = True) -> Expr:
     """Return r u_nu v_nu + r u_tau . v_tau, the left-hand side of Step 1 of Algorithm 2."""
     form = r * normal_part(u, nu) * normal_part(v, nu)
     if friction:

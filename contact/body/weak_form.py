@@ -7,9 +7,9 @@ that vanish where displacements and potentials are prescribed,
             = -int_Gamma_3 ((lambda_c + p_l) v_nu + lambda_f . v_tau - (D.nu) xi),
 
 with the pressure p_l of a layer. The first line is of this module, the second of
-`contact.interface`. That is (10) of docs/theory.md and [T 5.26], without a potential [T 3.9], where
-[T n] is equation (n) of the thesis; the test function of the potential is negated, so that the
-derivative of r is symmetric.
+`contact.interface`. That is (10) of docs/theory.md; with (11) it is [T 5.26], without
+a potential [T 3.9]; [T n] is equation (n) of the thesis. The test function of the potential is
+negated, so that the derivative of r is symmetric.
 Loads are negative terms: r = <F(x), z> - <f, z>. Stresses are those of `forms`.
 
 Measures, fields and laws in UFL are made by `contact.body.materials` and `contact.body.loads`;

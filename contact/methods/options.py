@@ -39,9 +39,9 @@ class LoopOptions(Options):
 
     stopping: Literal["residual", "thesis"] = "residual"
     """`residual`: the KKT residuals end the loops. `thesis`: the rules on the change between
-    iterations end them, (3.45) and (3.46), with a potential (5.38) and (6.40), with `penalty`
-    (4.38); phi is measured in the unit sqrt(mu_1/beta), where the thesis adds the numbers of u
-    and phi. The residuals decide `converged` in any case."""
+    iterations end them, (3.45) and (3.46), with a potential (5.38); without friction (6.40),
+    with `penalty` (4.38); phi is measured in the unit sqrt(mu_1/beta), where the thesis adds
+    the numbers of u and phi. The residuals decide `converged` in any case."""
     eps_fp: Annotated[Tolerance, ReadWith("stopping", "thesis")] = 1e-5
     """Tolerance of (3.46), outer loop."""
     max_inner: Count = 5000
@@ -66,7 +66,7 @@ class FixedPointOptions(LoopOptions):
         Discriminator(lambda given: ":text" if isinstance(given, str) else ":number"),
         Accepted('"auto" or a number > 0'),
     ] = "auto"
-    """Augmentation parameter of the Uzawa block relaxation (force/volume). `auto` fits a block;
+    """Augmentation parameter of the Uzawa block relaxation (stress/length). `auto` fits a block;
     for a slender body no r does."""
     acceleration: Literal["anderson", "none"] = "anderson"
     """Acceleration of the Uzawa block relaxation."""
@@ -138,7 +138,7 @@ class NewtonOptions(Options):
     max_iterations: Internal[int] = 60
     """Number of steps allowed in each stage."""
     gamma: Internal[float] = 1e4
-    """Augmentation parameter: stiffness of the eliminated constraints over that of the body."""
+    """Penalty gamma of the eliminated constraints over max(c, kappa), (20)."""
     stagnation_limit: Internal[int] = 12
     """Steps without progress after which the stage is given up."""
     softening: Internal[Annotated[float, AllowInfNan()]] = 0.25

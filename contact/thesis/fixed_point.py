@@ -4,8 +4,8 @@ An outer iteration freezes nonlinear terms (Kacanov's secant modulus, the fricti
 the frozen problem by an inner iteration, and evaluates the residuals: `OuterLoop`, of `uzawa` and
 of `penalty`. A loop that fails ends with its best iterate, by the thesis's rules with the last.
 
-Method `uzawa` has variants of Algorithms 1, 4, 6 and 8 (as printed with the options that
-docs/results.md names), which differ in the frozen terms:
+Method `uzawa` has variants of Algorithms 1, 4, 6 and 8 (as printed with the options in
+docs/algorithms.md, Fixed points), which differ in the frozen terms:
 
 - Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
 - Algorithm 4, Problem (P~V): also psi, or all of the charge l where it is lagged.
@@ -265,7 +265,7 @@ class FixedPoint(OuterLoop):
         state, nodal = self.state, interface.nodes.jump(self.state.x)
         blocks = augmentation(interface.nodes, self.r, friction)
         if interface.foundation.active:
-            blocks = blocks + self._current_block(nodal, interface.pressure(nodal, state.forces))
+            blocks = blocks + self._charge_block(nodal, interface.pressure(nodal, state.forces))
         # At zero strain the tangent is the secant.
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
         linearised_at = self._secant_at if kind == "secant" else state.x
@@ -281,7 +281,7 @@ class FixedPoint(OuterLoop):
         self._secant_at = x
         return result.iterations, "tangent" if kind == "tangent" else ""
 
-    def _current_block(self, nodal: Array, pressure: Array) -> Array:
+    def _charge_block(self, nodal: Array, pressure: Array) -> Array:
         """Linearise the charge, near the solution with the derivative of psi by the gap."""
         law = self.problem.interface.foundation
         if not law.follows_gap or not self._gap_derivative(self._residual):

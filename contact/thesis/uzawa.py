@@ -4,12 +4,12 @@ The augmented Lagrangian of (3.32), (3.33) has the auxiliary variables phi = (ph
 u_nu and the slip, and their multipliers lambda. An iteration is
 
 - Step 1, (3.34): u of K u + r u = f + r phi - lambda (`FrozenProblem.displacement_load`),
-- Step 2, (3.44): phi, lambda + r u less its projection, over r,
-- Step 3, (3.36): lambda + r (u - phi), which is this projection (`FrozenProblem.project`).
+- Step 2, (3.44): phi = (z - P z)/r with z = lambda + r u (`FrozenProblem.auxiliary`),
+- Step 3, (3.36): lambda + r (u - phi) = P z (`FrozenProblem.project`),
 
-So the iteration is a fixed-point map of z = lambda + r u. Here u is u - u_0 with u_0 of the outer
-iterate, against rounding of a small lambda beside a large slip. It is accelerated
-(`contact.thesis.acceleration`). Numbers of equations are those of the thesis.
+P the projections of (3.43) and onto the disc of radius s: a fixed-point map of z. Here u is u - u_0
+with u_0 of the outer iterate, against rounding of a small lambda beside a large slip. It is
+accelerated (`contact.thesis.acceleration`). Numbers of equations are those of the thesis.
 
 References
 ----------
@@ -145,7 +145,7 @@ class FrozenProblem:
     secant_at
         Unknowns of the secant modulus.
     bound
-        Friction bound s_n, shape (n,).
+        Friction bound s_n, shape (n,); with `single_loop` the one thing that is not frozen.
     friction
         Whether there is friction.
     r
@@ -179,7 +179,7 @@ class FrozenProblem:
         self.nodes.add_jump_transposed(self.nodes.weight[:, None] * forces, to)
 
     def displacement_load(self, multipliers: Array, z: Array) -> Array:
-        """Return the right-hand side of Step 1, f + r phi - lambda, with r phi = z - lambda."""
+        """Return the right-hand side of Step 1, f + r phi - lambda: r (phi - u_0) = z - lambda."""
         forces, load = 2 * multipliers - z, self._load.copy()
         self._add(-(forces[:, :1] * self.nodes.normal + forces[:, 1:]), load)
         return load
@@ -239,7 +239,7 @@ class FrozenProblem:
 
 @dataclass
 class ThesisCriterion:
-    """The thesis's criterion (3.45), (5.38): relative change of (u, phi) in L2.
+    """The thesis's criterion (3.45), (5.38): relative change of unknowns and auxiliary variables.
 
     Attributes
     ----------

@@ -5,7 +5,7 @@ knows the bounds that the theorems ask for. `derivative` is the derivative with 
 the argument, used by Newton's method.
 """
 
-from forms.laws.current import (
+from forms.laws.charge import (
     Conductivity,
     PerfectConductivity,
     PotentialLaw,

@@ -135,7 +135,7 @@ class FrictionLaw(Protocol):
 
 @dataclass(frozen=True)
 class Coulomb:
-    """Coulomb's law s = mu(|u_tau|) p, (1.36).
+    """Coulomb's law s = mu(|u_tau|) p, (1.38).
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ import numpy as np
 import ufl
 
 from forms.foundation import (
-    augmented_lagrangian,
+    augmentation_form,
     auxiliary_load,
     compliance,
     electric_contact,
@@ -60,7 +60,7 @@ u, v, w = ufl.Coefficient(V), ufl.TrialFunction(V), ufl.TestFunction(V)
 linear, hencky = Linear(1.0, 0.3), Log(1.0, 0.3, yield_strain=0.05)
 print(secant_form(linear, u, v, w))
 nu = ufl.FacetNormal(abstract)
-print(augmented_lagrangian(v, w, nu, 25.0))
+print(augmentation_form(v, w, nu, 25.0))
 B = secant_form(hencky, u, v, w) * ufl.dx
 print("arguments:", B.arguments(), "coefficients:", B.coefficients())
 
@@ -139,7 +139,7 @@ _ = axes.legend()
 # %%
 nu, r, eps = ufl.FacetNormal(square), 25.0, 1e-3
 normal, along, none = normal_part(u, nu), tangential_part(u, nu), ufl.zero(2)
-left_side = vector(augmented_lagrangian(u, w, nu, r) * ufl.ds)
+left_side = vector(augmentation_form(u, w, nu, r) * ufl.ds)
 right_side = vector(auxiliary_load(normal, along, ufl.zero(), none, w, nu, r) * ufl.ds)
 assert np.linalg.norm(left_side - right_side) < 1e-13 * np.linalg.norm(left_side)
 

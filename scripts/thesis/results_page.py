@@ -76,11 +76,13 @@ bounds, limits and references. The numbers of every picture are in the CSV file 
 - **Layer.** For the same reason p_ν(u_ν − ρ) of (1.29) and (6.9) is never positive. Examples 8.3
   and 8.4 are computed as printed, and with a layer of thickness 0.1 in front of the rigid part.
 - **s₀**, which Algorithm 1 is given, is μ(0) R p of the frictionless solution. With μ at its slip
-  the counts of Table 7.1 differ by at most 2.
+  the counts of Table 7.1 on 32 cells, at both ends of ρ, differ by at most 2.
 - **Friction bound.** s = μ [R p]⁺ with p = −σ_ν, which differs from μ |R σ_ν| on iterates alone.
   The weights of R are normalised at the ends of Γ₃ too: a constant pressure stays as it is.
-- **Penalty.** (4.1) to (4.3) have one ε, and [u_ν]⁺ without the gap. Here ε_c and ε_s may differ,
-  and the pressure is [u_ν − ρ]⁺/ε_c plus that of the layer.
+- **Penalty.** Chapter 4 has one ε and no gap. Here ε_c and ε_s may differ, the pressure is
+  [u_ν − ρ]⁺/ε_c plus that of the layer, and friction is bounded by it in place of |R σ_ν|.
+- **Step 1 with a potential.** After (5.32) and (6.33) J_n is called strictly convex. The form
+  (5.27) is concave in φ: step 1 finds a saddle point of u and φ, a minimum once φ is eliminated.
 - **Example 7.1.** f₂ = 1600 is a force per area in the text, and a line load in the formulas for p
   and b; here it is the line load. The printed u_τ = 0 on the line of symmetry would support the
   cylinder; here the condition is u_x = 0.

@@ -73,13 +73,13 @@ def lumped(problem, vectors):
 
 
 @pytest.mark.core
-def test_augmentation_is_the_form_of_the_augmented_lagrangian(problem, x):
+def test_augmentation_is_the_form_of_the_augmentation_form(problem, x):
     body, nodes = problem.body, problem.nodes
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
     for friction in (True, False):
         blocks = augmentation(nodes, R, friction)
         total = lumped(problem, np.einsum("nij,nj->ni", blocks, nodes.jump(x)))
-        form = forms.augmented_lagrangian(body.function(x), v, nu, R, friction) * ds
+        form = forms.augmentation_form(body.function(x), v, nu, R, friction) * ds
         assert assembled(form) == pytest.approx(total, abs=1e-15)
 
 

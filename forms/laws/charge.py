@@ -38,7 +38,7 @@ class Truncation:
 
 
 class Conductivity(Protocol):
-    """psi: how well a foundation conducts, assumption (h5). A new law is a class with these."""
+    """Surface conductivity psi, assumption (h5). A new law is a class with these."""
 
     @property
     def k_e(self) -> float:
@@ -50,7 +50,7 @@ class Conductivity(Protocol):
 
     @property
     def follows_gap(self) -> bool:
-        """Whether it is a function of the gap that Newton's method can follow."""
+        """Whether it is a differentiable function of the gap."""
 
     def at(self, s: Value, pressed: Condition, loaded: Condition) -> Value:
         """Return the conductivity at nodes, k_e at most.
@@ -137,7 +137,9 @@ class ShiftedConductivity(RampConductivity):
 
 @dataclass(frozen=True)
 class PerfectConductivity:
-    """psi = k_e where the node is in contact, 0 elsewhere, equation (1.33).
+    """psi = k_e where rigid part or layer press, 0 elsewhere, equation (1.33).
+
+    (1.33) has u_nu >= rho: with a layer contact begins before.
 
     Parameters
     ----------
