@@ -87,20 +87,21 @@ def interface_residuals(
     trial = interface.nodes.tangential_component(multipliers.friction) + c * interface.slip(nodal)
     friction = multipliers.friction - project_disc(trial, bound)
     friction[np.isnan(bound)] = np.nan  # no comparison with NaN is true
-    # Beside small pressures the reference is the stress that closes the gaps, up to the motion of
-    # the nodes: wider gaps say nothing of the loads.
+    # The scale is max(|p|, 1e-4 c_0 |g|), with gaps g of at most the motion of their nodes.
     before = np.linalg.norm(interface.friction.history.jump, axis=1)
     now = np.linalg.norm(nodal[:, : interface.dim], axis=1)
-    way = np.maximum(now, before)
-    closing = interface.c_0 * interface.norms(
-        np.minimum(np.minimum(np.abs(normal_gap), way), interface.size)
+    motion = np.maximum(now, before)
+    gap_stress = interface.c_0 * interface.norms(
+        np.minimum(np.minimum(np.abs(normal_gap), motion), interface.size)
     )
-    pressed = interface.norms(interface.pressure(nodal, multipliers))
+    total = interface.norms(interface.pressure(nodal, multipliers))
     # Without pressure nodes may just touch: their gaps are rounding too.
-    moved = interface.norms(np.full_like(way, interface.rounding(nodal)))
-    covered = interface.c_0 * interface.norms(np.minimum(now, interface.size))
-    closing = np.where(pressed <= moved, np.maximum(closing, covered), closing)
-    scale = np.maximum(pressed, 1e-4 * closing)
+    rounding_stress = interface.norms(np.full_like(motion, interface.rounding(nodal)))
+    motion_stress = interface.c_0 * interface.norms(np.minimum(now, interface.size))
+    gap_stress = np.where(
+        total <= rounding_stress, np.maximum(gap_stress, motion_stress), gap_stress
+    )
+    scale = np.maximum(total, 1e-4 * gap_stress)
     scale = np.maximum(scale, EPS * scale.max())
     norms = np.array([interface.norms(contact), interface.norms(friction)])
     scale = np.where(scale > 0, scale, 1.0)

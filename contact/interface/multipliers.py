@@ -4,9 +4,10 @@
 the last step of an evolution, and the accumulated slip: friction acts against the slip since then,
 and a coefficient mu(slip) depends on the accumulated one. A static problem is one step from zero.
 
-The active set says which contact nodes are open, stick or slip; this is its only definition. A node
-is in contact where p - c (rho - u_nu) > 0, and sticks where |lambda_f + c u_tau| <= s: the pieces
-of the complementarity functions (`contact.interface.complementarity`).
+The active set says which contact nodes are open, stick or slip. A node is in contact where
+p - c (rho - u_nu) > 0 and sticks where |lambda_f + c u_tau| <= s: the pieces of the complementarity
+functions (`contact.interface.complementarity`). Newton's method, the residuals and the status have
+a c each: the sets agree at the solution.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ class ActiveSet:
     closed
         Where the non-penetration constraint is active, shape (n,).
     sticks, slips
-        Where friction is below its bound, and at it, shape (n,). By Tresca's law, a smoothed
+        Where |lambda_f + c u_tau| <= s, and above, shape (n,). By Tresca's law, a smoothed
         pressure or the pressure of a compliant layer open nodes have a bound, and do either.
     """
 
