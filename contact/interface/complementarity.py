@@ -129,7 +129,7 @@ class ComplementarityParameters:
     c
         Complementarity parameter of the functions and of the active set.
     nodal_stiffness
-        Stiffness of the body at one contact node, about E'/h.
+        Stiffness kappa of the body at one contact node, 1.93 E'/h.
     gamma
         Penalty of the eliminated constraints, far above the others.
     """

@@ -54,7 +54,7 @@ class Residuals:
     contact
         |lambda_c - max(0, lambda_c + c (u_nu - rho))| in L2(Gamma_3) over max(|p|, 1e-4 c_0 |g|),
         p = -sigma_nu, g the gaps up to the displacements (`interface_residuals`); the largest of
-        all connected components. c = c_0 = E/length of the touching bodies, times the elongation
+        all connected components. c = c_0 = E/size of the bodies, times the elongation
         >= 1 of the cells behind Gamma_3 (`contact.mesh.entities.elongation`).
     friction
         |lambda_f - proj_s(lambda_f + c u_tau)| over the same, with the final bound s.
@@ -127,7 +127,7 @@ def residual_forces(
     """Return G(x, lambda) = F(x) - f + T^T W lambda on the owned unknowns. Collective.
 
     The residual r of the body with contact: lambda includes layer and charge, as in (15) of
-    docs/residuals.md. At fixed unknowns G is minus the reactions of the supports.
+    docs/residuals.md. At fixed unknowns G is the reaction of the support on the body.
 
     Parameters
     ----------

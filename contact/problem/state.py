@@ -22,7 +22,7 @@ class State:
     x
         Local unknowns, ghosts behind the owned ones: displacement and scaled potential by node.
     forces
-        Contact pressure and friction at the contact nodes.
+        Multipliers lambda_c and lambda_f at the contact nodes (stress).
     time
         Time of loads and prescribed values; 1 of a static problem.
     history
