@@ -3,7 +3,9 @@
 `python3 -m scripts.studies.robustness KIND [--out DIR] [--coarse] [--methods newton uzawa]
 [--only NAME] [--seed N]`. Kinds: plain (300 problems like those of the thesis), hard (340 that
 bend, stick, stretch and harden), cells (200 on cells of all shapes and degrees), bodies (500 of
-several bodies, checked by an independent assembly). All but the last also run under mpirun.
+several bodies, checked by an independent assembly), held (400 that friction alone holds), plastic
+(60 evolutions of metals, checked by their energies), pairs (100 blocks on each other). All but
+bodies and held also run under mpirun.
 """
 
 from __future__ import annotations
@@ -27,15 +29,13 @@ from scripts.studies.robustness.check import recheck
 from scripts.studies.robustness.problems import KINDS, Problem, problems
 
 METHODS = ("newton", "uzawa")
-#: Largest errors of the check by their names, and of all others.
-ALLOWED, SMALL = {"normal turned": 0.3, "status": 0.5}, 1e-6
-#: Largest component of friction along the normal, over the largest pressure.
-ALONG = 1e-14
+#: Largest errors of the checks by their names, and of all others.
+ALLOWED = {"normal turned": 0.3, "status": 0.5, "energies": 0.05, "along the normal": 1e-14}
+SMALL = 1e-6
 #: Difference of the displacements from which on two methods do not agree.
 AGREE = 1e-7
 #: Notes on steps of Newton's method itself.
 OWN = "chord step", "tangent", "rejected", "initial guess"
-COLUMNS = "problem", "method", "end", "solves", "dense", "seconds", "why", "difference", "critical"
 NOTE = (
     "Problems are drawn with a fixed seed: loads, friction, cells, degrees and geometries. A "
     "fallback is any method that Newton's method takes beside its own steps; solves are linear "
@@ -53,36 +53,60 @@ def along_normal(solution: Solution) -> float:
     return float(largest / max(scale, 1e-300))
 
 
+def energies(solution: Solution) -> float:
+    """Return work less stored energy, friction and plastic flow, over the work; 0 without flow."""
+    rows = [step.row for step in solution.steps]
+    if not rows or "plastic_dissipation" not in rows[-1]:
+        return 0.0
+    names = "work", "dissipation", "plastic_dissipation"
+    work, friction, plastic = (np.array([float(row[name]) for row in rows]) for name in names)
+    left = work.sum() - friction.sum() - plastic.sum() - float(rows[-1]["energy"])
+    return float(abs(left) / np.abs(work).sum())
+
+
 def judge(problem: Problem, solution: Solution, folder: Path) -> dict[str, float]:
-    """Write the results of a solution, and return the errors that are more than allowed."""
-    assert problem.mesh is not None
-    write_outputs(solution, folder)
-    found = recheck(problem.mesh, problem.tables, folder)
-    wrong = {name: value for name, value in found.items() if not value <= ALLOWED.get(name, SMALL)}
-    off = along_normal(solution)
-    return wrong if off <= ALONG else wrong | {"along the normal": off}
+    """Return the errors that are more than allowed; write the results of several bodies."""
+    found = {"energies": energies(solution)}
+    if problem.mesh is not None:
+        write_outputs(solution, folder)
+        found |= recheck(problem.mesh, problem.tables, folder)
+        found["along the normal"] = along_normal(solution)
+    return {name: value for name, value in found.items() if not value <= ALLOWED.get(name, SMALL)}
 
 
-def solved(problem: Problem, method: str, first: Solution | None, folder: Path) -> list[Any]:
-    """Solve a problem; return its row from the end on, and the solution. Collective."""
+def solved(
+    problem: Problem, method: str, first: Solution | None, folder: Path
+) -> tuple[dict[str, Any], Solution | None]:
+    """Solve a problem; return its row, and the solution unless it is refused. Collective."""
     begin, case = time.perf_counter(), problem.case
-    comm = MPI.COMM_WORLD if problem.mesh is None else MPI.COMM_SELF
+    row: dict[str, Any] = {
+        "problem": problem.name, "method": method, "end": "refused", "solves": 0, "dense": 0,
+        "seconds": 0.0, "why": "", "difference": 0.0, "critical": 0.0, "steps": 0, "energies": 0.0,
+    }  # fmt: skip
+    alone = problem.mesh is not None or problem.domain is not None
+    comm = MPI.COMM_SELF if alone else MPI.COMM_WORLD
     try:
-        given = case if case.evolution else build_problem(case, comm)
+        given = case if case.evolution else build_problem(case, comm, domain=problem.domain)
         solution = solve(given, with_method(case.solver, OPTIONS[method]), comm=comm)
     except InputError as error:
-        return ["refused", 0, 0, round(time.perf_counter() - begin, 2), str(error), 0.0, 0.0, None]
+        return row | {"seconds": round(time.perf_counter() - begin, 2), "why": str(error)}, None
     steps, counters = max(1, len(solution.steps)), solution.counters
     end, why = "right", ", ".join(sorted(_fallbacks(solution)))
     if not solution.converged:
         end, why = "not converged", solution.outcome.reason
-    elif problem.mesh and (wrong := judge(problem, solution, folder)):
+    elif wrong := judge(problem, solution, folder):
         end, why = "false", ", ".join(f"{k} {v:.1e}" for k, v in wrong.items())
-    return [
-        end, -(-counters.linear_solves // steps), -(-counters.contact_solves // steps),
-        round(time.perf_counter() - begin, 2), why, _difference(solution, first or solution),
-        solution.critical_factor, solution,
-    ]  # fmt: skip
+    return row | {
+        "end": end,
+        "solves": -(-counters.linear_solves // steps),
+        "dense": -(-counters.contact_solves // steps),
+        "seconds": round(time.perf_counter() - begin, 2),
+        "why": why,
+        "difference": _difference(solution, first or solution),
+        "critical": solution.critical_factor,
+        "steps": steps,
+        "energies": energies(solution),
+    }, solution
 
 
 def _fallbacks(solution: Solution) -> set[str]:
@@ -129,21 +153,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command.add_argument("--only", help="a family, or one problem such as bar-7")
     command.add_argument("--seed", type=int, help="of the drawn problems")
     given = command.parse_args(arguments)
-    rows: dict[str, list[Any]] = {key: [] for key in COLUMNS}
+    found = []
     with tempfile.TemporaryDirectory() as scratch:
         drawn = problems(given.kind, given.only, given.coarse, given.seed, Path(scratch))
         for problem in drawn:
             first: Solution | None = None
             for method in given.methods:
-                *row, solution = solved(problem, method, first, Path(scratch, problem.name))
+                row, solution = solved(problem, method, first, Path(scratch, problem.name))
                 first = first or solution
-                append(rows, problem.name, method, *row)
-                end, why, difference, critical = row[0], row[4], row[5], row[6]
-                if end != "right" or why or not difference <= AGREE or critical <= 1:
+                found.append(row)
+                end, apart = row["end"], not row["difference"] <= AGREE
+                if end != "right" or row["why"] or apart or row["critical"] <= 1:
                     if MPI.COMM_WORLD.rank == 0:
-                        print(problem.name, method, *row, flush=True)
+                        print(*row.values(), flush=True)
                 if end != "right" and problem.mesh:
                     _keep(problem, Path(scratch, "body.msh"), given.out / problem.name)
+    if not found:
+        command.error(f"--only {given.only}: no such problem of this kind")
+    rows = {key: [row[key] for row in found] for key in found[0]}
     report = Report(given.out)
     report.numbers(f"sweep-{given.kind}", rows)
     counts = table(rows, given.methods)

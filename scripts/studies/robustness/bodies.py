@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from scripts.studies.robustness.check import Array, Mesh
-from scripts.studies.robustness.one_body import Families, Rng, Tables, coulomb, one
+from scripts.studies.robustness.one_body import Families, Rng, Tables, coulomb, one, plane
 
 
 class Bodies:
@@ -198,8 +198,9 @@ def wedges(rng: Rng, b: Bodies) -> Tables:
         sign = np.sign(x)
         normal = [float(-sign * np.cos(angle)), float(np.sin(angle))]
         point = [float(x + sign * (gap + 0.03 * (gap > 0))), 0.0]
-        shape = {"shape": "plane", "point": point, "normal": normal}
-        contacts.append({"on": f"wedge_{side}", "foundation": shape, **friction(rng)})
+        contacts.append(
+            {"on": f"wedge_{side}", "foundation": plane(point, normal), **friction(rng)}
+        )
     way = float(10 ** rng.uniform(-2.5, -1.2))
     aside = one(rng, 0.0, 0.4) * way
     return {"fixed": [_clamp("wedge_top", aside, -way - gap)], "contact": contacts}
@@ -375,8 +376,7 @@ def small_bodies(rng: Rng, b: Bodies) -> Tables:
     }  # fmt: skip
 
 
-#: Family -> how a problem is drawn, and how many there are.
-BODIES: Families = {draw.__name__: (draw, count) for draw, count in (
+BODIES: Families = {draw.__name__: (draw, range(count)) for draw, count in (
     (rings, 50), (stacks, 50), (wedges, 45), (driven_wedges, 35), (snap_fits, 40), (lifted_off, 50),
     (indenters, 55), (tilted_blocks, 40), (clouds, 50), (layers, 35), (small_bodies, 50),
 )}  # fmt: skip

@@ -1,12 +1,13 @@
 """Families of random problems of one or two bodies on the package's own meshes.
 
 Each function draws the tables of a case. `PLAIN` are problems like those of the thesis, `HARD`
-those that bend, stick, stretch and harden, `CELLS` those on cells of each shape and degree.
+those that bend, stick, stretch and harden, `CELLS` those on cells of each shape and degree,
+`PLASTIC` evolutions of metals, `PAIRS` blocks on each other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,7 +16,8 @@ import numpy as np
 Tables = dict[str, Any]
 Rng = np.random.Generator
 Draw = Callable[..., Tables]
-Families = dict[str, tuple[Draw, int]]
+#: Family -> how a problem is drawn, and the numbers of its problems.
+Families = dict[str, tuple[Draw, Sequence[int]]]
 
 PZT = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
 SHARP = {"young": 58.7102, "poisson": 0.3912, "piezo": PZT}
@@ -30,6 +32,11 @@ def grid(size: list[float], cells: list[int], **more: Any) -> Tables:
     """Return the mesh of a rectangle or a box."""
     kind = "rectangle" if len(size) == 2 else "box"
     return {"generator": kind, "size": size, "cells": cells, **more}
+
+
+def plane(point: list[float], normal: list[float]) -> Tables:
+    """Return a rigid plane, its normal towards the body."""
+    return {"shape": "plane", "point": point, "normal": normal}
 
 
 def clamp(*sides: str, dim: int = 2) -> list[Tables]:
@@ -73,7 +80,7 @@ def bar(rng: Rng) -> Tables:
     angle = np.deg2rad(mesh["rotation"])
     gap = one(rng, 0.0, 0.0, 0.002)
     normal = [float(-np.sin(angle)), float(np.cos(angle))]
-    plane = {"shape": "plane", "point": [-gap * n for n in normal], "normal": normal}
+    ground = plane([-gap * n for n in normal], normal)
     return {
         "mesh": mesh,
         "space": {"degree": one(rng, 1, 1, 2)},
@@ -83,7 +90,7 @@ def bar(rng: Rng) -> Tables:
         },
         "fixed": clamp("left"),
         "load": [{"on": "loaded", "traction": [load * n for n in normal]}],
-        "contact": {"on": "bottom", "foundation": plane, "direction": direction},
+        "contact": {"on": "bottom", "foundation": ground, "direction": direction},
         "friction": slip_weakening(rng, radius=one(rng, 0.0, 0.0, 0.1)),
     }  # fmt: skip
 
@@ -132,14 +139,14 @@ def layer(rng: Rng) -> Tables:
 def hertz(rng: Rng) -> Tables:
     """Draw Example 7.1: both contact directions, loads 160 to 1600, mu 0 to 1."""
     load = one(rng, 160.0, 800.0, 1600.0) / 16
-    plane = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
     return {
         "mesh": {"generator": "quarter_disc", "radius": 8.0, "contact_size": one(rng, 0.1, 0.2)},
         "material": {"law": "linear", "young": 2000.0, "poisson": one(rng, 0.1, 0.3, 0.45)},
         "fixed": [{"on": "symmetry", "displacement": [0.0, "free"]}],
         "load": [{"on": "top", "traction": [0.0, -load]}],
         "contact": {
-            "on": "contact", "foundation": plane, "direction": one(rng, "foundation", "body"),
+            "on": "contact", "foundation": plane([0.0, 0.0], [0.0, 1.0]),
+            "direction": one(rng, "foundation", "body"),
         },
         "friction": slip_weakening(rng),
     }  # fmt: skip
@@ -280,13 +287,12 @@ def rough(rng: Rng) -> Tables:
 
 def few(rng: Rng) -> Tables:
     """Draw a disc that touches at single nodes, or at none."""
-    plane = {"shape": "plane", "point": [0.0, -0.01], "normal": [0.0, 1.0]}
     return {
         "mesh": {"generator": "quarter_disc", "radius": 8.0, "contact_size": 0.8},
         "material": {"young": 2000.0, "poisson": 0.3},
         "fixed": [{"on": "symmetry", "displacement": [0.0, "free"]}],
         "load": [{"on": "top", "traction": [0.0, -one(rng, 1e-3, 1e-1, 1.0, 10.0)]}],
-        "contact": {"on": "contact", "foundation": plane},
+        "contact": {"on": "contact", "foundation": plane([0.0, -0.01], [0.0, 1.0])},
         "friction": coulomb(rng, 0.0, 0.5),
     }
 
@@ -368,7 +374,7 @@ def round_body(rng: Rng, dim: int) -> Tables:
     up = [0.0] * (dim - 1)
     ground = one(
         rng,
-        {"shape": "plane", "point": [*up, 0.0], "normal": [*up, 1.0]},
+        plane([*up, 0.0], [*up, 1.0]),
         {"shape": "sphere", "centre": [*up, -12.0], "radius": 12.0},
     )
     load, law = -one(rng, 1.0, 10.0, 100.0), one(rng, "linear", "log")
@@ -432,20 +438,107 @@ def _on_cells(rng: Rng, draws: tuple[Draw, ...], cell: str) -> Tables:
     return case
 
 
+def two_blocks(rng: Rng, _: int) -> Tables:
+    """Draw a block pressed on another one and pushed along: moduli, sizes, gaps, mu at random."""
+    width = rng.uniform(1.0, 4.0)
+    upper = width * rng.uniform(0.3, 1.5)
+    heights = rng.uniform(0.3, 2.0, 2)
+    sizes = rng.uniform(0.06, 0.4, 2)
+    ratio = 10 ** rng.uniform(-3, 3)
+    press = rng.uniform(0.001, 0.03)
+    gap: float | str = rng.choice([0.0, 0.5 * press])
+    if rng.random() < 0.3:
+        gap = f"{rng.uniform(0, 0.01):.4g}*x**2"
+    on, against = ("upper_bottom", "lower_top") if rng.random() < 0.5 else (
+        "lower_top", "upper_bottom",
+    )  # fmt: skip
+    return {
+        "mesh": {
+            "generator": "two_blocks", "lower_width": width, "upper_width": upper,
+            "lower_height": heights[0], "upper_height": heights[1],
+            "lower_size": sizes[0], "upper_size": sizes[1],
+        },
+        "space": {"degree": int(rng.integers(1, 3))},
+        "material": [
+            {"on": "upper", "young": ratio, "poisson": rng.uniform(0.0, 0.45)},
+            {"on": "lower", "young": 1.0, "poisson": rng.uniform(0.0, 0.45)},
+        ],
+        "fixed": [
+            {"on": "lower_bottom", "displacement": [0.0, 0.0]},
+            {"on": "upper_top", "displacement": [rng.uniform(-1, 1) * press, -press]},
+        ],
+        "contact": {"on": on, "against": against, "gap": gap},
+        "friction": {"law": "coulomb", "mu": rng.uniform(0.0, 1.0)},
+        "solver": {"tolerance": 1e-10},
+    }  # fmt: skip
+
+
+#: Hardening of metals (MPa), by family.
+HARDENING: dict[str, Tables] = {
+    "none": {},
+    "linear": {"hardening": 4e3},
+    "kinematic": {"kinematic": 4e3},
+    "voce": {"hardening": {"saturation": 150.0, "rate": 100.0}},
+    "points": {"hardening": [[0.0, 250.0], [0.01, 320.0], [0.05, 400.0]]},
+    "chaboche": {"kinematic": [{"modulus": 40e3, "recovery": 300.0}, {"modulus": 2e3}]},
+}
+
+
+def metal(rng: Rng, number: int, name: str) -> Tables:
+    """Draw an evolution of one plastic body or two: press, shear, unload, reverse."""
+    two, degree = bool(rng.integers(2)), int(rng.integers(1, 3))
+    mu = float(rng.choice([0.0, 0.1, 0.3, 0.6, 1.0]))
+    down = rng.uniform(1.0, 4.0) * 1e-3 * np.array([1.0, 1.0, rng.uniform(0.3, 0.9), 1.2])
+    aside = rng.uniform(-3e-3, 3e-3, 3)
+    elastic = {"young": 200e3, "poisson": 0.3}
+    material: Any = {"law": "j2", **elastic, "yield_stress": 250.0, **HARDENING[name]}
+    n, top, fixed = 6 if degree == 2 else 10, "top", []
+    mesh, contact = grid([2.0, 1.0], [2 * n, n]), {"on": "bottom", "gap": "0.002*(x-1)**2"}
+    if two:
+        mesh, top, fixed = {"generator": "two_blocks"}, "upper_top", clamp("lower_bottom")
+        contact = {"on": "upper_bottom", "against": "lower_top"}
+        # The lower one is elastic, or of a softer metal (where a list of points does not say it).
+        softer = material | {"yield_stress": 250.0 if name == "points" else 0.7 * 250.0}
+        lower = softer if number % 4 < 2 else elastic
+        material = [{"on": "upper", **material}, {"on": "lower", **lower}]
+    times = [0.0, 1.0, 2.0, 3.0, 4.0]
+    moves = {"aside": [0.0, 0.0, *aside.tolist()], "down": [0.0, *(-down).tolist()]}
+    return {
+        "mesh": mesh,
+        "space": {"degree": degree},
+        "material": material,
+        "fixed": [
+            {"on": top, "displacement": [1.0, "free"], "amplitude": "aside"},
+            {"on": top, "displacement": ["free", 1.0], "amplitude": "down"},
+            *fixed,
+        ],
+        "contact": contact,
+        **({"friction": {"law": "coulomb", "mu": mu}} if mu else {}),
+        "evolution": {
+            "times": times, "steps": [4, 4, 4, 4],
+            "amplitudes": {key: {"time": times, "value": value} for key, value in moves.items()},
+        },
+    }  # fmt: skip
+
+
 _FLAT = (bar, piezo, layer, partial(round_body, dim=2), partial(pair, dim=2))
 _SOLID = (block, partial(round_body, dim=3), partial(pair, dim=3))
 
-#: Family -> how a problem is drawn, and how many there are.
-PLAIN: Families = {draw.__name__: (draw, count) for draw, count in (
+PLAIN: Families = {draw.__name__: (draw, range(count)) for draw, count in (
     (bar, 120), (piezo, 60), (layer, 40), (hertz, 30), (block, 50),
 )}  # fmt: skip
-HARD: Families = {draw.__name__: (draw, count) for draw, count in (
+HARD: Families = {draw.__name__: (draw, range(count)) for draw, count in (
     (cantilever, 70), (clamped, 30), (lifted, 30), (bimorph, 20), (plate, 20), (stretched, 40),
     (stiff, 15), (rough, 15), (few, 10), (units, 20), (layers, 20), (yielding, 10), (corners, 20),
     (unsupported, 20),
 )}  # fmt: skip
 CELLS: Families = {
-    cell: (partial(_on_cells, draws=draws, cell=cell), 50)
+    cell: (partial(_on_cells, draws=draws, cell=cell), range(50))
     for cell, draws in (("triangle", _FLAT), ("quadrilateral", _FLAT),
                         ("tetrahedron", _SOLID), ("hexahedron", _SOLID))
 }  # fmt: skip
+PLASTIC: Families = {
+    name: (partial(metal, name=name), range(first, 60, len(HARDENING)))
+    for first, name in enumerate(HARDENING)
+}
+PAIRS: Families = {"two_blocks": (two_blocks, range(100))}

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from contact.case.file import Case, parse_case
+from contact.mesh.domain import Domain
 from scripts.studies.robustness.bodies import BODIES, Bodies
 from scripts.studies.robustness.check import Mesh, write_msh
-from scripts.studies.robustness.one_body import CELLS, HARD, PLAIN, Families
+from scripts.studies.robustness.held import HELD
+from scripts.studies.robustness.one_body import CELLS, HARD, PAIRS, PLAIN, PLASTIC, Families
 
 
 @dataclass(frozen=True)
@@ -21,28 +23,36 @@ class Problem:
 
     Attributes
     ----------
-    family, name
-        Its family, and the same with its number.
+    name
+        Its family with its number.
     tables, case
         Its case, as drawn and read.
     mesh
         Mesh of the problems of several bodies, which the independent assembly takes.
+    domain
+        Mesh in place of that of the case.
     """
 
-    family: str
     name: str
     tables: Mapping[str, Any]
     case: Case
     mesh: Mesh | None = None
+    domain: Domain | None = None
 
 
-#: Kind -> its families, and the seed, which the number of the family follows.
+#: Kind -> its families, and the seed, which the number of the family or of the problem follows.
 KINDS: dict[str, tuple[Families, tuple[int, ...]]] = {
     "plain": (PLAIN, (20240229,)),
     "hard": (HARD, (20240229, 1)),
     "cells": (CELLS, (20240229, 2)),
     "bodies": (BODIES, (37,)),
+    "held": (HELD, (11,)),
+    "plastic": (PLASTIC, ()),
+    "pairs": (PAIRS, ()),
 }
+
+#: Kinds whose families draw one problem after the other from one stream of random numbers.
+STREAMS = ("plain", "hard", "cells")
 
 
 def problems(
@@ -53,24 +63,29 @@ def problems(
     folder: Path | None = None,
 ) -> Iterator[Problem]:
     """Draw problems."""
-    families, (usual, *more) = KINDS[kind]
-    for number, (family, (draw, count)) in enumerate(families.items()):
+    families, key = KINDS[kind]
+    if seed is not None:
+        key = (seed, *key[1:])
+    for number, (family, (draw, numbers)) in enumerate(families.items()):
         if only is not None and only.rsplit("-", 1)[0] != family:
             continue
-        key = [usual if seed is None else seed, *more, number]
-        rng, mesh = np.random.default_rng(key), None
-        for k in range(count // 10 if coarse else count):
-            name, bodies = f"{family}-{k}", None
+        stream = np.random.default_rng([*key, number])
+        for k in numbers[: len(numbers) // 10 if coarse else None]:
+            name, mesh, domain = f"{family}-{k}", None, None
             wanted = only in (None, family, name)
-            if kind == "bodies":
-                if not wanted:
-                    continue
-                bodies = Bodies(np.random.default_rng([*key, k]))
+            if kind in STREAMS:
+                tables = draw(stream)
+            elif not wanted:
+                continue
+            elif kind == "bodies":
+                bodies = Bodies(np.random.default_rng([*key, number, k]))
                 tables = draw(bodies.rng, bodies)
                 mesh, file = bodies.mesh(), str(Path(folder or ".", "body.msh"))
                 write_msh(mesh, Path(file))
                 tables = {"mesh": {"file": file}, "material": bodies.materials(), **tables}
+            elif kind == "held":
+                tables, domain = draw(np.random.default_rng([*key, k]))
             else:
-                tables = draw(rng)
+                tables = draw(np.random.default_rng([*key, k]), k)
             if wanted:
-                yield Problem(family, name, tables, parse_case(tables, source=name), mesh)
+                yield Problem(name, tables, parse_case(tables, source=name), mesh, domain)

@@ -1,16 +1,13 @@
-"""Bodies that friction alone holds: belts, leaves, strips, clips, rings, blocks near their limit.
+"""Families of bodies that friction alone holds: belts, leaves, strips, clips, rings, jaws.
 
-`python3 -m scripts.studies.held_by_friction [--out DIR] [--coarse]`, on one rank. Belts around
-60 to 300 degrees of a drum are pulled with up to 5 % less than exp(mu theta) allows, arched leaves,
-one or two on each other, are pressed between two plates, strips that lie on a plane are pulled
-with up to 99 % of their friction, clips embrace a bar, rings a shaft (bodies of revolution), and
-blocks hang between two jaws (3-D). The table says how many are solved, by which fallback, in how
-many linear solves; all are drawn with a fixed seed.
+Belts around 60 to 300 degrees of a drum are pulled with up to 5 % less than exp(mu theta) allows,
+arched leaves, one or two on each other, are pressed between two plates, strips that lie on a plane
+are pulled with up to 99 % of their friction, clips embrace a bar, rings a shaft (bodies of
+revolution), and blocks hang between two jaws (3-D).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import basix.ufl
@@ -18,19 +15,19 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact import Solution, build_problem, parse_case, solve
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.typing import Array
-from scripts.reporting import Report, append, parser
+from scripts.studies.robustness.one_body import Families, Rng, Tables, grid, plane
 
-SEED, COUNT, COARSE_COUNT = 11, 400, 16
+#: Tables, and the mesh in place of theirs.
+Drawn = tuple[Tables, Domain | None]
 
-#: Notes of fallbacks, the last one tried first.
-WAYS = ("proximal point", "interior point", "working set")
 
-Rng = np.random.Generator
-Tables = dict[str, Any]
+def _on(*parts: str) -> Tables:
+    """Return the mesh of a case on a domain of its own, which has these parts beside the sides."""
+    named = {name: {"side": "top"} for name in parts}
+    return grid([1.0, 1.0], [1, 1], parts=named)
 
 
 def bent(size: Array, cells: tuple[int, int], place: Any) -> Domain:
@@ -41,7 +38,7 @@ def bent(size: Array, cells: tuple[int, int], place: Any) -> Domain:
     return domain
 
 
-def belt(rng: Rng) -> tuple[Tables, Domain]:
+def belt(rng: Rng) -> Drawn:
     """Draw a belt around a drum of radius 1, whose tension acts in the middle of its thickness."""
     angle, mu = np.deg2rad(rng.uniform(60, 300)), float(rng.uniform(0.1, 0.5))
     thick, cells = float(rng.uniform(0.01, 0.05)), int(rng.integers(12, 50))
@@ -56,6 +53,7 @@ def belt(rng: Rng) -> tuple[Tables, Domain]:
     pull = [float(c) for c in ratio * tension * np.array([np.sin(angle), np.cos(angle)])]
     drum = {"shape": "sphere", "centre": [0.0, 0.0], "radius": 1.0}
     return {
+        "mesh": _on(),
         "space": {"degree": degree, "kinematics": "plane_stress"},
         "material": {"young": 1.0, "poisson": 0.0},
         "load": [{"on": "left", "force": [0.0, -tension]}, {"on": "right", "force": pull}],
@@ -64,7 +62,22 @@ def belt(rng: Rng) -> tuple[Tables, Domain]:
     }, domain
 
 
-def leaf(rng: Rng) -> tuple[Tables, Domain]:
+def _between_plates(mu: float, poisson: float, low: float, high: float, force: float) -> Tables:
+    """Return an arched leaf, or two, between a plane and a rigid lid that a force presses down."""
+    lid = {"displacement": [0.0, "free"], "force": [0.0, -force]}
+    return {
+        "mesh": _on("inner", "outer"),
+        "space": {"degree": 2, "kinematics": "plane_stress"},
+        "material": {"young": 200e3, "poisson": poisson},
+        "friction": {"law": "coulomb", "mu": mu},
+        "contact": [
+            {"on": "bottom", "foundation": plane([0.0, low], [0.0, 1.0])},
+            {"on": "top", "foundation": plane([0.0, high], [0.0, -1.0]), "rigid": lid},
+        ],
+    }
+
+
+def leaf(rng: Rng) -> Drawn:
     """Draw an arched leaf between two plates, the upper of which is pressed down."""
     long, rise, thick = 100.0, float(rng.uniform(2, 10)), float(rng.uniform(0.5, 2))
     cells, mu = int(rng.integers(16, 60)), float(rng.choice([0.05, 0.1, 0.3, 0.6]))
@@ -81,31 +94,19 @@ def leaf(rng: Rng) -> tuple[Tables, Domain]:
     low = float(domain.mesh.geometry.x[:, 1].min())
     # Share of the force that would press a beam of the same length flat.
     force = 48 * 200e3 * thick**3 / 12 / long**3 * rise * float(rng.choice([0.1, 0.3, 0.6, 0.9]))
-    below = {"shape": "plane", "point": [0.0, low], "normal": [0.0, 1.0]}
-    above = {"shape": "plane", "point": [0.0, rise + thick], "normal": [0.0, -1.0]}
-    lid = {"displacement": [0.0, "free"], "force": [0.0, -force]}
-    return {
-        "space": {"degree": 2, "kinematics": "plane_stress"},
-        "material": {"young": 200e3, "poisson": 0.0},
-        "friction": {"law": "coulomb", "mu": mu},
-        "contact": [
-            {"on": "bottom", "foundation": below},
-            {"on": "top", "foundation": above, "rigid": lid},
-        ],
-    }, domain
+    return _between_plates(mu, 0.0, low, rise + thick, force), domain
 
 
-def strip(rng: Rng) -> tuple[Tables, None]:
+def strip(rng: Rng) -> Drawn:
     """Draw a strip on a plane, pressed, and pulled at one end."""
     mu, cells = float(rng.uniform(0.1, 0.6)), int(rng.integers(20, 80))
     share = float(rng.choice([0.6, 0.9, 0.97, 0.99]))
     press, solid = float(10 ** rng.uniform(-7, -4)), rng.random() < 1 / 3
     long = float(cells // 5) if solid else cells / 2
-    aside = [0.0] if solid else []
-    grid = {"size": [long, *[1.0] * len(aside), 1.0], "cells": [cells, 2]}
-    grid |= {"generator": "box", "cells": [cells // 5, 1, 1]} if solid else {}
+    aside, side = ([0.0], [1.0]) if solid else ([], [])
+    counts = [cells // 5, 1, 1] if solid else [cells, 2]
     return {
-        "mesh": {"generator": "rectangle", **grid},
+        "mesh": grid([long, *side, 1.0], counts),
         "material": {"young": 1.0, "poisson": 0.3},
         "load": [
             {"on": "top", "traction": [0.0, *aside, -press]},
@@ -116,7 +117,7 @@ def strip(rng: Rng) -> tuple[Tables, None]:
     }, None
 
 
-def stack(rng: Rng) -> tuple[Tables, Domain]:
+def stack(rng: Rng) -> Drawn:
     """Draw two arched leaves on each other, between two plates, the upper of which is pressed."""
     long, rise = 100.0, float(rng.uniform(3, 8))
     thick = rng.uniform(0.5, 1.5, 2)
@@ -129,8 +130,8 @@ def stack(rng: Rng) -> tuple[Tables, Domain]:
     points = np.array([[a, r] for row in rows for r in row for a in across])
     corner = np.array([i + j * (cells + 1) for j in (0, 1, 3, 4) for i in range(cells)])
     corners = np.array([0, 1, cells + 1, cells + 2])
-    plane = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
-    mesh = dmesh.create_mesh(MPI.COMM_SELF, corner[:, None] + corners, points, plane)
+    element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
+    mesh = dmesh.create_mesh(MPI.COMM_SELF, corner[:, None] + corners, points, element)
     places = {"bottom": 0.0, "inner": thick[0], "outer": apart, "top": apart + thick[1]}
     domain = from_mesh(
         mesh,
@@ -144,22 +145,12 @@ def stack(rng: Rng) -> tuple[Tables, Domain]:
     x[:, 1] = rise - radius + (radius + r) * np.cos(angle)
     stiffness = 48 * 200e3 * np.sum(thick**3) / 12 / long**3
     force = stiffness * rise * float(rng.choice([0.1, 0.3, 0.6]))
-    below = {"shape": "plane", "point": [0.0, float(x[:, 1].min())], "normal": [0.0, 1.0]}
-    above = {"shape": "plane", "point": [0.0, rise + float(thick.sum())], "normal": [0.0, -1.0]}
-    lid = {"displacement": [0.0, "free"], "force": [0.0, -force]}
-    return {
-        "space": {"degree": 2, "kinematics": "plane_stress"},
-        "material": {"young": 200e3, "poisson": 0.3},
-        "friction": {"law": "coulomb", "mu": mu},
-        "contact": [
-            {"on": "bottom", "foundation": below},
-            {"on": "outer", "against": "inner"},
-            {"on": "top", "foundation": above, "rigid": lid},
-        ],
-    }, domain
+    tables = _between_plates(mu, 0.3, float(x[:, 1].min()), rise + float(thick.sum()), force)
+    tables["contact"].insert(1, {"on": "outer", "against": "inner"})
+    return tables, domain
 
 
-def clip(rng: Rng) -> tuple[Tables, Domain]:
+def clip(rng: Rng) -> Drawn:
     """Draw a C-shaped clip on a round bar that is too thick for it, pulled around at one end."""
     angle, thick = np.deg2rad(rng.uniform(200, 330)), float(rng.uniform(0.05, 0.3))
     mu, spread = float(rng.uniform(0.1, 0.6)), float(10 ** rng.uniform(-5, -3))
@@ -175,6 +166,7 @@ def clip(rng: Rng) -> tuple[Tables, Domain]:
     bar = {"shape": "sphere", "centre": [0.0, 0.0], "radius": 1.0 + spread}
     pulled = {"on": "right", "force": [float(c) for c in along]}
     return {
+        "mesh": _on(),
         "space": {"degree": degree},
         "material": {"young": 1.0, "poisson": 0.3},
         "load": [pulled] if pull else [],
@@ -183,7 +175,7 @@ def clip(rng: Rng) -> tuple[Tables, Domain]:
     }, domain
 
 
-def ring(rng: Rng) -> tuple[Tables, None]:
+def ring(rng: Rng) -> Drawn:
     """Draw a ring on a shaft that is too thick for it, pulled along, as a body of revolution."""
     inner, wide = 1.0, float(rng.uniform(0.2, 1.5))
     tall, fit = float(rng.uniform(0.3, 3.0)), float(10 ** rng.uniform(-5, -3))
@@ -192,29 +184,31 @@ def ring(rng: Rng) -> tuple[Tables, None]:
     outer = inner + wide
     pressure = fit / inner * (outer**2 - inner**2) / (outer**2 + inner**2)  # Lame, nu = 0
     pull = share * mu * pressure * 2 * inner * tall / (outer**2 - inner**2)
-    shaft = {"shape": "plane", "point": [inner + fit, 0.0], "normal": [1.0, 0.0]}
-    grid = {"generator": "rectangle", "origin": [inner, 0.0], "size": [wide, tall]}
     return {
-        "mesh": {**grid, "cells": cells},
+        "mesh": grid([wide, tall], cells, origin=[inner, 0.0]),
         "space": {"degree": int(rng.choice([1, 2])), "kinematics": "axisymmetric"},
         "material": {"young": 1.0, "poisson": 0.0},
         "load": [{"on": str(rng.choice(["top", "bottom"])), "traction": [0.0, pull]}],
-        "contact": {"on": "left", "overlap": "press", "foundation": shaft},
+        "contact": {
+            "on": "left",
+            "overlap": "press",
+            "foundation": plane([inner + fit, 0.0], [1.0, 0.0]),
+        },
         "friction": {"law": "coulomb", "mu": mu},
     }, None
 
 
-def jaws(rng: Rng) -> tuple[Tables, None]:
+def jaws(rng: Rng) -> Drawn:
     """Draw a block that hangs between two jaws, the right one of which is pressed."""
     mu, share = float(rng.uniform(0.1, 0.6)), float(rng.choice([0.3, 0.6, 0.8, 0.9]))
     size = rng.uniform(0.5, 1.5, 3)
     cells, force = [int(n) for n in rng.integers(2, 6, 3)], float(10 ** rng.uniform(-5, -3))
     weight = share * 2 * mu * force / float(np.prod(size))
-    left = {"shape": "plane", "point": [0.0, 0.0, 0.0], "normal": [1.0, 0.0, 0.0]}
-    right = {"shape": "plane", "point": [float(size[0]), 0.0, 0.0], "normal": [-1.0, 0.0, 0.0]}
+    left = plane([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    right = plane([float(size[0]), 0.0, 0.0], [-1.0, 0.0, 0.0])
     jaw = {"displacement": ["free", 0.0, 0.0], "force": [-force, 0.0, 0.0]}
     return {
-        "mesh": {"generator": "box", "size": [float(s) for s in size], "cells": cells},
+        "mesh": grid(size.tolist(), cells),
         "material": {"young": 1.0, "poisson": float(rng.choice([0.0, 0.3]))},
         "load": [{"everywhere": True, "body_force": [0.0, 0.0, -weight]}],
         "contact": [
@@ -225,44 +219,10 @@ def jaws(rng: Rng) -> tuple[Tables, None]:
     }, None
 
 
-FAMILIES = (belt, belt, leaf, strip, stack, clip, ring, jaws)
+FAMILIES = belt, belt, leaf, strip, stack, clip, ring, jaws
 
-
-def solved(number: int) -> tuple[str, Solution]:
-    """Solve a problem; return its family too."""
-    family = FAMILIES[number % len(FAMILIES)]
-    tables, domain = family(np.random.default_rng([SEED, number]))
-    if domain is not None:
-        # The case is checked with the names of the parts; the mesh is another one.
-        parts = {name: {"side": "top"} for name in ("inner", "outer") if name in domain.parts}
-        given = {"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1], "parts": parts}
-        case = parse_case({"mesh": given, **tables})
-        return family.__name__, solve(build_problem(case, MPI.COMM_SELF, domain=domain))
-    return family.__name__, solve(build_problem(parse_case(tables), MPI.COMM_SELF))
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Solve all, and count by family and fallback."""
-    given = parser(__doc__, "held_by_friction").parse_args(arguments)
-    found: dict[tuple[str, str], list[tuple[bool, int]]] = {}
-    for number in range(COARSE_COUNT if given.coarse else COUNT):
-        family, solution = solved(number)
-        notes = " ".join(record.note for record in solution.history)
-        way = next((way for way in WAYS if way in notes), "none")
-        counters = solution.counters
-        solves = counters.contact_solves + counters.linear_solves
-        found.setdefault((family, way), []).append((solution.converged, solves))
-        if not solution.converged:
-            print(family, number, solution.outcome.reason, flush=True)
-    keys = ("family", "last fallback", "problems", "solved", "median solves", "most solves")
-    rows: dict[str, list[Any]] = {key: [] for key in keys}
-    for (family, way), runs in sorted(found.items()):
-        converged, solves = zip(*runs, strict=True)
-        counts = len(runs), sum(converged), int(np.median(solves)), max(solves)
-        append(rows, family, way, *counts)
-    caption = "Bodies that friction alone holds: problems solved, by the last fallback"
-    Report(given.out).table("held-by-friction", caption, rows)
-
-
-if __name__ == "__main__":
-    main()
+#: Family -> how a problem is drawn, and its numbers: of each eight in a row two are belts.
+HELD: Families = {
+    draw.__name__: (draw, [k for k in range(400) if FAMILIES[k % len(FAMILIES)] is draw])
+    for draw in FAMILIES
+}
