@@ -117,6 +117,11 @@ class Report:
         (self.out / f"{name}.md").write_text("\n\n".join(parts) + "\n")
 
 
+def empty(*names: str) -> dict[str, list[Any]]:
+    """Return the columns of a table without rows."""
+    return {name: [] for name in names}
+
+
 def append(columns: Mapping[str, list[Any]], *row: Any) -> None:
     """Append a row to columns of equal lengths."""
     for column, value in zip(columns.values(), row, strict=True):

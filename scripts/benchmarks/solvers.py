@@ -20,7 +20,7 @@ from contact.linear.layout import balance
 from contact.linear.multigrid import DEFAULTS, masked_motions, rigid_motions
 from contact.problem.problem import ContactProblem
 from scripts.benchmarks.bench_one import LINEAR, block
-from scripts.reporting import Report, append, parser
+from scripts.reporting import Report, append, empty, parser
 
 GAMG = {"pc_type": "gamg", "pc_gamg_agg_nsmooths": "1"}
 HYPRE = {
@@ -136,8 +136,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = made.parse_args(arguments)
     problem = build_problem(block(6 if given.coarse else given.cells, LINEAR))
     unknowns = problem.body.layout.unknowns
-    names = ("solver", "iterations", "residual", "set-up", "solve", "in all", "over this code")
-    columns: dict[str, list[Any]] = {name: [] for name in names}
+    columns = empty(
+        "solver", "iterations", "residual", "set-up", "solve", "in all", "over this code",
+    )  # fmt: skip
     first = np.nan
     for name, options in SOLVERS.items():
         found = measured(problem, options)

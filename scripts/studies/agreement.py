@@ -16,7 +16,7 @@ import numpy as np
 
 from contact import Solution, build_problem
 from contact.methods.options import FixedPointOptions, Options, PenaltyOptions, with_method
-from scripts.reporting import Report, append, observed_orders, parser
+from scripts.reporting import Report, append, empty, observed_orders, parser
 from scripts.studies.agreement_examples import TOLERANCE, Example, examples
 from scripts.studies.branches import AGREE, DISTURBANCE, SOLVES, Branches
 
@@ -98,11 +98,10 @@ def penalised(branches: Branches, solution: Solution, eps: float) -> Options:
 
 def agreement(report: Report, compared: Sequence[Compared]) -> None:
     """Tabulate the differences between Newton's method and Uzawa block relaxation. Collective."""
-    names = (
-        "example", "unknowns", "newton", "uzawa", "solves", "uzawa's", "u", "phi", "energy",
-        "p", "tau", "verdict", "solutions", "warned",
+    columns = empty(
+        "example", "unknowns", "newton", "uzawa", "solves", "uzawa's", "u", "phi", "energy", "p",
+        "tau", "verdict", "solutions", "warned",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {name: [] for name in names}
     for one in compared:
         newton, uzawa = one.runs["newton"], one.runs["uzawa"]
         apart = one.branches.difference(uzawa, newton)
@@ -151,8 +150,7 @@ def verdict(one: Compared, apart: float) -> str:
 
 def limits(report: Report, compared: Sequence[Compared]) -> None:
     """Tabulate how the penalised solutions tend to those with multipliers. Collective."""
-    names = ("example", "converged", "limit", *EPS, "order", "p", "order of p")
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty("example", "converged", "limit", *EPS, "order", "p", "order of p")
     for one in compared:
         runs = [one.runs[name] for name in EPS]
         near, apart = zip(*map(one.branches.nearest, runs), strict=True)
@@ -200,12 +198,11 @@ def path(letters: Sequence[str]) -> str:
 
 def solutions(report: Report, compared: Sequence[Compared]) -> None:
     """Tabulate the solutions of the examples that have several. Collective."""
-    names = (
+    columns = empty(
         "example", "solution", "found by", "stick", "slide", "open", "others than in A",
         "max |u_i|", "max p", "distance to A", "residual", "newton from it", "uzawa from it",
         "newton, disturbed", "uzawa, disturbed",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {name: [] for name in names}
     for one in compared:
         if not one.several:
             continue

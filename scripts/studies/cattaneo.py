@@ -25,7 +25,7 @@ from contact import Solution, parse_case, sensitivity
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.quantities import named_functionals
-from scripts.reporting import Report, append, options, solved
+from scripts.reporting import Report, append, empty, options, solved
 from scripts.studies.mindlin import MU, PRESS, RADIUS, YOUNG, write_mesh
 
 #: Q/(mu P), how near the first runs come to it, and the steps of the last run: so many, so far
@@ -214,8 +214,9 @@ def cylinders(elements: float, degree: int) -> tuple[Found, float]:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table."""
     given = options(__doc__ or "", "derivatives", arguments)
-    names = ("delta_x", "d delta_x/d mu", "scatter", "c", "dc/d mu")
-    columns: dict[str, list[Any]] = {name: [] for name in ("bodies", "elements", "sectors", *names)}
+    columns = empty(
+        "bodies", "elements", "sectors", "delta_x", "d delta_x/d mu", "scatter", "c", "dc/d mu",
+    )  # fmt: skip
 
     def add(bodies: str, elements: float, sectors: float, one: Found, scatter: float) -> None:
         values = one.way, one.by_mu, scatter, one.stick, one.stick_by_mu

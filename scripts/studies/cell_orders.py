@@ -30,7 +30,7 @@ from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
-from scripts.reporting import Report, append
+from scripts.reporting import Report, append, empty
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular
 from scripts.studies.hertz_exact import Line, Point
@@ -176,8 +176,8 @@ def _squares(
 def orders(report: Report, coarse: bool) -> dict[tuple[str, str, int, int], Array]:
     """Make the table of errors; return both orders by problem, cells, and both degrees."""
     keys = "problem", "cells", "geometry", "degree", "n", "unknowns", "u in L2", "p in L2"
-    columns: dict[str, list[Any]] = {key: [] for key in keys}
-    last: dict[str, list[Any]] = {key: [] for key in (*keys, "order of u", "order of p")}
+    columns = empty(*keys)
+    last = empty(*keys, "order of u", "order of p")
     found = {}
     for name, (kind, dim, above) in KNOWN.items():
         for shape in (shape for shape in SHAPES if shape.dim == dim):
@@ -228,8 +228,7 @@ def _measured(make: Callable[[int], tuple[ContactProblem, Any]], n: int) -> tupl
 
 def times(report: Report, coarse: bool) -> dict[tuple[str, str, int, int], float]:
     """Make the table of times to 1 %; return the unknowns by problem, cells and degrees."""
-    keys = ("problem", "cells", "geometry", "degree", "n", "unknowns", "error", "seconds")
-    columns: dict[str, list[Any]] = {key: [] for key in keys}
+    columns = empty("problem", "cells", "geometry", "degree", "n", "unknowns", "error", "seconds")
     found = {}
     makes = (("ring on a shaft", _ring), ("root-like", _root))
     asked = 5 * ASKED if coarse else ASKED

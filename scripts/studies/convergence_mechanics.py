@@ -13,7 +13,7 @@ from contact import NotConvergedError
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
-from scripts.reporting import Report, observed_orders, options
+from scripts.reporting import Report, empty, observed_orders, options
 from scripts.studies.corner import POISSON, exponent
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular, exact, manufactured
@@ -109,7 +109,7 @@ def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
     singular = Singular()
     names = ("problem", "1/h", "L2", "order (L2)", "H1", "order (H1)", "energy", "order (energy)")
     names = (*names, "largest", "order", "residual")
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty(*names)
     results = {}
     series = [
         (f"Hencky, {dim}-D, P{degree}", dim, degree, first * 2 ** np.arange(levels - (dim == 3)))

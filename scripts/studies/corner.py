@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from scripts.cases import bar
-from scripts.reporting import Report, observed_orders, options, solved
+from scripts.reporting import Report, empty, observed_orders, options, solved
 
 #: Poisson's ratio and decay of (7.16) of Example 7.2.
 POISSON, RHO = 0.3, 1e4
@@ -35,8 +35,9 @@ def exponent(poisson: float, angle: float = np.pi / 2) -> float:
 def main(arguments: Sequence[str] | None = None) -> list[float]:
     """Make the table; return the fitted exponents. Collective."""
     chosen = options(__doc__, "corner", arguments)
-    names = ("1/h", "status", "pressure at (4, 0)", "lambda, fitted", "lambda, theory", "residual")
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty(
+        "1/h", "status", "pressure at (4, 0)", "lambda, fitted", "lambda, theory", "residual",
+    )  # fmt: skip
     cells, pressures = (8, 16, 32) if chosen.coarse else (16, 32, 64, 128), []
     for n in cells:
         solution = solved(bar(n, -0.005, RHO))

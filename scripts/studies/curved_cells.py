@@ -16,7 +16,7 @@ from contact import Body, Contact, Cylinder, Domain, Fixed, Linear, Load, Sphere
 from contact.mesh.cells import SHAPES
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import Report, append, observed_orders, options
+from scripts.reporting import Report, append, empty, observed_orders, options
 from scripts.studies import cell_orders, round_bodies
 from scripts.studies.lame_rings import Lame, error, rings
 
@@ -114,8 +114,10 @@ def rim(report: Report, coarse: bool) -> dict[str, float]:
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, int], float]:
     """Make the table; return the last orders by problem, cell, and the degrees of both."""
     chosen = options(__doc__, "curved_cells", arguments)
-    names = ("problem", "cells", "geometry", "degree", "across", "unknowns", "error", "order")
-    columns: dict[str, list[object]] = {name: [] for name in (*names, "pressure")}
+    columns = empty(
+        "problem", "cells", "geometry", "degree", "across", "unknowns", "error", "order",
+        "pressure",
+    )  # fmt: skip
     orders = {}
     for kind, exact in (
         ("shaft", LAME.pressure),

@@ -45,7 +45,7 @@ from contact.mesh.domain import revolved
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, options, solved
+from scripts.reporting import Report, append, empty, options, solved
 
 YOUNG, POISSON = 1000.0, 0.3
 
@@ -450,8 +450,9 @@ def _of(name: str, kind: str, h: float, degree: int, order: int = 1) -> Array:
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, float, int, int], Array]:
     """Make the table; return mean, least and largest ratio of each problem. Collective."""
     chosen = options(__doc__, "curved_foundations", arguments)
-    names = "problem", "kind", "h", "degree", "geometry", "nodes", "mean", "least", "largest", "off"
-    rows: list[tuple[Any, ...]] = []
+    columns = empty(
+        "problem", "kind", "h", "degree", "geometry", "nodes", "mean", "least", "largest", "off"
+    )
     found = {}
     for name, kind, sizes, measured in series(chosen.coarse):
         for degree, order in ELEMENTS:
@@ -462,10 +463,8 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, float, 
                 values = np.array([p @ w / w.sum(), p.min(), p.max()])
                 found[name, kind, h, degree, order] = values
                 off = round(100 * float(w[np.abs(p - 1) > 0.1].sum() / w.sum()), 2)
-                rows.append((name, kind, h, degree, order, p.size, *values.round(4).tolist(), off))
-    columns = {
-        key: list(values) for key, values in zip(names, zip(*rows, strict=True), strict=True)
-    }
+                shown = values.round(4).tolist()
+                append(columns, name, kind, h, degree, order, p.size, *shown, off)
     Report(chosen.out).table("curved-foundations-table", CAPTION, columns, NOTE)
     return found
 

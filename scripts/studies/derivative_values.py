@@ -23,7 +23,7 @@ from contact.typing import Array
 from forms.elasticity import hexagonal
 from forms.piezo import hexagonal_voigt
 from scripts.cases import CASES
-from scripts.reporting import Report, append, options, solved
+from scripts.reporting import Report, append, empty, options, solved
 from scripts.studies.derivatives import block, evolving
 from scripts.studies.half_space import HalfSpace
 from scripts.studies.indentation import Setting
@@ -94,9 +94,7 @@ def exponents(report: Report, fineness: float) -> None:
     """Tabulate the exponents of the force on a ball, of PZT-4 and of Hertz."""
     crystal = {"law": "anisotropic", "poling": -90.0, **STIFFNESS, "piezo": PIEZO}
     shape = ["contact.foundation.radius", "contact.rigid.displacement.1"]
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("ball", "parameter", *(f"box {box:g} a" for box in BOXES))
-    }
+    columns = empty("ball", "parameter", *(f"box {box:g} a" for box in BOXES))
     columns |= {"extrapolated": [], "closed form": []}
     for kind, potential, material, own in (
         ("insulating", None, crystal, BY),
@@ -127,9 +125,7 @@ def exponents(report: Report, fineness: float) -> None:
 
 def known(report: Report) -> None:
     """Tabulate derivatives that are known."""
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("problem", "derivative", "found", "known")
-    }
+    columns = empty("problem", "derivative", "found", "known")
     changes = ["mesh.cells=[64,16]", "material.law=linear", "friction.mu=0.3"]
     bar = solved(load_case(CASES / "bar.toml", [*changes, "solver.tolerance=1e-12"]))
     names = ["contact_force_x", "contact_force_y", "max_pressure"]
@@ -238,10 +234,7 @@ def cost(report: Report, coarse: bool) -> None:
     }
     loop = evolving(pressed | {"mesh": pressed["mesh"] | {"cells": [64, 16]}}, 1 if coarse else 4)
     plastic = loop | {"material": {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 0.01}}
-    columns: dict[str, list[Any]] = {
-        name: []
-        for name in ("problem", "unknowns", "parameters", "by", "factorisations", "solves", "s")
-    }
+    columns = empty("problem", "unknowns", "parameters", "by", "factorisations", "solves", "s")
     many = ["friction.mu", "material.young", "material.poisson", "fixed.0.displacement.1"]
     for title, data in (
         ("plane", pressed),

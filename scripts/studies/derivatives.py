@@ -27,7 +27,7 @@ from contact.problem.linearised import active_set
 from contact.results.quantities import named_functionals
 from contact.results.solution import Solution
 from contact.typing import Array
-from scripts.reporting import Report, append, options
+from scripts.reporting import Report, append, empty, options
 
 #: Relative changes of a parameter in the central differences: the first without a kink between.
 STEPS = (2e-5, 5e-6, 1e-6)
@@ -405,7 +405,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Compare the problems, and tabulate them by family."""
     given = options(__doc__, "derivatives", arguments)
     report = Report(given.out)
-    rows: dict[str, list[Any]] = {name: [] for name in Compared.__annotations__}
+    rows = empty(*Compared.__annotations__)
     for seed in range(len(FAMILIES) if given.coarse else ALL):  # one of each
         append(rows, *vars(compared(seed, MPI.COMM_WORLD, each=not given.coarse)).values())
         print(seed, *(column[-1] for column in rows.values()), flush=True)
@@ -415,8 +415,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def tabulate(report: Report, rows: Mapping[str, Sequence[Any]]) -> None:
     """Tabulate the problems by family."""
-    names = "family", "problems", "derivatives", "adjoint", "differences", "apart", "kinks"
-    columns: dict[str, list[Any]] = {name: [] for name in names}
+    columns = empty("family", "problems", "derivatives", "adjoint", "differences", "apart", "kinks")
     every = [dict(zip(rows, row, strict=True)) for row in zip(*rows.values(), strict=True)]
     for family in dict.fromkeys(rows["family"]):
         own = [row for row in every if row["family"] == family]

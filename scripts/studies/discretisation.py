@@ -21,7 +21,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated
 from contact.results.remarks import LOCKED
-from scripts.reporting import Report, append, options, subplots
+from scripts.reporting import Report, append, empty, options, subplots
 from tests.problems.bar import changed
 from tests.problems.membrane import cook
 
@@ -117,9 +117,7 @@ def prandtl(n: int, degree: int, element: str, cell: str) -> float:
 
 def limits(report: Report, coarse: bool) -> None:
     """Make the table of Cook's membrane and Prandtl's punch. Collective."""
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("problem", "element", "cells", "found", "limit", "ratio")
-    }
+    columns = empty("problem", "element", "cells", "found", "limit", "ratio")
     for label, given in SHAPED.items():
         for n in (8,) if coarse else (8, 16, 32):
             rise = cook(n, *given)

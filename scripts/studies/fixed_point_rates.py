@@ -14,7 +14,7 @@ from contact.model.friction import Friction
 from contact.results.fields import DerivedFields
 from contact.typing import Array
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, append, iterates, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, empty, iterates, subplots
 from scripts.studies.error_norms import errors
 from scripts.studies.mesh_series import RHO
 
@@ -89,17 +89,9 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
     """Show the errors of the fixed points per iteration; return observed rates. Collective."""
     n = 8 if coarse else 16
     figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.4), sharey=True)
-    columns: dict[str, list[object]] = {
-        name: []
-        for name in (
-            "iteration",
-            "iterations",
-            "observed rate",
-            "max |dev eps|",
-            "Kacanov's bound",
-            "residual",
-        )
-    }
+    columns = empty(
+        "iteration", "iterations", "observed rate", "max |dev eps|", "Kacanov's bound", "residual"
+    )
     data: dict[str, Sequence[float]] = {}
     rates = {}
     chosen = ITERATIONS[1::3] if coarse else ITERATIONS

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from dolfinx.mesh import DiagonalType, create_rectangle, locate_entities_boundary
@@ -23,7 +22,7 @@ from contact import J2, Body, Contact, Fixed, Load, Problem, Solution, solve_ste
 from contact.mesh.domain import from_mesh, revolved
 from contact.results.fields import DerivedFields
 from contact.typing import Array
-from scripts.reporting import Report, append, options
+from scripts.reporting import Report, append, empty, options
 
 INNER, OUTER, POISSON = 1.0, 2.0, 0.3
 
@@ -227,9 +226,10 @@ LIMIT = Hill(YOUNG, YIELD).most
 def unloading(report: Report, cells: int) -> None:
     """Tabulate displacements and residual stresses."""
     exact = Hill(YOUNG, YIELD)
-    names = ("plastic to", "state", "u(1)", "u(2)", "hoop(1)", "hoop(2)")
-    more = ("u apart", "hoop apart", "strain apart", "in reverse", "known")
-    columns: dict[str, list[Any]] = {name: [] for name in (*names, *more)}
+    columns = empty(
+        "plastic to", "state", "u(1)", "u(2)", "hoop(1)", "hoop(2)", "u apart", "hoop apart",
+        "strain apart", "in reverse", "known",
+    )  # fmt: skip
     for front in FRONTS:
         pressure = exact.pressure(front)
         solution = pressed(cells, YOUNG, YIELD, pressure)
@@ -256,10 +256,9 @@ def unloading(report: Report, cells: int) -> None:
 def shakedown(report: Report, cells: int) -> None:
     """Tabulate the plastic dissipation in cycles beside the limit of shakedown."""
     exact = Hill(YOUNG, YIELD)
-    halves = ("off", "on, 2", "off, 2", "on, 3", "off, 3")
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("p/p_s", "on", "closed form", *halves, "closed form ")
-    }
+    columns = empty(
+        "p/p_s", "on", "closed form", "off", "on, 2", "off, 2", "on, 3", "off, 3", "closed form ",
+    )  # fmt: skip
     for share in CYCLED:
         pressure = share * 2 * exact.first
         on, *later = cycled(cells, pressure, 3)
@@ -278,9 +277,7 @@ def shakedown(report: Report, cells: int) -> None:
 
 def limits(report: Report, sizes: Sequence[int]) -> None:
     """Tabulate limit pressures."""
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("element", "cells", "p", "over the limit")
-    }
+    columns = empty("element", "cells", "p", "over the limit")
     for name, element in (("P2", "standard"), ("P2, mean", "mean_dilatation")):
         for cells in sizes:
             pressure = limit_pressure(cells, element)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
@@ -20,7 +19,7 @@ from contact.cli.identify import draw
 from contact.results.solution import Solution
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, parser, solved
+from scripts.reporting import Report, append, empty, parser, solved
 
 #: Parameters, measured columns, noise over the largest value, and probability of the intervals.
 KEYS, MEASURED = ("friction.mu", "material.young"), ("contact_force_x", "contact_force_y")
@@ -57,10 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     right, wrong = solved(case), case
     for key, factor in zip(KEYS, (1.5, 0.7), strict=True):
         wrong = with_number(wrong, key, factor * number_at(case, key))
-    columns: dict[str, list[Any]] = {
-        name: []
-        for name in ("repetition", "mu", "from", "to", "E", "E from", "E to", "both in", "runs")
-    }
+    columns = empty("repetition", "mu", "from", "to", "E", "E from", "E to", "both in", "runs")
     inside = np.zeros(len(KEYS), dtype=int)
     for seed in range(1 if given.coarse else given.count):
         data = measurement(right, seed)

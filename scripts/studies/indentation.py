@@ -21,7 +21,7 @@ from contact.typing import Array
 from forms.elasticity import isotropic
 from forms.piezo import hexagonal_voigt
 from scripts.cases import CASES
-from scripts.reporting import Report, append, options, solved
+from scripts.reporting import Report, append, empty, options, solved
 from scripts.studies import half_space
 from scripts.studies.half_space import HalfSpace, Indentation
 
@@ -216,8 +216,9 @@ def extrapolated(setting: Setting, extent: float = 30.0) -> tuple[Found, list[Fo
 
 def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS) -> None:
     """Tabulate ratios to the closed forms. Collective."""
-    names = ("material", "shape", "indenter", "P", "delta", "Q", "phi", "P in the box", "unknowns")
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty(
+        "material", "shape", "indenter", "P", "delta", "Q", "phi", "P in the box", "unknowns",
+    )  # fmt: skip
     for material in materials:
         for shape in MOMENTS:
             for potential in (None, 0.0, 0.002):
@@ -248,8 +249,7 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
 
 def half_spaces(report: Report) -> None:
     """Tabulate the moduli of the half spaces, and charge over force of a grounded indenter."""
-    names = "material", "E* insulating (GPa)", "E* conducting (GPa)", "|Q/P| (pC/N)"
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty("material", "E* insulating (GPa)", "E* conducting (GPa)", "|Q/P| (pC/N)")
     for material in MATERIALS:
         body = Setting(material, "ball", 0.0).body
         charge = 1e3 * abs(body.charge_ratio)  # from C/m2 over GPa
@@ -263,8 +263,7 @@ def half_spaces(report: Report) -> None:
 
 def units_and_poling(report: Report, fineness: float) -> None:
     """Tabulate the effects of poling and units on a ball on PZT-4. Collective."""
-    names = ("indenter", "given", "P", "Q or phi", "largest difference of p", "of phi")
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty("indenter", "given", "P", "Q or phi", "largest difference of p", "of phi")
     for potential in (None, 0.0):
         kind = "insulating" if potential is None else "grounded"
         first: tuple[float, float, Array, Array] | None = None

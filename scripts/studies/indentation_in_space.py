@@ -15,7 +15,7 @@ from contact import Case, Solution, load_case, parse_case
 from contact.results.resultants import charge_balance, movements
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, observed_orders, options, solved
+from scripts.reporting import Report, append, empty, observed_orders, options, solved
 from scripts.studies.indentation import COUPLING, THESIS
 
 #: How far the cut of the ball is lowered; potential of the conducting plate (GV).
@@ -83,8 +83,7 @@ def measured(space: bool, n: float, conducting: bool, degree: int = 1) -> Array:
 def beside_revolution(report: Report, coarse: bool) -> None:
     """Tabulate the errors of half plane and space against a fine half plane. Collective."""
     exact = {kind: measured(False, 8 if coarse else 32, kind, 2) for kind in (False, True)}
-    names = "mesh", "n", "P, insulating", "phi", "P, conducting", "Q"
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty("mesh", "n", "P, insulating", "phi", "P, conducting", "Q")
     for space in (False, True):
         sizes = (2, 3) if coarse else (4, 8, 12) if space else (4, 8, 16)
         errors = [
@@ -119,8 +118,10 @@ def rotation(solution: Solution) -> float:
 
 def tilted_punch(report: Report, coarse: bool) -> None:
     """Tabulate rotations, and the costs of a solve, condensed and not. Collective."""
-    names = "n", "extent", "unknowns", "theta", "order", "solves", "seconds"
-    columns: dict[str, list[object]] = {name: [] for name in (*names, "solves, lu", "seconds, lu")}
+    columns = empty(
+        "n", "extent", "unknowns", "theta", "order", "solves", "seconds", "solves, lu",
+        "seconds, lu",
+    )  # fmt: skip
     sizes = (0.25, 0.5) if coarse else (0.5, 1.0, 2.0, 2.5)
     rows = []
     for n, extent in [*((n, 10.0) for n in sizes), (sizes[1], 20.0)]:

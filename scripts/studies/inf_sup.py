@@ -31,7 +31,7 @@ from contact.mesh.reader import from_generator
 from contact.mesh.transfer import refined
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import Report, append, options
+from scripts.reporting import Report, append, empty, options
 from scripts.studies.dual_norm import DualNorm
 
 CAPTION = "Inf-sup constant of the nodal multipliers"
@@ -168,8 +168,7 @@ def constant(kind: Mesh, domain: Domain, degree: int, levels: int) -> tuple[floa
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int, int], float]:
     """Make the table; return the constants by mesh, degree and cells."""
     chosen = options(__doc__, "inf_sup", arguments)
-    names = ("mesh", "degree", "cells", "multipliers", "refined", "beta")
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty("mesh", "degree", "cells", "multipliers", "refined", "beta")
     found = {}
     for name, (kind, degrees) in SERIES.items():
         for degree, (cells, levels) in degrees.items():

@@ -18,7 +18,7 @@ from contact.methods.options import FixedPointOptions
 from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import TWO_COLUMNS, Report, append, iterates, options, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, empty, iterates, options, subplots
 from scripts.studies.product_norm import ProductNorm
 
 #: k_e of the figure.
@@ -97,9 +97,7 @@ def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
     name, shown = "piezo-8-1-conductive", SHOWN[1::2] if coarse else SHOWN
     figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.2), sharey=True)
     data: dict[str, Sequence[float]] = {}
-    columns: dict[str, list[object]] = {
-        key: [] for key in ("k_e", "charge", "iterations", "converged", "observed rate")
-    }
+    columns = empty("k_e", "charge", "iterations", "converged", "observed rate")
     rates = {}
     for lagged, ax in zip((True, False), axes, strict=True):
         how = "lagged" if lagged else "implicit"

@@ -16,7 +16,7 @@ from contact.mesh.transfer import carry
 from contact.methods.report import Outcome
 from contact.typing import Array
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, observed_orders, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, empty, observed_orders, solved, subplots
 from scripts.studies.error_norms import errors
 from scripts.studies.grading import grade
 
@@ -95,8 +95,7 @@ def mesh_series(
     report: Report, name: str, caption: str, note: str, variants: Sequence[Variant]
 ) -> dict[str, Array]:
     """Tabulate and draw errors over h; return them by label. Collective."""
-    names = ["problem", "1/h", "reference 1/h"]
-    columns: dict[str, list[object]] = {key: [] for key in names}
+    columns = empty("problem", "1/h", "reference 1/h")
     for norm in NORMS:
         columns |= {norm: [], f"order ({norm})": []}
     columns["residual"] = []

@@ -23,7 +23,7 @@ from contact import parse_case
 from contact.typing import Array
 from meshes.grading import Sizes, finish
 from meshes.turning import turn as turned
-from scripts.reporting import ONE_COLUMN, Report, append, options, solved, subplots
+from scripts.reporting import ONE_COLUMN, Report, append, empty, options, solved, subplots
 
 #: Radius (mm) and Young's modulus (N/mm^2) of the balls, and the friction coefficient.
 RADIUS, YOUNG, MU = 50.0, 20e3, 0.3
@@ -46,8 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     fine = [(0.0, PRESS, 6, 8), (0.0, PRESS, 12, 8), (0.0, PRESS, 12, 12), (0.0, PRESS, 18, 12)]
     fine += [(0.0, 4 * PRESS, 12, 12), (0.0, PRESS / 4, 12, 12), (0.3, PRESS, 12, 12)]
     runs = [(0.0, PRESS, 4, 6)] if given.coarse else fine
-    names = ("nu", "a/R", "a/h", "sectors", "Q/(mu P)", "area", "dissipation")
-    rows: dict[str, list[Any]] = {name: [] for name in names}
+    rows = empty("nu", "a/R", "a/h", "sectors", "Q/(mu P)", "area", "dissipation")
     for k, (poisson, press, elements, sectors) in enumerate(runs):
         loop = turn(poisson, elements, sectors, press)
         ratios = loop.area / loop.exact, loop.dissipation / loop.exact
@@ -64,12 +63,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "which is exact for nu = 0.",
     )
     draw(report, shown)
-    plane: dict[str, list[Any]] = {"degree": [], "a/h": [], "dissipation": []}
+    plane = empty("degree", "a/h", "dissipation")
     for degree in (1, 2):
         for elements in (6,) if given.coarse else (6, 12, 24, 48, 96)[: 7 - 2 * degree]:
-            plane["degree"].append(degree)
-            plane["a/h"].append(elements)
-            plane["dissipation"].append(turn_of_cylinders(elements, 3, degree))
+            append(plane, degree, elements, turn_of_cylinders(elements, 3, degree))
     report.table(
         "mindlin-plane",
         "Two cylinders: dissipation of a cycle, over the closed form",

@@ -18,10 +18,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 from contact.errors import InputError
-from scripts.reporting import Report, append, parser
+from scripts.reporting import Report, append, empty, parser
 
 ROOT = Path(__file__).parents[2]
 
@@ -325,7 +324,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given.add_argument("--only", nargs="+", choices=names, default=[*names], metavar="NAME")
     given.add_argument("--ranks", nargs="+", type=int, default=[1, 2, 3], metavar="N")
     options = given.parse_args(arguments)
-    columns: dict[str, list[Any]] = {k: [] for k in ("mutant", "breaks", "found by", "ranks", "s")}
+    columns = empty("mutant", "breaks", "found by", "ranks", "s")
     for name in options.only:
         mutant, began, found = names[name], time.perf_counter(), ""
         with tempfile.TemporaryDirectory() as folder:

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from contact import Solution
 from contact.results.contact_nodes import Table, contact_table
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, empty, options, solved, subplots
 from scripts.studies.error_norms import errors
 
 RHO = 1e4
@@ -36,22 +36,11 @@ def radii(n: int) -> dict[str, float]:
 
 def study(report: Report, n: int, load: float) -> dict[str, Solution]:
     """Tabulate and draw the solutions over the radius. Collective."""
-    names = (
-        "radius",
-        "Newton steps",
-        "factorizations",
-        "Algorithm 1: outer",
-        "inner",
-        "max pressure",
-        "contact force",
-        "friction force",
-        "stick",
-        "slip",
-        "u - u(0) in energy",
-        "residual",
+    columns = empty(
+        "radius", "Newton steps", "factorizations", "Algorithm 1: outer", "inner", "max pressure",
+        "contact force", "friction force", "stick", "slip", "u - u(0) in energy", "residual",
         "residual (Alg. 1)",
-    )
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    )  # fmt: skip
     solutions: dict[str, Solution] = {}
     tables: dict[str, Table | None] = {}
     local = None

@@ -18,7 +18,7 @@ from contact.typing import Array
 from forms.hencky import UserLaw
 from forms.ops import Value, maximum
 from scripts.cases import CASES
-from scripts.reporting import Report, append, options, solved, subplots
+from scripts.reporting import Report, append, empty, options, solved, subplots
 
 YOUNG, POISSON, YIELD = 200e3, 0.3, 250.0
 STEEL = {"law": "j2", "young": YOUNG, "poisson": POISSON, "yield_stress": YIELD}
@@ -84,9 +84,7 @@ def punch(size: float, element: str) -> Case:
 def prandtl(report: Report, coarse: bool) -> None:
     """Make the table of limit loads of a punch. Collective."""
     limit = (2 + np.pi) / np.sqrt(3)
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("element", "size", "unknowns", "steps", "p/Y", "over the limit")
-    }
+    columns = empty("element", "size", "unknowns", "steps", "p/Y", "over the limit")
     for element in ELEMENTS:
         for size in (0.2,) if coarse else (0.2, 0.1, 0.05):
             solution = solved(punch(size, element))
@@ -200,8 +198,7 @@ def first_yield(shape: str, fineness: float, poisson: float = POISSON) -> tuple[
 
 def ball_and_cylinder(report: Report, coarse: bool) -> None:
     """Make the table of first yield under Hertzian contact."""
-    names = ("body", "nu", "elements", "p_0/Y", "closed form", "depth/a", "closed form ")
-    columns: dict[str, list[Any]] = {name: [] for name in names}
+    columns = empty("body", "nu", "elements", "p_0/Y", "closed form", "depth/a", "closed form ")
     for shape, poisson in YIELDING:
         known = hertz_first_yield(shape, poisson)
         sizes = (6,) if coarse else (6, 12, 24) if poisson == POISSON else (24,)
@@ -246,11 +243,11 @@ def pressed_ball(report: Report, coarse: bool) -> None:
     """Make the tables of a ball that is pressed into steel that yields, and lifted. Collective."""
     depth = depth_of_first_yield()
     first = 4 / 3 * EFFECTIVE * np.sqrt(RADIUS) * depth**1.5
-    titles = ("w/w_c", "P/P_c", "another code", "over it")
-    fits = ("Kogut and Etsion", "over that", "Jackson and Green", "over these")
-    columns: dict[str, list[Any]] = {name: [] for name in (*titles, *fits)}
-    names = ("w/w_c", "mark over w", "Etsion et al.", "exponent", "rise 4 E* a/(3 P)")
-    lifted: dict[str, list[Any]] = {name: [] for name in names}
+    columns = empty(
+        "w/w_c", "P/P_c", "another code", "over it", "Kogut and Etsion", "over that",
+        "Jackson and Green", "over these",
+    )  # fmt: skip
+    lifted = empty("w/w_c", "mark over w", "Etsion et al.", "exponent", "rise 4 E* a/(3 P)")
     deepest = 0.0
     for case in ball_cases(coarse):
         solution = solved(case)
@@ -368,8 +365,10 @@ HARDENINGS: dict[str, dict[str, Any]] = {
 def cost(report: Report, coarse: bool) -> None:
     """Tabulate the processor time of an iteration with J2 and with Hencky's law. Collective."""
     times, repeated = np.linspace(0.0, 3.0, 19)[1:].tolist(), 1 if coarse else 3
-    names = ("degree", "cells", "factorisations", "material", "iterations", "s an iteration")
-    columns: dict[str, list[Any]] = {name: [] for name in (*names, "ratio to Hencky's")}
+    columns = empty(
+        "degree", "cells", "factorisations", "material", "iterations", "s an iteration",
+        "ratio to Hencky's",
+    )  # fmt: skip
     for degree, cells in ((2, 8),) if coarse else ((2, 24), (1, 64)):
         mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [2 * cells, cells]}
         for words, keep in (("few (chord steps)", "within"), ("each iteration", "never")):

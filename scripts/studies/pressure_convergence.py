@@ -19,7 +19,7 @@ from contact import NotConvergedError, Problem, solve
 from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, subplots
+from scripts.reporting import TWO_COLUMNS, Report, empty, observed_orders, options, subplots
 from scripts.studies.curved_foundations import ring
 from scripts.studies.dual_norm import DualNorm
 from scripts.studies.exact_solutions import Singular
@@ -123,11 +123,10 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int], Array]
     """Make table and figure; return the errors by problem and degree, (meshes, 2). Collective."""
     chosen = options(__doc__, "pressure_convergence", arguments)
     report = Report(chosen.out)
-    names = (
+    columns = empty(
         "problem", "degree", "cells", "p in L2", "order", "fitted", "p in H^-1/2", "its order",
         "its fit", "residual",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {name: [] for name in names}
     figure, axes = subplots(1, len(SERIES), size=(TWO_COLUMNS, 2.6), sharey=True)
     found = {}
     for ax, (name, series) in zip(axes, SERIES.items(), strict=True):

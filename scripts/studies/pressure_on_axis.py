@@ -23,7 +23,7 @@ from contact.mesh.domain import revolved
 from contact.mesh.grid import rectangle
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
-from scripts.reporting import Report, options
+from scripts.reporting import Report, append, empty, options
 
 POISSON, RADIUS, DEPTH, SIZE = 0.3, 4.0, 9e-4, 0.5
 #: How a square is cut, and where it is not.
@@ -85,15 +85,14 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[int, str, int], P
     kinds = [(1, way) for way in WAYS] + [(2, way) for way in WAYS if way != "left_right"]
     found = {(*kind, n): profile(n, *kind) for kind in kinds for n in meshes}
     best = found[2, "crossed", meshes[-1]]
-    names = "degree", "squares", "1/h", "p_0", "error of p_0", "r = h", "2 h", "3 h", "a/2"
-    rows = []
+    columns = empty("degree", "squares", "1/h", "p_0", "error of p_0", "r = h", "2 h", "3 h", "a/2")
     for (degree, way, n), one in found.items():
         error = 100 * (one.pressure / best.fitted(one.radius) - 1)
         middle = error[np.argmin(np.abs(one.radius - 0.03))]
         at_axis = 100 * (np.sqrt(one.square / best.square) - 1)
         values = (at_axis, *error[:3], middle)
-        rows.append((degree, way, n, one.square**0.5, *(round(float(e), 3) + 0.0 for e in values)))
-    columns = {k: list(v) for k, v in zip(names, zip(*rows, strict=True), strict=True)}
+        rounded = (round(float(e), 3) + 0.0 for e in values)
+        append(columns, degree, way, n, one.square**0.5, *rounded)
     Report(chosen.out).table("pressure-on-axis-table", CAPTION, columns, NOTE)
     return found
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -17,7 +16,7 @@ from contact import Body, Contact, Domain, Fixed, Linear, Plane
 from contact.mesh.cells import SHAPES
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import Report, append, options
+from scripts.reporting import Report, append, empty, options
 from scripts.studies.cell_orders import ELEMENTS, grid, solved
 
 CAPTION = "A disc and a ball of soft rim on a rigid plane, on straight and on curved cells"
@@ -130,10 +129,8 @@ def solution(dim: int, cell: str, order: int, degree: int, n: int, depth: float)
 def orders(report: Report, coarse: bool) -> dict[tuple[str, int, int], Array]:
     """Make the table; return the orders of all three by cells and both degrees. On one rank."""
     keys = ("cells", "geometry", "degree", "n", "unknowns", "force", "u", "p")
-    columns: dict[str, list[Any]] = {key: [] for key in keys}
-    last: dict[str, list[Any]] = {
-        key: [] for key in (*keys, "order of force", "order of u", "order of p")
-    }
+    columns = empty(*keys)
+    last = empty(*keys, "order of force", "order of u", "order of p")
     found, hertz = {}, []
     for dim, fine in FINE.items():
         fine //= 4 if coarse else 1

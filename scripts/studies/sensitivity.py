@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from contact import Solution, build_problem, load_case, solve
 from scripts.cases import CASES
-from scripts.reporting import ONE_COLUMN, Report, options, subplots
+from scripts.reporting import ONE_COLUMN, Report, append, empty, options, subplots
 
 
 @dataclass(frozen=True)
@@ -108,13 +108,15 @@ def study(report: Report, name: str, coarse: bool) -> None:
     sweep = SWEEPS[name]
     cells = (24, 24 // (sweep.cells[0] // sweep.cells[1])) if coarse else sweep.cells
     parameter = name.partition("-")[0]
-    names = (parameter, "contact force", "max p", "p in L2", "in contact", "converged", "residual")
-    columns: dict[str, list[object]] = {key: [] for key in names}
+    columns = empty(
+        parameter, "contact force", "max p", "p in L2", "in contact", "converged", "residual",
+    )  # fmt: skip
     domain = None
     for value in sweep.values:
         solution = run(sweep, value, cells, domain)
         domain, nodes = solution.problem.domain, solution.problem.nodes
-        row = (
+        append(
+            columns,
             value,
             float(-solution.contact_force[1]),
             nodes.maximum(solution.pressure),
@@ -123,8 +125,6 @@ def study(report: Report, name: str, coarse: bool) -> None:
             solution.converged,
             solution.outcome.residuals.largest,
         )
-        for key, entry in zip(names, row, strict=True):
-            columns[key].append(entry)
     caption = f"Sensitivity to {parameter}: Example {sweep.example}, {cells[0]} x {cells[1]} cells"
     report.table(f"sensitivity-{name}-table", caption, columns, sweep.note)
     if MPI.COMM_WORLD.rank > 0:

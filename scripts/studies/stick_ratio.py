@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,7 +24,7 @@ from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from scripts.cases import CASES
-from scripts.reporting import Report, append, options
+from scripts.reporting import Report, append, empty, options
 from scripts.studies import stick_limit
 
 POISSON, HALF_WIDTH = 0.3, 0.02
@@ -151,9 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cells, steps = (20, STEPS[:3]) if given.coarse else (160, STEPS)
     for name, pressed in PRESSED.items():
         labels = [f"{count} step{'s' * (count > 1)}" for count in steps]
-        columns: dict[str, list[Any]] = {
-            key: [] for key in ("mu", *labels, "boundary elements", "uncoupled")
-        }
+        columns = empty("mu", *labels, "boundary elements", "uncoupled")
         for mu in COEFFICIENTS:
             row = [*pressed.ratios(mu, steps, cells), pressed.coupled(mu), pressed.uncoupled(mu)]
             append(columns, mu, *(f"{value:.3f}" for value in row))

@@ -16,7 +16,7 @@ from contact.results.contact_nodes import Table, contact_table
 from contact.results.solution import Solution
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, options, solved, subplots
+from scripts.reporting import Report, append, empty, options, solved, subplots
 from scripts.studies.curved_foundations import ratios, two_rings
 
 #: E/(1 - nu^2) of steel and aluminium of the cylinder on a block, radius there.
@@ -61,8 +61,7 @@ def hertz(report: Report, sizes: Sequence[float]) -> None:
     With friction in one step and in `STEPS`, and at smaller loads, where the contact is small
     beside the cylinder.
     """
-    names = ("mu", "steps", "load", "h/a", "a", "p_0", "stick", "u_y")
-    rows: dict[str, list[Any]] = {name: [] for name in names}
+    rows = empty("mu", "steps", "load", "h/a", "a", "p_0", "stick", "u_y")
     modulus = 1 / (1 / STEEL + 1 / ALUMINIUM)
     runs = [(0.0, 1, 1.0, size) for size in sizes] + [(0.1, 1, 1.0, sizes[-1])]
     runs += [(0.1, STEPS, 1.0, size) for size in sizes]
@@ -190,14 +189,7 @@ def approach(small: Pressed, large: Pressed, kinematics: str) -> float:
 
 def round_bodies(report: Report, counts: Sequence[float]) -> None:
     """Write a, p_0 and approach of two balls and of two cylinders over Hertz's, for some meshes."""
-    rows: dict[str, list[Any]] = {
-        "bodies": [],
-        "P": [],
-        "a/h": [],
-        "a": [],
-        "p_0": [],
-        "approach": [],
-    }
+    rows = empty("bodies", "P", "a/h", "a", "p_0", "approach")
     for name, kinematics, degree, push in (
         ("balls", "axisymmetric", 1, 2.0),
         ("balls", "axisymmetric", 2, 2.0),
@@ -206,12 +198,8 @@ def round_bodies(report: Report, counts: Sequence[float]) -> None:
     ):
         for count in counts:
             small, large = (pressed(kinematics, degree, u, count) for u in (push / 4, push))
-            rows["bodies"].append(name)
-            rows["P"].append(degree)
-            rows["a/h"].append(count)
-            rows["a"].append(small.a)
-            rows["p_0"].append(small.p_0)
-            rows["approach"].append(approach(small, large, kinematics))
+            way = approach(small, large, kinematics)
+            append(rows, name, degree, count, small.a, small.p_0, way)
     report.table(
         "two-bodies-round",
         "Two equal balls (SSNV104) and cylinders over Hertz",

@@ -15,7 +15,7 @@ from contact import Case, Solution, build_problem
 from contact.mesh.geometry import area
 from contact.plot.body import draw_plane, picture
 from contact.results.contact_nodes import contact_table
-from scripts.reporting import TWO_COLUMNS, Report, append, options, run_of, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, empty, options, run_of, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 
 
@@ -108,19 +108,10 @@ CYLINDERS = (
 
 def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], Solution]:
     """Make the table of cylinders; return its solutions by row. Collective."""
-    names = (
-        "shape",
-        "load",
-        "mu",
-        "direction",
-        "b/h",
-        "b/b_H (edge)",
-        "b/b_H (moment)",
-        "p_0/p_H",
-        "force error",
-        "residual",
-    )
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty(
+        "shape", "load", "mu", "direction", "b/h", "b/b_H (edge)", "b/b_H (moment)", "p_0/p_H",
+        "force error", "residual",
+    )  # fmt: skip
     solutions = {}
     for load, mu, direction, shape in CYLINDERS:
         hertz = Cylinder(load)
@@ -222,19 +213,10 @@ def approach(solution: Solution) -> float:
 def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, list[float]]:
     """Make the table of spheres over (fineness, degree); return the ratios. Collective."""
     hertz = Sphere()
-    names = (
-        "a/h wanted",
-        "degree",
-        "dofs",
-        "a/a_H (moment)",
-        "p_0/p_H (fit)",
-        "approach/Hertz's at depth R",
-        "force error",
-        "p_0/p_H (node)",
-        "Newton steps",
-        "residual",
-    )
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty(
+        "a/h wanted", "degree", "dofs", "a/a_H (moment)", "p_0/p_H (fit)",
+        "approach/Hertz's at depth R", "force error", "p_0/p_H (node)", "Newton steps", "residual",
+    )  # fmt: skip
     ratios: dict[str, list[float]] = {"radius": [], "peak": [], "approach": [], "force": []}
     for fineness, degree in levels:
         solution, found = run(sphere(fineness, degree), hertz.force / 4)

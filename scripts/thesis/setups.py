@@ -12,7 +12,7 @@ from mpi4py import MPI
 from contact import build_problem, load_case
 from contact.cli.setup import draw_setup
 from scripts.cases import CASES
-from scripts.reporting import Report, options
+from scripts.reporting import Report, append, empty, options
 
 #: Figure -> case file, changes of its mesh for a drawing, title.
 FIGURES: Mapping[str, tuple[str, tuple[str, ...], str]] = {
@@ -45,15 +45,11 @@ def constants(report: Report) -> None:
         ("beta22/eps_0 (here beta11)", "C/(GV m) for 1", 916.0, piezo.beta11),
         ("beta33/eps_0", "C/(GV m) for 1", 830.0, piezo.beta33),
     )
-    names = ("constant", "unit", "thesis", "case file", "case file by the thesis")
-    columns: dict[str, list[object]] = {name: [] for name in names}
+    columns = empty("constant", "unit", "thesis", "case file", "case file by the thesis")
     for name, unit, thesis, ours in rows:
         assert ours is not None
         factor = GIGA * VACUUM if name.startswith("beta") else 1.0
-        for key, entry in zip(
-            names, (name, unit, thesis, float(ours), float(ours) / factor / thesis), strict=True
-        ):
-            columns[key].append(entry)
+        append(columns, name, unit, thesis, float(ours), float(ours) / factor / thesis)
     report.table(
         "table-8-1",
         "Table 8.1: constants of PZT-5A, as printed and as the case files have them",

@@ -12,7 +12,7 @@ import numpy as np
 from contact import build_problem
 from contact.body.equilibrium import BodyEquilibrium
 from contact.problem.state import State
-from scripts.reporting import Report, append, iterates, options
+from scripts.reporting import Report, append, empty, iterates, options
 from scripts.thesis.tables_compliance import EPS_FP, LAGGED, case_of
 
 #: The thesis's count.
@@ -52,11 +52,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table. Collective."""
     chosen = options(__doc__, "stopping_8_3", arguments)
     cells = (24, 4) if chosen.coarse else (96, 16)
-    names = (
+    columns = empty(
         "case", "inner loop", "thesis", "(6.40), u and phi as they are", "(6.40), phi scaled",
         "inner, first", "inner, last", "residual",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {name: [] for name in names}
     stopping = ("solver.stopping=thesis", "solver.max_outer=20", "solver.eps_fp=1e-13")
     for topic, name in CASES.items():
         for rule, changes in RULES.items():

@@ -14,7 +14,7 @@ import numpy as np
 
 from contact import Solution, build_problem, solve
 from scripts.cases import bar
-from scripts.reporting import Report, append, parser
+from scripts.reporting import Report, append, empty, parser
 
 LOADS = (-0.005, -0.05)
 RHO = (1e5, 1e6, 1e7, 6e7)
@@ -209,9 +209,7 @@ def _ratios(values: list[object]) -> list[object]:
 
 def literal(report: Report, n: int, limit: int) -> list[Run]:
     """Show the effect of r = 2.5e4 E, taken at its word. Collective."""
-    columns: dict[str, list[object]] = {
-        name: [] for name in ("f2", "rho", "outer", "solves", "residual", "seconds", "stopped by")
-    }
+    columns = empty("f2", "rho", "outer", "solves", "residual", "seconds", "stopped by")
     found = []
     for load in LOADS:
         options = (PLAIN, f"solver.r={LITERAL}", f"solver.max_inner={limit}", "solver.max_outer=6")

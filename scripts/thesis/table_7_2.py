@@ -15,7 +15,7 @@ from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.results.solution import Solution
 from scripts.cases import bar
-from scripts.reporting import Report, append, observed_orders, options, solved, subplots
+from scripts.reporting import Report, append, empty, observed_orders, options, solved, subplots
 from scripts.studies.dual_norm import DualNorm
 from scripts.studies.error_norms import errors
 
@@ -54,35 +54,14 @@ def penalty(problem: ContactProblem, n: int, load: float, eps: float, *changes: 
 
 def table(report: Report, n: int) -> None:
     """Make the counterpart of Table 7.2. Collective."""
-    counts: dict[str, list[object]] = {
-        name: []
-        for name in (
-            "f2",
-            "eps",
-            "thesis",
-            "(4.38)",
-            "SNES",
-            "residual then",
-            "Algorithm 3 to 1e-8",
-            "its residual",
-            "with implicit end",
-            "SNES then",
-            "residual of (PV_eps)",
-        )
-    }
-    measured: dict[str, list[object]] = {
-        name: []
-        for name in (
-            "f2",
-            "eps",
-            "residual of (PV_eps)",
-            "contact residual",
-            "friction residual",
-            "u in L2",
-            "u in energy",
-            "p",
-        )
-    }
+    counts = empty(
+        "f2", "eps", "thesis", "(4.38)", "SNES", "residual then", "Algorithm 3 to 1e-8",
+        "its residual", "with implicit end", "SNES then", "residual of (PV_eps)",
+    )  # fmt: skip
+    measured = empty(
+        "f2", "eps", "residual of (PV_eps)", "contact residual", "friction residual", "u in L2",
+        "u in energy", "p",
+    )  # fmt: skip
     for load in LOADS:
         problem = build_problem(bar(n, load, RHO))
         reference = solved(bar(n, load, RHO, "solver.tolerance=1e-10"), problem)
@@ -161,11 +140,10 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
         "mu = 0.5": ("friction.mu=0.5",),
         "(7.16), rho = 1e4": (),
     }
-    names = (
-        "law", "eps", "residual", "L2", "energy", "order", "pressure", "order of p",
-        "p in H^-1/2", "its order", "over |u - u_eps|_V",
+    columns = empty(
+        "law", "eps", "residual", "L2", "energy", "order", "pressure", "order of p", "p in H^-1/2",
+        "its order", "over |u - u_eps|_V",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {name: [] for name in names}
     found: dict[str, list[float]] = {}
     figure, axes = subplots(1, 2, sharex=True)
     for (label, changes), marker in zip(variants.items(), "os^", strict=True):

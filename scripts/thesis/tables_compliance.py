@@ -12,7 +12,7 @@ import numpy as np
 from contact import Case, Solution, build_problem, load_case, solve
 from contact.mesh.domain import Domain
 from scripts.cases import CASES
-from scripts.reporting import Report, options
+from scripts.reporting import Report, append, empty, options
 
 #: mu = k_e -> iterations of the thesis.
 THESIS: Mapping[float, int] = {
@@ -88,12 +88,11 @@ def table_8_4(
     report: Report, cells: tuple[int, int], suffix: str, rows: Mapping[float, int] = THESIS
 ) -> None:
     """Make the counterpart of Table 8.4, as printed or with the layer. Collective."""
-    names = (
+    columns = empty(
         "mu = k_e", "thesis", "Alg. 6, (3.46)", "delta = 83.3", "Alg. 6, literal", "residual left",
         "Alg. 6, 1e-8", "implicit, 1e-8", "solves", "residual", "Newton", "at contact",
         "difference",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {name: [] for name in names}
     domain = build_problem(case_of(f"compliance-8-4{suffix}", cells)).domain
     for value, thesis in rows.items():
 
@@ -106,7 +105,8 @@ def table_8_4(
         literal = solution(*LITERAL)
         alone = newton.converged
         met = "criterion is met" in literal.outcome.reason
-        row = (
+        append(
+            columns,
             value,
             thesis,
             lagged[0],
@@ -121,8 +121,6 @@ def table_8_4(
             newton.counters.contact_solves,
             difference(implicit, newton) if alone else np.nan,
         )
-        for name, entry in zip(names, row, strict=True):
-            columns[name].append(entry)
     topic = "layer of thickness 0.1" if suffix else "as printed"
     report.table(
         f"table-8-4{suffix}",
@@ -150,15 +148,13 @@ def difference(a: Solution, b: Solution) -> float:
 
 def examples(report: Report, cells: tuple[int, int]) -> None:
     """Make a table of the results of Examples 8.3 and 8.4. Collective."""
-    names = (
+    columns = empty(
         "example", "converged", "iterations", "solves", "residual", "in contact", "on rigid part",
         "from x", "to x", "max u_i", "max p", "phi min", "phi max", "max |dev eps|",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {name: [] for name in names}
     for example, name in EXAMPLES.items():
         solution = run(case_of(name, cells))
-        for key, entry in zip(names, (example, *values(solution)), strict=True):
-            columns[key].append(entry)
+        append(columns, example, *values(solution))
     report.table(
         "examples-8-3-8-4",
         f"Examples 8.3 and 8.4, {cells[0]} x {cells[1]} cells",

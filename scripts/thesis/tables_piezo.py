@@ -17,7 +17,7 @@ from contact.results.resultants import charge_balance
 from contact.thesis.uzawa import augmentation
 from scripts.cases import CASES
 from scripts.force_balance import force_balance
-from scripts.reporting import Report, options
+from scripts.reporting import Report, append, empty, options
 from scripts.thesis.tables_compliance import difference, iterations, run
 
 PHI_F = (0, 1, 2, 4, 8, 16, 32)
@@ -68,12 +68,10 @@ def case_of(name: str, cells: tuple[int, int], *changes: str) -> Case:
 
 def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
     """Make the counterpart of Table 8.2 or 8.3. Collective."""
-    names = (
-        "phi_F", "thesis", "Alg. 4, (3.46)", "Alg. 4, literal", "Alg. 4, 1e-8",
-        "implicit, (3.46)", "implicit, 1e-8", "solves", "residual", "Newton", "at contact",
-        "difference",
+    columns = empty(
+        "phi_F", "thesis", "Alg. 4, (3.46)", "Alg. 4, literal", "Alg. 4, 1e-8", "implicit, (3.46)",
+        "implicit, 1e-8", "solves", "residual", "Newton", "at contact", "difference",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {name: [] for name in names}
     name, counts = THESIS[number]
     domain = build_problem(case_of(name, cells)).domain
     for phi_f, thesis in zip(PHI_F, counts, strict=True):
@@ -84,7 +82,8 @@ def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
         lagged = iterations(solution(*LAGGED, "solver.tolerance=1e-9"))
         changes = [counted(solution(*s, *BY_CHANGE)) for s in (LAGGED, SECANT)]
         implicit, newton = solution(UZAWA), solution(NEWTON)
-        row = (
+        append(
+            columns,
             phi_f,
             thesis,
             changes[0],
@@ -98,8 +97,6 @@ def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
             newton.counters.contact_solves,
             difference(implicit, newton),
         )
-        for key, entry in zip(names, row, strict=True):
-            columns[key].append(entry)
     report.table(
         f"table-{number.replace('.', '-')}",
         f"Table {number}: iterations for k_e = 1, {cells[0]} x {cells[1]} cells",
@@ -150,17 +147,15 @@ def counted(solution: Solution) -> float:
 def series(report: Report, number: str, cells: tuple[int, int]) -> None:
     """Make a table of the rows of Figures 8.4 (b) or 8.6 (b). Collective."""
     name, _ = THESIS[number]
-    names = (
+    columns = empty(
         "k_e", "converged", "iterations", "solves", "residual", "phi min", "phi max", "max u_i",
         "max p", "max |dev eps|", "yielded share", "charge at the left", "through foundation",
         "charge imbalance", "force imbalance",
     )  # fmt: skip
-    columns: dict[str, list[object]] = {key: [] for key in names}
     domain = build_problem(case_of(name, cells)).domain
     for k_e in K_E:
         solution = run(case_of(name, cells, f"electric.k_e={k_e}", NEWTON), domain)
-        for key, entry in zip(names, (k_e, *values(solution)), strict=True):
-            columns[key].append(entry)
+        append(columns, k_e, *values(solution))
     example = {"8.2": "8.1", "8.3": "8.2"}[number]
     report.table(
         f"series-k-e-{example.replace('.', '-')}",
@@ -214,16 +209,13 @@ def iterative(report: Report, coarse: bool) -> None:
     """Tabulate the iterations of the linear solver over the mesh. Collective."""
     plane = [(16, 8), (32, 16)] if coarse else [(n, n // 2) for n in (32, 64, 128, 256)]
     space = [(4, 4, 8), (6, 6, 12)] if coarse else [(n, n, 2 * n) for n in (10, 14, 20, 24)]
-    columns: dict[str, list[object]] = {"body": [], "cells": [], "unknowns": [], "iterations": []}
+    columns = empty("body", "cells", "unknowns", "iterations")
     for name, meshes in (("piezo-8-1-conductive", plane), ("piezo-column", space)):
         for cells in meshes:
             grid = f"mesh.cells=[{', '.join(map(str, cells))}]"
             problem = build_problem(load_case(CASES / f"{name}.toml", [grid]))
-            columns["body"].append(name)
-            columns["cells"].append(" x ".join(map(str, cells)))
-            dofmap = problem.body.space.dofmap
-            columns["unknowns"].append(dofmap.index_map.size_global * dofmap.index_map_bs)
-            columns["iterations"].append(linear_iterations(problem))
+            unknowns, shown = problem.body.layout.unknowns, " x ".join(map(str, cells))
+            append(columns, name, shown, unknowns, linear_iterations(problem))
     report.table(
         "piezo-linear-iterations",
         "MINRES iterations to 1e-10: diag(GAMG, hypre) on displacement and potential",

@@ -24,7 +24,7 @@ from contact import InputError, Solution, build_problem, solve
 from contact.case.file import to_toml
 from contact.methods.options import OPTIONS, with_method
 from contact.writing import write_outputs
-from scripts.reporting import Report, append, parser
+from scripts.reporting import Report, append, empty, parser
 from scripts.studies.robustness.check import recheck
 from scripts.studies.robustness.problems import KINDS, Problem, problems
 
@@ -110,10 +110,12 @@ def solved(
 
 
 def _fallbacks(solution: Solution) -> set[str]:
+    """Return the fallbacks of a history, whose notes also name the times of an evolution."""
     notes = {record.note for record in solution.history}
     for word in OWN:
-        notes = {note.replace(word, "").strip(" ,") for note in notes}
-    return notes - {""}
+        notes = {note.replace(word, "") for note in notes}
+    words = {word.strip() for note in notes for word in note.split(",")}
+    return {word for word in words if word and not word.startswith("t = ")}
 
 
 def _difference(solution: Solution, other: Solution) -> float:
@@ -127,10 +129,10 @@ def _difference(solution: Solution, other: Solution) -> float:
 def table(rows: Mapping[str, list[Any]], methods: Sequence[str]) -> dict[str, list[Any]]:
     """Count by family and method."""
     other = [end for end in ("refused", "false") if end in rows["end"]]
-    names = "family", "method", "problems", "converged", "without fallback", *other
-    made: dict[str, list[Any]] = {
-        name: [] for name in (*names, "median solves", "most solves", "largest difference")
-    }
+    made = empty(
+        "family", "method", "problems", "converged", "without fallback", *other, "median solves",
+        "most solves", "largest difference",
+    )  # fmt: skip
     family = np.array([name.rsplit("-", 1)[0] for name in rows["problem"]])
     method, end, why = (np.array(rows[name]) for name in ("method", "end", "why"))
     solves, difference = np.array(rows["solves"]), np.array(rows["difference"])

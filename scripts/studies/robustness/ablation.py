@@ -41,7 +41,7 @@ from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.residuals import evaluate, undeformed_equilibrium
 from scripts.benchmarks import bench_one
 from scripts.cases import CASES
-from scripts.reporting import Report, append, parser
+from scripts.reporting import Report, append, empty, parser
 from scripts.studies import cantilevers
 from scripts.studies.robustness.bodies import Bodies
 from scripts.studies.robustness.check import write_msh
@@ -398,8 +398,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for case in own.values():
         run(case, NewtonOptions())  # loads its forms
     whole = {case.source: run(case, NewtonOptions()) for case in [*common, *own.values()]}
-    keys = ("device", "lines", "failed", "slow", "seconds", "problems that need it", "literature")
-    rows: dict[str, list[Any]] = {key: [] for key in keys}
+    rows = empty(
+        "device", "lines", "failed", "slow", "seconds", "problems that need it", "literature",
+    )  # fmt: skip
     for device in chosen:
         failed, slow, total = [], [], 0.0
         with device.off() as options:
