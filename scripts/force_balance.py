@@ -15,26 +15,17 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class ForceBalance:
-    """Resultants of the forces on a body, of shape (d,); of one of revolution along its axis.
+    """Resultants of the forces on a body, of shape (d,); of one of revolution along its axis."""
 
-    Attributes
-    ----------
-    applied
-        Given tractions and body forces.
-    supports
-        Reactions of the prescribed displacements, and of rigid parts.
-    contact
-        Forces of the foundations on the body; between bodies they cancel.
-    passed
-        Force on the side `on` of each of the contacts, shape (contacts, d).
-    rounding
-        Rounding floor of these sums: see `force_rounding`.
-    """
-
+    #: Given tractions and body forces.
     applied: Array
+    #: Reactions of the prescribed displacements, and of rigid parts.
     supports: Array
+    #: Forces of the foundations on the body; between bodies they cancel.
     contact: Array
+    #: Force on the side `on` of each of the contacts, shape (contacts, d).
     passed: Array
+    #: Rounding floor of these sums: see `force_rounding`.
     rounding: float
 
     @property

@@ -31,14 +31,9 @@ FOLDER = Path(__file__).parents[1] / "docs" / "examples"
 
 @dataclass(frozen=True)
 class Run:
-    """The written files of a run.
+    """The written files of a run."""
 
-    Attributes
-    ----------
-    folder
-        The folder of results.
-    """
-
+    #: The folder of results.
     folder: Path
 
     @cached_property
@@ -65,32 +60,21 @@ Compared = tuple[str, float, float]
 
 @dataclass(frozen=True)
 class Example:
-    """An example.
+    """An example."""
 
-    Attributes
-    ----------
-    case
-        Name of the case file.
-    compare
-        Sets results beside reference values.
-    source
-        Source of the reference.
-    within
-        The largest relative difference that is expected.
-    figure
-        Name of the figure of the run.
-    changes
-        Changed keys of the case.
-    meshes
-        Names and changed keys of other meshes, a coarse one first, its own next, the finest last.
-    """
-
+    #: Name of the case file.
     case: str
+    #: Sets results beside reference values.
     compare: Callable[[Run], Iterator[Compared]]
+    #: Source of the reference.
     source: str
+    #: The largest relative difference that is expected.
     within: float
+    #: Name of the figure of the run.
     figure: str = "figure-contact.png"
+    #: Changed keys of the case.
     changes: tuple[str, ...] = ()
+    #: Names and changed keys of other meshes, a coarse one first, its own next, the finest last.
     meshes: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 

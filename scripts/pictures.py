@@ -28,23 +28,15 @@ _FILE = re.compile(r"^<!-- file: (\S+) -->\n+^```\w+\n(.*?)^```", re.DOTALL | re
 
 @dataclass(frozen=True)
 class Drawn:
-    """A run whose figures are pictures of the pages.
+    """A run whose figures are pictures of the pages."""
 
-    Attributes
-    ----------
-    case
-        Name of a case file, or the page that has the files of the run.
-    pictures
-        Picture -> figure of the run.
-    changes
-        Values that replace those of the case.
-    plot
-        Arguments of `contact plot`, for figures that a run does not draw by itself.
-    """
-
+    #: Name of a case file, or the page that has the files of the run.
     case: str
+    #: Picture -> figure of the run.
     pictures: Mapping[str, str]
+    #: Values that replace those of the case.
     changes: tuple[str, ...] = ()
+    #: Arguments of `contact plot`, for figures that a run does not draw by itself.
     plot: tuple[str, ...] = ()
 
     def prepare(self) -> str:

@@ -49,14 +49,9 @@ rcParams["axes.prop_cycle"] = cycler(
 
 @dataclass(frozen=True)
 class Report:
-    """A folder that tables and figures are written to, by rank 0.
+    """A folder that tables and figures are written to, by rank 0."""
 
-    Parameters
-    ----------
-    out
-        The folder; it is made if need be.
-    """
-
+    #: The folder; it is made if need be.
     out: Path
 
     def table(

@@ -35,17 +35,11 @@ TIMEOUT = 150.0
 
 @dataclass(frozen=True)
 class Bench:
-    """Where results go, and how large the meshes are.
+    """Where results go, and how large the meshes are."""
 
-    Attributes
-    ----------
-    report
-        The folder.
-    coarse, large
-        The smallest meshes alone; the largest ones too.
-    """
-
+    #: The folder.
     report: Report
+    #: The smallest meshes alone; the largest ones too.
     coarse: bool
     large: bool
 

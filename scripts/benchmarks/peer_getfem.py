@@ -29,19 +29,13 @@ HELD, CONTACT, LOADED = 1, 2, 3
 
 @dataclass(frozen=True)
 class Setting:
-    """A mesh with its regions, and its material and loads.
-
-    Attributes
-    ----------
-    held
-        Diagonal of the matrix that picks the components held on HELD.
-    traction
-        On LOADED.
-    """
+    """A mesh with its regions, and its material and loads."""
 
     mesh: gf.Mesh
     young: float
+    #: Diagonal of the matrix that picks the components held on HELD.
     held: tuple[float, ...]
+    #: On LOADED.
     traction: tuple[float, ...]
 
 

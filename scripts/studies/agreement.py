@@ -29,26 +29,17 @@ EPS = {f"eps 1e-{k}": 10.0**-k for k in range(3, 8)}
 
 @dataclass
 class Compared:
-    """Results of the methods on one example.
+    """Results of the methods on one example."""
 
-    Attributes
-    ----------
-    example
-        The example.
-    newton
-        Settings of Newton's method.
-    branches
-        Its solutions.
-    runs
-        Name of a method or start -> where it has ended.
-    letters
-        Method, start or eps -> which solution that is, or which one is next to a penalised one.
-    """
-
+    #: The example.
     example: Example
+    #: Settings of Newton's method.
     newton: Options
+    #: Its solutions.
     branches: Branches
+    #: Name of a method or start -> where it has ended.
     runs: dict[str, Solution]
+    #: Method, start or eps -> which solution that is, or which one is next to a penalised one.
     letters: dict[str, str]
 
     @property

@@ -17,20 +17,13 @@ RHO = (0.0, 1e5, 1e6, 1e7, 6e7)
 
 @dataclass(frozen=True)
 class Example:
-    """A case file with changes.
+    """A case file with changes."""
 
-    Attributes
-    ----------
-    label
-        In the tables.
-    name
-        Of the case file.
-    changes
-        To the case file, its mesh aside.
-    """
-
+    #: In the tables.
     label: str
+    #: Of the case file.
     name: str
+    #: To the case file, its mesh aside.
     changes: tuple[str, ...] = ()
 
     def case(self, coarse: bool) -> Case:

@@ -39,14 +39,9 @@ class TooManyError(Exception):
 
 @dataclass
 class Limit:
-    """A monitor that ends Uzawa block relaxation after so many linear solves.
+    """A monitor that ends Uzawa block relaxation after so many linear solves."""
 
-    Attributes
-    ----------
-    left
-        How many there still are.
-    """
-
+    #: How many there still are.
     left: int
 
     def __call__(self, record: Record) -> None:
@@ -61,21 +56,14 @@ class Limit:
 
 @dataclass(frozen=True)
 class Difference:
-    """Relative differences of two solutions.
+    """Relative differences of two solutions."""
 
-    Attributes
-    ----------
-    u, phi
-        Largest difference at a node over the largest value; phi is NaN without a potential.
-    energy
-        Of |eps(u)| and |grad(phi)| in L2(Omega), the larger one.
-    pressure, friction
-        Of -sigma_nu and -sigma_tau in L2(Gamma_3), both over |sigma_nu|.
-    """
-
+    #: Largest difference at a node over the largest value; phi is NaN without a potential.
     u: float
     phi: float
+    #: Of |eps(u)| and |grad(phi)| in L2(Omega), the larger one.
     energy: float
+    #: Of -sigma_nu and -sigma_tau in L2(Gamma_3), both over |sigma_nu|.
     pressure: float
     friction: float
 

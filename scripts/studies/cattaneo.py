@@ -43,21 +43,14 @@ MU_KEY, WAY_KEY = "friction.mu", "fixed.0.displacement.0"
 
 @dataclass(frozen=True)
 class Found:
-    """Results of a run at Q = SHARE mu P, in units of the closed form.
+    """Results of a run at Q = SHARE mu P, in units of the closed form."""
 
-    Attributes
-    ----------
-    share
-        Q/(mu P) itself.
-    way, by_mu
-        Displacement along x and its derivative by mu, over k P/a of balls and k P of cylinders.
-    stick, stick_by_mu
-        Radius of the stick zone, and its derivative by mu, over a.
-    """
-
+    #: Q/(mu P) itself.
     share: float
+    #: Displacement along x and its derivative by mu, over k P/a of balls and k P of cylinders.
     way: float
     by_mu: float
+    #: Radius of the stick zone, and its derivative by mu, over a.
     stick: float
     stick_by_mu: float
 

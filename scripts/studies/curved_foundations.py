@@ -85,28 +85,19 @@ Measured: TypeAlias = Callable[..., Array]
 
 @dataclass(frozen=True)
 class Profile:
-    """The meridian of a body around a shape, or a plane body.
+    """The meridian of a body around a shape, or a plane body."""
 
-    Attributes
-    ----------
-    points
-        Corners (r, z) in order, shape (n, 2).
-    arcs
-        Number of a side, which begins at the corner of this number -> centre of the arc that it
-        is, and its half axes.
-    contact
-        Numbers of the sides that touch.
-    held
-        Those that are displaced; the others have no traction along them, nor a normal motion that
-        is not the given one.
-    shape
-        Returns the shape that conforms to them, in a dimension of space, as large as given.
-    """
-
+    #: Corners (r, z) in order, shape (n, 2).
     points: Sequence[tuple[float, float]]
+    #: Number of a side, which begins at the corner of this number -> centre of the arc that it is,
+    #: and its half axes.
     arcs: Mapping[int, tuple[tuple[float, float], tuple[float, float]]]
+    #: Numbers of the sides that touch.
     contact: Sequence[int]
+    #: Those that are displaced; the others have no traction along them, nor a normal motion that is
+    #: not the given one.
     held: Sequence[int]
+    #: Returns the shape that conforms to them, in a dimension of space, as large as given.
     shape: Callable[[int, float], Shape]
 
 

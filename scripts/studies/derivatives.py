@@ -318,24 +318,17 @@ def differences(
 
 @dataclass(frozen=True)
 class Compared:
-    """Relative differences of the tangent, the largest over results and ways.
-
-    Attributes
-    ----------
-    apart, adjoint
-        To central differences of solutions, and to the adjoint.
-    weak, kinks
-        Number of weakly active nodes; names of the parameters whose differences were shortened, for
-        at their ends another node touches, sticks or slips, each with the step.
-    parameters, results, ways
-        How many there are; ways of parameters along which solutions were compared.
-    """
+    """Relative differences of the tangent, the largest over results and ways."""
 
     family: str
+    #: To central differences of solutions, and to the adjoint.
     apart: float
     adjoint: float
+    #: Number of weakly active nodes; names of the parameters whose differences were shortened, for
+    #: at their ends another node touches, sticks or slips, each with the step.
     weak: int
     kinks: str
+    #: How many there are; ways of parameters along which solutions were compared.
     parameters: int
     results: int
     ways: int

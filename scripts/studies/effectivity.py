@@ -47,23 +47,15 @@ WHY = {
 
 @dataclass(frozen=True)
 class Known:
-    """A problem whose solution is known.
+    """A problem whose solution is known."""
 
-    Attributes
-    ----------
-    source
-        Of the solution.
-    make
-        Returns the problem with n cells along an edge, of a degree.
-    solution
-        Returns the solution of a problem, as `errors` takes it.
-    cells
-        Those looked at, of degree 1 and 2; 0 for none.
-    """
-
+    #: Of the solution.
     source: str
+    #: Returns the problem with n cells along an edge, of a degree.
     make: Callable[[int, int], ContactProblem]
+    #: Returns the solution of a problem, as `errors` takes it.
     solution: Callable[[ContactProblem], Any]
+    #: Those looked at, of degree 1 and 2; 0 for none.
     cells: tuple[int, int] = (32, 16)
 
 

@@ -29,21 +29,15 @@ from forms.plane_stress import ACROSS, HenckyAtPoints, PlaneStressHistory
 
 @dataclass(frozen=True)
 class Errors:
-    """Norms of the difference between two displacements.
+    """Norms of the difference between two displacements."""
 
-    Attributes
-    ----------
-    l2, h1
-        Norm in L2(Omega), and |grad(.)| in L2(Omega).
-    energy
-        sqrt(B(u; e, e)) with the secant form of the finer solution u: the norm in which Cea's
-        lemma holds for a linear material. In a piezoelectric body with E . beta E besides. Strains
-        of u are those of its element: of the mean dilatation the error is that of the pressure. In
-        plane stress strains across are those at which e has no stress there.
-    """
-
+    #: Norm in L2(Omega), and |grad(.)| in L2(Omega).
     l2: float
     h1: float
+    #: sqrt(B(u; e, e)) with the secant form of the finer solution u: the norm in which Cea's lemma
+    #: holds for a linear material. In a piezoelectric body with E . beta E besides. Strains of u
+    #: are those of its element: of the mean dilatation the error is that of the pressure. In plane
+    #: stress strains across are those at which e has no stress there.
     energy: float
 
     def __truediv__(self, other: Errors) -> Errors:

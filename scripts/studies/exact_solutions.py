@@ -162,20 +162,13 @@ def exact(dim: int, charged: bool = False) -> Callable[[Any], ufl.core.expr.Expr
 
 @dataclass(frozen=True)
 class Singular:
-    """Frictionless contact of a half plane y > 0 for x > x0.
+    """Frictionless contact of a half plane y > 0 for x > x0."""
 
-    Attributes
-    ----------
-    law
-        Elastic constants, plane strain.
-    amplitude
-        -A > 0: the pressure is |A| sqrt(x - x0).
-    x0
-        Where the contact ends.
-    """
-
+    #: Elastic constants, plane strain.
     law: Linear = field(default_factory=lambda: Linear(1.0, 0.3))
+    #: -A > 0: the pressure is |A| sqrt(x - x0).
     amplitude: float = 0.1
+    #: Where the contact ends.
     x0: float = 0.53
 
     def component(self, i: int, x: Any, polar: tuple[Any, Any], ops: Any) -> Any:

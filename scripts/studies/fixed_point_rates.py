@@ -27,23 +27,15 @@ def secant_rate(strain: float, yield_strain: float = 0.05) -> float:
 
 @dataclass(frozen=True)
 class Iteration:
-    """A fixed point whose errors are watched.
+    """A fixed point whose errors are watched."""
 
-    Attributes
-    ----------
-    label
-        In tables and figures.
-    load
-        Vertical traction.
-    mu
-        Constant coefficient of friction; 0 for none.
-    eps
-        Parameter of the penalty method; None for multipliers (Algorithm 1).
-    """
-
+    #: In tables and figures.
     label: str
+    #: Vertical traction.
     load: float
+    #: Constant coefficient of friction; 0 for none.
     mu: float = 0.0
+    #: Parameter of the penalty method; None for multipliers (Algorithm 1).
     eps: float | None = None
 
 

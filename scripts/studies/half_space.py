@@ -18,15 +18,10 @@ from contact.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace:
-    """A half space whose poling axis is its inward normal.
+    """A half space whose poling axis is its inward normal."""
 
-    Attributes
-    ----------
-    stiffness, coupling, permittivity
-        In Voigt's notation with X3 along the axis, shapes (6, 6), (3, 6) and (3, 3), in any units
-        that agree.
-    """
-
+    #: In Voigt's notation with X3 along the axis, shapes (6, 6), (3, 6) and (3, 3), in any units
+    #: that agree.
     stiffness: Array
     coupling: Array
     permittivity: Array
@@ -84,18 +79,12 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Indentation:
-    """Force and moment on an indenter.
+    """Force and moment on an indenter."""
 
-    Attributes
-    ----------
-    force, charge
-        P, and Q = the integral of D_z; 0 where it insulates.
-    depth, radius
-        delta and a.
-    """
-
+    #: P, and Q = the integral of D_z; 0 where it insulates.
     force: float
     charge: float
+    #: delta and a.
     depth: float
     radius: float
 

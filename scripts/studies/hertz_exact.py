@@ -28,18 +28,12 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(60)
 
 @dataclass(frozen=True)
 class Line:
-    """The contact of a cylinder with the half plane y > 0, p = p_0 sqrt(1 - x^2/b^2).
+    """The contact of a cylinder with the half plane y > 0, p = p_0 sqrt(1 - x^2/b^2)."""
 
-    Attributes
-    ----------
-    half_width, peak
-        b and p_0.
-    law
-        Elastic constants, plane strain.
-    """
-
+    #: b and p_0.
     half_width: float = 0.53
     peak: float = 0.1
+    #: Elastic constants, plane strain.
     law: Linear = field(default_factory=lambda: Linear(1.0, 0.3))
 
     def pressure(self, points: Array) -> Array:
@@ -85,18 +79,12 @@ class Line:
 
 @dataclass(frozen=True)
 class Point:
-    """The contact of a ball with the half space z > 0, p = p_0 sqrt(1 - r^2/a^2).
+    """The contact of a ball with the half space z > 0, p = p_0 sqrt(1 - r^2/a^2)."""
 
-    Attributes
-    ----------
-    radius, peak
-        a and p_0.
-    law
-        Elastic constants.
-    """
-
+    #: a and p_0.
     radius: float = 0.53
     peak: float = 0.1
+    #: Elastic constants.
     law: Linear = field(default_factory=lambda: Linear(1.0, 0.3))
 
     def pressure(self, points: Array) -> Array:

@@ -39,14 +39,9 @@ FAR = 100.0
 
 @dataclass(frozen=True)
 class Hill:
-    """The sphere without hardening, under an inner pressure that grows from zero.
+    """The sphere without hardening, under an inner pressure that grows from zero."""
 
-    Attributes
-    ----------
-    young, limit
-        Young's modulus, and the yield stress Y.
-    """
-
+    #: Young's modulus, and the yield stress Y.
     young: float
     limit: float
 

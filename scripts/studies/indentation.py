@@ -40,29 +40,19 @@ MATERIALS = ("PZT-4", "PZT-5A", "thesis")
 
 @dataclass(frozen=True)
 class Setting:
-    """An indentation.
+    """An indentation."""
 
-    Attributes
-    ----------
-    material
-        Name in the library, or "thesis"; "elastic" without coupling.
-    shape
-        "punch", "cone" or "ball".
-    potential
-        Of a conducting indenter (GV); None for an insulating one.
-    fineness
-        Elements on the contact radius.
-    poling
-        -90: into the half space; 90: out of it.
-    units
-        "GPa", or "SI".
-    """
-
+    #: Name in the library, or "thesis"; "elastic" without coupling.
     material: str
+    #: "punch", "cone" or "ball".
     shape: str
+    #: Of a conducting indenter (GV); None for an insulating one.
     potential: float | None = None
+    #: Elements on the contact radius.
     fineness: float = 12.0
+    #: -90: into the half space; 90: out of it.
     poling: float = -90.0
+    #: "GPa", or "SI".
     units: str = "GPa"
 
     @property
@@ -150,23 +140,16 @@ def _foundation(shape: str) -> str:
 
 @dataclass(frozen=True)
 class Found:
-    """Results of a solution, in GPa, m, GV and C: ratios to the closed form at its own radius.
+    """Results of a solution, in GPa, m, GV and C: ratios to the closed form at its own radius."""
 
-    Attributes
-    ----------
-    force, depth, charge, potential
-        P, delta, Q, and phi(0) of an insulating indenter; NaN for those that do not exist.
-    radius
-        a, of the second moment of the pressure.
-    unknowns
-        Number of unknowns.
-    """
-
+    #: P, delta, Q, and phi(0) of an insulating indenter; NaN for those that do not exist.
     force: float
     depth: float
     charge: float
     potential: float
+    #: a, of the second moment of the pressure.
     radius: float
+    #: Number of unknowns.
     unknowns: int
 
 

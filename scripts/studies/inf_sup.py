@@ -52,20 +52,13 @@ ALTERNATING = 8.0
 
 @dataclass(frozen=True)
 class Mesh:
-    """Meshes of a kind.
+    """Meshes of a kind."""
 
-    Attributes
-    ----------
-    make
-        The mesh of a number of cells.
-    part
-        Its Gamma_3.
-    fixed
-        The parts that are held.
-    """
-
+    #: The mesh of a number of cells.
     make: Callable[[int], Domain]
+    #: Its Gamma_3.
     part: str
+    #: The parts that are held.
     fixed: Sequence[str]
 
     def problem(self, domain: Domain, degree: int) -> ContactProblem:

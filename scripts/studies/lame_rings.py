@@ -24,21 +24,14 @@ AROUND = 2
 
 @dataclass(frozen=True)
 class Lame:
-    """A ring between two radii under a pressure inside, in plane strain.
+    """A ring between two radii under a pressure inside, in plane strain."""
 
-    Attributes
-    ----------
-    inner, outer
-        Radii.
-    pressure
-        Inside.
-    young, poisson
-        Of the material.
-    """
-
+    #: Radii.
     inner: float = 1.0
     outer: float = 2.0
+    #: Inside.
     pressure: float = 0.01
+    #: Of the material.
     young: float = 1.0
     poisson: float = 0.3
 

@@ -21,20 +21,13 @@ SYMBOLS = {
 
 @dataclass(frozen=True)
 class Errors:
-    """Distances to a limit over a parameter.
+    """Distances to a limit over a parameter."""
 
-    Attributes
-    ----------
-    name
-        The varied parameter.
-    parameter
-        Its values, shape (k,).
-    norms
-        Distances in V (and W), shape (k, 1 or 2).
-    """
-
+    #: The varied parameter.
     name: str
+    #: Its values, shape (k,).
     parameter: Array
+    #: Distances in V (and W), shape (k, 1 or 2).
     norms: Array
 
     @property

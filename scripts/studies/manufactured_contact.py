@@ -44,19 +44,13 @@ class Sliding:
     given; the displacements a + z c + z^2 q of both blocks have these tractions and this jump at
     z = 0, body forces and tractions of the sides do the rest. Under Hencky's law, whose stress at
     z = 0 is another one, the difference is a load.
-
-    Attributes
-    ----------
-    laws
-        The material of the upper block, and of the lower one, if there is any.
-    dim
-        2 or 3.
-    mu
-        Coefficient of friction.
     """
 
+    #: The material of the upper block, and of the lower one, if there is any.
     laws: tuple[Hencky, ...] = (Linear(1.0, 0.3),)
+    #: 2 or 3.
     dim: int = 2
+    #: Coefficient of friction.
     mu: float = 0.4
 
     #: Where slip begins, and contact ends: on lines of meshes of a multiple of eight cells.
@@ -211,22 +205,15 @@ class PiezoLayers:
 
     sigma_yy, sigma_xy and D_y are given functions of y, continuous between the layers; the
     displacement and the potential are their integrals through the law of each layer.
-
-    Attributes
-    ----------
-    law
-        The material.
-    piezo
-        Of the lower layer and of the upper one, in the plane, poled along y.
-    mu
-        Coefficient of friction.
-    k_e
-        Conductivity of the foundation.
     """
 
+    #: The material.
     law: Linear
+    #: Of the lower layer and of the upper one, in the plane, poled along y.
     piezo: tuple[Piezo, Piezo]
+    #: Coefficient of friction.
     mu: float = 0.3
+    #: Conductivity of the foundation.
     k_e: float = 2.0
 
     #: Height of the layers, pressure at the bottom over Young's modulus, slip, displacement of the

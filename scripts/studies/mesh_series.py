@@ -28,30 +28,20 @@ NORMS = ("L2", "H1", "energy")
 
 @dataclass(frozen=True)
 class Variant:
-    """A series of meshes of Example 7.2 with its reference.
+    """A series of meshes of Example 7.2 with its reference."""
 
-    Attributes
-    ----------
-    label
-        In tables and figures.
-    load, degree
-        Of the problem.
-    cells
-        Cells per unit length of the meshes.
-    reference
-        Of the reference, at least four times the last of them.
-    changes
-        Of the case.
-    power
-        How far the mesh is pulled towards the corners and the end of the load, `grading.grade`.
-    """
-
+    #: In tables and figures.
     label: str
+    #: Of the problem.
     load: float
     degree: int
+    #: Cells per unit length of the meshes.
     cells: tuple[int, ...]
+    #: Of the reference, at least four times the last of them.
     reference: int
+    #: Of the case.
     changes: tuple[str, ...] = ()
+    #: How far the mesh is pulled towards the corners and the end of the load, `grading.grade`.
     power: float = 1.0
 
     @property

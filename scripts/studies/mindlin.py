@@ -77,21 +77,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 @dataclass(frozen=True)
 class Loop:
-    """A turn of the upper ball, there and back, over one and the same force Q at its ends.
+    """A turn of the upper ball, there and back, over one and the same force Q at its ends."""
 
-    Attributes
-    ----------
-    way, force
-        Displacement of the cut along x, and its driving force, at the ends of steps.
-    dissipation
-        Dissipation of friction in the turn.
-    normal, width, compliance
-        P, Hertz's a, and k = sum (2 - nu)/G.
-    """
-
+    #: Displacement of the cut along x, and its driving force, at the ends of steps.
     way: Array
     force: Array
+    #: Dissipation of friction in the turn.
     dissipation: float
+    #: P, Hertz's a, and k = sum (2 - nu)/G.
     normal: float
     width: float
     compliance: float

@@ -42,26 +42,18 @@ FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+::\S+)", re.M)
 
 @dataclass(frozen=True)
 class Mutant:
-    """An error of one line.
+    """An error of one line."""
 
-    Attributes
-    ----------
-    name, breaks
-        Its name, and the term that it breaks.
-    file, old, new
-        The file, a text that stands there once, and the one that takes its place.
-    near
-        Files with tests, or folders, that come before all others.
-    ranks
-        The number of ranks on which the tests run first.
-    """
-
+    #: Its name, and the term that it breaks.
     name: str
     breaks: str
+    #: The file, a text that stands there once, and the one that takes its place.
     file: str
     old: str
     new: str
+    #: Files with tests, or folders, that come before all others.
     near: tuple[str, ...]
+    #: The number of ranks on which the tests run first.
     ranks: int = 1
 
     def apply(self, tree: Path) -> None:

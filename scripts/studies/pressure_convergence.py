@@ -51,26 +51,17 @@ PLACES = (1 / 6, 1 / 2, 5 / 6)
 
 @dataclass(frozen=True)
 class Series:
-    """A problem with its exact pressure, on meshes of several sizes.
+    """A problem with its exact pressure, on meshes of several sizes."""
 
-    Attributes
-    ----------
-    make
-        Returns the exact solution for a place where the contact ends.
-    problem
-        Returns its problem, given cells and degree.
-    pressure
-        Returns its pressure at points.
-    cells
-        By degree.
-    places
-        Where the contact ends between two nodes.
-    """
-
+    #: Returns the exact solution for a place where the contact ends.
     make: Callable[[float], Any]
+    #: Returns its problem, given cells and degree.
     problem: Callable[[Any, int, int], ContactProblem | Problem]
+    #: Returns its pressure at points.
     pressure: Callable[[Any, Array], Array]
+    #: By degree.
     cells: Mapping[int, tuple[int, ...]]
+    #: Where the contact ends between two nodes.
     places: tuple[float, ...] = PLACES
 
 

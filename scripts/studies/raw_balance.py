@@ -28,24 +28,17 @@ FACETS = {2: basix.CellType.interval, 3: basix.CellType.triangle}
 
 @dataclass(frozen=True)
 class Imbalance:
-    """Residual forces at the free nodes, and the forces on the body.
+    """Residual forces at the free nodes, and the forces on the body."""
 
-    Attributes
-    ----------
-    force, applied
-        Euclidean norms over the nodes: of the forces left; of loads, contact forces, reactions
-        and the forces of the potential on the undeformed body, added up (force).
-    charge, electrified
-        The same of charges, those of the strain among them, but for charges that flow through nodes
-        that a support holds; 0 without a potential (charge).
-    unsure
-        Effect of the rounding of each unknown on `force` and `charge`: moved up or down at random.
-    """
-
+    #: Euclidean norms over the nodes: of the forces left; of loads, contact forces, reactions and
+    #: the forces of the potential on the undeformed body, added up (force).
     force: float
     applied: float
+    #: The same of charges, those of the strain among them, but for charges that flow through nodes
+    #: that a support holds; 0 without a potential (charge).
     charge: float
     electrified: float
+    #: Effect of the rounding of each unknown on `force` and `charge`: moved up or down at random.
     unsure: tuple[float, float]
 
     @property

@@ -73,19 +73,13 @@ def lattice(dim: int, n: int) -> Array:
 
 @dataclass(frozen=True)
 class Solution:
-    """Displacements and pressures at nodes, and the force.
+    """Displacements and pressures at nodes, and the force."""
 
-    Attributes
-    ----------
-    points, displacement, pressure
-        Of all nodes; the pressure is 0 away from the contact.
-    force
-        On the part that is modelled.
-    """
-
+    #: Of all nodes; the pressure is 0 away from the contact.
     points: Array
     displacement: Array
     pressure: Array
+    #: On the part that is modelled.
     force: float
 
     def off(self, other: Solution, n: int) -> Array:

@@ -18,34 +18,23 @@ from scripts.reporting import ONE_COLUMN, Report, append, empty, options, subplo
 
 @dataclass(frozen=True)
 class Sweep:
-    """One parameter of one case.
+    """One parameter of one case."""
 
-    Attributes
-    ----------
-    words
-        Its name, for the axis.
-    example
-        Of the thesis.
-    case, key
-        Case file, and the key that is changed.
-    values
-        Of the parameter.
-    cells, changes
-        The mesh, along and across, and further changes of the case.
-    log
-        Whether the axis is logarithmic.
-    note
-        The observation.
-    """
-
+    #: Its name, for the axis.
     words: str
+    #: Of the thesis.
     example: str
+    #: Case file, and the key that is changed.
     case: str
     key: str
+    #: Of the parameter.
     values: Sequence[float]
+    #: The mesh, along and across, and further changes of the case.
     cells: tuple[int, int]
     changes: tuple[str, ...] = ()
+    #: Whether the axis is logarithmic.
     log: bool = True
+    #: The observation.
     note: str = ""
 
 

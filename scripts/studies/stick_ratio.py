@@ -74,20 +74,13 @@ def ball_alone(k: float, mu: float) -> float:
 
 @dataclass(frozen=True)
 class Pressed:
-    """A pressed body.
+    """A pressed body."""
 
-    Attributes
-    ----------
-    make
-        The problem of a friction coefficient, whose load grows with the time up to 1.
-    kind
-        Boundary elements of a half plane or a half space.
-    alone
-        Zero at the stick ratio without it, a function of k and mu.
-    """
-
+    #: The problem of a friction coefficient, whose load grows with the time up to 1.
     make: Callable[[float, int], ContactProblem]
+    #: Boundary elements of a half plane or a half space.
     kind: Callable[[int, float], tuple[np.ndarray, ...]]
+    #: Zero at the stick ratio without it, a function of k and mu.
     alone: Callable[[float, float], float]
 
     def coupled(self, mu: float) -> float:

@@ -109,24 +109,16 @@ def middle(solution: Solution) -> float:
 
 @dataclass(frozen=True)
 class Pressed:
-    """Two equal round bodies, each cut in half and moved by its cut, and Hertz's values for them.
+    """Two equal round bodies, cut in half and moved by their cuts, and Hertz's values for them."""
 
-    Attributes
-    ----------
-    push
-        How far each cut is moved.
-    force
-        Of all of the contact; a unit length of cylinders.
-    a, p_0
-        Half width and largest pressure, found over those of Hertz at this force.
-    width
-        Hertz's a.
-    """
-
+    #: How far each cut is moved.
     push: float
+    #: Of all of the contact; a unit length of cylinders.
     force: float
+    #: Half width and largest pressure, found over those of Hertz at this force.
     a: float
     p_0: float
+    #: Hertz's a.
     width: float
 
 

@@ -14,27 +14,18 @@ from mpi4py import MPI
 
 @dataclass(frozen=True)
 class Part:
-    """A script.
+    """A script."""
 
-    Attributes
-    ----------
-    script
-        Its name, and that of the folder that it writes into.
-    heading
-        On the results page.
-    tables, figures
-        Whether it makes tables, and figures.
-    package
-        Where the script is.
-    page
-        Name of the page, one of `PAGES`.
-    """
-
+    #: Its name, and that of the folder that it writes into.
     script: str
+    #: On the results page.
     heading: str
+    #: Whether it makes tables, and figures.
     tables: bool = True
     figures: bool = True
+    #: Where the script is.
     package: str = "thesis"
+    #: Name of the page, one of `PAGES`.
     page: str = "thesis-studies"
 
     @property

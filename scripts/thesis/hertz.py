@@ -21,31 +21,21 @@ from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 
 @dataclass(frozen=True)
 class Found:
-    """Hertz's quantities of a contact solution.
+    """Hertz's quantities of a contact solution."""
 
-    Attributes
-    ----------
-    edge
-        Radius where a line through p^2 over r^2, of the outer half of the nodes in contact,
-        vanishes.
-    moment
-        Radius of Hertz's pressure with the same second moment.
-    peak
-        The largest nodal pressure.
-    centre
-        Pressure at r = 0 of a line through p^2 over r^2 of the inner half of the nodes, free
-        of the noise of the nodal values on irregular meshes.
-    force_error
-        |contact force - load|/load, vertical.
-    h
-        Spacing of the contact nodes.
-    """
-
+    #: Radius where a line through p^2 over r^2, of the outer half of the nodes in contact,
+    #: vanishes.
     edge: float
+    #: Radius of Hertz's pressure with the same second moment.
     moment: float
+    #: The largest nodal pressure.
     peak: float
+    #: Pressure at r = 0 of a line through p^2 over r^2 of the inner half of the nodes, free of the
+    #: noise of the nodal values on irregular meshes.
     centre: float
+    #: |contact force - load|/load, vertical.
     force_error: float
+    #: Spacing of the contact nodes.
     h: float
 
 

@@ -13,14 +13,9 @@ from scripts.cases import CASES
 
 @dataclass(frozen=True)
 class Cylinder:
-    """Hertz's line contact of an elastic cylinder with a rigid plane.
+    """Hertz's line contact of an elastic cylinder with a rigid plane."""
 
-    Attributes
-    ----------
-    load
-        Line load of the whole cylinder (force/length).
-    """
-
+    #: Line load of the whole cylinder (force/length).
     load: float
     young: float = 2000.0
     poisson: float = 0.3

@@ -13,29 +13,19 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the summary.
+    """A row of the summary."""
 
-    Attributes
-    ----------
-    item
-        Table, figure or theorem of the thesis.
-    content
-        Its content.
-    script
-        The script whose section has the counterpart.
-    remark
-        The comparison in words.
-    file
-        CSV file of that script with both columns; none for figures, which have no printed numbers.
-    theirs, ours
-        The thesis's column, and ours.
-    """
-
+    #: Table, figure or theorem of the thesis.
     item: str
+    #: Its content.
     content: str
+    #: The script whose section has the counterpart.
     script: str
+    #: The comparison in words.
     remark: str
+    #: CSV file of that script with both columns; none for figures, which have no printed numbers.
     file: str = ""
+    #: The thesis's column, and ours.
     theirs: str = ""
     ours: str = ""
 

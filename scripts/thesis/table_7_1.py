@@ -33,26 +33,18 @@ CONVERGED = ("solver.method=uzawa", SECANT)
 
 @dataclass(frozen=True)
 class Run:
-    """The costs of one solution.
+    """The costs of one solution."""
 
-    Attributes
-    ----------
-    outer
-        Iterations after the frictionless start.
-    inner, solves, factorizations
-        Iterations of the Uzawa block relaxation, linear solves and factorisations.
-    residual
-        The largest KKT residual at the end.
-    change, square
-        Iterations after which the relative change of the friction bound, or its square, was
-        below 1e-5; NaN for none.
-    """
-
+    #: Iterations after the frictionless start.
     outer: int
+    #: Iterations of the Uzawa block relaxation, linear solves and factorisations.
     inner: int
     solves: int
     factorizations: int
+    #: The largest KKT residual at the end.
     residual: float
+    #: Iterations after which the relative change of the friction bound, or its square, was below
+    #: 1e-5; NaN for none.
     change: float
     square: float
     converged: bool

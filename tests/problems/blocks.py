@@ -17,37 +17,25 @@ from tests.problems.meshes import assembled, midpoints
 
 @dataclass(frozen=True)
 class Blocks:
-    """An upper block on a lower one, in the plane or in space.
+    """An upper block on a lower one, in the plane or in space."""
 
-    Attributes
-    ----------
-    dim
-        2 or 3.
-    upper, lower
-        Cells along each edge, as along x and y and z.
-    jitter
-        How far inner nodes are moved, in lengths of cells.
-    grading
-        The exponent of the spacing along x.
-    turn
-        Angle by which both are turned (degrees).
-    gap
-        Between them.
-    cell
-        Shape of the cells; by default triangles or tetrahedra.
-    bow
-        How far nodes move along the faces, and those within also across: cells are then of second
-        order, and facets curved in their planes; 0 for straight cells.
-    """
-
+    #: 2 or 3.
     dim: int = 2
+    #: Cells along each edge, as along x and y and z.
     upper: int = 3
     lower: int = 4
+    #: How far inner nodes are moved, in lengths of cells.
     jitter: float = 0.15
+    #: The exponent of the spacing along x.
     grading: float = 1.0
+    #: Angle by which both are turned (degrees).
     turn: float = 0.0
+    #: Between them.
     gap: float = 0.0
+    #: Shape of the cells; by default triangles or tetrahedra.
     cell: str = ""
+    #: How far nodes move along the faces, and those within also across: cells are then of second
+    #: order, and facets curved in their planes; 0 for straight cells.
     bow: float = 0.0
 
     @property

@@ -57,29 +57,19 @@ SLOW_LINEAR = 1.1
 
 @dataclass(frozen=True)
 class Device:
-    """A part of the method that can be switched off.
+    """A part of the method that can be switched off."""
 
-    Attributes
-    ----------
-    name
-        As in the documentation.
-    source
-        The functions and classes that it consists of.
-    literature
-        Its reference.
-    changes
-        Its replacement: owner, name, value.
-    options
-        Changes of the options.
-    problem
-        The only problem that is solved without it; None for all.
-    """
-
+    #: As in the documentation.
     name: str
+    #: The functions and classes that it consists of.
     source: tuple[Any, ...]
+    #: Its reference.
     literature: str
+    #: Its replacement: owner, name, value.
     changes: tuple[tuple[Any, str, Any], ...] = ()
+    #: Changes of the options.
     options: tuple[tuple[str, Any], ...] = ()
+    #: The only problem that is solved without it; None for all.
     problem: Callable[[], Case] | None = None
 
     @property

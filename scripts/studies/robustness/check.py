@@ -25,22 +25,15 @@ Tables = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Mesh:
-    """Bodies of triangles that share no nodes.
+    """Bodies of triangles that share no nodes."""
 
-    Attributes
-    ----------
-    points, triangles
-        Shapes (n, 2) and (m, 3).
-    region
-        Number of the body of each triangle, shape (m,); `names` has its name.
-    parts
-        Edges of each named part of the boundary, shape (k, 2).
-    """
-
+    #: Shapes (n, 2) and (m, 3).
     points: Array
     triangles: NDArray[np.intp]
+    #: Number of the body of each triangle, shape (m,); `names` has its name.
     region: NDArray[np.intp]
     names: Sequence[str]
+    #: Edges of each named part of the boundary, shape (k, 2).
     parts: Mapping[str, NDArray[np.intp]]
 
     def nodes(self, parts: str | Sequence[str]) -> NDArray[np.intp]:

@@ -19,24 +19,16 @@ from scripts.studies.robustness.one_body import CELLS, HARD, PAIRS, PLAIN, PLAST
 
 @dataclass(frozen=True)
 class Problem:
-    """A random problem.
+    """A random problem."""
 
-    Attributes
-    ----------
-    name
-        Its family with its number.
-    tables, case
-        Its case, as drawn and read.
-    mesh
-        Mesh of the problems of several bodies, which the independent assembly takes.
-    domain
-        Mesh in place of that of the case.
-    """
-
+    #: Its family with its number.
     name: str
+    #: Its case, as drawn and read.
     tables: Mapping[str, Any]
     case: Case
+    #: Mesh of the problems of several bodies, which the independent assembly takes.
     mesh: Mesh | None = None
+    #: Mesh in place of that of the case.
     domain: Domain | None = None
 
 
