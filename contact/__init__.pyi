@@ -46,7 +46,7 @@ from contact.model.obstacle import Triangles as Triangles
 from contact.model.rigid import Motion as Motion
 from contact.model.rigid import Rigid as Rigid
 from contact.problem.problem import ContactProblem as Problem  # noqa: F401
-from contact.results.solution import Solution as Solution
+from contact.solution import Solution as Solution
 from contact.solving import NotConvergedError as NotConvergedError
 from contact.solving import SolveInterrupted as SolveInterrupted
 from contact.solving import evolve as evolve

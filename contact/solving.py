@@ -35,8 +35,9 @@ from contact.problem.state import State
 from contact.refining import adapted, default_start
 from contact.results.fields import check_variables
 from contact.results.remarks import announce
-from contact.results.solution import Solution, StepRecord, StepRecorder
+from contact.results.solution import StepRecord, StepRecorder
 from contact.results.uniqueness import uniqueness
+from contact.solution import Solution
 from contact.typing import Array
 
 logger = logging.getLogger("contact.steps")

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +26,7 @@ from contact.results.contact_nodes import (
     opposite_surface,
     opposite_table,
 )
+from contact.results.options import OutputOptions
 from contact.results.quantities import (
     ADAPT,
     AGAINST,
@@ -36,6 +40,9 @@ from contact.results.quantities import (
     values_of,
 )
 from contact.results.solution import Solution
+
+if TYPE_CHECKING:
+    from contact.plot.run import Run
 
 
 def write_outputs(
@@ -72,6 +79,18 @@ def write_outputs(
     else:
         with result_folder(folder, solution.problem.comm) as held:
             _replace(solution, held, figures)
+
+
+def written(solution: Solution) -> Run | None:
+    """Return the results in the files as figures read them; None but on rank 0. Collective."""
+    from contact.plot.run import read_run  # which takes a while to load
+
+    comm = solution.problem.comm
+    with ExitStack() as stack:
+        folder = stack.enter_context(TemporaryDirectory()) if comm.rank == 0 else ""
+        whole = replace(solution, output=OutputOptions(), seconds={**solution.seconds})
+        write_outputs(whole, comm.bcast(folder))
+        return read_run(Path(folder)) if comm.rank == 0 else None
 
 
 def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
@@ -132,7 +151,7 @@ def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:
 
     run = None
     if solution.output.fields != "vtu":
-        run = solution.written()
+        run = written(solution)
     elif solution.problem.comm.rank == 0:
         run = read_run(folder, summary)
     if run is not None:

@@ -30,6 +30,7 @@ from contact.plot.run import Run
 from contact.plot.style import STYLE
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.writing import written
 
 #: Widths of figures of one column, 85 mm, and of two (inches).
 ONE_COLUMN, TWO_COLUMNS = 85 / 25.4, 175 / 25.4
@@ -185,7 +186,7 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
 
 def run_of(solution: Solution) -> Run | None:
     """Return the run that figures of a solution are drawn from, without its title. Collective."""
-    run = solution.written()
+    run = written(solution)
     return None if run is None else replace(run, title="")
 
 

@@ -1,15 +1,15 @@
 """Checkpoints: the state of a solution, and of each step of an evolution, for any number of ranks.
 
 A checkpoint is one file of NumPy, which rank 0 writes. Places stand beside the values: nodes are
-found again by where they are. The file of a step has the case and the digests of its files, too,
-and the name of its run: a new run replaces the first file, and those behind it, which have another
-name, count no longer.
+found again by where they are. The file of a step has the case and the digests of its files, too.
+A new run removes the files of an earlier one from the last to the first: whenever it is killed,
+the files from the first on are those of one run.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
-import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -43,8 +43,8 @@ FOLDER, STEPS = "checkpoints", "[0-9]" * 5 + ".npz"
 NODES = "nodes"
 #: Begin of the names of the arrays of a history.
 HISTORY = "history "
-#: Keys of the file of a step: its run, the case, the digests of its files, and the record.
-RUN, CASE, FILES, RECORD = "run", "case", "files", "record"
+#: Keys of the file of a step: the case, the digests of its files, and the record.
+CASE, FILES, RECORD = "case", "files", "record"
 #: How near a node has to be to where it was, over the size of the body.
 _NEAR = 1e-9
 
@@ -69,14 +69,13 @@ class Checkpoints:
 
         def begin() -> None:
             for path in () if here else self._folder.glob(STEPS):
-                if _run_of(path) is None:
+                if _case_of(path) is None:
                     raise InputError(
                         f"{path}: no run has left it; accepted: a folder of results without it, "
                         "checkpoints of the evolution go there",
                         "not-ours",
                     )
-            run = _run_of(files_of(folder)[0]) if here else uuid.uuid4().hex
-            about = {RUN: run, CASE: to_toml(case, anchored=True), FILES: json.dumps(digest(case))}
+            about = {CASE: to_toml(case, anchored=True), FILES: json.dumps(digest(case))}
             self._about.update({key: np.array(text) for key, text in about.items()})
 
         on_root(problem.comm, begin)
@@ -85,7 +84,7 @@ class Checkpoints:
             self.keep(record)
 
     def keep(self, record: StepRecord) -> None:
-        """Write the checkpoint of the next step; the first replaces those of an earlier run."""
+        """Write the checkpoint of the next step; those behind it, of an earlier run, go first."""
         self._count += 1
         said = {"row": record.row, "enthalpy": record.enthalpy, "rounding": record.rounding}
         arrays = _gathered(self._problem, record.state)
@@ -93,20 +92,17 @@ class Checkpoints:
 
         def write() -> None:
             self._folder.mkdir(parents=True, exist_ok=True)
-            _write(self._folder / f"{self._count:05d}.npz", arrays)
-            for path in sorted(self._folder.glob(STEPS))[1:] if self._count == 1 else ():
+            for path in sorted(self._folder.glob(STEPS))[self._count - 1 :][::-1]:
                 path.unlink()
+            _write(self._folder / f"{self._count:05d}.npz", arrays)
 
         on_root(self._problem.comm, write)
 
 
 def files_of(folder: Path) -> list[Path]:
     """Return the checkpoints in a folder, one after the other; refuse none. On one rank."""
-    found: list[Path] = []
-    while (run := _run_of(path := folder / FOLDER / f"{len(found) + 1:05d}.npz")) is not None:
-        if found and run != _run_of(found[0]):
-            break
-        found.append(path)
+    numbered = (folder / FOLDER / f"{number:05d}.npz" for number in itertools.count(1))
+    found = [*itertools.takewhile(lambda path: _case_of(path) is not None, numbered)]
     if not found:
         raise InputError(
             f"--restart {folder}: no checkpoints there; accepted: the folder of an evolution that "
@@ -118,9 +114,7 @@ def files_of(folder: Path) -> list[Path]:
 
 def kept_case(folder: Path) -> str | None:
     """Return the case of the checkpoints in a folder; None without any. On one rank."""
-    with suppress(InputError):
-        return str(_read(files_of(folder)[0])[CASE])
-    return None
+    return _case_of(folder / FOLDER / "00001.npz")
 
 
 def check_restart(folder: Path, case: Case) -> None:
@@ -192,10 +186,10 @@ def _read(path: Path) -> Arrays:
         return dict(arrays)
 
 
-def _run_of(path: Path) -> str | None:
-    """Return the name of the run that has left the checkpoint of a step; None of another file."""
+def _case_of(path: Path) -> str | None:
+    """Return the case of the checkpoint of a step; None of another file."""
     with suppress(InputError), _as_written(path), np.load(path) as arrays:
-        return str(arrays[RUN])
+        return str(arrays[CASE])
     return None
 
 

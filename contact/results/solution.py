@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from dolfinx import fem
@@ -38,11 +35,6 @@ from contact.results.resultants import (
     supports,
 )
 from contact.typing import Array
-
-if TYPE_CHECKING:
-    from contact.plot.figures import Gallery
-    from contact.plot.run import Run
-
 
 #: Columns of ``steps.csv`` that a look at a step shows.
 SHOWN = ("t", "max_pressure", "contact_nodes", "max_displacement", "kkt")
@@ -231,56 +223,6 @@ class Solution(Solved):
     def von_mises(self) -> fem.Function:
         """The von Mises stress, likewise. Collective."""
         return self._derived["von_mises"]
-
-    def plot(self, *fields: str, width: float | None = None) -> Gallery | None:
-        """Return the figures on rank 0, which a notebook shows; None elsewhere. Collective.
-
-        Parameters
-        ----------
-        fields
-            Fields to colour the body by, as ``contact plot --field`` takes them. By default
-            contact part, von Mises stress and potential are drawn.
-        width
-            Of the figures (inches).
-
-        Returns
-        -------
-        The figures.
-
-        Raises
-        ------
-        InputError
-            If there is no such field.
-        """
-        from contact.plot.figures import Look, figures_of  # which take a while to load
-
-        run = self.written()
-        return None if run is None else figures_of(run, fields, Look(width))
-
-    def view(self, field: str | None = None) -> Any:
-        """Show a body in 3-D in a window or a notebook, on rank 0. Collective.
-
-        Parameters
-        ----------
-        field
-            To colour the body by, as `plot` takes it; by default the contact pressure.
-        """
-        from contact.plot.figures import window  # which takes a while to load
-
-        run = self.written()
-        return None if run is None else window(run, field).show()
-
-    def written(self) -> Run | None:
-        """Return the results in the files as figures read them; None but on rank 0. Collective."""
-        from contact import write_outputs
-        from contact.plot.run import read_run
-
-        comm = self.problem.comm
-        with ExitStack() as stack:
-            folder = stack.enter_context(TemporaryDirectory()) if comm.rank == 0 else ""
-            whole = replace(self, output=OutputOptions(), seconds={**self.seconds})
-            write_outputs(whole, comm.bcast(folder))
-            return read_run(Path(folder)) if comm.rank == 0 else None
 
     @cached_property
     def _unknowns(self) -> dict[str, fem.Function]:

@@ -13,7 +13,7 @@ from contact.plot.series import draw_loop
 from contact.results.options import OutputOptions
 from contact.results.solution import Solution
 from contact.solving import solve
-from contact.writing import write_outputs
+from contact.writing import write_outputs, written
 from tests.problems.written import block, electric
 
 
@@ -34,7 +34,7 @@ def test_figures(dim: int, tmp_path: Path) -> None:
 
 
 def run_of(solution: Solution) -> Run:
-    run = solution.written()
+    run = written(solution)
     assert run is not None
     return run
 

@@ -15,6 +15,7 @@ from contact.plot.foundation import (
 )
 from contact.plot.run import Run
 from contact.solving import solve
+from contact.writing import written
 from tests.problems.written import block
 
 SHAPES: dict[str, dict[str, Any]] = {
@@ -39,7 +40,7 @@ def pressed(contact: dict[str, Any], by: float = 1e-3, **more: Any) -> Run:
         "contact": {"on": "bottom", **contact},
         "friction": {"law": "none"},
     }
-    run = solve(block(2, **(sections | more))).written()
+    run = written(solve(block(2, **(sections | more))))
     assert run is not None
     return run
 

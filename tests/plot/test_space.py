@@ -15,6 +15,7 @@ from contact.plot.space import (
 )
 from contact.plot.style import Look
 from contact.solving import solve
+from contact.writing import written
 from tests.problems.written import block
 
 AXES = {"left": -1, "right": 1, "front": -2, "back": 2, "bottom": -3, "top": 3}
@@ -35,7 +36,7 @@ def pressed(on: Any = "bottom", side: str = "bottom", **more: Any) -> Run:
         "contact": {"on": on, "foundation": plane},
         "friction": {"law": "coulomb", "mu": 0.3},
     }
-    run = solve(block(3, **(sections | more))).written()
+    run = written(solve(block(3, **(sections | more))))
     assert run is not None
     return run
 

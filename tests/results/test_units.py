@@ -7,6 +7,7 @@ from contact.cli.main import main
 from contact.plot.body import picture
 from contact.plot.run import read_run
 from contact.results.options import Units
+from contact.writing import written
 from scripts.cases import CASES
 
 SMALL = ("mesh.cells=[8, 4]", "solver.method=newton")
@@ -30,4 +31,4 @@ def test_units_reach_figures_and_summary(tmp_path):
     assert summary["units"] == {"length": "m", "stress": "GPa", "potential": "GV", "charge": "C"}
     again = read_run(folder)
     assert picture(again, "potential").label == r"potential $\varphi$ (GV)"
-    assert solve(load_case(CASES / "piezo-8-1.toml", SMALL)).written().units == again.units
+    assert written(solve(load_case(CASES / "piezo-8-1.toml", SMALL))).units == again.units
