@@ -18,7 +18,7 @@ from contact.methods.options import FixedPointOptions
 from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import TWO_COLUMNS, Report, append, empty, iterates, options, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, empty, iterates, subplots
 from scripts.studies.product_norm import ProductNorm
 
 #: k_e of the figure.
@@ -131,13 +131,3 @@ def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
     report.table("theorem-5-2-rates", caption, columns, note)
     report.figure("theorem-5-2", caption, figure, data)
     return rates
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Make the figure and its table. Collective."""
-    chosen = options(__doc__, "lagged_current", arguments)
-    theorem_5_2(Report(chosen.out), chosen.coarse)
-
-
-if __name__ == "__main__":
-    main()

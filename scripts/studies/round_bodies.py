@@ -1,11 +1,7 @@
-"""Orders of convergence of a disc and a ball on a plane, on straight cells and on curved ones.
-
-`python3 -m scripts.studies.round_bodies [--out DIR] [--coarse]`
-"""
+"""Orders of convergence of a disc and a ball on a plane, on straight cells and on curved ones."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +12,7 @@ from contact import Body, Contact, Domain, Fixed, Linear, Plane
 from contact.mesh.cells import SHAPES
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import Report, append, empty, options
+from scripts.reporting import Report, append, empty
 from scripts.studies.cell_orders import ELEMENTS, grid, solved
 
 CAPTION = "A disc and a ball of soft rim on a rigid plane, on straight and on curved cells"
@@ -150,13 +146,3 @@ def orders(report: Report, coarse: bool) -> dict[tuple[str, int, int], Array]:
     report.table("round-bodies", CAPTION, last, NOTE + "; ".join(hertz) + ".")
     report.numbers("round-bodies-meshes", columns)
     return found
-
-
-def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int, int], Array]:
-    """Make the table; return the orders."""
-    chosen = options(__doc__, "curved_cells", arguments)
-    return orders(Report(chosen.out), chosen.coarse)
-
-
-if __name__ == "__main__":
-    main()

@@ -267,10 +267,7 @@ def test_directions_are_halfway_between_an_arc_and_a_line() -> None:
 
 
 def test_a_bowl_that_touches_within_facets_does_not_cut_them() -> None:
-    """Those of |x - c|^2 over two triangles of degree 2, c in the middle of the edge between.
-
-    It is so shallow that its arcs are parabolas.
-    """
+    """Those of |x - c|^2 over two triangles of degree 2, c in the middle of the edge between."""
     depth = 1e-4
     slave, points = flat((TRIANGLE, 2), 1, 0.0, 1.0, 1)
     bowl, _ = flat((TRIANGLE, 2), 1, 0.5 * depth, -1.0, 1, FIRST)

@@ -185,10 +185,7 @@ def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"
 @pytest.mark.parametrize("direction", ["foundation", "body"])
 @pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1)])
 def test_straight_facets_around_a_circle_touch_it(degree, levels, direction, shape):
-    """The corners lie on the circle; refined edges are in it by the depth of their chords.
-
-    Gaps of nodes in the middle of edges are those of the curved surface.
-    """
+    """The corners lie on the circle; refined edges are in it by the depth of their chords."""
     cells = 6
     nodes = around_a_circle(1.0, degree, levels, cells, direction, shape)
     depth = 1 - np.cos(np.pi / 6 / cells)

@@ -117,11 +117,7 @@ def test_one_material_for_both_regions_is_one_material() -> None:
 
 @pytest.mark.parallel
 def test_a_soft_layer_far_from_the_contact_excuses_nothing() -> None:
-    """What touches is weighed by its own modulus: by the layer's, gaps and slips were too little.
-
-    The layer hands the traction on, whatever its modulus is. The penalty method said that the laws
-    hold, and had 4 % of the friction force.
-    """
+    """Contact is weighed by its own modulus: by the layer's, gaps and slips were too small."""
 
     def force(young: float, method: str):
         soft = {"young": young, "poisson": 0.3}

@@ -40,10 +40,7 @@ def test_steps_in_between_that_must_not_follow():
 
 
 def test_a_node_opens_along_the_ramp():
-    """A node that draws less current as it opens, and thus opens further: no cycle.
-
-    Followed, the ramp points back to the foundation, where the node is under tension.
-    """
+    """A node that draws less current as it opens, and thus opens further: no cycle."""
     friction = Friction(SlipCoefficient(0.5, 0.2, 1.0))
     found = []
     methods = (

@@ -202,10 +202,7 @@ def boxes(folder, **blocks):
 
 @pytest.mark.parametrize("method", ["newton", "uzawa", "penalty"])
 def test_two_pads_that_a_lid_pushes_go_no_farther_than_they_must(method, tmp_path):
-    """By 0.02 and 0.03 downwards: they had turned, since where they just touch gaps are rounding.
-
-    The contact residual there was 453, that of rounding over the rounding of pressures.
-    """
+    """By 0.02 and 0.03 downwards: they had turned, as gaps where they just touch are rounding."""
     case = {
         "mesh": boxes(tmp_path, base=(-2.0, 2.0, -1.0, 0.0, 0.5), low=(-1.0, 0.2, 0.05, 0.55, 0.25),
                       high=(-0.8, 0.9, 0.56, 1.0, 0.25), lid=(-2.0, 2.0, 1.02, 1.5, 0.5)),

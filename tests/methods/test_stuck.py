@@ -62,10 +62,7 @@ def test_what_friction_alone_holds_is_stuck_at_first(case):
 
 
 def test_a_body_that_lies_lightly_on_one_that_is_bent():
-    """What bends the lower one is far more than friction has to bear: it stalled at 4e-1.
-
-    Where the upper one comes to rest is not unique.
-    """
+    """What bends the lower one is far more than friction has to bear: it stalled at 4e-1."""
     loop, state = relaxed(on_a_bent_one())
     problem = loop.problem
     pressed = problem.interface.nodes.sum(state.forces.pressure * problem.nodes.normal[:, 1])

@@ -14,10 +14,7 @@ STAGES = ("nested", "separated")
 @pytest.mark.parallel(3, alone=False)  # which measures 1 and 2 as well
 @pytest.mark.parametrize("bodies", [1, 2])
 def test_no_rank_has_more_where_there_are_more(bodies: int) -> None:
-    """Slices in a row, so that ranks exchange at the cuts: lists of all would be of each rank.
-
-    Where all forms are known, arrays of 3, 4 and 5 ranks are equal to .1 %.
-    """
+    """Slices in a row, so that ranks exchange at the cuts: lists of all would be of each rank."""
     found = {}
     for size in range(1, COMM.size + 1):
         some = COMM.Split(0 if COMM.rank < size else MPI.UNDEFINED, COMM.rank)

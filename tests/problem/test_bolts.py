@@ -149,10 +149,7 @@ def stiffnesses():
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 @pytest.mark.parametrize("cut", [0.4, 0.8])
 def test_a_bolt_and_two_flanges_in_series(cut, linear):
-    """N = s k_b k_f/(k_b + k_f); a given force asks for s = N (1/k_b + 1/k_f).
-
-    A cell away from the rigid head too, whose nodes have the bolt's forces then.
-    """
+    """N = s k_b k_f/(k_b + k_f); a given force asks for s = N (1/k_b + 1/k_f)."""
     bolt, flanges = stiffnesses()
     s = 0.004
     force = s / (1 / bolt + 1 / flanges)

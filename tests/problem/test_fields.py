@@ -76,10 +76,7 @@ def test_what_a_potential_exerts_is_what_acts():
 @pytest.mark.parametrize("method", ["newton", "uzawa", "penalty"])
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
 def test_counts_and_residuals_in_any_units(method, linear):
-    """MINRES ended at a size of the solution, and compared residuals in two units.
-
-    The units are powers of two, which no number is rounded by.
-    """
+    """MINRES ended at a size of the solution, and compared residuals in two units."""
     units, volts = (1.0, 2.0**40, 2.0**-30), (1.0, 2.0**-14, 2.0**26)
     found = [
         solved(method, linear, 1.0, 1.0, unit, volt)

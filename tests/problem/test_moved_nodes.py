@@ -102,10 +102,7 @@ def halved(on, against):
 @pytest.mark.parallel
 @pytest.mark.parametrize(("on", "against"), [("over", "under"), ("under", "over")])
 def test_a_plane_of_symmetry_between_boxes(on, against):
-    """Nodes in the plane face masters beside it, which move: their jump is no unknown.
-
-    With friction along it there Newton's method did not converge in 350 solves.
-    """
+    """Nodes in the plane face masters beside it, which move: their jump is no unknown."""
     contact = halved(on, against).contact
     plane = contact.points[:, 0] < contact.points[:, 0].min() + 1e-9
     assert contact.slip[plane, 0] == pytest.approx(0.0, abs=1e-15)

@@ -106,10 +106,7 @@ def test_plane_stress_of_small_strains_is_linear(degree):
 
 
 def test_wrong_pressures_in_the_fluxes_are_overestimated():
-    """Nearly incompressible, 3.5 times: with the right ones the estimate is the error.
-
-    That is k e_p^2 of the pressures, which are off by ten times their size, and what is left.
-    """
+    """Nearly incompressible, 3.5 times: with the right ones the estimate is the error."""
     tube = Tube(law=Linear(1.0, 0.4999))
     problem = tube.problem(8, 2)
     body, state, law = problem.body, state_of(problem), tube.law

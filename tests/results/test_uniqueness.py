@@ -152,10 +152,7 @@ def test_any_number_of_ranks():
 @pytest.mark.parametrize("method", ["newton", "uzawa"])
 @pytest.mark.parametrize("yaw", [0.0, 0.7, np.pi / 2])
 def test_critical_friction_does_not_depend_on_the_axes(yaw, method, tmp_path):
-    """A tetrahedron on a plane, clamped along its slope: one node, and K as of the triangle.
-
-    It sticks, or slides with friction across the slope: of that direction nothing was critical.
-    """
+    """A tetrahedron on a plane, clamped along its slope: one node, and K as of the triangle."""
     turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
     height, poisson = 0.5345, 0.3
     points = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, height]])

@@ -1,21 +1,12 @@
 """The scripts of Examples 8.1 and 8.2 on coarse meshes: tables, figures, Theorem 5.2, sensor."""
 
-import csv
-from pathlib import Path
-
-import numpy as np
 import pytest
 
 from scripts.examples import sensor
 from scripts.reporting import Report
 from scripts.studies import lagged_current
 from scripts.thesis import figures_piezo, tables_piezo
-
-
-def columns(path: Path) -> dict[str, list[str]]:
-    with path.open() as stream:
-        header, *rows = csv.reader(stream)
-    return dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
+from tests.problems.written import rows_of
 
 
 @pytest.mark.slow
@@ -32,11 +23,10 @@ def test_theorem_5_2(tmp_path):
 def test_tables(tmp_path):
     report = Report(tmp_path)
     tables_piezo.series(report, "8.3", (16, 8))
-    found = columns(tmp_path / "series-k-e-8-2.csv")
-    assert set(found["converged"]) == {"True"}
-    assert max(map(float, found["charge imbalance"])) < 1e-8
+    for row in rows_of(tmp_path / "series-k-e-8-2.csv"):
+        assert row["converged"] == "True" and float(row["charge imbalance"]) < 1e-8
     tables_piezo.iterative(report, coarse=True)
-    assert len(columns(tmp_path / "piezo-linear-iterations.csv")["iterations"]) == 4
+    assert len(rows_of(tmp_path / "piezo-linear-iterations.csv")) == 4
 
 
 def test_figures(tmp_path):
@@ -50,8 +40,7 @@ def test_figures(tmp_path):
 
 def test_sensor(tmp_path):
     sensor.main(["--coarse", "--out", str(tmp_path)])
-    found = columns(tmp_path / "sensor-table.csv")
-    charge = np.array(found["charge per load"], dtype=float)
+    charge = [float(row["charge per load"]) for row in rows_of(tmp_path / "sensor-table.csv")]
     # In proportion at small loads, no longer at the largest.
     assert charge[1] == pytest.approx(charge[0], rel=1e-2)
     assert abs(charge[2]) > 1.2 * abs(charge[0])

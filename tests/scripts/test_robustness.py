@@ -15,12 +15,7 @@ from scripts.studies.robustness.problems import problems
 
 @pytest.mark.parametrize("name", ["bimorph-3", "bimorph-8", "unsupported-5"])
 def test_what_takes_no_block_relaxation(name):
-    """A bent bimorph, a good conductor, and a block that Newton's loop lets fly away.
-
-    The first took 212 dense steps, the second 700 solves of the body or 970 dense ones, or was not
-    solved, by the BLAS: its foundation conducts next to nothing at first. Of the last the convex
-    problem was taken 3e12 away from rest: a fifth of its load was rounding there.
-    """
+    """A bent bimorph, a good conductor, and a block that Newton's loop lets fly away."""
     case = next(problems("hard", name)).case
     solution = solve(build_problem(case), NewtonOptions())
     assert solution.converged, solution.outcome.reason
@@ -29,10 +24,7 @@ def test_what_takes_no_block_relaxation(name):
 
 @pytest.mark.parametrize("condense", [True, False])
 def test_contact_forces_that_are_all_rounding_are_none(condense):
-    """lifted-4: a beam on the ground pressed along it with nu 0, which asks for none.
-
-    Newton's loop cycles on the friction of pressures of 1e-17, and the interior point leaves 2e-8.
-    """
+    """lifted-4: a beam on the ground pressed along it with nu 0, which asks for none."""
     case = next(problems("hard", "lifted-4")).case
     solution = solve(build_problem(case), NewtonOptions(condense=condense))
     assert solution.converged, solution.outcome.reason
@@ -43,11 +35,7 @@ def test_contact_forces_that_are_all_rounding_are_none(condense):
 
 
 def test_a_node_that_begins_to_slide_goes_on():
-    """bar-67 on quadrilaterals: friction falls from 0.1 to 0.083 of the pressure within 1e-7.
-
-    The linearised bound of a node at the end of the slip zone was far below that of its slip. By it
-    the node stuck, to be released again: all ways ended with 2e-5 after 308 solves.
-    """
+    """bar-67 on quadrilaterals: friction falls from 0.1 to 0.083 of the pressure within 1e-7."""
     tables = next(problems("plain", "bar-67")).tables
     case = parse_case({**tables, "mesh": tables["mesh"] | {"cell": "quadrilateral"}})
     solution = solve(build_problem(case), NewtonOptions())
@@ -136,12 +124,7 @@ def test_forces_of_the_check():
 
 @pytest.mark.parametrize("name", ["snap_fits-0", "snap_fits-1", "rings-24"])
 def test_solutions_without_contact_forces(name, tmp_path):
-    """A beam that has been let go, and a ring that the lid pushes through its clearance.
-
-    Nothing acts on them, and residuals were relative to forces that vanish: they took 1383, 508 and
-    3368 dense steps. How many the ring takes, rounding decides: from 16 to 231 in 170 runs with
-    moduli that differ by rounding.
-    """
+    """A beam let go, and a ring that the lid pushes through its clearance: no force, no scale."""
     solution = solve(problem(name, tmp_path).case, comm=MPI.COMM_SELF)
     assert solution.converged
     assert solution.problem.nodes.maximum(solution.pressure) == 0

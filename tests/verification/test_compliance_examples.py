@@ -255,10 +255,7 @@ def test_iterations_are_counted_where_the_residual_ends_the_run():
 
 @pytest.mark.slow
 def test_the_default_ramp_has_a_mesh_limit():
-    """Its width is a length of the body; with a steep one, the mesh decides how often it touches.
-
-    A warning says where the mesh does not resolve the ramp.
-    """
+    """Its width is a length of the body; a warning says where the mesh does not resolve it."""
     runs = {cells: solved("8-4", cells, NEWTON) for cells in (48, 96, 192)}
     deltas = [run.problem.interface.foundation.conductor.psi.delta for run in runs.values()]
     assert deltas == pytest.approx([1 / 0.3] * 3, rel=1e-12)

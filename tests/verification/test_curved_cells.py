@@ -45,10 +45,7 @@ NAMES = [shape.name for shape in SHAPES]
 @pytest.mark.parallel
 @pytest.mark.parametrize("name", NAMES)
 def test_a_ring_on_a_shaft_converges_with_the_third_order(name: str) -> None:
-    """With the second on tetrahedra, whose contact ends at free edges, 1 deep.
-
-    There directions at the nodes are not those of the resultants of quadratic triangles.
-    """
+    """With the second on tetrahedra, whose contact ends at free edges, 1 deep."""
     found = [solved(on_a_shaft(rings(COMM, name, 2, (1.0, 2.0), (n,)), 2)) for n in (2, 4)]
     if name == "tetrahedron":
         assert found[1][0] < found[0][0] / 2**1.9 < 1.3e-3

@@ -181,10 +181,7 @@ def told(warning):
 @pytest.mark.parallel
 @pytest.mark.parametrize(("count", "node"), [(8, 0.14), (10, 0.1), (12, 0.08), (6, None)])
 def test_pins_of_few_edges(count, node):
-    """A body around half a pin: vertices counted as corners have 20 times the pressure.
-
-    Six edges are a hexagon, which is said.
-    """
+    """A body around half a pin: vertices counted as corners have 20 times the pressure."""
     domain = rectangle(COMM, [0.0, 0.0], [1.0, 1.0], [count // 2, 8])
     x = domain.mesh.geometry.x
     angle, radius = np.pi * x[:, 0], 0.8 - 0.6 * x[:, 1]

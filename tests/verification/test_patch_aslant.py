@@ -178,10 +178,7 @@ def test_on_another_block(dim, degree, cell, pair, condense):
 @pytest.mark.parallel
 @pytest.mark.parametrize("method", ["dense", "sparse", "uzawa"])
 def test_friction_across_the_plane_of_symmetry(method):
-    """Sliding along y with the foundation's slope along x alone: the bound is that of p.
-
-    The block is strained along y alone, so that nothing slips in another direction.
-    """
+    """Sliding along y with the foundation's slope along x alone: the bound is that of p."""
     mu, sliding = 0.3, 0.2
     domain = Blocks(3, 2, 2).domain(COMM)
     x = domain.mesh.geometry.x
@@ -261,10 +258,7 @@ def test_friction_has_no_part_along_directions_that_are_held(mu):
 
 
 def test_the_node_that_is_held_alone_is_off():
-    """Sliding under a uniform stress: its pressure is p (1 + mu tan a) on all meshes.
-
-    The force is off by the friction that its share of the surface lacks, which falls with the mesh.
-    """
+    """Sliding under a uniform stress: its pressure is p (1 + mu tan a) on all meshes."""
     p, mu, slope = 1.0, 0.05, 0.4
     stress = p * np.array([[2 * mu / slope - 1, mu], [mu, -1.0]])
     exact = p * np.array([slope - mu, -1 - mu * slope])

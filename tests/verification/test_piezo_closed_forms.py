@@ -71,11 +71,12 @@ def test_column(name, dim, units):
 
 
 @pytest.mark.core
-@pytest.mark.parametrize("dim", [2, 3])
-def test_second_degree(dim):
+@pytest.mark.parametrize(
+    ("dim", "given"), [(2, {"degree": 2}), (3, {"degree": 2}), (2, {"perfect": True})]
+)
+def test_second_degree_and_perfect_conductor(dim, given):
     column = COLUMNS["conductive"]
-    problem = column.problem(COMM, dim, degree=2)
-    solver = solve(problem)
+    solver = solve(column.problem(COMM, dim, **given))
     assert max(errors(solver, column, SCALED)) < 1e-10
 
 
@@ -87,14 +88,6 @@ def test_lagged_charge_has_the_same_limit(dim):
     solver = solve(problem)
     assert max(errors(solver, column, SCALED)) < 1e-10
     assert len(solver.history) > 3
-
-
-@pytest.mark.core
-def test_perfect_conductor():
-    column = COLUMNS["conductive"]
-    problem = column.problem(COMM, 2, perfect=True)
-    solver = solve(problem)
-    assert max(errors(solver, column, SCALED)) < 1e-10
 
 
 @pytest.mark.core

@@ -214,10 +214,7 @@ class Counted(HenckyAtPoints):
 @pytest.mark.parametrize("argument", ["norm", "square"])
 @pytest.mark.parametrize("poisson", [-0.95, 0.3, 0.4999])
 def test_the_strain_across_is_that_of_a_bracket(poisson, argument, size):
-    """Also beyond e xi_0, where the deviator softens; it ended after 100 steps for nu = .4999.
-
-    Both parts of the stress across are pulls at |eps_xx + eps_yy|, and pressures at minus that.
-    """
+    """Also beyond e xi_0, where the deviator softens; it ended after 100 steps for nu = .4999."""
     base = Counted(Log(YOUNG, poisson, yield_strain=0.003, argument=argument))
     strain = size * np.random.default_rng(3).standard_normal((20, 4)) * [1, 1, 0, 1]
     Counted.asked = 0
