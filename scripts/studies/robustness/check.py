@@ -66,12 +66,18 @@ def write_msh(mesh: Mesh, path: Path) -> None:
     path.write_text("\n".join([*lines, "$EndElements", ""]))
 
 
-def internal_forces(mesh: Mesh, materials: Sequence[Tables], u: Array) -> Array:
-    """Return the nodal forces of Hencky's materials in plane strain, shape (n, 2)."""
+def gradients(mesh: Mesh) -> tuple[Array, Array]:
+    """Return the gradients of the barycentric coordinates, shape (m, 3, 2), and the areas."""
     edges = mesh.points[np.roll(mesh.triangles, 1, 1)] - mesh.points[np.roll(mesh.triangles, -1, 1)]
     twice = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    # Gradients of the barycentric coordinates: edges turned by 90 degrees over twice the area.
+    # Edges turned by 90 degrees over twice the area.
     slopes = np.stack([-edges[..., 1], edges[..., 0]], axis=2) / twice[:, None, None]
+    return slopes, np.abs(twice) / 2
+
+
+def internal_forces(mesh: Mesh, materials: Sequence[Tables], u: Array) -> Array:
+    """Return the nodal forces of Hencky's materials in plane strain, shape (n, 2)."""
+    slopes, areas = gradients(mesh)
     gradient = np.einsum("mai,maj->mij", u[mesh.triangles], slopes)
     strain = (gradient + gradient.transpose(0, 2, 1)) / 2
     trace = np.trace(strain, axis1=1, axis2=2)
@@ -88,7 +94,7 @@ def internal_forces(mesh: Mesh, materials: Sequence[Tables], u: Array) -> Array:
     stress = 2 * shear[:, None, None] * strain
     stress += ((bulk - 2 * shear / 3) * trace)[:, None, None] * np.eye(2)
     forces = np.zeros_like(mesh.points)
-    nodal = np.abs(twice)[:, None, None] / 2 * np.einsum("mij,maj->mai", stress, slopes)
+    nodal = areas[:, None, None] * np.einsum("mij,maj->mai", stress, slopes)
     np.add.at(forces, mesh.triangles, nodal)
     return forces
 
