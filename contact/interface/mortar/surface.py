@@ -192,18 +192,13 @@ class Surface:
 
     @property
     def turns(self) -> Array:
-        """How far the curve turns from end to end of a straight edge, the most, shape (f,)."""
+        """h/R, the turn of the curve over a straight edge, the largest of a facet, shape (f,)."""
         return np.asarray(np.abs(2 * self.deviation / self.edges).max(axis=1, initial=0.0))
 
     @property
     def unknown_deviation(self) -> float:
         """Largest part of the deviations that gaps do not contain (length), on this rank."""
         return float(self.unknown.max(initial=0.0)) / 4 if self.follows else self.largest_deviation
-
-    @property
-    def waves(self) -> Array:
-        """The largest slope of the unknown part, along an edge, shape (f,)."""
-        return np.asarray((self.unknown / (4 * self.edges)).max(axis=1, initial=0.0))
 
     @property
     def follows(self) -> bool:
@@ -268,11 +263,6 @@ class Surface:
             along = functions[:, first] + functions[:, second]
             products /= np.where(along != 0, along, 1.0) ** 2
         return along, products
-
-    @property
-    def middles(self) -> NDArray[np.intp]:
-        """The local numbers of the nodes of degree 2 in the middle of the edges."""
-        return np.asarray(self._bubbles(self.shape.nodes(self.degree))[1].argmax(axis=0))
 
     def reconstructed(self, values: Array) -> tuple[NDArray[np.int64], Array]:
         """Return the third-order reconstruction of a function from its corner values. Collective.
