@@ -218,45 +218,55 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
     """
     asked = case.adapt
     assert case.mesh is not None and asked is not None
-    domain, solution, rows = case.mesh.build(comm), None, []
-    while True:
+    domain: Domain | None = case.mesh.build(comm)
+    solution: Solution | None = None
+    rows: list[dict[str, float]] = []
+    while domain is not None:
         problem = build_problem(case, comm, domain=domain)
-        unknowns = problem.body.layout.unknowns
-        if solution is not None and unknowns > asked.max_unknowns:
+        if solution is not None and problem.body.layout.unknowns > asked.max_unknowns:
             break
-        start = None
-        if solution is not None and not solution.steps:
-            start = prolong(solution.problem, solution.state, problem)
-        before = solution
-        solution = solve(problem, start=start)
+        solution = _solved_after(solution, problem, solve)
         if solution.outcome.signal:
             break
-        if solution.converged:
-            solution.error = estimated(solution.problem, solution.state)
         rows.append(values_of(ADAPT, solution))
-        if before is not None:
-            for phase, seconds in before.seconds.items():
-                solution.seconds[phase] += seconds
-        if not solution.converged:
-            break
-        squares, error = indicators(solution)
-        tell(logger, 0.0, "%d unknowns, estimated error %.2g %%", unknowns, 100 * error)
-        # A first mesh may have seen nothing of a narrow load, or of contact between its nodes.
-        seen = error > ROUNDING or before is not None
-        if asked.error is not None and error <= asked.error and seen:
-            break
-        goal = (asked.error / error) ** 2 if asked.error is not None and seen else 0.0
-        room = asked.max_unknowns / unknowns
-        finer = grown(domain, squares, asked.fraction, goal, room, problem.body.degree)
-        if _cells(finer) < LEAST * _cells(domain):
-            break
-        domain = finer
+        domain = _next_mesh(asked, domain, solution, len(rows)) if solution.converged else None
+    assert solution is not None
     solution.adaptation = rows
     for identifier, remarks in {"adapt": missed(asked, rows if solution.converged else ())}.items():
         solution.warnings += [f"{text} [{identifier}]" for text in remarks]
     if asked.fraction == 1 and solution.converged:
         solution.intervals = intervals(rows)
     return solution
+
+
+def _solved_after(before: Solution | None, problem: ContactProblem, solve: Solver) -> Solution:
+    """Solve on the next mesh, from the solution on the mesh before, and estimate. Collective."""
+    start = None
+    if before is not None and not before.steps:
+        start = prolong(before.problem, before.state, problem)
+    solution = solve(problem, start=start)
+    if solution.outcome.signal:
+        return solution
+    if solution.converged:
+        solution.error = estimated(solution.problem, solution.state)
+    for phase, seconds in before.seconds.items() if before is not None else ():
+        solution.seconds[phase] += seconds
+    return solution
+
+
+def _next_mesh(asked: Adapt, domain: Domain, solution: Solution, count: int) -> Domain | None:
+    """Return the mesh after the last of `count`; None where the goal is met. Collective."""
+    squares, error = indicators(solution)
+    layout = solution.problem.body.layout
+    tell(logger, 0.0, "%d unknowns, estimated error %.2g %%", layout.unknowns, 100 * error)
+    # A first mesh may have seen nothing of a narrow load, or of contact between its nodes.
+    seen = error > ROUNDING or count > 1
+    if asked.error is not None and error <= asked.error and seen:
+        return None
+    goal = (asked.error / error) ** 2 if asked.error is not None and seen else 0.0
+    room, degree = asked.max_unknowns / layout.unknowns, solution.problem.body.degree
+    finer = grown(domain, squares, asked.fraction, goal, room, degree)
+    return finer if _cells(finer) >= LEAST * _cells(domain) else None
 
 
 def missed(asked: Adapt, rows: Sequence[Mapping[str, float]]) -> Iterator[Remark]:

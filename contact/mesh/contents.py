@@ -142,8 +142,8 @@ class Contents:
             group[first + block] = np.union1d(group.get(first + block, members), members)
 
     def add_nodes(self, key: str, values: Array) -> None:
-        """Add the sets of whole numbers of nodes."""
-        for name, _, members in _by_number(key, [values]):
+        """Add the sets of whole numbers of nodes; references of Medit's nodes are no sets."""
+        for name, _, members in _by_number(key, [values]) if key != "medit:ref" else ():
             self.nodes[name] = np.union1d(self.nodes.get(name, members), members)
 
 
@@ -345,31 +345,23 @@ def check(contents: Contents) -> Cells:
         For cells other than triangles or quadrilaterals in a plane z = const, or solids, of order 1
         or 2; for flat, folded or overlapping cells; and if no part is left.
     """
-    given = contents.kinds
+    given, empty = contents.kinds, _empty_groups(contents)
     dim = max((kind.dim for kind in given), default=0)
-    for _, nodes in contents.blocks:
-        if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(contents.points):
-            raise InputError("it has elements whose nodes it does not have", "mesh-file")
+    _check_numbers(contents)
     contents = with_one_shape(contents)
     shape = _check_kinds([kind for kind in contents.kinds if kind.dim == dim], dim)
     points = np.asarray(contents.points, dtype=float)
-    pairs = zip(contents.blocks, contents.kinds, strict=True)
-    rows = np.concatenate([nodes for (_, nodes), kind in pairs if kind.dim == dim])
-    rows = in_dolfinx_order(shape, points, rows)
-    corners = rows[:, : shape.corners]
-    curved = _curved(points, rows, shape)
-    rows = rows if curved else corners
-    number = _number(rows)
+    every = _all_cells(contents, points, shape)
+    number = _number(every)
     first = np.unique(number, return_index=True)[1]
-    notes = [*contents.notes]
-    parts = _parts(contents, shape, corners[first])
+    parts = _parts(contents, shape, every[first, : shape.corners])
     regions, body = _regions(contents, dim, number)
     new = np.full(first.size, -1)
     new[body] = np.arange(body.size)
     labels, sets = combinations(body.size, [new[cells] for cells in regions.values()])
-    rows = rows[first[body]]
+    rows, notes = every[first[body]], [*contents.notes]
 
-    if curved and rows.shape[1] < len(shape.nodes(2)):
+    if shape.corners < rows.shape[1] < len(shape.nodes(2)):
         points, rows = _filled(points, rows, shape)
         if dim == 3:
             notes.append(SERENDIPITY)
@@ -387,15 +379,8 @@ def check(contents: Contents) -> Cells:
     _check_volumes(shape, points[rows] / unit, unit)
     reasons, inside = _check_facets(shape, points / unit, rows[:, : shape.corners], parts)
     usable = {name: facets for name, facets in parts.items() if name not in reasons}
-    if not usable:
-        if reasons:
-            raise InputError(next(iter(reasons.values())), "part-facets")
-        entities = "curves" if dim == 2 else "surfaces"
-        raise InputError(
-            f"it has no physical groups of {entities}, nor sets or tags of facets or nodes: no "
-            "part has a name",
-            "no-groups",
-        )
+    _check_named(usable, reasons, dim)
+    reasons |= {name: reason for name, reason in empty.items() if name not in parts}
     notes += [
         reason if name in inside else f"ignored: {reason}" for name, reason in reasons.items()
     ]
@@ -404,6 +389,44 @@ def check(contents: Contents) -> Cells:
     cells = Groups(tuple(regions), rows, labels, sets)
     kept = _join(usable | {name: parts[name] for name in inside})
     return Cells(shape, points, cells, kept, reasons, tuple(notes), inside, space)
+
+
+def _empty_groups(contents: Contents) -> dict[str, str]:
+    """Return the groups without elements that are no sets either, and the message of each."""
+    empty = [name for name, group in contents.groups.items() if not any(map(len, group.values()))]
+    others = contents.nodes.keys() | contents.surfaces.keys()
+    return {
+        name: f"the physical group {name!r} has no elements" for name in empty if name not in others
+    }
+
+
+def _check_numbers(contents: Contents) -> None:
+    """Refuse elements whose nodes are not among the points."""
+    for _, nodes in contents.blocks:
+        if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(contents.points):
+            raise InputError("it has elements whose nodes it does not have", "mesh-file")
+
+
+def _all_cells(contents: Contents, points: Array, shape: Shape) -> Ints:
+    """Return all cells in dolfinx's order, (m, k): by their corners unless some are curved."""
+    pairs = zip(contents.blocks, contents.kinds, strict=True)
+    rows = np.concatenate([nodes for (_, nodes), kind in pairs if kind.dim == shape.dim])
+    rows = in_dolfinx_order(shape, points, rows)
+    return rows if _curved(points, rows, shape) else rows[:, : shape.corners]
+
+
+def _check_named(usable: Mapping[str, Ints], reasons: Mapping[str, str], dim: int) -> None:
+    """Refuse a mesh no part of which has a name."""
+    if usable:
+        return
+    if reasons:
+        raise InputError(next(iter(reasons.values())), "part-facets")
+    entities = "curves" if dim == 2 else "surfaces"
+    raise InputError(
+        f"it has no physical groups of {entities}, nor sets or tags of facets or nodes: no "
+        "part has a name",
+        "no-groups",
+    )
 
 
 def _check_kinds(kinds: Sequence[Kind], dim: int) -> Shape:

@@ -119,16 +119,13 @@ def estimated(
     apart, modulus = _acting_inside(problem), np.ones(len(flux))
     squares, sums, volume = np.zeros(len(flux)), np.zeros(3), 0.0
     for material, cells in zip(body.description.materials, body.cells, strict=True):
-        law = material.law
-        if isinstance(law, Anisotropic | HistoryLaw):
-            shear = secant[cells]
-        else:
+        law, factor = material.law, factor_of(body.domain, material, cells)
+        shear = secant[cells]
+        if not isinstance(law, Anisotropic | HistoryLaw):
             shear = np.asarray(law.secant_modulus(strain[cells] ** 2)).mean(axis=1)
-        factor = factor_of(body.domain, material, cells)
-        modulus[cells] = shear * factor
-        if isinstance(law, Anisotropic):
-            shears = np.diag(mandel(law.stiffness))[5 if body.dim == 2 else 3 :]
-            modulus[cells] = shears.mean() / 2 * factor
+        modulus[cells] = factor * (
+            _mean_shear(law, body.dim) if isinstance(law, Anisotropic) else shear
+        )
         means, places = None, None
         if local is not None:
             squares[cells] = local.squares(cells, _stiffness(material, shear, factor))
@@ -152,27 +149,35 @@ def estimated(
             sums[0] += known.sum()
             if material.in_plane_stress:
                 continue
-            if isinstance(law, Anisotropic):
-                stiffer = _of_crystal(problem.domain, material, flux[chosen].mean(axis=1))
-            elif isinstance(law, HistoryLaw):
+            whole = shear[some]
+            if isinstance(law, HistoryLaw):
                 whole = _over_whole_strain(law, flux[chosen], strain[chosen])
-                energy = _density(material, whole, factor[some])
-                known = np.sum(volumes * energy(raw), axis=1)
-                stiffer = np.asarray(_bulk(material) / whole)
-            else:
-                stiffer = np.asarray(_bulk(material) / shear[some], dtype=np.float64)
-            sums[1:] += known @ stiffer, known.sum()
+                known = np.sum(volumes * _density(material, whole, factor[some])(raw), axis=1)
+            ratio = _stiffness_ratio(problem.domain, material, whole, flux[chosen])
+            sums[1:] += known @ ratio, known.sum()
     if body.degree == 1:  # the local problems of degree 2 see loads up to the third degree
         # A surface is as stiff as E/(1 - nu^2), twice the shear modulus and more.
         squares += oscillation(problem, state.time) / (2 * modulus)
     at_contact = _at_contact(problem, state)
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
-    energy_sum, locked, shearing, total, contact = sums
-    if energy_sum <= _rounding(problem, state, volume):
+    energies, by_ratio, with_ratio, total, contact = map(float, sums)
+    if energies <= _rounding(problem, state, volume):
         return Estimate(np.zeros_like(squares), 0.0, 0.0, 0.0, None)
-    ratio = float(locked / shearing) if shearing > 0 else None
-    return Estimate(squares, float(contact), float(energy_sum), float(total), ratio)
+    mean_ratio = by_ratio / with_ratio if with_ratio > 0 else None
+    return Estimate(squares, contact, energies, total, mean_ratio)
+
+
+def _mean_shear(law: Anisotropic, dim: int) -> float:
+    """Return the mean shear modulus of a crystal."""
+    return float(np.diag(mandel(law.stiffness))[5 if dim == 2 else 3 :].mean()) / 2
+
+
+def _stiffness_ratio(domain: Domain, material: Material, shear: Array, flux: Array) -> Array:
+    """Return bulk over shear modulus of cells, or of a crystal its ratio of `_of_crystal`."""
+    if isinstance(material.law, Anisotropic):
+        return _of_crystal(domain, material, flux.mean(axis=1))
+    return np.asarray(_bulk(material) / shear, dtype=np.float64)
 
 
 def _acting_inside(problem: ContactProblem) -> list[str]:

@@ -10,6 +10,7 @@ import meshes
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.errors import InputError
 from contact.mesh.contents import SERENDIPITY, Contents
+from contact.mesh.formats import session
 from contact.mesh.reader import from_file, mesh_files
 from tests.problems import files
 from tests.problems.sizes import integral, measures
@@ -323,3 +324,36 @@ def test_binary_arrays_are_beside_their_xdmf(tmp_path, monkeypatch):
     assert {path.name for path in mesh_files(tmp_path / "part.xdmf")} == {
         path.name for path in tmp_path.iterdir()
     }
+
+
+@pytest.mark.core
+def test_labels_of_nodes_of_medit_are_no_parts(tmp_path):
+    """Medit has a reference at each node; only those of edges and cells are groups."""
+    meshio = pytest.importorskip("meshio")
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    blocks = [("triangle", np.array([[0, 1, 2]])), ("line", np.array([[0, 1]]))]
+    labels = {"medit:ref": np.array([4, 4, 5])}
+    cells = {"medit:ref": [np.array([1]), np.array([2])]}
+    meshio.write(tmp_path / "part.vtu", meshio.Mesh(points, blocks, labels, cells))
+    domain = from_file(MPI.COMM_SELF, tmp_path / "part.vtu")
+    assert measures(domain) == pytest.approx({"2": 1.0})
+    assert [*domain.regions] == ["1"]
+
+
+def test_an_empty_physical_group_is_named(tmp_path):
+    """Where the case asks for it: it is no part whose name is not known."""
+    pytest.importorskip("gmsh")
+    with session() as gmsh:
+        gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        far = gmsh.model.occ.addPoint(5, 5, 0)
+        line = gmsh.model.occ.addLine(gmsh.model.occ.addPoint(4, 4, 0), far)
+        gmsh.model.occ.synchronize()
+        for dim, tags, name in ((2, [1], "body"), (1, [1], "low"), (1, [line], "none")):
+            gmsh.model.addPhysicalGroup(dim, tags, name=name)
+        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.clear([(1, line)])
+        gmsh.write(str(tmp_path / "part.msh"))
+    domain = from_file(MPI.COMM_SELF, tmp_path / "part.msh")
+    assert [*domain.parts] == ["low"]
+    with pytest.raises(InputError, match="'none' has no elements"):
+        domain.facets("none")
