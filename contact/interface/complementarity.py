@@ -139,13 +139,30 @@ class ComplementarityParameters:
     gamma: float
 
 
+@dataclass(frozen=True)
+class LinearisedBound:
+    """The friction bound s(|u_tau|, p) at an iterate, for (19d).
+
+    Attributes
+    ----------
+    s
+        The bound, shape (n,) (stress).
+    by_pressure, by_slip
+        ds/dp and ds/d|u_tau|, shape (n,).
+    """
+
+    s: Array
+    by_pressure: Array
+    by_slip: Array
+
+
 def linearise(
     interface: Interface,
     nodal: Array,
     multipliers: Multipliers,
     active: ActiveSet,
     parameters: ComplementarityParameters,
-    bound_by_slip: Array,
+    bound: LinearisedBound,
 ) -> tuple[Multipliers, Array]:
     """Linearise the complementarity functions at an iterate, (19a)-(19d). Collective.
 
@@ -157,8 +174,8 @@ def linearise(
         Active set: the pieces of the functions.
     parameters
         Of the complementarity functions.
-    bound_by_slip
-        Derivative of the friction bound by the slip, shape (n,).
+    bound
+        The friction bound with its derivatives.
 
     Returns
     -------
@@ -174,15 +191,12 @@ def linearise(
     if not interface.friction.acts:
         return Multipliers(pressure, np.zeros_like(n)), blocks
 
-    slip = interface.slip(nodal)
-    total, length = interface.pressure(nodal, multipliers), np.linalg.norm(slip, axis=1)
     # (19d): s+ = s + ds/dp (p+ - p) + ds/d|u_tau| e_u.(u_tau+ - u_tau), with p+ - p of (19a) where
     # closed, and of the layer.
-    s = interface.friction.bound(total, length)
-    by_pressure = interface.friction.by_pressure(total, length)
-    bound = s - by_pressure * gamma * np.where(active.closed, normal_gap, 0.0)
+    slip, s, by_pressure = interface.slip(nodal), bound.s, bound.by_pressure
+    s_plus = s - by_pressure * gamma * np.where(active.closed, normal_gap, 0.0)
     gradient = by_pressure[:, None] * interface.foundation.pressure_gradient(nodal)
-    gradient[:, :d] += by_pressure[:, None] * slope + bound_by_slip[:, None] * unit_vectors(slip)
+    gradient[:, :d] += by_pressure[:, None] * slope + bound.by_slip[:, None] * unit_vectors(slip)
 
     friction, sticks, slips = np.zeros_like(n), active.sticks, active.slips
     # (19b): lambda+ = lambda + gamma u_tau+ where it sticks.
@@ -195,7 +209,7 @@ def linearise(
     least = np.maximum(s * parameters.c / gamma, 1e-300)  # theta is at most gamma
     theta = s * parameters.c / np.maximum(size - s, least)
     across = theta[:, None, None] * (nodes.tangent - e[:, :, None] * e[:, None, :])
-    slipping = bound[:, None] * e + np.einsum("nij,nj->ni", across, slip)
+    slipping = s_plus[:, None] * e + np.einsum("nij,nj->ni", across, slip)
     friction[slips] = slipping[slips]
     blocks[slips, :d, :] += e[slips, :, None] * gradient[slips, None, :]
     blocks[slips, :d, :d] += across[slips]

@@ -47,7 +47,7 @@ from contact.interface.nodes import unit_vectors
 from contact.methods.report import PROGRESS, Outcome
 from contact.methods.semismooth import SemismoothNewton
 from contact.methods.unconstrained_modes import all_loads
-from contact.problem.residuals import evaluate, evaluate_forces, residual_forces
+from contact.problem.residuals import evaluate, evaluate_iterate, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
 from contact.tolerances import EPS, HUGE
@@ -416,7 +416,7 @@ class InteriorPoint:
     def iterate(self, most: int = LIMIT) -> Outcome:
         """Take steps until the duality gap is closed, or as many as given. Collective."""
         newton = self._newton
-        residuals, self._internal = evaluate_forces(self.problem, self.state)
+        self._evaluated = evaluate_iterate(self.problem, self.state)
         ended = "the interior point was given no step"
         for steps in range(1, most + 1):
             try:
@@ -426,14 +426,15 @@ class InteriorPoint:
                 if error.identifier == "memory":
                     raise
                 taken = False
-            residuals, self._internal = evaluate_forces(self.problem, self.state)
-            newton.see(self.state, residuals)
+            self._evaluated = evaluate_iterate(self.problem, self.state)
+            state, residuals = self._evaluated.state, self._evaluated.residuals
+            newton.see(state, residuals)
             newton.recorder.record(residuals, INTERIOR_POINT, 2)
             ended = f"the interior point has not converged in {steps} steps"
             if not taken or not np.isfinite(residuals.significant):
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
-            interface, state = self.problem.interface, self.state
+            interface = self.problem.interface
             nodal = interface.nodes.jump(state.x)
             pressure = interface.nodes.maximum(interface.pressure(nodal, state.forces))
             if pressure <= interface.rounding(nodal):
@@ -444,7 +445,7 @@ class InteriorPoint:
             if gap <= CLOSED and (balanced or 0 < gap <= CLOSED**2):
                 ended = f"duality gap closed after {steps} steps"
                 break
-        return Outcome(residuals, newton.options.allowed, ended)
+        return Outcome(self._evaluated.residuals, newton.options.allowed, ended)
 
     @property
     def state(self) -> State:
@@ -463,7 +464,7 @@ class InteriorPoint:
         slips = interface.slip_length(nodal)[self._frictional]
         contact = float(summed(nodes.comm, cones.force @ ways[self._rigid] + cones.bound @ slips))
         own = body.owned_part(x)[: body.owned]
-        forces = self._internal, body.external(self._state.time)
+        forces = self._evaluated.internal, body.external(self._state.time)
         works = [abs(float(summed(nodes.comm, own @ force[: body.owned]))) for force in forces]
         return cones.duality_gap() / (max(contact + sum(works), self._least_work) or 1.0)
 
@@ -476,7 +477,7 @@ class InteriorPoint:
         nodes, rigid, frictional = interface.nodes, self._rigid, self._frictional
         body, d = self.problem.body, nodes.dim
         nodal = nodes.jump(state.x)
-        residual = -residual_forces(self.problem, state, internal=self._internal)
+        residual = -residual_forces(self.problem, state, internal=self._evaluated.internal)
         slack = interface.normal_gap(nodal)[rigid] - cones.slack
         slip = interface.slip(nodal)[frictional] - cones.slip
         cones.scale()

@@ -236,10 +236,10 @@ class Newton:
         chord.begin()
         tangent = state.active_set is not None and secant_at is None and not body.linear
         for _ in range(min(options.max_iterations, self.whole.steps_left)):
-            previous, previous_residuals = state, loop.residuals
-            largest = previous_residuals.significant
+            previous, last = state, loop.iterate
+            largest = last.residuals.significant
             state, keep = chord.choose(state, largest, secant_at)
-            internal = loop.internal if state is previous and secant_at is None else None
+            internal = last.internal if state is previous and secant_at is None else None
             kind = "tangent" if tangent else "secant"
             condensed = self.condensation.linearise(kind, state, keep, secant_at, internal)
             if condensed is None:
@@ -263,13 +263,13 @@ class Newton:
             loop.evaluate(state)
             taken = [word for word in FALLBACKS if any(word in r.note for r in records)]
             note = ", ".join([*["chord step"] * keep, *taken])
-            loop.record(state, note, "tangent" * tangent, steps=records)
+            loop.record(note, "tangent" * tangent, steps=records)
             if overloaded and not loop.converged:
                 return state, replace(loop.outcome(OVERLOADED), overloaded=True)
-            if (found := loop.ended(state)) is not None:
+            if (found := loop.ended()) is not None:
                 return found
             if not body.linear:
-                tangent = loop.next_is_tangent(tangent, previous_residuals)
+                tangent = loop.next_is_tangent(tangent, last.residuals)
             if (stalled := loop.stalled()) is not None:
                 return state, stalled
         return state, loop.out_of_steps()

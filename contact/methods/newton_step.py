@@ -16,7 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contact.errors import InputError, SingularError
-from contact.interface.complementarity import ComplementarityParameters, linearise
+from contact.interface.complementarity import (
+    ComplementarityParameters,
+    LinearisedBound,
+    linearise,
+)
 from contact.interface.interface import Interface
 from contact.interface.multipliers import ActiveSet, Multipliers
 from contact.linear.operator import Counters, Operator
@@ -28,7 +32,7 @@ from contact.methods.safeguards import (
     regularisation,
 )
 from contact.problem.condensed import AnyProblem
-from contact.problem.residuals import Residuals, residual_forces
+from contact.problem.residuals import Iterate, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
 from contact.typing import Array
@@ -69,6 +73,22 @@ class LinearisedLaws:
     layer: Array
     layer_shift: Array
     charge: Array | float
+
+
+@dataclass(frozen=True)
+class MaterialStep:
+    """How a step linearises the material.
+
+    Attributes
+    ----------
+    tangent
+        By the tangent, or by the secant (Kacanov).
+    secant_at
+        Unknowns at which the secant modulus is taken; None for those of the iterate.
+    """
+
+    tangent: bool
+    secant_at: Array | None = None
 
 
 class NewtonStep:
@@ -166,27 +186,18 @@ class NewtonStep:
     def __call__(
         self,
         problem: AnyProblem,
-        state: State,
-        tangent: bool,
-        residuals: Residuals,
-        secant_at: Array | None = None,
-        internal_forces: Array | None = None,
+        iterate: Iterate,
+        material: MaterialStep,
         exact: bool = False,
     ) -> State | None:
         """Return the next iterate; None if the matrix is singular there. Collective.
 
         Parameters
         ----------
-        problem, state
-            The problem and the iterate.
-        tangent
-            Whether to take the tangent of the material, or its secant.
-        residuals
-            Residuals of the iterate.
-        secant_at
-            Unknowns at which the secant modulus is taken; those of the state by default.
-        internal_forces
-            F_int of the state, if computed before.
+        problem, iterate
+            The problem, and the iterate with its residuals.
+        material
+            How the material is linearised.
         exact
             Whether iterative solvers go to their own tolerance, without the forcing term.
 
@@ -196,11 +207,11 @@ class NewtonStep:
             If the matrix is singular and another iterate does not help: with a linear body, or in
             the first step of an underconstrained one.
         """
-        body = problem.body
-        laws = self._linearise(problem.interface, state, residuals.significant)
-        self._update(problem, state, laws, tangent, residuals, secant_at)
-        residual = self._residual(problem, state, laws, secant_at, internal_forces)
-        forcing = None if exact else self._forcing_term(residuals.significant)
+        body, state, largest = problem.body, iterate.state, iterate.residuals.significant
+        laws = self._linearise(problem.interface, state, largest)
+        self._update(problem, iterate, laws, material)
+        residual = _residual(problem, iterate, laws, material)
+        forcing = None if exact else self._forcing_term(largest)
         try:
             increment = self.solve(-residual, forcing)
         except SingularError:
@@ -215,17 +226,16 @@ class NewtonStep:
         parameters, before = self.parameters, state.active_set
         nodal = interface.nodes.jump(state.x)
         total, length = interface.pressure(nodal, state.forces), interface.slip_length(nodal)
-        bound = interface.friction.bound(total, length)
-        active, forces = guarded_active_set(
-            interface, nodal, state.forces, bound, parameters.c, before
-        )
+        s = interface.friction.bound(total, length)
+        active, forces = guarded_active_set(interface, nodal, state.forces, s, parameters.c, before)
         changed = before is None or not active.same(before)
         unchanged = float(summed(interface.comm, changed)) == 0
-        by_slip = np.zeros_like(bound)
+        by_slip = np.zeros_like(s)
         if unchanged:
             limit = self.options.softening * parameters.nodal_stiffness
             by_slip = bound_by_slip(interface, total, length, limit)
-        multipliers, contact = linearise(interface, nodal, forces, active, parameters, by_slip)
+        bound = LinearisedBound(s, interface.friction.by_pressure(total, length), by_slip)
+        multipliers, contact = linearise(interface, nodal, forces, active, parameters, bound)
         layer, shift = linearised_layer(interface, nodal, state, parameters, unchanged)
         charge = self._charge(interface, nodal, multipliers, unchanged, residual)
         return LinearisedLaws(active, unchanged, multipliers, contact, layer, shift, charge)
@@ -250,41 +260,35 @@ class NewtonStep:
     def _update(
         self,
         problem: AnyProblem,
-        state: State,
+        iterate: Iterate,
         laws: LinearisedLaws,
-        tangent: bool,
-        residuals: Residuals,
-        secant_at: Array | None,
+        material: MaterialStep,
     ) -> None:
         """Assemble and factorise the operator. Collective."""
         interface, body = problem.interface, problem.body
+        state, residuals = iterate.state, iterate.residuals
         blocks = laws.contact + laws.layer + laws.charge
         if self._underconstrained and not laws.unchanged:
             blocks[:, : body.dim, : body.dim] += regularisation(
                 interface, residuals.significant, self.parameters.nodal_stiffness
             )
-        kind, last = "tangent" if tangent else "secant", self._kind
+        kind, last = "tangent" if material.tangent else "secant", self._kind
         remains = kind == last and residuals.equilibrium < SMALL * residuals.significant
-        at = state if secant_at is None else replace(state, x=secant_at)
+        at = state if material.secant_at is None else replace(state, x=material.secant_at)
         weighted = interface.weighted(blocks, state.x)
         self.operator.update(kind, at, weighted, constant=body.linear or remains)
         self._kind = kind
 
-    def _residual(
-        self,
-        problem: AnyProblem,
-        state: State,
-        laws: LinearisedLaws,
-        secant_at: Array | None,
-        internal_forces: Array | None,
-    ) -> Array:
-        """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
-        here, nodes = replace(state, forces=laws.multipliers), problem.interface.nodes
-        residual = residual_forces(problem, here, secant_at, internal_forces)
-        nodes.add_jump_transposed(
-            (nodes.weight * laws.layer_shift)[:, None] * nodes.normal, residual
-        )
-        return residual
+
+def _residual(
+    problem: AnyProblem, iterate: Iterate, laws: LinearisedLaws, material: MaterialStep
+) -> Array:
+    """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
+    here, nodes = replace(iterate.state, forces=laws.multipliers), problem.interface.nodes
+    internal = iterate.internal if material.secant_at is None else None
+    residual = residual_forces(problem, here, material.secant_at, internal)
+    nodes.add_jump_transposed((nodes.weight * laws.layer_shift)[:, None] * nodes.normal, residual)
+    return residual
 
 
 def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: Array) -> State:

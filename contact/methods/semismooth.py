@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from contact.interface.multipliers import Multipliers, constraint_active
-from contact.methods.newton_step import NewtonStep
+from contact.methods.newton_step import MaterialStep, NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import PROGRESS, Best, Outcome, Record, Recorder, Stagnation
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.condensed import AnyProblem
 from contact.problem.residuals import (
     Residuals,
-    evaluate_forces,
+    evaluate_iterate,
     residual_forces,
     undeformed_equilibrium,
 )
@@ -135,32 +135,31 @@ class SemismoothNewton:
         # At zero strain the secant is the tangent; an initial guess with an active set is near.
         tangent = state.active_set is not None and secant_at is None and not linear
         for _ in range(min(options.max_iterations, self.steps_left if steps is None else steps)):
-            previous, previous_residuals = state, loop.residuals
-            internal = loop.internal if secant_at is None else None
-            taken = step(problem, state, tangent, previous_residuals, secant_at, internal, exact)
+            previous = loop.iterate
+            taken = step(problem, previous, MaterialStep(tangent, secant_at), exact)
             if taken is None:
                 return state, loop.outcome(step.fault)
             state, secant_at = taken, None
             loop.evaluate(state)
             worse = step.conductivity_derivative.worsened(loop.residuals.significant)
-            loop.record(state, "tangent" * tangent, "rejected" * worse)
+            loop.record("tangent" * tangent, "rejected" * worse)
             if worse:
-                state = previous
+                state = previous.state
                 loop.evaluate(state)
-            if (found := loop.ended(state)) is not None:
+            if (found := loop.ended()) is not None:
                 return found
-            if give_up and previous.active_set is None:
+            if give_up and previous.state.active_set is None:
                 if _overestimates_stiffness(problem, step.parameters.c, state):
                     return state, loop.outcome(OVERESTIMATED)
             if not linear:
-                tangent = loop.next_is_tangent(tangent, previous_residuals)
+                tangent = loop.next_is_tangent(tangent, previous.residuals)
             if (stalled := loop.stalled()) is not None:
                 return state, stalled
         return state, loop.out_of_steps()
 
 
 class Iteration:
-    """Residuals and internal forces of the last iterate, and the ends by these residuals."""
+    """The last iterate with its residuals, and the ends by these residuals."""
 
     def __init__(
         self,
@@ -173,12 +172,17 @@ class Iteration:
         self._problem, self._options = newton.problem, newton.options
         limit = stagnation_limit or self._options.stagnation_limit
         self._stagnation = Stagnation(limit, PROGRESS, cumulative=True)
-        self.residuals, self.internal = evaluate_forces(self._problem, state)
+        self.iterate = evaluate_iterate(self._problem, state)
         self._pressed = self._largest_pressure(state)
         self.starts_converged = state.active_set is not None and self.converged
         if self.starts_converged:
             newton.see(state, self.residuals)
             newton.recorder.record(self.residuals, f"{note} initial guess".strip(), inner=0)
+
+    @property
+    def residuals(self) -> Residuals:
+        """Residuals of the last iterate."""
+        return self.iterate.residuals
 
     @property
     def converged(self) -> bool:
@@ -187,17 +191,18 @@ class Iteration:
 
     def evaluate(self, state: State) -> None:
         """Evaluate the residuals of an iterate. Collective."""
-        self.residuals, self.internal = evaluate_forces(self._problem, state)
+        self.iterate = evaluate_iterate(self._problem, state)
         self._newton.see(state, self.residuals)
 
-    def record(self, state: State, *words: str, steps: tuple[Record, ...] = ()) -> None:
-        """Record the step to an iterate. Collective."""
+    def record(self, *words: str, steps: tuple[Record, ...] = ()) -> None:
+        """Record the step to the last iterate. Collective."""
         note = " ".join(word for word in (self._note, *words) if word)
-        sizes = _node_counts(state, self._problem)
+        sizes = _node_counts(self.iterate.state, self._problem)
         self._newton.recorder.record(self.residuals, note, sizes=sizes, steps=steps)
 
-    def ended(self, state: State) -> tuple[State, Outcome] | None:
+    def ended(self) -> tuple[State, Outcome] | None:
         """Return the end by convergence, divergence, or loss of contact; else None. Collective."""
+        state = self.iterate.state
         if self.converged:
             return state, self.outcome()
         if (found := self._loss_of_contact(state)) is not None:
@@ -243,9 +248,9 @@ class Iteration:
         if found is None:
             return None
         undeformed = replace(
-            found[0], active_set=state.active_set, layer_pressure=state.layer_pressure
+            found.state, active_set=state.active_set, layer_pressure=state.layer_pressure
         )
-        self.residuals = found[1]
+        self.iterate = replace(found, state=undeformed)
         self._newton.see(undeformed, self.residuals)
         words = f"{self._note} zero displacement".strip()
         self._newton.recorder.record(self.residuals, words, inner=0)

@@ -118,6 +118,15 @@ class Residuals:
         return f"the {worst} residual is {value:.2e}, its floor {floor:.2e}"
 
 
+@dataclass(frozen=True)
+class Iterate:
+    """A state with its residuals and the internal forces F(x) on the owned unknowns."""
+
+    state: State
+    residuals: Residuals
+    internal: Array
+
+
 def residual_forces(
     problem: AnyProblem,
     state: State,
@@ -209,12 +218,12 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
 def evaluate(problem: AnyProblem, state: State) -> Residuals:
     """Return the residuals of a state; NaN where numbers overflow. Collective."""
-    return evaluate_forces(problem, state)[0]
+    return evaluate_iterate(problem, state).residuals
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def evaluate_forces(problem: AnyProblem, state: State) -> tuple[Residuals, Array]:
-    """Return the residuals of a state, and the internal forces there. Collective."""
+def evaluate_iterate(problem: AnyProblem, state: State) -> Iterate:
+    """Return a state with its residuals and the internal forces there. Collective."""
     body, interface = problem.body, problem.interface
     loads = body.load_norms(state.time)
     # First, as laws with history keep their last response: it is to be that of the state.
@@ -259,7 +268,8 @@ def evaluate_forces(problem: AnyProblem, state: State) -> tuple[Residuals, Array
         for (first,), (contact, friction) in zip(balance, laws, strict=True)
     )
     pressure_rounding = _over_pressed(interface, state, pressures)
-    return Residuals(*residuals, floors, equilibrium_rounding, pressure_rounding), internal
+    evaluated = Residuals(*residuals, floors, equilibrium_rounding, pressure_rounding)
+    return Iterate(state, evaluated, internal)
 
 
 #: Gauss points of the stress power in a step of a nonlinear material.
@@ -383,14 +393,13 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
     return Balance(done, enthalpy - charged, dissipation, flow, enthalpy, state.x, given, internal)
 
 
-def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> tuple[State, Residuals] | None:
-    """Return `problem.start()` and its residuals if it is in equilibrium, else None. Collective.
+def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> Iterate | None:
+    """Return `problem.start()` if it is in equilibrium, else None. Collective.
 
     That is zero displacement but for the prescribed values; of a whole problem each free foundation
     is moved by its force to the first touch. Residuals are relative to the forces that act:
     approaching a state without forces, none becomes small. With friction there may be other
     solutions, so a method asks for this where it fails.
     """
-    state = problem.start()
-    residuals = evaluate(problem, state)
-    return (state, residuals) if residuals.significant <= tolerance else None
+    found = evaluate_iterate(problem, problem.start())
+    return found if found.residuals.significant <= tolerance else None

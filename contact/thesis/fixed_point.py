@@ -31,7 +31,12 @@ from contact.methods.options import FixedPointOptions, LoopOptions
 from contact.methods.report import Best, Monitor, Outcome, Record, Recorder, Stagnation
 from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads, sum_of_forces
 from contact.problem.problem import ContactProblem
-from contact.problem.residuals import Residuals, evaluate, undeformed_equilibrium
+from contact.problem.residuals import (
+    Iterate,
+    Residuals,
+    evaluate_iterate,
+    undeformed_equilibrium,
+)
 from contact.problem.state import State
 from contact.thesis.uzawa import (
     FrozenProblem,
@@ -116,14 +121,15 @@ class OuterLoop(ABC):
         """Iterate until convergence, stagnation or the limit; keep the best iterate."""
         begin, problem, options = time.perf_counter(), self.problem, self.options
         stagnation = Stagnation(*self.stagnation)
-        best: Best[tuple[State, Residuals]] = Best()
+        best: Best[Iterate] = Best()
         by_thesis = options.stopping == "thesis"
         for iteration in range(first, options.max_outer + 1):
             previous = self.state
             inner, note = self._step(iteration)
-            residuals = evaluate(problem, self.state)
+            iterate = evaluate_iterate(problem, self.state)
+            residuals = iterate.residuals
             residual = self._target(residuals)
-            best.see((self.state, residuals), residual)
+            best.see(iterate, residual)
             change, seconds = self._update_bound(iteration), time.perf_counter() - begin
             self.recorder.add(Record(iteration, inner, residuals, change, seconds, note))
             if by_thesis and iteration > first and self._thesis_criterion(change, previous):
@@ -147,7 +153,7 @@ class OuterLoop(ABC):
         if best.found is not None and not by_thesis:
             if rest := undeformed_equilibrium(problem, options.tolerance):
                 best.found, ended = rest, ""
-            self.state, residuals = best.found
+            self.state, residuals = best.found.state, best.found.residuals
         return self._outcome(residuals, ended)
 
     def _update_bound(self, iteration: int) -> float:
@@ -271,9 +277,15 @@ class FixedPoint(OuterLoop):
         linearised_at = self._secant_at if kind == "secant" else state.x
         weighted = interface.weighted(blocks, state.x)
         self.operator.update(kind, replace(state, x=linearised_at), weighted, constant=body.linear)
-        frozen = FrozenProblem(problem, state, self._secant_at, self.bound, friction, self.r)
+        frozen = FrozenProblem(problem, state, self._secant_at, friction, self.r)
         result = uzawa_block_relaxation(
-            frozen, self.operator, self._z, self.options, self._norm, self.recorder.poll
+            frozen,
+            self.operator,
+            self._z,
+            self.bound,
+            self.options,
+            self._norm,
+            self.recorder.poll,
         )
         self._stalled = result.stalled and not self._gap_derivative.included
         x = body.updated(state.x, result.increment)

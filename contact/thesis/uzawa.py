@@ -25,6 +25,7 @@ import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from contact.interface.complementarity import (
     project_disc,
     project_half_line,
 )
+from contact.interface.foundation import NormalGraph
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
@@ -132,11 +134,12 @@ def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
     return result
 
 
-@dataclass
+@dataclass(frozen=True)
 class FrozenProblem:
     """The problem of one outer iteration, with Kacanov's frozen terms, and the steps on it.
 
-    Contact forces and jumps are arrays of normal and tangential parts, shape (n, 1 + d).
+    Contact forces and jumps are arrays of normal and tangential parts, shape (n, 1 + d). Steps take
+    the friction bound s_n, shape (n,): with `single_loop` it is not frozen.
 
     Parameters
     ----------
@@ -144,8 +147,6 @@ class FrozenProblem:
         The problem, and the iterate u_0 at which layer, charge and geometry are frozen.
     secant_at
         Unknowns of the secant modulus.
-    bound
-        Friction bound s_n, shape (n,); with `single_loop` the one thing that is not frozen.
     friction
         Whether there is friction.
     r
@@ -155,24 +156,43 @@ class FrozenProblem:
     problem: ContactProblem
     state: State
     secant_at: Array
-    bound: Array
     friction: bool
     r: float
 
-    def __post_init__(self) -> None:
-        """Evaluate the loads and the layer at the iterate. Collective."""
-        interface, nodes = self.problem.interface, self.problem.interface.nodes
-        self.interface, self.nodes = interface, nodes
-        self.at = nodes.jump(self.state.x)
-        #: The layer, within the constraint; None without one.
-        self.layer = interface.foundation.normal_graph(self.at)
-        self.origin = self.r * displacement_and_slip(interface, self.at, self.friction)
+    @property
+    def interface(self) -> Interface:
+        """The interface of the problem."""
+        return self.problem.interface
+
+    @property
+    def nodes(self) -> ContactNodes:
+        """The contact nodes."""
+        return self.interface.nodes
+
+    @cached_property
+    def at(self) -> Array:
+        """u_0 at the contact nodes, shape (n, block size)."""
+        return self.nodes.jump(self.state.x)
+
+    @cached_property
+    def layer(self) -> NormalGraph | None:
+        """The layer, within the constraint; None without one."""
+        return self.interface.foundation.normal_graph(self.at)
+
+    @cached_property
+    def origin(self) -> Array:
+        """Augmentation r u_0, tangentially that of the slip, shape (n, 1 + d)."""
+        return self.r * displacement_and_slip(self.interface, self.at, self.friction)
+
+    @cached_property
+    def _load(self) -> Array:
+        """Loads minus internal forces at u_0, on the owned unknowns. Collective."""
         residual = residual_forces(self.problem, self.state, self.secant_at)
-        contact = self.state.forces.vectors(nodes)
+        contact = self.state.forces.vectors(self.nodes)
         if self.layer is not None:
-            contact += interface.foundation.pressure(self.at)[:, None] * nodes.normal
+            contact += self.interface.foundation.pressure(self.at)[:, None] * self.nodes.normal
         self._add(-contact, residual)
-        self._load = -residual
+        return -residual
 
     def _add(self, forces: Array, to: Array) -> None:
         """Add the nodal forces of stresses on Gamma_3, shape (n, d)."""
@@ -188,7 +208,7 @@ class FrozenProblem:
         """Return r (u - u_0) of jumps u - u_0, shape (n, block size)."""
         return self.r * normal_and_tangential(self.nodes, moved, self.friction)
 
-    def project(self, z: Array) -> Array:
+    def project(self, z: Array, bound: Array) -> Array:
         """Return lambda of Step 3, (3.43) and its like in the disc, of z, (..., n, 1 + d).
 
         With a layer the normal one is the total pressure -sigma_nu.
@@ -200,10 +220,10 @@ class FrozenProblem:
             # Laws of users take one value per node.
             rows = z[..., 0].reshape(math.prod(z.shape[:-2]), z.shape[-2])
             pressure = np.reshape([self.layer.pressure(row, self.r) for row in rows], z.shape[:-1])
-        friction = project_disc(z[..., 1:], self.bound)
+        friction = project_disc(z[..., 1:], bound)
         return np.concatenate([pressure[..., None], friction], axis=-1)
 
-    def projection_derivative(self, z: Array, directions: Array) -> Array:
+    def projection_derivative(self, z: Array, bound: Array, directions: Array) -> Array:
         """Return the derivatives of `project` along directions, shape (n, 1 + d, k)."""
         z = z + self.origin
         if self.layer is None:
@@ -211,15 +231,15 @@ class FrozenProblem:
         else:
             slope = self.layer.pressure_slope(z[:, 0], self.r)
         normal = slope[:, None, None] * directions[:, :1]
-        tangential = disc_derivative(z[:, 1:], self.bound, directions[:, 1:])
+        tangential = disc_derivative(z[:, 1:], bound, directions[:, 1:])
         return np.concatenate([normal, tangential], axis=1)
 
-    def auxiliary(self, z: Array) -> Array:
+    def auxiliary(self, z: Array, bound: Array) -> Array:
         """Return phi of Step 2, (3.44)."""
-        return (z + self.origin - self.project(z)) * (1 / self.r)
+        return (z + self.origin - self.project(z, bound)) * (1 / self.r)
 
-    def accelerator(self, depth: int, size: Array) -> ResidualMinimiser:
-        """Return the acceleration of the flat z; `size`: unit of stresses, (n,)."""
+    def accelerator(self, depth: int, size: Array, bound: Callable[[], Array]) -> ResidualMinimiser:
+        """Return the acceleration of the flat z, given the unit of stresses, (n,), and s_n."""
         nodes, shape = self.nodes, (self.nodes.weight.size, 1 + self.nodes.normal.shape[1])
         weights = np.repeat(nodes.weight / size**2, shape[1])
 
@@ -227,11 +247,12 @@ class FrozenProblem:
             return summed(nodes.comm, a.T @ (weights[:, None] * b))
 
         def project(flat: Array) -> Array:
-            return self.project(flat.reshape(*flat.shape[:-1], *shape)).reshape(flat.shape)
+            z = flat.reshape(*flat.shape[:-1], *shape)
+            return self.project(z, bound()).reshape(flat.shape)
 
         def derivative(flat: Array, directions: Array) -> Array:
             columns = directions.reshape(*shape, directions.shape[1])
-            found = self.projection_derivative(flat.reshape(shape), columns)
+            found = self.projection_derivative(flat.reshape(shape), bound(), columns)
             return found.reshape(directions.shape)
 
         return ResidualMinimiser(inner, project, derivative, depth)
@@ -272,6 +293,7 @@ def uzawa_block_relaxation(
     frozen: FrozenProblem,
     operator: Operator,
     z: Array,
+    bound: Array,
     options: FixedPointOptions,
     domain_norm: Callable[[Array], float] | None,
     poll: Callable[[], None],
@@ -286,6 +308,8 @@ def uzawa_block_relaxation(
         Factorised operator with `augmentation(nodes, r, friction)`.
     z
         Initial lambda + r (u - u_0), shape (n, 1 + d).
+    bound
+        Friction bound s_n, shape (n,).
     options
         The options.
     domain_norm
@@ -301,12 +325,16 @@ def uzawa_block_relaxation(
     rtol = max(SHARE * options.inner, ROUNDING)
     increment: Array = np.zeros(frozen.problem.body.owned)
     stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
+
+    def current_bound() -> Array:
+        return bound
+
     for iteration in range(1, options.max_inner + 1):
         poll()
         # Tangential again: rounding along the normal would be amplified by the acceleration.
         z[:, 1:] = nodes.tangential_component(z[:, 1:])
         # Steps 2 and 3 of the last solve, then Step 1.
-        multipliers = frozen.project(z)
+        multipliers = frozen.project(z, bound)
         load = frozen.displacement_load(multipliers, z)
         increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.jump(increment)
@@ -320,15 +348,15 @@ def uzawa_block_relaxation(
             layer = frozen.layer.layer(nodes.normal_component(nodal))
         forces = Multipliers.of(nodes, force[:, 0] - layer, force[:, 1:])
         if options.single_loop and frozen.friction:
-            frozen.bound = interface.bound(nodal, forces)
-        residual = float(interface_residuals(interface, nodal, forces, frozen.bound)[0].max())
+            bound = interface.bound(nodal, forces)
+        residual = float(interface_residuals(interface, nodal, forces, bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         plain = multipliers + (1 - over) * (z - multipliers) + over * r_u
         done = residual <= options.inner or not np.isfinite(residual)
         # The residual is small before contact, the defect of the fixed point is not.
-        defect = nodes.norm((force - frozen.project(force + r_u)) / stress_unit[:, None])
+        defect = nodes.norm((force - frozen.project(force + r_u, bound)) / stress_unit[:, None])
         if criterion is not None:
-            done, change = criterion(increment, frozen.auxiliary(plain))
+            done, change = criterion(increment, frozen.auxiliary(plain, bound))
             defect = defect if change is None else change
         stalled = not done and stagnation(defect)
         if done or stalled:
@@ -336,7 +364,7 @@ def uzawa_block_relaxation(
         z = plain
         if accelerated:
             if accelerator is None:
-                accelerator = frozen.accelerator(options.depth, stress_unit)
+                accelerator = frozen.accelerator(options.depth, stress_unit, current_bound)
             newest = (force + r_u).ravel()
             z = accelerator.next(force.ravel(), newest, plain.ravel()).reshape(z.shape)
     return RelaxationResult(increment, forces, z - r_u, options.max_inner)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.interface.complementarity import ComplementarityParameters, linearise
+from contact.interface.complementarity import ComplementarityParameters, LinearisedBound, linearise
 from contact.interface.multipliers import ActiveSet, Multipliers
 from contact.methods.safeguards import at_bound, bound_by_slip, guarded_active_set
 from contact.model.friction import Friction
@@ -40,10 +40,14 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     assert np.any(active.slips & active.closed)
     # a sticking node pushes with lambda + gamma u_tau, a pressed one with p - gamma (gap - u_nu)
     direction, zero = 1e-6 * rng.standard_normal(nodal.shape), np.zeros(n)
-    (base, blocks), (moved, _) = (
-        linearise(interface, at, forces, active, parameters, zero)
-        for at in (nodal, nodal + direction)
-    )
+
+    def linearised(nodal):
+        pressure, length = interface.pressure(nodal, forces), interface.slip_length(nodal)
+        s = interface.friction.bound(pressure, length)
+        bound = LinearisedBound(s, interface.friction.by_pressure(pressure, length), zero)
+        return linearise(interface, nodal, forces, active, parameters, bound)
+
+    (base, blocks), (moved, _) = linearised(nodal), linearised(nodal + direction)
     difference = moved.vectors(nodes) - base.vectors(nodes)
     predicted = np.einsum("nij,nj->ni", blocks, direction)[:, :dimension]
     assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
@@ -67,11 +71,12 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     interface, limit = problem.interface, softening * parameters.nodal_stiffness
 
     def linearised(nodal):
-        bound, length = interface.bound(nodal, forces), interface.slip_length(nodal)
-        active, raised = guarded_active_set(interface, nodal, forces, bound, parameters.c, before)
+        s, length = interface.bound(nodal, forces), interface.slip_length(nodal)
+        active, raised = guarded_active_set(interface, nodal, forces, s, parameters.c, before)
         assert active.same(before)
         by_slip = bound_by_slip(interface, pressure, length, limit)
-        return linearise(interface, nodal, raised, active, parameters, by_slip)
+        bound = LinearisedBound(s, interface.friction.by_pressure(pressure, length), by_slip)
+        return linearise(interface, nodal, raised, active, parameters, bound)
 
     step = np.array([1e-8, 0.0])
     (base, blocks), (moved, _) = linearised(nodal), linearised(nodal + step)

@@ -82,10 +82,9 @@ def test_several_points_are_projected_as_one_after_the_other(nodes, layer):
     gap = np.full(nodes, 0.5)
     law = NormalGraph(Compliance(2.0), np.ones(nodes), 0 * gap, gap) if layer else None
     frozen = SimpleNamespace(
-        layer=law, r=3.0, origin=np.zeros((nodes, 3)), bound=np.full(nodes, 0.4),
-        interface=SimpleNamespace(gap=gap),
+        layer=law, r=3.0, origin=np.zeros((nodes, 3)), interface=SimpleNamespace(gap=gap)
     )  # fmt: skip
-    project = partial(FrozenProblem.project, frozen)
+    project = partial(FrozenProblem.project, frozen, bound=np.full(nodes, 0.4))
     points = rng.normal(size=(5, nodes, 3))
     found = project(points)
     assert found.shape == points.shape
