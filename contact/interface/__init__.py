@@ -13,7 +13,8 @@ all laws together
 friction
     `friction`, with the coefficients of `forms.laws`, and the non-local operator R.
 layer and charge
-    `foundation.FoundationLaw`; `NormalGraph` is the layer with the rigid part behind it.
+    `foundation.FoundationLaw`; `NormalGraph` is the layer with the rigid part behind it;
+    `grouping`: the laws of several contacts as one.
 jump, lumped surface mass
     `nodes.ContactNodes`, of both kinds of contact; `nodes.Geometry` of one contact.
 contact forces, slip history

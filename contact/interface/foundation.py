@@ -8,33 +8,21 @@ The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer 
 unilateral constraint, as the one monotone graph `NormalGraph` of Figure 1.6, and the charge
 through `charge_block` in the operator. A linearised layer would not do there: a column that
 is stiff enough cycles for ever between the slopes of an open and of a saturated layer.
-
-Laws of several contacts are `Grouped` into one law, each acting on its own nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.errors import InputError
 from contact.interface.multipliers import constraint_active
-from contact.interface.nodes import ContactNodes, Geometry, side_by_side
+from contact.interface.nodes import ContactNodes
 from contact.model.foundation import Conductor, Layer
 from contact.tolerances import EPS
 from contact.typing import Array
-from forms.laws import (
-    Compliance,
-    PenetrationLaw,
-    PerfectConductivity,
-    PotentialFactor,
-    Truncation,
-)
+from forms.laws import PenetrationLaw
 
 
 @dataclass(frozen=True)
@@ -286,175 +274,3 @@ class FoundationLaw:
         if self.layer is not None and (full or not self.layer.lagged):
             total += self.pressure_block(x, full)
         return total
-
-
-@dataclass(frozen=True)
-class Grouped:
-    """Laws of groups of nodes in place of one, of whatever kind (`forms.laws`).
-
-    Values are those of each law at its own nodes, constants the largest ones. The operator R is
-    one too: the pressure on one obstacle does not bound friction on another.
-
-    Attributes
-    ----------
-    laws
-        The law of each group.
-    bounds
-        Where the groups begin on this rank, and the number of all nodes.
-    """
-
-    laws: tuple[Any, ...]
-    bounds: tuple[int, ...]
-
-    @staticmethod
-    def of(laws: Iterable[Any], nodes: Sequence[ContactNodes]) -> Any:
-        """Return one law of the kind of given ones, those of the nodes of each contact."""
-        ends = np.cumsum([0, *(piece.nodes.size for piece in nodes)])
-        return Grouped(tuple(laws), tuple(int(end) for end in ends))
-
-    def _at_nodes(self, value: Callable[..., Any], *given: Array) -> Array:
-        """Return the values of each law at its own nodes: `value` of the law and its arguments."""
-        parts = []
-        for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
-            values = value(law, *(argument[begin:end] for argument in given))
-            parts.append(np.broadcast_to(np.asarray(values, dtype=float), (end - begin,)))
-        return np.concatenate(parts)
-
-    def __call__(self, *given: Any) -> Any:
-        """Return s(|u_tau|, p), p_nu, h_nu, phi_L, or the smoothed pressure R p."""
-        return self._at_nodes(lambda law, *own: law(*own), *given)
-
-    def derivative(self, s: Any) -> Any:
-        """Return the derivative of a law of one argument."""
-        return self._at_nodes(lambda law, s: law.derivative(s), s)
-
-    def by_slip(self, slip: Any, pressure: Any) -> Any:
-        """Return the derivative of a friction law by the slip."""
-        return self._at_nodes(lambda law, slip, p: law.by_slip(slip, p), slip, pressure)
-
-    def by_pressure(self, slip: Any, pressure: Any) -> Any:
-        """Return the derivative of a friction law by the pressure."""
-        return self._at_nodes(lambda law, slip, p: law.by_pressure(slip, p), slip, pressure)
-
-    def transposed(self, values: Array) -> Array:
-        """Return the transpose of R on nodal values."""
-        return self._at_nodes(lambda smoothing, own: smoothing.transposed(own), values)
-
-    def at(self, s: Any, pressed: Any, loaded: Any) -> Any:
-        """Return the conductivity psi."""
-        return self._at_nodes(lambda psi, *own: psi.at(*own), s, pressed, loaded)
-
-    def gap_slope(self, s: Any, pressed: Any) -> Any:
-        """Return the derivative of psi by the gap."""
-        return self._at_nodes(lambda psi, *own: psi.gap_slope(*own), s, pressed)
-
-    @property
-    def maximum(self) -> float:
-        """The largest mu, or phi_L."""
-        return max(law.maximum for law in self.laws)
-
-    @property
-    def lipschitz(self) -> float:
-        """The largest Lipschitz constant of mu by the slip."""
-        return max(law.lipschitz for law in self.laws)
-
-    @property
-    def radius(self) -> float:
-        """The largest radius of R."""
-        return max(law.radius for law in self.laws)
-
-    @property
-    def k_e(self) -> float:
-        """The largest conductivity."""
-        return max(law.k_e for law in self.laws)
-
-    @property
-    def delta(self) -> float:
-        """The steepest ramp of a conductivity."""
-        return max(law.delta for law in self.laws)
-
-    @property
-    def follows_gap(self) -> bool:
-        """Whether a conductivity depends on the gap."""
-        return any(law.follows_gap for law in self.laws)
-
-
-#: Laws of an obstacle without layer or charge.
-NO_LAYER = Layer(0.0, Compliance(np.inf), PotentialFactor(0.0))
-NO_CONDUCTOR = Conductor(PerfectConductivity(0.0), 0.0, Truncation(np.inf))
-
-
-def joined_layers(given: Sequence[Layer | None], geometries: Sequence[Geometry]) -> Layer | None:
-    """Return the layers of all contacts as one; None where there is none."""
-    if not any(given):
-        return None
-    pieces, layers = [geometry.nodes for geometry in geometries], [own or NO_LAYER for own in given]
-    return Layer(
-        np.repeat([own.thickness for own in layers], [piece.nodes.size for piece in pieces]),
-        Grouped.of((own.p_nu for own in layers), pieces),
-        Grouped.of((own.h_nu for own in layers), pieces),
-        _alike([own.lagged for own in given if own is not None]),
-    )
-
-
-def joined_conductors(
-    given: Sequence[Conductor | None], pieces: Sequence[ContactNodes]
-) -> Conductor | None:
-    """Return the conductors of all contacts as one, given their nodes; None where there is none."""
-    if len(given) == 1 or not any(given):
-        return given[0]
-    conductors = [own or NO_CONDUCTOR for own in given]
-    sizes = [piece.nodes.size for piece in pieces]
-
-    def phi_f(time: float) -> Array:
-        """Return the potentials of the foundations at a time."""
-        return np.repeat([float(own.at(time).phi_f) for own in conductors], sizes)
-
-    moving = any(own.phi_f_at is not None for own in conductors)
-    return Conductor(
-        Grouped.of((own.psi for own in conductors), pieces),
-        np.repeat([own.phi_f for own in conductors], sizes),
-        Grouped.of((own.phi_l for own in conductors), pieces),
-        _alike([own.lagged for own in given if own is not None]),
-        phi_f if moving else None,
-    )
-
-
-def joined_fixed_conducting(
-    given: Sequence[Conductor | None],
-    geometries: Sequence[Geometry],
-    law: FoundationLaw,
-    begin: int,
-) -> FoundationLaw | None:
-    """Return the law at the fixed conducting nodes of all contacts; None without conductors.
-
-    Parameters
-    ----------
-    given, geometries, law
-        The conductors, the geometries, and the law at contact nodes.
-    begin
-        Global number of the first node of this rank.
-    """
-    there = [
-        (geometry.fixed_conducting, own)
-        for geometry, own in zip(geometries, given, strict=True)
-        if geometry.fixed_conducting is not None
-    ]
-    if not there:
-        return None
-    pieces = [own for own, _ in there]
-    nodes = side_by_side(pieces)
-    if law.nodes.coupling is not None:
-        coupling = law.nodes.coupling.at(nodes.nodes.astype(np.int64) + begin)
-        nodes = replace(nodes, coupling=coupling)
-    conductor = joined_conductors([own for _, own in there], pieces)
-    return replace(law, nodes=nodes, layer=None, conductor=conductor)
-
-
-def _alike(lagged: Sequence[bool]) -> bool:
-    """Return the value of all; refuse different ones."""
-    if len(set(lagged)) > 1:
-        raise InputError(
-            "contact: lagged is true for some and false for others; accepted: one way", "lagged"
-        )
-    return lagged[0]

@@ -25,7 +25,7 @@ from contact.arguments import (
     real,
 )
 from contact.errors import InputError
-from contact.interface.foundation import Grouped
+from contact.interface.grouping import Grouped, GroupedFriction
 from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes, Geometry
 from contact.linear.layout import times
@@ -71,6 +71,23 @@ class Smoothing:
     def transposed(self, values: Array) -> Array:
         """Return R^T applied to nodal values, shape (n,). Collective."""
         return times(self._matrix, values, transposed=True)
+
+
+class GroupedSmoothing(Grouped[Smoothing]):
+    """R of several contacts: the pressure on one obstacle does not bound friction on another."""
+
+    def __call__(self, values: Array) -> Array:
+        """Return R applied to nodal values, shape (n,). Collective."""
+        return self.at_nodes(lambda smoothing, own: smoothing(own), values)
+
+    def transposed(self, values: Array) -> Array:
+        """Return R^T applied to nodal values, shape (n,). Collective."""
+        return self.at_nodes(lambda smoothing, own: smoothing.transposed(own), values)
+
+    @property
+    def radius(self) -> float:
+        """The largest radius."""
+        return max(smoothing.radius for smoothing in self.laws)
 
 
 def _mollifier(nodes: ContactNodes, radius: float) -> PETSc.Mat:
@@ -215,7 +232,7 @@ class NodalFriction:
     """
 
     law: FrictionLaw | None
-    smoothing: Grouped
+    smoothing: GroupedSmoothing
     history: SlipHistory
 
     @property
@@ -272,9 +289,9 @@ def joined_friction(
     """Return friction at the nodes of all contacts, joined before. Collective."""
     pieces = [geometry.nodes for geometry in geometries]
     pairs = list(zip(frictions, pieces, strict=True))
-    smoothing = Grouped.of((Smoothing(own, given.radius) for given, own in pairs), pieces)
+    smoothing = GroupedSmoothing.of((Smoothing(own, given.radius) for given, own in pairs), pieces)
     laws, law = [law_at(given, own) for given, own in pairs], None
     if any(laws):
         every = [NO_FRICTION if own is None else own for own in laws]
-        law = Grouped.of(every, pieces)
+        law = GroupedFriction.of(every, pieces)
     return NodalFriction(law, smoothing, SlipHistory.rest(nodes))

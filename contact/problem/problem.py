@@ -20,13 +20,9 @@ from contact.body.internal_variables import VARIABLES
 from contact.body.materials import young_behind
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
-from contact.interface.foundation import (
-    FoundationLaw,
-    joined_conductors,
-    joined_fixed_conducting,
-    joined_layers,
-)
+from contact.interface.foundation import FoundationLaw
 from contact.interface.friction import joined_friction
+from contact.interface.grouping import joined_conductors, joined_fixed_conducting, joined_layers
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import (

@@ -1,0 +1,206 @@
+"""The laws of several contacts as one law, each acting on its own nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Generic, Self, TypeVar
+
+import numpy as np
+
+from contact.errors import InputError
+from contact.interface.foundation import FoundationLaw
+from contact.interface.nodes import ContactNodes, Geometry, side_by_side
+from contact.model.foundation import Conductor, Layer
+from contact.typing import Array
+from forms.laws import (
+    Compliance,
+    Conductivity,
+    FrictionLaw,
+    PenetrationLaw,
+    PerfectConductivity,
+    PotentialFactor,
+    PotentialLaw,
+    StiffnessLaw,
+    Truncation,
+)
+from forms.ops import Value
+
+LawType = TypeVar("LawType")
+
+
+@dataclass(frozen=True)
+class Grouped(Generic[LawType]):
+    """Laws of groups of nodes; values are those of each law at its own nodes.
+
+    Attributes
+    ----------
+    laws
+        The law of each group.
+    bounds
+        Where the groups begin on this rank, and the number of all nodes.
+    """
+
+    laws: tuple[LawType, ...]
+    bounds: tuple[int, ...]
+
+    @classmethod
+    def of(cls, laws: Iterable[LawType], nodes: Sequence[ContactNodes]) -> Self:
+        """Return the laws of the nodes of each contact as one."""
+        ends = np.cumsum([0, *(piece.nodes.size for piece in nodes)])
+        return cls(tuple(laws), tuple(int(end) for end in ends))
+
+    def at_nodes(self, value: Callable[..., Value], *given: Array) -> Array:
+        """Return the values of each law at its own nodes: `value` of the law and its arguments."""
+        parts = []
+        for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
+            values = value(law, *(argument[begin:end] for argument in given))
+            parts.append(np.broadcast_to(np.asarray(values, dtype=float), (end - begin,)))
+        return np.concatenate(parts)
+
+
+class GroupedLaw(Grouped[PenetrationLaw | StiffnessLaw | PotentialLaw]):
+    """p_nu, h_nu or phi_L of several contacts."""
+
+    def __call__(self, s: Any) -> Array:
+        """Return the values."""
+        return self.at_nodes(lambda law, s: law(s), s)
+
+    def derivative(self, s: Any) -> Array:
+        """Return the derivatives."""
+        return self.at_nodes(lambda law, s: law.derivative(s), s)
+
+
+class GroupedConductivity(Grouped[Conductivity]):
+    """The conductivity psi of several contacts."""
+
+    def at(self, s: Any, pressed: Any, loaded: Any) -> Array:
+        """Return psi."""
+        return self.at_nodes(lambda psi, *own: psi.at(*own), s, pressed, loaded)
+
+    def gap_slope(self, s: Any, pressed: Any) -> Array:
+        """Return the derivative of psi by the gap."""
+        return self.at_nodes(lambda psi, *own: psi.gap_slope(*own), s, pressed)
+
+    @property
+    def k_e(self) -> float:
+        """The largest conductivity."""
+        return max(psi.k_e for psi in self.laws)
+
+    @property
+    def delta(self) -> float:
+        """The steepest ramp."""
+        return max(psi.delta for psi in self.laws)
+
+    @property
+    def follows_gap(self) -> bool:
+        """Whether one depends on the gap."""
+        return any(psi.follows_gap for psi in self.laws)
+
+
+class GroupedFriction(Grouped[FrictionLaw]):
+    """The friction bound s(|u_tau|, p) of several contacts."""
+
+    def __call__(self, slip: Any, pressure: Any) -> Array:
+        """Return s."""
+        return self.at_nodes(lambda law, slip, p: law(slip, p), slip, pressure)
+
+    def by_slip(self, slip: Any, pressure: Any) -> Array:
+        """Return the derivative by the slip."""
+        return self.at_nodes(lambda law, slip, p: law.by_slip(slip, p), slip, pressure)
+
+    def by_pressure(self, slip: Any, pressure: Any) -> Array:
+        """Return the derivative by the pressure."""
+        return self.at_nodes(lambda law, slip, p: law.by_pressure(slip, p), slip, pressure)
+
+    @property
+    def maximum(self) -> float:
+        """The largest upper bound of s/p."""
+        return max(law.maximum for law in self.laws)
+
+    @property
+    def lipschitz(self) -> float:
+        """The largest Lipschitz constant of s/p by the slip."""
+        return max(law.lipschitz for law in self.laws)
+
+
+#: Laws of an obstacle without layer or charge.
+NO_LAYER = Layer(0.0, Compliance(np.inf), PotentialFactor(0.0))
+NO_CONDUCTOR = Conductor(PerfectConductivity(0.0), 0.0, Truncation(np.inf))
+
+
+def joined_layers(given: Sequence[Layer | None], geometries: Sequence[Geometry]) -> Layer | None:
+    """Return the layers of all contacts as one; None where there is none."""
+    if not any(given):
+        return None
+    pieces, layers = [geometry.nodes for geometry in geometries], [own or NO_LAYER for own in given]
+    return Layer(
+        np.repeat([own.thickness for own in layers], [piece.nodes.size for piece in pieces]),
+        GroupedLaw.of((own.p_nu for own in layers), pieces),
+        GroupedLaw.of((own.h_nu for own in layers), pieces),
+        _alike([own.lagged for own in given if own is not None]),
+    )
+
+
+def joined_conductors(
+    given: Sequence[Conductor | None], pieces: Sequence[ContactNodes]
+) -> Conductor | None:
+    """Return the conductors of all contacts as one, given their nodes; None where there is none."""
+    if len(given) == 1 or not any(given):
+        return given[0]
+    conductors = [own or NO_CONDUCTOR for own in given]
+    sizes = [piece.nodes.size for piece in pieces]
+
+    def phi_f(time: float) -> Array:
+        """Return the potentials of the foundations at a time."""
+        return np.repeat([float(own.at(time).phi_f) for own in conductors], sizes)
+
+    moving = any(own.phi_f_at is not None for own in conductors)
+    return Conductor(
+        GroupedConductivity.of((own.psi for own in conductors), pieces),
+        np.repeat([own.phi_f for own in conductors], sizes),
+        GroupedLaw.of((own.phi_l for own in conductors), pieces),
+        _alike([own.lagged for own in given if own is not None]),
+        phi_f if moving else None,
+    )
+
+
+def joined_fixed_conducting(
+    given: Sequence[Conductor | None],
+    geometries: Sequence[Geometry],
+    law: FoundationLaw,
+    begin: int,
+) -> FoundationLaw | None:
+    """Return the law at the fixed conducting nodes of all contacts; None without conductors.
+
+    Parameters
+    ----------
+    given, geometries, law
+        The conductors, the geometries, and the law at contact nodes.
+    begin
+        Global number of the first node of this rank.
+    """
+    there = [
+        (geometry.fixed_conducting, own)
+        for geometry, own in zip(geometries, given, strict=True)
+        if geometry.fixed_conducting is not None
+    ]
+    if not there:
+        return None
+    pieces = [own for own, _ in there]
+    nodes = side_by_side(pieces)
+    if law.nodes.coupling is not None:
+        coupling = law.nodes.coupling.at(nodes.nodes.astype(np.int64) + begin)
+        nodes = replace(nodes, coupling=coupling)
+    conductor = joined_conductors([own for _, own in there], pieces)
+    return replace(law, nodes=nodes, layer=None, conductor=conductor)
+
+
+def _alike(lagged: Sequence[bool]) -> bool:
+    """Return the value of all; refuse different ones."""
+    if len(set(lagged)) > 1:
+        raise InputError(
+            "contact: lagged is true for some and false for others; accepted: one way", "lagged"
+        )
+    return lagged[0]
