@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-import numpy as np
-
 from contact.typing import Array
 
 #: Places of a part: the first axis of its arrays, those that this rank owns.
@@ -52,13 +50,6 @@ class InternalVariables:
 
 class History(dict[str, Part]):
     """The parts of a history by name; none for a step from the reference configuration."""
-
-    def near(self, other: History, rtol: float = 0.0, atol: float = 0.0) -> bool:
-        """Tell whether another history has the same parts and values on this rank."""
-        ours, theirs = self.arrays(), other.arrays()
-        return ours.keys() == theirs.keys() and all(
-            np.allclose(array, theirs[name], rtol=rtol, atol=atol) for name, array in ours.items()
-        )
 
     @property
     def places(self) -> list[str]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from contact.history import History
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.multipliers import ActiveSet, Multipliers
@@ -44,19 +42,6 @@ class State:
         """Mark the arrays as read-only."""
         for array in (self.x, self.forces.pressure, self.forces.friction):
             array.flags.writeable = False
-
-    def near(self, other: State, rtol: float = 0.0, atol: float = 0.0) -> bool:
-        """Tell whether another state has the same values on this rank."""
-        pairs = (
-            (self.x, other.x),
-            (self.forces.pressure, other.forces.pressure),
-            (self.forces.friction, other.forces.friction),
-        )
-        return (
-            self.history.near(other.history, rtol, atol)
-            and self.time == other.time
-            and all(np.allclose(one, two, rtol=rtol, atol=atol) for one, two in pairs)
-        )
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from contact.cli.main import main
 from contact.cli.solve import solve_and_keep
 from contact.io.checkpoint import Checkpoints, read_steps
 from tests.problem.test_plasticity import block
+from tests.problems.mechanics import close
 from tests.problems.written import rows_of
 from tests.results.test_steps import case_of as steps_case
 
@@ -65,7 +66,7 @@ def test_going_on(tmp_path, ended, count, elsewhere):
     assert solution.converged
     assert len(solution.steps) == len(whole.steps)
     for one, two in zip(whole.steps, solution.steps, strict=True):
-        assert one.state.near(two.state, atol=1e-12)
+        assert close(one.state, two.state, atol=1e-12)
         for name, value in one.row.items():
             if name not in ("linear_solves", "factorizations", "kkt"):
                 assert two.row[name] == pytest.approx(value, rel=1e-9, abs=1e-12)
@@ -87,8 +88,7 @@ def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
     assert solution.converged and len(solution.steps) == len(whole.steps)
     assert whole.plastic_dissipation > 0
     for one, two in zip(whole.steps, solution.steps, strict=True):
-        assert one.state.near(two.state, rtol=1e-12, atol=0.0)
-        assert one.state.history.near(two.state.history, rtol=1e-12, atol=0.0)
+        assert close(one.state, two.state, rtol=1e-12, atol=0.0)
 
 
 @pytest.mark.core
@@ -111,7 +111,7 @@ def test_other_ranks_go_on(shared_tmp_path: Path, ended) -> None:
         world.barrier()
     assert solution.converged and len(solution.steps) == len(whole.steps) == 6
     for one, two in zip(whole.steps, solution.steps, strict=True):
-        assert one.state.near(two.state, rtol=1e-9, atol=1e-9)
+        assert close(one.state, two.state, rtol=1e-9, atol=1e-9)
     assert sorted(path.name for path in place.iterdir()) == [f"{k:05d}.npz" for k in range(1, 7)]
     again = read_steps(shared_tmp_path, whole.problem)
     assert [step.state.time for step in again] == [step.state.time for step in whole.steps]
@@ -192,7 +192,7 @@ def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, capfd, number,
 def test_read_steps_gives_the_states(tmp_path):
     solution = solve_and_keep(steps_case(), None, SELF, tmp_path)
     for one, two in zip(solution.steps, read_steps(tmp_path, solution.problem), strict=True):
-        assert one.state.near(two.state)
+        assert close(one.state, two.state)
 
 
 MESHES = Path(__file__).parents[2] / "meshes" / "fixtures"

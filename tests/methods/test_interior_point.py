@@ -22,7 +22,7 @@ from contact.problem.residuals import Residuals, evaluate
 from contact.solving import solve
 from forms.laws import ConstantCoefficient
 from tests.problems import mechanics
-from tests.problems.mechanics import bar_case, newton
+from tests.problems.mechanics import bar_case, close, newton
 from tests.problems.rigid import PIEZO
 
 SELF = MPI.COMM_SELF
@@ -57,7 +57,7 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     method = Newton(problem, NewtonOptions(condense=False))
     found, outcome = interior_point(method.whole)
     assert outcome.converged, outcome.reason
-    assert found.near(state, rtol=1e-6, atol=1e-9)
+    assert close(found, state, rtol=1e-6, atol=1e-9)
 
 
 def test_a_singular_matrix_in_the_last_steps_leaves_another_bound():
@@ -120,7 +120,7 @@ def interior(
     supported = newton.modes.constrained_by_supports
     begin = newton.step.without_contact(problem, problem.start()) if supported else None
     found, outcome = interior_point(newton, begin)
-    return outcome, found.near(state, rtol=1e-6, atol=atol)
+    return outcome, close(found, state, rtol=1e-6, atol=atol)
 
 
 @pytest.mark.core
@@ -162,7 +162,7 @@ def test_an_interior_point_with_friction_on_a_layer(kind, rigid):
     # The friction bounds of the method itself, from zero on.
     found, outcome = interior_point(newton, begin)
     assert outcome.converged, outcome.reason
-    assert found.near(state, rtol=1e-6, atol=1e-9)
+    assert close(found, state, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("linear", ["lu", "iterative"])

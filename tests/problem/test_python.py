@@ -16,6 +16,7 @@ from contact import (
     solve,
     solve_steps,
 )
+from tests.problems.mechanics import close
 from tests.problems.put_together import block, problem
 
 
@@ -44,7 +45,7 @@ def test_steps_of_a_problem() -> None:
     states = list(evolve(friction, times))
     solution = solve_steps(friction, np.array(times))
     assert [step.row["t"] for step in solution.steps] == times
-    assert solution.state.near(states[-1], atol=1e-9)
+    assert close(solution.state, states[-1], atol=1e-9)
     force = solution.steps[-1].row["contact_force_y"]
     assert force == pytest.approx(solution.contact_force[1])
     assert solution.movements == {}

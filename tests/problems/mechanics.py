@@ -10,6 +10,7 @@ from mpi4py import MPI
 from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.case.file import Case
+from contact.history import History
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
@@ -26,6 +27,28 @@ from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import FrictionCoefficient, SlipCoefficient
 from scripts import cases
+
+
+def close(one: State, two: State, rtol: float = 0.0, atol: float = 0.0) -> bool:
+    """Tell whether two states have the same values on this rank."""
+    pairs = (
+        (one.x, two.x),
+        (one.forces.pressure, two.forces.pressure),
+        (one.forces.friction, two.forces.friction),
+    )
+    return (
+        same_history(one.history, two.history, rtol, atol)
+        and one.time == two.time
+        and all(np.allclose(a, b, rtol=rtol, atol=atol) for a, b in pairs)
+    )
+
+
+def same_history(one: History, two: History, rtol: float = 0.0, atol: float = 0.0) -> bool:
+    """Tell whether two histories have the same parts and values on this rank."""
+    ours, theirs = one.arrays(), two.arrays()
+    return ours.keys() == theirs.keys() and all(
+        np.allclose(array, theirs[name], rtol=rtol, atol=atol) for name, array in ours.items()
+    )
 
 
 @dataclass(frozen=True)
