@@ -1,4 +1,4 @@
-"""What `solve` returns: the results of a problem, with the figures that are drawn from its files.
+"""The solution that `solve` returns: results of a problem, with figures drawn from its files.
 
 `results/` knows neither files nor figures, and its `Solution` has numbers and fields alone.
 """
