@@ -94,7 +94,7 @@ def problem_of(kind: str, cell: str, order: int, degree: int, n: int) -> Contact
 
 def rim(report: Report, coarse: bool) -> dict[str, float]:
     """Make the table of tetrahedra on a shaft; return the last orders."""
-    columns: dict[str, list[float]] = {"across": [], "unknowns": []}
+    columns = empty("across", "unknowns")
     last = {}
     for n in (2, 4) if coarse else (4, 8, 12):
         domain = rings(MPI.COMM_WORLD, "tetrahedron", 2, (1.0, 2.0), (n,))

@@ -23,7 +23,7 @@ from contact import build_problem, load_case
 from contact.mesh.domain import Domain
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, append, options, solved
+from scripts.reporting import Report, append, empty, options, solved
 from scripts.studies.two_bodies import ALUMINIUM, RADIUS, STEEL, half_width, middle
 
 #: Force of the whole cylinder (N/mm), and Young's moduli (N/mm^2); Poisson's ratio is 0.3.
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def rotations(report: Report, size: float) -> float:
     """Tabulate the depth without and with finite rotations; return how much these add to it."""
-    rows: dict[str, list[Any]] = {"load": [], "contact elements (mm)": [], "without": []}
+    rows = empty("load", "contact elements (mm)", "without")
     rows |= {"with rotations": [], "more (%)": []}
     for length, share in ((2 * size, 1.0), (size, 1.0), (size, 0.5), (size, 0.25)):
         domain = build_problem(case(length, share)).domain
@@ -67,7 +67,7 @@ def rotations(report: Report, size: float) -> float:
 
 def depth(report: Report, size: float, more: float) -> None:
     """Tabulate the depth beside that of code_aster, which has finite rotations."""
-    rows: dict[str, list[Any]] = {"mu": [], "linear": [], "code_aster": [], "apart (%)": []}
+    rows = empty("mu", "linear", "code_aster", "apart (%)")
     rows |= {"with rotations": [], "then apart (%)": []}
     for mu, published in CODE_ASTER.items():
         ours = middle(solved(case(size, 1.0, "space.degree=2", f"friction.mu={mu}")))
@@ -85,7 +85,7 @@ def depth(report: Report, size: float, more: float) -> None:
 
 def friction(report: Report, count: int) -> None:
     """Tabulate two half planes with friction."""
-    rows: dict[str, list[Any]] = {"mu": [], "steps": [], "a": [], "p_0": [], "stick": []}
+    rows = empty("mu", "steps", "a", "p_0", "stick")
     for mu, steps in ((0.0, 1), (0.1, 1), (0.1, 32)):
         append(rows, mu, steps, *half_planes(mu, count, steps))
     report.table(

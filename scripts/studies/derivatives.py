@@ -191,22 +191,10 @@ FURTHER = ("turning plate", "slant, in SI", "numbers at 0")
 COUNT, ALL = 60, 72
 
 FAMILIES = (
-    "number",
-    "slip",
-    "log",
-    "layer",
-    "evolution",
-    "evolution, slip",
-    "evolution, log",
-    "piezo",
-    "two bodies",
-    "ball under a force",
-    "3-D",
-    "revolution",
-    "smoothed",
-    "evolution, j2",
+    "number", "slip", "log", "layer", "evolution", "evolution, slip", "evolution, log", "piezo",
+    "two bodies", "ball under a force", "3-D", "revolution", "smoothed", "evolution, j2",
     "evolution, electrode",
-)
+)  # fmt: skip
 
 
 def keys(case: Case, every: bool = False) -> list[str]:

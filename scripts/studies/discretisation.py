@@ -52,11 +52,10 @@ def bar(n: int, degree: int, element: str = "standard", **changes: Any) -> Conta
 
 def locking(report: Report, coarse: bool) -> None:
     """Make the table of elements that lock, and of those that do not. Collective."""
-    columns: dict[str, list[Any]] = {
-        name: []
-        for name in ("bar", "element", "cells a unit", "largest displacement", "seconds",
-                     "k/g", "estimate", "warns")
-    }  # fmt: skip
+    columns = empty(
+        "bar", "element", "cells a unit", "largest displacement", "seconds", "k/g", "estimate",
+        "warns",
+    )  # fmt: skip
     for name, changes in LOCKING.items():
         for label, (degree, element) in ELEMENTS.items():
             for n in (8,) if coarse else (8, 16, 32):
@@ -140,10 +139,7 @@ def limits(report: Report, coarse: bool) -> None:
 
 def quantities(report: Report, coarse: bool) -> None:
     """Make the table of intervals beside values on a finer mesh. Collective."""
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("problem", "element", "unknowns", "quantity", "low", "high",
-                              "value", "inside")
-    }  # fmt: skip
+    columns = empty("problem", "element", "unknowns", "quantity", "low", "high", "value", "inside")
     cases: dict[str, dict[str, Any]] = {
         "bar with friction": {**LINEAR, "friction__mu": 0.6},
         "bar without friction": {**LINEAR, "friction__mu": 0.0},
@@ -178,10 +174,7 @@ def _uniform(degree: int, unknowns: int, **changes: Any) -> Case:
 
 def per_second(report: Report, coarse: bool) -> None:
     """Make the table of errors and times by element. Collective."""
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("problem", "element", "unknowns", "seconds", "estimate",
-                              "largest displacement")
-    }  # fmt: skip
+    columns = empty("problem", "element", "unknowns", "seconds", "estimate", "largest displacement")
     tip = {"on": "right", "traction": [0.0, -1e-6]}
     beam = {**LINEAR, "mesh__size": [80.0, 1.0], "mesh__parts__loaded": None, "load__0": tip,
             "contact__gap": 10.0}  # fmt: skip
@@ -218,11 +211,10 @@ def adaptive(report: Report, coarse: bool) -> None:
     """Draw the error on adapted and uniform meshes, with a table of costs. Collective."""
     figure, axes = subplots(1, 2)
     data: dict[str, Sequence[Any]] = {}
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("problem", "element", "error", "unknowns, adapted",
-                              "unknowns, uniform", "rate, adapted", "rate, uniform", "meshes",
-                              "unknowns, last", "seconds", "seconds, last alone", "ratio")
-    }  # fmt: skip
+    columns = empty(
+        "problem", "element", "error", "unknowns, adapted", "unknowns, uniform", "rate, adapted",
+        "rate, uniform", "meshes", "unknowns, last", "seconds", "seconds, last alone", "ratio",
+    )  # fmt: skip
     for name, place, degree, error, case, uniform in _adapted(coarse):
         rows, seconds, last = _timed(case)
         found = {"adapted": [(row["unknowns"], row["error"]) for row in rows], "uniform": []}

@@ -25,7 +25,7 @@ from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated
 from forms.hencky import Linear, Log
-from scripts.reporting import Report, append, options
+from scripts.reporting import Report, append, empty, options
 from scripts.studies.discretisation import LINEAR, LOCKING, bar, state_of
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular, exact, manufactured, nearly_isochoric
@@ -168,11 +168,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table of estimates beside known errors. Collective."""
     chosen = options(__doc__ or "", "discretisation", arguments)
     report, share = Report(chosen.out), 2 if chosen.coarse else 1
-    columns: dict[str, list[Any]] = {
-        name: []
-        for name in ("problem", "known by", "element", "cells", "error", "estimate",
-                     "effectivity", "why not")
-    }  # fmt: skip
+    columns = empty(
+        "problem", "known by", "element", "cells", "error", "estimate", "effectivity", "why not",
+    )  # fmt: skip
     for name, one in known().items():
         for degree, cells in enumerate(one.cells, 1):
             if not cells:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -253,7 +252,7 @@ def partial_slip(report: Report, size: float, degree: int) -> None:
 
 def rings(report: Report, sizes: Sequence[float]) -> None:
     """Write the pressures of two rings with a small interference over the exact one."""
-    rows: dict[str, list[Any]] = {"degree": [], "h": [], "mean": [], "least": [], "largest": []}
+    rows = empty("degree", "h", "mean", "least", "largest")
     for degree in (1, 2):
         for h in sizes:
             pressure, weight = ratios(*two_rings(h, degree))

@@ -22,7 +22,7 @@ from contact.plot.body import picture
 from contact.results.contact_nodes import contact_table
 from contact.typing import Array
 from forms.kinematics import strain
-from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, run_of, subplots
+from scripts.reporting import TWO_COLUMNS, Report, empty, observed_orders, options, run_of, subplots
 from scripts.studies.lagged_current import theorem_5_2
 from scripts.thesis.figures_compliance import (
     ALONG,
@@ -139,7 +139,7 @@ def norms(body: BodyEquilibrium) -> Callable[[Array], Array]:
 def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
     """Draw the error against a reference three levels finer than the last mesh. Collective."""
     cells, last = ((4, 8), 64) if coarse else ((8, 16, 32, 64), 512)
-    columns: dict[str, list[object]] = {"problem": [], "cells": [], "reference": []}
+    columns = empty("problem", "cells", "reference")
     for name in NORMS:
         columns |= {name: [], f"order ({name})": []}
     found = {}

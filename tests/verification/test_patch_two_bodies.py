@@ -20,6 +20,7 @@ from contact.model.friction import Friction
 from contact.model.material import Material
 from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 from contact.results.fields import DerivedFields
 from contact.typing import Array
 from forms.hencky import Linear
@@ -42,6 +43,7 @@ KINDS = [
 NAMES = [f"{cell}-{degree}" for _, degree, cell in KINDS]
 CURVED = [cell for _, degree, cell in KINDS if degree == 2]
 SIDES = {2: ("left", "right"), 3: ("left", "right", "front", "back")}
+ROLLERS = {dim: (("bottom", dim - 1), ("left", 0), ("front", 1))[:dim] for dim in (2, 3)}
 NOTHING = GapFunction(lambda points: np.zeros(len(points)))
 
 
@@ -114,8 +116,7 @@ def test_constant_pressure(
     dim: int, degree: int, cell: str, pair: Sequence[str], condense: bool
 ) -> None:
     domain = blocks(dim, grading=1.4, cell=cell).domain(COMM)
-    rollers = (("bottom", dim - 1), ("left", 0), ("front", 1))[:dim]
-    check_constant_pressure(domain, rollers, degree, pair, condense)
+    check_constant_pressure(domain, ROLLERS[dim], degree, pair, condense)
 
 
 @pytest.mark.parallel
@@ -127,8 +128,7 @@ def test_constant_pressure_between_facets_curved_in_their_plane(
     """With facets cut along straight lines pressures are off by up to 9 %."""
     dim = Shape(cell).dim
     domain = blocks(dim, cell=cell, bow=0.06).domain(COMM)
-    rollers = (("bottom", dim - 1), ("left", 0), ("front", 1))[:dim]
-    check_constant_pressure(domain, rollers, 2, pair, True, 1.0)
+    check_constant_pressure(domain, ROLLERS[dim], 2, pair, True, 1.0)
 
 
 @pytest.mark.core
@@ -193,26 +193,37 @@ def test_constant_stress_between_facets_curved_in_their_plane(
     check_constant_stress(blocks(Shape(cell).dim, turn=turn, cell=cell, bow=0.06), 2, pair)
 
 
-def check_constant_stress(given: Blocks, degree: int, pair: Sequence[str]) -> None:
-    """Check that two blocks have a constant stress under its tractions."""
-    dim = given.dim
-    law, axes = Linear(1.0, 0.3), given.axes
+LAW = Linear(1.0, 0.3)
+
+
+def strain_of(given: Blocks) -> Array:
+    """Return a strain along the axes of two blocks."""
+    dim, axes = given.dim, given.axes
     strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
-    strain = axes @ strain @ axes.T
-    across = law.bulk - 2 * law.shear / 3
-    stress = across * np.trace(strain) * np.eye(dim) + 2 * law.shear * strain
-    linear = [Linearly(row) for row in strain]
+    return axes @ strain @ axes.T
+
+
+def check_constant_stress(given: Blocks, degree: int, pair: Sequence[str], *further: Fixed) -> None:
+    """Check that two blocks have a constant stress under its tractions."""
+    dim, axes, strain = given.dim, given.axes, strain_of(given)
+    stress = (LAW.bulk - 2 * LAW.shear / 3) * np.trace(strain) * np.eye(dim)
+    stress += 2 * LAW.shear * strain
     outward = {"left": -axes[:, 0], "right": axes[:, 0], "top": axes[:, -1]}
     outward |= {"front": -axes[:, 1], "back": axes[:, 1]}
     loads = [Load(part, constants(stress @ outward[part])) for part in ("top", *SIDES[dim])]
-    body = Body(law, [Fixed("bottom", linear)], loads)
+    body = Body(LAW, [Fixed("bottom", [Linearly(row) for row in strain]), *further], loads)
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
-    state = state_of(problem, 1e-12)
+    state = check_linear(problem, strain)
+    vectors = state.forces.vectors(problem.nodes)
+    np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
+
+
+def check_linear(problem: ContactProblem, strain: Array) -> State:
+    """Check that the displacement of the solution is that of a constant strain."""
+    state, dim = state_of(problem, 1e-12), len(strain)
     x = problem.body.space.tabulate_dof_coordinates()[:, :dim]
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
-    traction = -problem.nodes.normal @ stress
-    vectors = state.forces.vectors(problem.nodes)
-    np.testing.assert_allclose(vectors, traction, rtol=0, atol=1e-11)
+    return state
 
 
 @pytest.mark.core
@@ -224,16 +235,12 @@ def test_a_rim_that_is_held_carries_no_multiplier(
 ) -> None:
     """All of the outer boundary follows a linear field: the functions of the rim go inwards."""
     given = blocks(dim, cell=cell)
-    law = Linear(1.0, 0.3)
-    strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
+    strain = strain_of(given)
     linear = [Linearly(row) for row in strain]
-    fixed = [Fixed(part, linear) for part in ("top", "bottom", *SIDES[dim])]
-    body = Body(law, fixed)
+    body = Body(LAW, [Fixed(part, linear) for part in ("top", "bottom", *SIDES[dim])])
     problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
     # The rim has no jump of its own, and the gap of the others is that of the linear field.
-    state = state_of(problem, 1e-12)
-    x = problem.body.space.tabulate_dof_coordinates()[:, :dim]
-    np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
+    check_linear(problem, strain)
 
 
 @pytest.mark.parallel
@@ -241,23 +248,8 @@ def test_a_rim_that_is_held_carries_no_multiplier(
 def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int, cell: str) -> None:
     """Friction acts there on the other body, which is not held: a constant shear passes."""
     given = blocks(dim, cell=cell)
-    law = Linear(1.0, 0.3)
-    strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
-    stress = (law.bulk - 2 * law.shear / 3) * np.trace(strain) * np.eye(dim)
-    stress += 2 * law.shear * strain
-    linear, axes = [Linearly(row) for row in strain], np.eye(dim)
-    outward = {"left": -axes[0], "right": axes[0], "front": -axes[1], "back": axes[1]}
-    outward["top"] = axes[-1]
-    loads = [Load(part, constants(stress @ outward[part])) for part in ("top", *SIDES[dim])]
-    fixed = [Fixed("bottom", linear), Fixed("upper_left", [*linear[:-1], None])]
-    problem = ContactProblem(
-        given.domain(COMM), Body(law, fixed, loads), contact("under", "over", 2.0), degree=degree
-    )
-    state = state_of(problem, 1e-12)
-    x = problem.body.space.tabulate_dof_coordinates()[:, :dim]
-    np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
-    vectors = state.forces.vectors(problem.nodes)
-    np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
+    along = [Linearly(row) for row in strain_of(given)[:-1]]
+    check_constant_stress(given, degree, PAIRS[0], Fixed("upper_left", [*along, None]))
 
 
 @pytest.mark.core
