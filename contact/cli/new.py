@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+from scipy.spatial import cKDTree
 
 from contact.case.file import literal
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
-from contact.interface.pairing import facing_parts
+from contact.interface.pairing import REACH
 from contact.mesh.domain import ON_AXIS, Domain
+from contact.mesh.entities import distributed_components
+from contact.mesh.geometry import facet_normals, geometry_nodes
 from contact.mesh.reader import convert, from_file
 from contact.ranks import on_root
-from contact.tolerances import NEGLIGIBLE
+from contact.tolerances import NEGLIGIBLE, TOUCHING
+from contact.typing import Array
+
+#: Cosine of the angle between two normals up to which facets face each other.
+OPPOSED = -0.5
 
 CASE = """\
 # A case to begin with; every key is described in docs/case-file.md.
@@ -163,3 +173,69 @@ def _heights(domain: Domain) -> dict[str, float]:
         if not revolved or radius > ON_AXIS:
             found[name] = round(float(height), 6)
     return found
+
+
+class _Side(NamedTuple):
+    """The facets of a part, of all ranks: arrays of shape (f, d) and (f,)."""
+
+    middle: Array
+    normal: Array
+    size: Array  # length of an edge
+    height: Array  # of the cell behind it
+    body: Array  # number of its connected component
+
+
+def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
+    """Guess pairs of parts of different bodies that face each other, nearest first. Collective.
+
+    Each has its least gap (length), below 0 where the bodies overlap, and the finer side is the
+    first of a pair. Parts that belong to several bodies are left out.
+    """
+    space = fem.functionspace(domain.mesh, ("Lagrange", 1))
+    labels, count = distributed_components(space, space.dofmap.list)
+    if count == 1:
+        return []
+    bodies = labels[space.dofmap.list[:, 0]]
+    sides = {name: _side(domain, name, bodies) for name in domain.parts}
+    own = {name: side for name, side in sides.items() if np.unique(side.body).size == 1}
+    # The finer side of a pair is its first, of alike ones the first by name.
+    finest = sorted(own, key=lambda name: (float(f"{own[name].size.mean():.9e}"), name))
+    found = []
+    for one, other in itertools.combinations(finest, 2):
+        if own[one].body[0] != own[other].body[0]:
+            gap = _least_gap(own[one], own[other], REACH * domain.size)
+            if np.isfinite(gap):
+                found.append((0.0 if abs(gap) <= TOUCHING * domain.size else gap, one, other))
+    return sorted(found)
+
+
+def _least_gap(one: _Side, other: _Side, reach: float) -> float:
+    """Return the least gap along the normals of the facets of a side; infinity of none that face.
+
+    Each facet is held against the nearest one of the other side. Those that look away from each
+    other have the cells of both bodies between them; an overlap is less than half of that.
+    """
+    nearest = cKDTree(other.middle).query(one.middle)[1]
+    way = other.middle[nearest] - one.middle
+    gap = np.einsum("fd,fd->f", way, one.normal)
+    beside = np.linalg.norm(way - gap[:, None] * one.normal, axis=1)
+    facing = np.einsum("fd,fd->f", one.normal, other.normal[nearest]) < OPPOSED
+    facing &= beside <= one.size + other.size[nearest]
+    facing &= (abs(gap) <= reach) & (gap > -(one.height + other.height[nearest]) / 2)
+    return float(gap[facing].min(initial=np.inf))
+
+
+def _side(domain: Domain, name: str, bodies: Array) -> _Side:
+    """Return the facets of a part, given the body of each cell of this rank. Collective."""
+    cells, _, areas = facet_normals(domain, name, 1)
+    facets, d = domain.facets(name), domain.dim
+    middle: Array = np.empty((0, d))
+    if facets.size > 0:  # dolfinx divides by their number
+        middle = dmesh.compute_midpoints(domain.mesh, d - 1, facets)[:, :d]
+    area = areas.mean(axis=1)
+    size = np.linalg.norm(area, axis=1)
+    normal = area / size[:, None]
+    behind = middle[:, None] - geometry_nodes(domain, cells.astype(np.int32))
+    height = np.einsum("fkd,fd->fk", behind, normal).max(axis=1, initial=0.0)
+    own = middle, normal, size ** (1 / (d - 1)), height, bodies[cells]
+    return _Side(*(np.concatenate(domain.comm.allgather(values)) for values in own))

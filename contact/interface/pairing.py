@@ -1,4 +1,4 @@
-"""Contact of two bodies: which nodes, their geometry at any place, and which parts face each other.
+"""Contact of two bodies: which nodes, and their geometry at any place.
 
 `find_pair` decides once, in the reference configuration, and checks the input; the
 `PairPlacement` that it returns gives normals, gaps, areas, D and M as functions of positions.
@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact import _compat
 from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.supports import APART
@@ -23,8 +21,7 @@ from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, Geometry, contact_directions
 from contact.interface.placing import check_gap
-from contact.mesh.domain import Domain
-from contact.mesh.entities import cells_at, connected_components, owned_among
+from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
 from contact.model.obstacle import Obstacle
 from contact.model.obstacle.shapes import measured
@@ -295,49 +292,3 @@ def _connected(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> boo
         found[k, piece[owners.requested(nodes) - owners.begin]] = 1
     body.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
     return bool(found.all(axis=0).any())
-
-
-def facing_parts(domain: Domain) -> list[tuple[float, str, str]]:
-    """Return pairs of parts of different bodies that face each other, nearest first. Collective.
-
-    Each has its least gap (length), below 0 where the bodies overlap, and the finer side is the
-    first of a pair. Parts that belong to several bodies are left out.
-    """
-    space = fem.functionspace(domain.mesh, ("Lagrange", 1))
-    piece, count = connected_components(space)
-    if count == 1:
-        return []
-    comm = domain.comm
-    sides: list[tuple[float, float, str, Surface, int]] = []
-    for name in sorted(domain.parts):
-        side = surface_of(domain, space, name)
-        there = np.zeros(count, dtype=np.intc)
-        there[piece[side.owners.requested(side.nodes.ravel()) - side.owners.begin]] = 1
-        comm.Allreduce(MPI.IN_PLACE, there, op=MPI.MAX)
-        total = comm.allreduce(np.array([side.radii.sum(), side.count]), op=MPI.SUM)
-        thinnest = comm.allreduce(float(_heights(domain, side, name).min(initial=np.inf)), MPI.MIN)
-        if there.sum() == 1:
-            # Of alike sides the first by name is the first.
-            mean = float(f"{total[0] / total[1]:.9e}")
-            sides.append((mean, thinnest, name, side, int(there.argmax())))
-    found = []
-    sides.sort(key=lambda side: (side[0], side[2]))
-    for i, (_, thinnest, on, slave, body) in enumerate(sides):
-        for _, beside, against, master, other in sides[i + 1 :]:
-            if other == body:
-                continue
-            coupling = couple(slave, master, REACH * domain.size)
-            least = comm.allreduce(float(coupling.gap.min(initial=np.inf)), op=MPI.MIN)
-            overlap = coupling.depth if coupling.depth > TOUCHING * domain.size else 0.0
-            # Between sides that look away from each other are cells of both bodies.
-            if np.isfinite(least) and overlap < thinnest + beside:
-                found.append((-overlap if overlap > 0 else max(least, 0.0), on, against))
-    return sorted(found)
-
-
-def _heights(domain: Domain, side: Surface, part: str) -> Array:
-    """Return the heights of the cells above the facets of a part, shape (f,)."""
-    cells, _ = cells_at(domain.mesh, domain.facets(part))
-    nodes = domain.mesh.geometry.x[_compat.geometry_dofmap(domain.mesh)[cells]][..., : domain.dim]
-    below = side.centres[:, None] - nodes
-    return np.asarray(np.einsum("fkd,fd->fk", below, side.normal).max(axis=1, initial=0.0))

@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from contact import Body, Contact, Fixed, Linear, Plane, Problem, parse_case, solve
+from contact.cli.new import facing_parts
 from contact.errors import InputError
-from contact.interface.pairing import facing_parts
 from tests.problems import overlapping
 from tests.problems.overlapping import POISSON, UNIAXIAL, YOUNG, body, layers, pressure
 
