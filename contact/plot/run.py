@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,8 +23,6 @@ from contact.results.contact_nodes import Table
 from contact.results.options import Units
 from contact.results.quantities import OPPOSITE
 from contact.typing import Array
-
-_SET = re.compile(r'timestep="([^"]+)" file="([\w-]+\.vtu)"')
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,7 @@ def _as_written(folder: Path) -> Iterator[None]:
         ) from None
     except OSError as error:
         raise refused(error) from None
-    except (KeyError, ValueError, IndexError, TypeError) as error:
+    except (KeyError, ValueError, IndexError, TypeError, SyntaxError) as error:
         raise InputError(
             f"{folder}: not as a run has left it ({error}); accepted: the files of a run",
             "no-results",
@@ -173,12 +170,13 @@ def _frames(folder: Path) -> tuple[Run, list[tuple[float, int, str, str]]]:
         )
     run = read_run(folder)
     assert run.steps is not None  # where there are fields in time, there are steps
-    fields, contact = (
-        _SET.findall((folder / f"{kind}.pvd").read_text("utf-8")) for kind in ("fields", "contact")
-    )
-    times = [float(time) for time, _ in fields]
+    with _as_written(folder):
+        fields, contact = (
+            pyvista.PVDReader(folder / f"{kind}.pvd").datasets for kind in ("fields", "contact")
+        )
+    times = [frame.time for frame in fields]
     rows = [int(np.argmin(abs(run.steps["t"] - time))) for time in times]
-    files = ([name for _, name in sets] for sets in (fields, contact))
+    files = ([Path(frame.path).name for frame in frames] for frames in (fields, contact))
     return run, list(zip(times, rows, *files, strict=True))
 
 
