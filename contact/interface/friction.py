@@ -266,13 +266,13 @@ class NodalFriction:
     def by_pressure(self, pressure: Array, slip: Array) -> Array:
         """Return the derivative of the bound by the pressure at the node, shape (n,).
 
-        0 for a smoothed pressure: it would couple all nodes within the radius, and is lagged.
+        0 where p < 0, for s is a function of max(p, 0); and 0 for a smoothed pressure: it would
+        couple all nodes within the radius, and is lagged.
         """
         if self.law is None or not self.local:
             return np.zeros_like(slip)
-        return np.asarray(
-            self.law.by_pressure(self._accumulated(slip), self.smooth(pressure)), dtype=float
-        )
+        rate = self.law.by_pressure(self._accumulated(slip), self.smooth(pressure))
+        return np.where(pressure >= 0, np.asarray(rate, dtype=float), 0.0)
 
     def smooth(self, pressure: Array) -> Array:
         """Return max(R p, 0), shape (n,): of an iterate R p may be negative. Collective."""
