@@ -66,8 +66,8 @@ class FixedPointOptions(LoopOptions):
         Discriminator(lambda given: ":text" if isinstance(given, str) else ":number"),
         Accepted('"auto" or a number > 0'),
     ] = "auto"
-    """Augmentation parameter of the Uzawa block relaxation (stress/length). `auto` fits a block;
-    for a slender body no r does."""
+    """Augmentation parameter of the Uzawa block relaxation (stress/length). `auto` fits a block,
+    and a slender body where the relaxation stalls with that."""
     acceleration: Literal["anderson", "none"] = "anderson"
     """Acceleration of the Uzawa block relaxation."""
     depth: Annotated[

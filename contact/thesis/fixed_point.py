@@ -38,6 +38,7 @@ from contact.problem.residuals import (
     undeformed_equilibrium,
 )
 from contact.problem.state import State
+from contact.thesis.softest_mode import fitted_augmentation
 from contact.thesis.uzawa import (
     FrozenProblem,
     augmentation,
@@ -229,7 +230,7 @@ class FixedPoint(OuterLoop):
         self, start: State | None = None, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit; see `Method`. Collective."""
-        self._stalled, self._residual = False, np.inf
+        self._stalled, self._residual, self._fitted = False, np.inf, False
         self._gap_derivative = ConductivityDerivative(NEAR)
         if not self.operator.symmetric:  # of an earlier solve
             self.operator = self._new_operator(symmetric=True)
@@ -252,7 +253,7 @@ class FixedPoint(OuterLoop):
                 pressure = interface.pressure(nodal, start.forces)
             self._z = np.column_stack([pressure, start.forces.friction])
             self.bound = interface.bound(nodal, start.forces)
-        self._first, self._tangent = first, False
+        self._first, self._tangent, self._first_bound = first, False, self.bound
         outcome = self._iterate(first)
         return self.state, outcome
 
@@ -268,6 +269,8 @@ class FixedPoint(OuterLoop):
         if friction and self._first == 0 and iteration == 1:
             # Slip and contact without friction are a bad initial guess.
             self._z = self._initial_z(0.0, friction)
+        if self._stalled and self._residual > NEAR:
+            self._fit_to_softest_mode(friction)
         state, nodal = self.state, interface.nodes.jump(self.state.x)
         blocks = augmentation(interface.nodes, self.r, friction)
         if interface.foundation.active:
@@ -292,6 +295,19 @@ class FixedPoint(OuterLoop):
         self.state, self._z = replace(state, x=x, forces=result.forces), result.z
         self._secant_at = x
         return result.iterations, "tangent" if kind == "tangent" else ""
+
+    def _fit_to_softest_mode(self, friction: bool) -> None:
+        """Begin anew with the r of a slender body, once, if the body is one."""
+        options, problem = self.options, self.problem
+        if self._fitted or options.r != "auto" or options.stopping == "thesis":
+            return
+        self._fitted = True
+        start = problem.start()
+        r = fitted_augmentation(problem, self.operator, start)
+        if r is not None:
+            self.r, self.state, self._secant_at = r, start, problem.body.zero_displacement()
+            self.bound = self._first_bound.copy()
+            self._z = self._initial_z(0.0, friction)
 
     def _charge_block(self, nodal: Array, pressure: Array) -> Array:
         """Linearise the charge, near the solution with the derivative of psi by the gap."""

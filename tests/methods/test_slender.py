@@ -11,7 +11,9 @@ from contact.methods import fallbacks, newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
 from contact.problem.residuals import evaluate
-from contact.solving import solve
+from contact.solving import build_problem, solve
+from contact.thesis.fixed_point import FixedPoint
+from contact.thesis.softest_mode import softest_mode
 from tests.problems.everywhere import agree
 
 SELF = MPI.COMM_SELF
@@ -282,12 +284,44 @@ def test_ranks_agree_on_the_working_set():
     agree(lambda comm: solve(parse_case(case), comm=comm), quantities, 1e-7)
 
 
-def test_no_r_fits_a_slender_body():
-    """The stiffnesses of its modes are too far apart for one r; Newton's method takes two steps."""
+@pytest.mark.parametrize(
+    ("case", "force"),
+    [
+        (beam(100.0, [200, 2], TIP, 0.5), [0.0, -9.9734515e-05]),
+        (beam(100.0, [200, 2], TIP, 0.5, 0.3), FRICTION),
+        (
+            beam(80.0, [240, 3], {"on": "right", "traction": [0.0, -2e-4]}, 0.3, 0.25)
+            | {"material": {"young": 2.0, "poisson": 0.3}},
+            [-4.8438046e-05, -1.9908977e-04],
+        ),
+    ],
+    ids=["tip", "friction", "stiffer"],
+)
+def test_the_block_relaxation_fits_r_to_a_beam(case, force):
+    """With the r of a block it stalled at 1: the softest mode is 1e8 times softer."""
+    solution = solve(parse_case(case), FixedPointOptions(), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert np.allclose(solution.contact_force, force, rtol=0, atol=1e-7 * np.abs(force).max())
+    assert solution.counters.factorizations <= 3
+
+
+def test_an_r_of_the_user_stays():
+    """Another r than the given one would be a surprise in a study of r."""
     case = parse_case(beam(100.0, [200, 2], TIP, 0.5))
-    solution = solve(case, FixedPointOptions(), comm=SELF)
+    solution = solve(case, FixedPointOptions(r=2.0), comm=SELF)
     assert not solution.converged
-    assert "the Uzawa block relaxation with r = " in solution.outcome.reason
+    assert "the Uzawa block relaxation with r = 2 stalls" in solution.outcome.reason
+
+
+@pytest.mark.core
+def test_the_softest_mode_of_a_cantilever_is_its_first_bending_mode():
+    """With masses at the contact nodes: (1.8751/L)^4 E' h^3/12, but for its shear."""
+    case = parse_case(beam(40.0, [160, 2], TIP, 0.5, space={"degree": 2}))
+    problem = build_problem(case, comm=SELF)
+    operator = FixedPoint(problem, FixedPointOptions()).operator
+    shift = 1e-12 * problem.scales.augmentation
+    found = softest_mode(problem, operator, problem.start(), shift)
+    assert found == pytest.approx(1.8751**4 / 40.0**4 * problem.scales.plane_modulus / 12, rel=5e-3)
 
 
 @pytest.mark.parametrize(("poisson", "far"), [(0.3, False), (0.4999, True)])

@@ -1,0 +1,103 @@
+"""The augmentation parameter of a slender body, from the stiffness of its softest mode.
+
+A mode of Gamma_3 with the stiffness sigma contracts by sigma/(sigma + r) in contact and by
+r/(sigma + r) without: r = sqrt(sigma_min sigma_max) is the best. A block has the ends 1.1 E'/H and
+1.92 E'/h, a body that bends has a smaller sigma_min.
+
+References
+----------
+Ghadimi, Teixeira, Shames and Johansson, Optimal parameter selection for the alternating direction
+method of multipliers (ADMM): quadratic problems, IEEE Trans. Automat. Control 60 (2015) 644.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contact.errors import InputError
+from contact.linear.operator import Operator
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.ranks import summed
+from contact.thesis.uzawa import augmentation
+from contact.typing import Array
+
+#: Steps of the Rayleigh-Ritz method: the softest mode of a body that bends stands apart.
+STEPS = 12
+
+#: Stiffness added to all modes, over r*, and modes softer than `FREE` times it: rigid motions.
+SHIFT, FREE = 1e-12, 10.0
+
+#: Least stiffness of a mode of a block, over E'/H.
+BLOCK = 1.1
+
+
+def fitted_augmentation(problem: ContactProblem, operator: Operator, state: State) -> float | None:
+    """Return r = sqrt(sigma_min sigma_max) (stress/length). Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    operator
+        Its operator, which is assembled anew.
+    state
+        Where the body is linearised.
+
+    Returns
+    -------
+    The parameter; None if the body is not softer than a block.
+    """
+    scales = problem.scales
+    block = BLOCK * scales.plane_modulus / scales.height
+    try:
+        sigma = softest_mode(problem, operator, state, SHIFT * scales.augmentation)
+    except InputError:  # singular: contact alone holds a rigid-body mode
+        return None
+    if not sigma < block:
+        return None
+    return scales.augmentation * math.sqrt(sigma / block)
+
+
+def softest_mode(problem: ContactProblem, operator: Operator, state: State, shift: float) -> float:
+    """Return the least stiffness of normal displacements, but for rigid motions. Collective.
+
+    The Ritz value of the compliance on a Krylov space, in L2(Gamma_3); `shift` is added to all
+    stiffnesses (stress/length).
+    """
+    interface, nodes = problem.interface, problem.interface.nodes
+    blocks = augmentation(nodes, shift, False)
+    if interface.foundation.active:
+        nodal = nodes.jump(state.x)
+        blocks += interface.foundation.charge_block(nodal, interface.pressure(nodal, state.forces))
+    weighted = interface.weighted(blocks, state.x)
+    operator.update("secant", state, weighted, constant=problem.body.linear)
+
+    def inner(a: Array, b: Array) -> Array:
+        return summed(nodes.comm, a.T @ (nodes.weight[:, None] * b))
+
+    def displacement(traction: Array) -> Array:
+        load = np.zeros(problem.body.owned)
+        nodes.add_jump_transposed((nodes.weight * traction)[:, None] * nodes.normal, load)
+        return nodes.normal_component(nodes.jump(operator.solve(load)))
+
+    # Without symmetries, and the same on all ranks.
+    uneven = np.sqrt([2.0, 3.0, 5.0])[: nodes.dim]
+    vector = nodes.normal @ uneven * (1 + nodes.points @ uneven / problem.scales.size)
+    basis = images = np.zeros((vector.size, 0))
+    for _ in range(STEPS):
+        for _ in range(2):  # twice is enough, in spite of cancellation
+            vector = vector - basis @ inner(basis, vector[:, None])[:, 0]
+        length = nodes.norm(vector)
+        if basis.shape[1] and not length > 1e-12 * nodes.norm(images[:, -1]):
+            break
+        basis = np.column_stack([basis, vector / length])
+        vector = displacement(basis[:, -1])
+        images = np.column_stack([images, vector])
+    compliance = inner(basis, images)
+    values = np.linalg.eigvalsh((compliance + compliance.T) / 2)
+    stiffness = 1 / values[values > 0] - shift
+    held = stiffness[stiffness > FREE * shift]
+    return float(held.min(initial=np.inf))
