@@ -23,6 +23,7 @@ from contact.model.foundation import Conductor, Layer
 from contact.tolerances import EPS
 from contact.typing import Array
 from forms.laws import PenetrationLaw
+from forms.ops import Value
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,21 @@ class NormalGraph:
         return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))
 
 
+@dataclass(frozen=True)
+class ElasticBed:
+    """k s in place of p_nu(s), in tension too; see `PenetrationLaw`."""
+
+    stiffness: Array
+
+    def __call__(self, s: Value) -> Value:
+        """Return the pressure over h_nu."""
+        return self.stiffness * s
+
+    def derivative(self, s: Value) -> Value:
+        """Return its derivative."""
+        return self.stiffness + 0.0 * s
+
+
 #: A pressure above zero.
 TINY = np.finfo(float).tiny
 
@@ -144,6 +160,23 @@ class FoundationLaw:
         assert self.conductor is not None
         return replace(self, conductor=replace(self.conductor, share=share))
 
+    def elastic_bed(self, secant: Array) -> FoundationLaw:
+        """Return the foundation with an elastic bed in place of its layer, in tension too."""
+        assert self.layer is not None
+        return replace(self, layer=replace(self.layer, p_nu=ElasticBed(secant)))
+
+    def secant(self, x: Array) -> Array:
+        """Return p_nu(s)/s at nodal unknowns, shape (n,); 0 where the layer is not touched."""
+        assert self.layer is not None
+        s = self._layer_penetration(x)
+        return np.asarray(self.layer.p_nu(s) / np.where(s > 0, s, 1.0), dtype=float)
+
+    def largest_secant(self, size: float) -> Array:
+        """Return the largest p_nu(s)/s of penetrations up to the size of the body, shape (n,)."""
+        assert self.layer is not None
+        depths = [np.full(self.nodes.weight.size, s) for s in size * np.logspace(-9, 0, 37)]
+        return np.max([self.layer.p_nu(s) / s for s in depths], axis=0)
+
     def normal_graph(self, x: Array) -> NormalGraph | None:
         """Return the layer and the constraint as one graph, h_nu frozen at the nodal unknowns.
 
@@ -172,6 +205,22 @@ class FoundationLaw:
             return np.zeros(x.shape[0])
         stiffness = self.layer.h_nu(self._difference(x))
         return np.asarray(stiffness * self.layer.p_nu(self._layer_penetration(x)), dtype=float)
+
+    def largest_pressure(self, deep: float) -> Array:
+        """Return bounds of the normal contact pressure, shape (n,): finite on saturated layers.
+
+        Parameters
+        ----------
+        deep
+            Penetration beyond all that bodies reach (length). Where a layer still grows there,
+            has a rigid part, or depends on the potential, the bound is infinite.
+        """
+        unbounded = np.full(self.nodes.weight.size, np.inf)
+        if self.layer is None or self.nodes.block_size > self.nodes.dim:
+            return unbounded
+        at, further = (self.layer.p_nu(np.full(unbounded.size, s)) for s in (deep, 2 * deep))
+        saturated = np.isinf(self.layer.thickness) & (further <= at)
+        return np.where(saturated, self.layer.h_nu(np.zeros_like(at)) * at, np.inf)
 
     def _layer_penetration(self, x: Array) -> Array:
         """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""

@@ -39,6 +39,10 @@ class Proximal:
     about: Array
 
 
+#: Penetration at which a layer is looked at for saturation, over the size of the bodies.
+DEEP = 1e3
+
+
 @dataclass(frozen=True)
 class Interface:
     """Unilateral contact, friction, layer and surface charge at the owned contact nodes.
@@ -149,6 +153,17 @@ class Interface:
     def pressure(self, nodal: Array, multipliers: Multipliers) -> Array:
         """Return -sigma_nu = lambda_c + p_l, p_l the layer's pressure, shape (n,)."""
         return multipliers.pressure + self.foundation.pressure(nodal)
+
+    @property
+    def largest_pressure(self) -> Array:
+        """Bounds of the contact pressure, shape (n,); finite on saturated layers alone."""
+        return self.foundation.largest_pressure(DEEP * self.size)
+
+    @property
+    def saturation(self) -> float:
+        """The largest pressure of layers that saturate; 0 without such. Collective."""
+        bound = self.largest_pressure
+        return self.nodes.maximum(np.where(np.isfinite(bound), bound, 0.0))
 
     def bound(self, nodal: Array, multipliers: Multipliers) -> Array:
         """Return the friction bound s, shape (n,). Collective."""

@@ -7,6 +7,7 @@
    - continuation in the conductivity, of a condensed problem alone, from the initial guess
      `problem.start()`;
    - a rigid motion that separates the bodies, of a condensed problem alone;
+   - secants of a layer that alone holds a body, from that guess;
    - proximal points, from that guess;
    - the interior point from that guess, its first slacks from the gaps of the linear solve;
    - steps on the condensed body, of a whole problem alone, from that guess.
@@ -60,6 +61,11 @@ Solver: TypeAlias = Callable[[State, Array | None], End]
 
 #: Notes of steps in the history.
 WORKING_SET, CONTINUATION, PROXIMAL_POINT = "working set", "continuation", "proximal point"
+SECANT = "secant of the layer"
+
+#: Most secants of a layer, the least one over the largest, and the ratio of residuals from one
+#: trial of Newton's last steps to the next.
+SECANTS, SOFTEST, NEARER_BY = 50, 1e-6, 0.1
 
 #: Factor by which the conductivity grows: the first, and the least one that is tried.
 FACTOR, LEAST_FACTOR = 1e3, 1.2
@@ -138,6 +144,7 @@ def fall_back(
     for fallback in (
         partial(working_set, newton, without_contact),
         partial(conductivity_continuation, newton),
+        partial(layer_secants, newton),
         partial(rigid_motion, newton, outcome),
         partial(proximal_points, newton),
         partial(interior_points, newton, without_contact, condensed is not None),
@@ -331,6 +338,33 @@ def conductivity_continuation(newton: SemismoothNewton) -> End | None:
         return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
 
     return continuation(solve, problem.start())
+
+
+def layer_secants(newton: SemismoothNewton) -> End | None:
+    """Solve by secants of the layer that alone holds a body, if there is one that saturates.
+
+    It has no stiffness where it is saturated, nor before its first touch. Kacanov's method takes
+    p_nu(s)/s of the last iterate; where the forces nearly balance, Newton's method the last steps.
+    """
+    problem, interface = newton.problem, newton.problem.interface
+    if newton.modes.constrained_by_supports or interface.saturation == 0:
+        return None
+    foundation, near = interface.foundation, NEARLY_BALANCED
+    state, largest = problem.start(), foundation.largest_secant(interface.size)
+    secant = largest
+    for _ in range(SECANTS):
+        bed = foundation.elastic_bed(np.maximum(secant, SOFTEST * largest))
+        method = newton.on(problem.with_interface(replace(interface, foundation=bed)))
+        state, outcome = method.iterate(state, note=SECANT)
+        if not outcome.converged:
+            return None
+        if evaluate(problem, state).significant <= near:
+            found = newton.iterate(newton.started(state), note=SECANT)
+            if found[1].converged:
+                return found
+            near *= NEARER_BY
+        secant = foundation.secant(interface.nodes.jump(state.x))
+    return None
 
 
 def proximal_points(newton: SemismoothNewton) -> End | None:

@@ -18,6 +18,7 @@ from contact.model.fields import values_at
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
     PULLED_OFF,
+    PUSHED_THROUGH,
     Group,
     UnilateralSupport,
     described,
@@ -221,12 +222,23 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
     if unconstrained.shape[1] > 0:
         raise InputError(_unconstrained(group, unconstrained), "unsupported")
     support = UnilateralSupport.of(group)
-    if support is not None and support.release(problem.time) is not None:
+    found = None if support is None else support.release(problem.time)
+    if found is None:
+        return
+    if found.borne == 0:
         raise InputError(
             f"the loads {PULLED_OFF}, and no support holds it there; accepted: loads that press it "
             "on, or more displacement components fixed",
             "pulled-off",
         )
+    words = described(found.motion[:, None], group.names)
+    raise InputError(
+        f"the loads {PUSHED_THROUGH} ({words}): it bears {found.borne:.4g} at most, with its "
+        f"largest pressure of {problem.interface.saturation:.4g} (stiffness x limit), the loads "
+        f"are {found.power:.4g}; accepted: smaller loads, a larger limit, a layer on a rigid "
+        "part, or supports",
+        "saturated",
+    )
 
 
 def _unconstrained(group: Group, unconstrained: Array) -> str:

@@ -296,6 +296,27 @@ PULLED_OFF = "pull the body off the foundation, or along it by more than frictio
 
 
 @dataclass(frozen=True)
+class Release:
+    """A motion by which loads move bodies off their unilateral supports.
+
+    Attributes
+    ----------
+    motion
+        The mode, shape (m,).
+    power, borne
+        Power of the loads on it, and the largest of saturated layers, which is less (force).
+    """
+
+    motion: Array
+    power: float
+    borne: float
+
+
+#: The motion of a body by loads beyond the pressure of a layer without a rigid part.
+PUSHED_THROUGH = "push the body through the layer"
+
+
+@dataclass(frozen=True)
 class UnilateralSupport:
     """Contact as unilateral support of a group of bodies.
 
@@ -306,13 +327,16 @@ class UnilateralSupport:
     free
         The modes that the supports do not constrain, shape (m, k).
     cone
-        Rows of all ranks, shape (rows, k): admissible contact forces do no positive work on motions
-        q with cone q <= 0.
+        Rows of all ranks, shape (rows, n, k): contact forces within the friction cone of a node do
+        at most the power of its largest pressure times max(0, row q) on a motion q.
+    bound
+        Largest contact forces of the nodes, shape (n,) (force); infinite but on saturated layers.
     """
 
     group: Group
     free: Array
     cone: Array
+    bound: Array
 
     @staticmethod
     def of(group: Group, at: NDArray[np.bool_] | slice = slice(None)) -> UnilateralSupport | None:
@@ -327,35 +351,41 @@ class UnilateralSupport:
         mu = comm.allreduce(mu, op=MPI.MAX)
         if free.shape[1] == 0 or not np.isfinite(mu) or not friction.local:
             return None
-        normal = group.normal @ free
+        nodes, normal = problem.nodes, group.normal @ free
         across = [
             mu * np.einsum("ni,nim->nm", along, group.tangential) @ free
-            for along in _sideways(problem.nodes.normal)
+            for along in _sideways(nodes.normal)
         ]
         rows = [normal + sign * part for part in across for sign in (-1, 1)]
+        bound = nodes.weight * problem.interface.largest_pressure
         return UnilateralSupport(
-            group, free, np.concatenate([problem.nodes.gather(row[at]) for row in rows])
+            group, free, np.stack([nodes.gather(row[at]) for row in rows]), nodes.gather(bound[at])
         )
 
-    def release(self, time: float) -> Array | None:
-        """Return the mode, shape (m,), by which loads release the bodies; None if balanced.
-
-        Collective.
-        """
+    def release(self, time: float) -> Release | None:
+        """Return the mode by which loads move the bodies off; None if balanced. Collective."""
         work, scale = _work(self.group, self.free, time)
         return on_root(self.group.problem.comm, lambda: self._release(work, scale))
 
-    def _release(self, work: Array, scale: float) -> Array | None:
-        """Return the mode of most power of the loads, on the rank that has the cone."""
+    def _release(self, work: Array, scale: float) -> Release | None:
+        """Return the mode of most power left to the loads, on the rank that has the cone."""
         if np.abs(work).max() <= NEGLIGIBLE * scale:
             return None
         from scipy.optimize import linprog  # takes a while to load
+        from scipy.sparse import block_array, eye_array
 
-        bounds = [(-1, 1)] * work.size
-        motion = linprog(-work, self.cone, np.zeros(len(self.cone)), bounds=bounds)
-        if motion.status != 0 or -motion.fun <= BALANCED * scale:
+        gives = np.isfinite(self.bound)
+        bears, layer = self.cone[:, ~gives].reshape(-1, work.size), self.cone[:, gives]
+        cost = np.concatenate([-work, self.bound[gives]]) / scale
+        bounds = [(-1, 1)] * work.size + [(0, None)] * layer.shape[1]
+        rows = [[bears, None], *([each, -eye_array(each.shape[0])] for each in layer)]
+        cone = block_array(rows, format="csr")
+        found = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
+        if found.status != 0 or -found.fun <= BALANCED:
             return None
-        return np.asarray(self.free @ motion.x)
+        motion = found.x[: work.size]
+        power, borne = float(work @ motion), float(self.bound[gives] @ found.x[work.size :])
+        return Release(np.asarray(self.free @ motion), power, borne)
 
 
 def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
@@ -375,12 +405,12 @@ def released(supports: Sequence[UnilateralSupport], begin: float, end: float) ->
         A time of equilibrium, and the time of the loads.
     """
     for support in supports:
-        if support.release(end) is None:
+        if (found := support.release(end)) is None:
             continue
         for _ in range(ROUNDS):
             middle = (begin + end) / 2
             begin, end = (middle, end) if support.release(middle) is None else (begin, middle)
-        return f"from t = {end:g} on the loads {PULLED_OFF}"
+        return f"from t = {end:g} on the loads {PUSHED_THROUGH if found.borne else PULLED_OFF}"
     return ""
 
 

@@ -210,7 +210,8 @@ def not_held(solution: Solution) -> Iterator[Remark]:
             bound = problem.nodes.weight * solution.friction_bound
             motion = sliding_mode(group, time, bound)
         elif (support := UnilateralSupport.of(group)) is not None:
-            motion = support.release(time)
+            found = support.release(time)
+            motion = None if found is None else found.motion
         if motion is None:
             continue
         large = np.abs(motion) > 0.1 * np.abs(motion).max()

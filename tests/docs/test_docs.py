@@ -24,7 +24,7 @@ from contact.methods import (
 )
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.problem import condensed
-from contact.thesis import fixed_point, penalty, uzawa
+from contact.thesis import fixed_point, penalty, softest_mode, uzawa
 from contact.tolerances import LARGEST_VIOLATION
 from scripts import command_page
 from scripts.reporting import text
@@ -238,6 +238,8 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"[{interior_point.SHORTEST} to {interior_point.LONGEST}] of the way": True,
         "with k = [10⁻²] c": fallbacks.PROXIMAL_STIFFNESS == 1e-2,
         f"are at most [{fallbacks.NEARLY_BALANCED}]": True,
+        f"below a residual of [{fallbacks.NEARLY_BALANCED}] Newton": True,
+        f"of [{softest_mode.STEPS}] steps of the Krylov method": True,
         f"Multiply k by [{fallbacks.SOFTER}]": True,
         f"multiply k by [{fallbacks.STIFFER:g}] until": True,
         f"after [{fallbacks.STAGNANT_PROBLEMS}] problems in succession": True,

@@ -212,6 +212,21 @@ def _belt() -> Case:
     return parse_case(tables, source="belt")
 
 
+def _layer() -> Case:
+    """Return a block on a layer that the load presses to 95 % of its limit."""
+    stiffness, limit = 500.0, 3e-3
+    tables = {
+        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [6, 3]},
+        "material": {"young": 1000.0, "poisson": 0.0},
+        "fixed": [{"on": "left", "symmetry": "x"}],
+        "load": [{"on": "top", "pressure": 0.95 * stiffness * limit}],
+        "contact": {"on": "bottom", "law": "compliance", "layer": np.inf,
+                    "stiffness": stiffness, "limit": limit},
+        "friction": {"law": "none"},
+    }  # fmt: skip
+    return parse_case(tables, source="layer")
+
+
 def _wedge() -> Case:
     """Return a wedge between two planes, whose bounds by interior points alone take far longer."""
     (problem,) = problems("bodies", "wedges-21", folder=Path(tempfile.mkdtemp()))
@@ -291,6 +306,8 @@ DEVICES = (
            "Lawson and Hanson 1974", ((fallbacks, "rigid_motion", _nothing),), (), _pads),
     Device("steps on the condensed body at last", (fallbacks.condensed_body,), "Guyan 1965",
            ((fallbacks, "condensed_body", _nothing),)),
+    Device("secants of a layer", (fallbacks.layer_secants,), "Kacanov 1959",
+           ((fallbacks, "layer_secants", _nothing),), (), _layer),
     Device("proximal points", (fallbacks.proximal_points,), "Rockafellar 1976",
            ((fallbacks, "proximal_points", _nothing),), (), _belt),
     Device("continuation in the conductivity", (fallbacks.continuation,), "Allgower and Georg 2003",

@@ -1,0 +1,115 @@
+"""Bodies that a layer without a rigid part alone holds: it bears stiffness x limit at most."""
+
+import re
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.case.file import parse_case
+from contact.errors import InputError
+from contact.solving import solve
+
+SELF = MPI.COMM_SELF
+STIFFNESS, LIMIT = 500.0, 0.003
+LARGEST = STIFFNESS * LIMIT
+
+#: Mesh, sides of symmetry, and area of the base, of blocks of height 1.
+BLOCKS = {
+    "plane": (("rectangle", [2.0, 1.0], [6, 3]), {"left": "x"}, 2.0),
+    "solid": (("box", [2.0, 1.0, 1.0], [3, 2, 2]), {"left": "x", "front": "y"}, 2.0),
+    "revolved": (("rectangle", [2.0, 1.0], [6, 3]), {}, 4 * np.pi),
+}
+
+
+def block(kind: str, share: float, mu: float = 0.0, **more) -> dict:
+    """Return a block that a share of the largest pressure presses on the layer."""
+    (generator, size, cells), sides, _ = BLOCKS[kind]
+    revolved = {"kinematics": "axisymmetric"} if kind == "revolved" else {}
+    return {
+        "mesh": {"generator": generator, "size": size, "cells": cells},
+        "space": revolved,
+        "material": {"young": 1000.0, "poisson": 0.0},
+        "fixed": [{"on": side, "symmetry": axis} for side, axis in sides.items()],
+        "load": [{"on": "top", "pressure": share * LARGEST}],
+        "contact": {
+            "on": "bottom",
+            "law": "compliance",
+            "layer": np.inf,
+            "stiffness": STIFFNESS,
+            "limit": LIMIT,
+        },
+        "friction": {"law": "coulomb", "mu": mu} if mu else {"law": "none"},
+        **more,
+    }
+
+
+@pytest.mark.core
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize("share", [0.05, 0.6, 0.95, 0.999])
+@pytest.mark.parametrize("kind", BLOCKS)
+def test_a_layer_bears_up_to_its_limit(kind, share, mu):
+    """From a third of the limit on Newton's method ended at displacements of 1e13."""
+    solution = solve(parse_case(block(kind, share, mu)), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    pressed = share * LARGEST
+    assert solution.pressure == pytest.approx(pressed, rel=1e-6)
+    # The base sinks by p/k, the top by the compression p/E more.
+    assert solution.max_displacement == pytest.approx(pressed / STIFFNESS + pressed / 1e3, rel=1e-6)
+
+
+@pytest.mark.core
+@pytest.mark.parametrize("kind", BLOCKS)
+def test_loads_beyond_the_limit_are_refused_with_both(kind):
+    area = BLOCKS[kind][2]
+    with pytest.raises(InputError, match=r"\[saturated\]") as refused:
+        solve(parse_case(block(kind, 1.02)), comm=SELF)
+    message = str(refused.value)
+    assert f"bears {LARGEST * area:.4g} at most" in message
+    assert f"largest pressure of {LARGEST:.4g} (stiffness x limit)" in message
+    assert f"the loads are {1.02 * LARGEST * area:.4g}" in message
+
+
+def test_a_load_aside_tilts_a_block_until_the_layer_is_saturated_there():
+    """Its moment is M; rigid and linear, the pressure F/A + M x/I would be above the limit."""
+    case = block("plane", 0.0, fixed=[{"on": "left", "displacement": ["free", 0.0]}])
+    case["fixed"] = []
+    case["material"]["young"] = 1e6
+    case["friction"] = {"law": "coulomb", "mu": 0.3}
+    case["load"] = [{"on": "top", "traction": ["0", f"-{LARGEST}*0.6*(0.1+0.9*x)"]}]
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert solution.contact_force[1] == pytest.approx(-2 * LARGEST * 0.6, rel=1e-6)
+    assert solution.pressure.max() == pytest.approx(LARGEST, rel=1e-9)
+
+
+def test_load_steps_end_where_the_layer_is_saturated():
+    """The load 0.6 t (3 - t) of the limit is above it from t = 0.736 on, and 0 at the end."""
+    case = block("plane", 0.0, evolution={"times": [0.0, 3.0], "steps": [6]})
+    case["load"] = [{"on": "top", "traction": ["0", f"-{0.6 * LARGEST}*t*(3 - t)"]}]
+    solution = solve(parse_case(case), comm=SELF)
+    when = (3 - np.sqrt(9 - 4 / 0.6)) / 2
+    assert not solution.converged
+    words = r"from t = (\S+) on the loads push the body through the layer"
+    said = re.search(words, solution.outcome.reason)
+    assert said is not None and float(said[1]) == pytest.approx(when, rel=1e-5)
+    # Halves of a step come as near as 1/16 of it.
+    assert when - 0.5 / 16 <= solution.steps[-1].row["t"] <= when
+
+
+def test_a_saturated_layer_under_a_held_body_is_no_fault():
+    case = block("plane", 3.0)
+    case["fixed"].append({"on": "right", "displacement": [0.0, 0.0]})
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert solution.pressure.max() == pytest.approx(LARGEST, rel=1e-9)
+
+
+@pytest.mark.parallel
+def test_ranks_agree_on_a_saturated_layer():
+    case = parse_case(block("solid", 0.95, 0.3))
+    shared, alone = solve(case), solve(case, comm=SELF)
+    assert shared.converged
+    assert np.allclose(shared.contact_force, alone.contact_force, rtol=1e-8, atol=1e-10)
+    with pytest.raises(InputError, match=r"\[saturated\]"):
+        solve(parse_case(block("solid", 1.02)))
