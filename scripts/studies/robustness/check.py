@@ -169,8 +169,8 @@ def recheck(mesh: Mesh, tables: Tables, folder: Path) -> dict[str, float]:
     before = np.zeros(len(last))
     moved = max(float(np.abs(_displacement(mesh, path)).max()) for _, path in steps)
     young = max(material["young"] for material in tables["material"])
-    # Displacements are known to their rounding, and forces to that of stresses.
-    least = max(1e-8 * young * moved, 1e-300)
+    # Displacements are known to their rounding, and forces to that of stresses: 1e-13 E |u|.
+    least = max(1e-7 * young * moved, 1e-300)
     for time, path in steps:
         rows = [row for row in table if float(row["t"]) == time] if table else last
         found = _laws(tables, rows, before, float(np.ptp(mesh.points)), least)
