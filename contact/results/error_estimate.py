@@ -8,7 +8,7 @@ see are added (`oscillation`). S is the compliance of the last linearisation, wi
 modulus. In a piezoelectric body sigma is the pair (sigma, D), and S that of [F, -e^T; e, beta],
 whose energy is eps : F eps + E . beta E. At the contact pressures times gaps between the nodes are
 added, and friction times slip that is not dissipated (Krause, Veeser and Walloth, Numer. Math.
-130, 2015).
+130, 2015), at most the energy of tractions that move to where the gap is closed.
 
 `nodal_means` are means of the cells around a vertex. Across facets inside of the body at which
 something acts, stresses jump: there the cells fall into groups that these facets separate, as the
@@ -158,7 +158,7 @@ def estimated(
     if body.degree == 1:  # the local problems of degree 2 see loads up to the third degree
         # A surface is as stiff as E/(1 - nu^2), twice the shear modulus and more.
         squares += oscillation(problem, state.time) / (2 * modulus)
-    at_contact = _at_contact(problem, state)
+    at_contact = _at_contact(problem, state, modulus)
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
     energies, by_ratio, with_ratio, total, contact = map(float, sums)
@@ -304,10 +304,14 @@ def _stiffness(material: Material, shear: Array, factor: Array) -> Array:
     return whole
 
 
-def _at_contact(problem: ContactProblem, state: State) -> Array:
+def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     """Return the share of contact in eta_K^2 of the owned cells, shape (cells,). Collective."""
     # Between its nodes, all values linear: p |u_n - g| and s |u_t| - lambda_f . u_t, where
-    # complementarity holds at the nodes alone.
+    # complementarity holds at the nodes alone. Their integral D over a facet counts a multiplier
+    # lambda that is spread over its size h, however narrow the contact, as at an edge. Moved to a
+    # width b < h, where the gap is closed, lambda leaves D b/h and costs S log(h/b), as a line
+    # load does, with S = h/(2 pi g) int |lambda|^2 as of a load that nodes do not see. Where S < D
+    # the sum is least for b/h = S/D: S (1 + log(D/S)).
     body, interface = problem.body, problem.interface
     domain, d, nodal = body.domain, body.dim, problem.nodal(state)
     sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
@@ -342,8 +346,36 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     ends = shape.facet_nodes(domain.order)[place]
     of_facet = np.take_along_axis(behind, ends[..., None], axis=1)
     areas = integration_weights(domain.revolved, shape.facet, of_facet, at, weights)
-    np.add.at(squares, cells, np.sum(areas * density, axis=1))
+    products = np.sum(areas * density, axis=1)
+    size = integration_weights(False, shape.facet, of_facet, at, weights).sum(axis=1)
+    share = size ** (1 / shape.facet.dim) / np.pi * _compliance(problem, cells, modulus)
+    moved = share * np.sum(areas * (pressure**2 + np.sum(friction**2, axis=-1)), axis=1)
+    ratio = np.divide(products, moved, out=np.ones_like(moved), where=moved > 0)
+    # Beside a facet that touches with all of its nodes there is room, and b is h.
+    touches = values[nodes, 0] > interface.negligible(nodal, state.forces.pressure)
+    within = la.vector(index_map)
+    within.array[nodes[touches.all(axis=1)]] = 1.0
+    within.scatter_reverse(la.InsertMode.add)
+    within.scatter_forward()
+    alone = ~np.any(touches & (within.array[nodes] > 0), axis=1)
+    moved *= 1 + alone * np.log(np.maximum(ratio, 1.0))
+    np.add.at(squares, cells, np.minimum(products, moved))
     return squares
+
+
+def _compliance(problem: ContactProblem, cells: Indices, modulus: Array) -> Array:
+    """Return 1/(2 g) of cells at the contact, of two bodies with that of the other. Collective."""
+    found, domain = 1 / (2 * modulus[cells]), problem.domain
+    for contact in problem.contacts:
+        if contact.against is not None:
+            own, other = (
+                cells_at(domain.mesh, domain.facets(part))[0]
+                for part in (contact.on, contact.against)
+            )
+            # The softest: which cells are opposite is not asked.
+            softest = np.max(1 / (2 * modulus[other]), initial=0.0)
+            found[np.isin(cells, own)] += problem.comm.allreduce(float(softest), op=MPI.MAX)
+    return found
 
 
 def oscillation(problem: ContactProblem, time: float) -> Array:

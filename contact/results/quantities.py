@@ -482,12 +482,12 @@ _RUN = (
     ),
     Quantity(
         "error", "",
-        "Estimated discretisation error. `energy`: relative, in the energy norm; displacements "
-        "under given loads are off by about its square. `effectivity`: `null`, for it is the "
-        "estimate over the error, which a run does not know. `intervals`: bounds of forces, of the "
-        "largest displacement and of the largest pressure, by the last three meshes of "
-        "`[mesh.adapt]` with `fraction = 1`; `null` for one that does not converge, such as a "
-        "pressure at a corner. All are `null` where the equations are not solved.",
+        "Estimated discretisation error. `energy`: relative, in the energy norm; the elastic "
+        "energy is off by about its square. `effectivity`: `null`, for it is the estimate over the "
+        "error, which a run does not know. `intervals`: bounds of forces, of the largest "
+        "displacement and of the largest pressure, by the last three meshes of `[mesh.adapt]` with "
+        "`fraction = 1`; `null` for one that does not converge, such as a pressure at a corner. "
+        "All are `null` where the equations are not solved.",
         lambda r: {
             "energy": _error(r), "effectivity": None, "intervals": r.intervals,
         }, component=VECTOR, entries=ENDS,

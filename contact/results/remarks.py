@@ -56,7 +56,7 @@ LOCKED = 20.0
 #: Estimated error below which no mesh locks: there the solution is one that these elements have.
 EXACT = 5e-3
 
-#: Largest estimated error without a warning: its square is that of displacements under loads.
+#: Largest estimated error without a warning: its square is that of the elastic energy.
 COARSE = 0.15
 
 #: Largest deviation of facets from a curved surface, as a share of the gaps that are closed, or of
@@ -318,13 +318,15 @@ def locking(solution: Solution) -> Iterator[Remark]:
 
 
 def large_error(solution: Solution) -> Iterator[Remark]:
-    """Warn of an estimated error that is large, as where slender parts bend."""
+    """Warn of an estimated error that is large."""
     error = solution.error
     if error is not None and error.relative > COARSE and not locks(solution):
+        # Where one cell of degree 1 is the thickness, the estimate is half of the error.
+        bending = ", more where slender parts bend" if solution.problem.body.degree == 1 else ""
         yield (
             "the mesh is too coarse: the estimated discretisation error is "
-            f"{error.relative:.1%} (energy norm), that of displacements about "
-            f"{error.relative**2:.1%}, more where slender parts bend"
+            f"{error.relative:.1%} (energy norm), that of the elastic energy about "
+            f"{error.relative**2:.1%}{bending}"
         )
 
 

@@ -16,6 +16,7 @@ from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import from_mesh
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.mesh.grid import box, rectangle
+from contact.mesh.transfer import carry
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.model.body import Fixed
@@ -28,6 +29,7 @@ from contact.results.fields import DerivedFields, fields_of
 from contact.results.local_problems import LocalProblems
 from forms.elasticity import isotropic, mandel
 from forms.hencky import Linear, Log
+from scripts.studies.edge_contact import edged
 from scripts.studies.effectivity import known
 from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular, manufactured
@@ -135,6 +137,28 @@ def test_effectivity_at_the_end_of_contact(degree):
     found = estimated(problem, state)
     assert 0.9 < np.sqrt(found.total) / singular.errors(problem, state)[0].energy < 1.1
     assert 0 < found.contact < 0.3 * found.total
+
+
+@pytest.mark.core("flat punch", "beam on a knife")
+@pytest.mark.parametrize("name", edged())
+def test_effectivity_at_edges(name):
+    """One or two nodes touch: at degree 2 it was 3 to 4, of the punch 80.
+
+    The errors of the energy are about the squares, which the warning says.
+    """
+    one = edged()[name]
+    fine, best = one.reference(8, local=6)
+    energy = errors(fine.body, best.x, None).energy ** 2
+    for degree in (1, 2):
+        problem = one.make(2, degree)
+        state = state_of(problem)
+        found = estimated(problem, state)
+        other = carry(problem.body.function(state.x), fine.body.space)
+        error = errors(fine.body, best.x, other).energy
+        assert 0.5 < np.sqrt(found.total) / error < 2.0
+        if degree == 2:
+            off = abs(energy - found.energy) / energy
+            assert off < 2.5 * error**2 / energy
 
 
 @pytest.mark.core
@@ -297,14 +321,15 @@ def test_the_share_of_contact_is_never_negative():
 @pytest.mark.core
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("degree", [1, 2])
-def test_ranks_agree(degree):
+@pytest.mark.parametrize("gap", ["0.02*(x - 1)**2", "abs(x - 1)", "where(x < 1.01, 0, 1)"])
+def test_ranks_agree(gap, degree):
     """A gap that is closed in a part, whose nodes belong to several ranks."""
     data = {
         "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [12, 6]},
         "space": {"degree": degree},
         "material": {"young": 1.0, "poisson": 0.3},
         "fixed": [{"on": "top", "displacement": ["0.01*x*x", -0.1]}],
-        "contact": {"on": "bottom", "gap": "0.02*(x - 1)**2"},
+        "contact": {"on": "bottom", "gap": gap},
         "friction": {"law": "coulomb", "mu": 0.3},
     }
 
@@ -352,3 +377,12 @@ def test_a_beam_of_three_cells_is_said_to_be_too_stiff():
     solution = solve(parse_case(data))
     assert solution.error.relative > 0.3
     assert any("slender parts bend" in text for text in solution.warnings)
+
+
+@pytest.mark.parametrize("name", ["Belleville washer", "beam on a knife"])
+def test_no_word_of_stiffness_at_degree_2(name):
+    """The error is about the edge: that of the washer was said to be 18 %, and is 5 %."""
+    solution = solve(edged()[name].make(1, 2))
+    warned = [text for text in solution.warnings if "[discretisation-error]" in str(text)]
+    assert len(warned) == (name == "beam on a knife")
+    assert not any("slender" in text or "stiff" in text for text in warned)
