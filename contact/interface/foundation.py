@@ -206,21 +206,20 @@ class FoundationLaw:
         stiffness = self.layer.h_nu(self._difference(x))
         return np.asarray(stiffness * self.layer.p_nu(self._layer_penetration(x)), dtype=float)
 
-    def largest_pressure(self, deep: float) -> Array:
-        """Return bounds of the normal contact pressure, shape (n,): finite on saturated layers.
+    def largest_pressure(self, size: float) -> Array:
+        """Return bounds of the normal contact pressure, shape (n,): finite on saturating layers.
 
-        Parameters
-        ----------
-        deep
-            Penetration beyond all that bodies reach (length). Where a layer still grows there,
-            has a rigid part, or depends on the potential, the bound is infinite.
+        Infinite with a rigid part, beside a potential, on which h_nu may depend, and where p_nu
+        falls anywhere, or still grows at a thousand times the size of the bodies (length).
         """
         unbounded = np.full(self.nodes.weight.size, np.inf)
         if self.layer is None or self.nodes.block_size > self.nodes.dim:
             return unbounded
-        at, further = (self.layer.p_nu(np.full(unbounded.size, s)) for s in (deep, 2 * deep))
-        saturated = np.isinf(self.layer.thickness) & (further <= at)
-        return np.where(saturated, self.layer.h_nu(np.zeros_like(at)) * at, np.inf)
+        depths = size * np.logspace(-9, 3, 49)
+        p_nu = np.array([self.layer.p_nu(np.full(unbounded.size, depth)) for depth in depths])
+        steps = np.diff(p_nu, axis=0)
+        saturates = np.isinf(self.layer.thickness) & (steps >= 0).all(axis=0) & (steps[-1] == 0)
+        return np.where(saturates, self.layer.h_nu(np.zeros_like(unbounded)) * p_nu[-1], np.inf)
 
     def _layer_penetration(self, x: Array) -> Array:
         """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""
@@ -243,7 +242,7 @@ class FoundationLaw:
         return np.asarray(self.conductor.share * psi)
 
     def resting(self, x: Array) -> Array:
-        """Return rounding pressures, by which fixed nodes that touch conduct, shape (n,)."""
+        """Return pressures just above rounding, shape (n,), which mark fixed nodes as closed."""
         reach = np.abs(self.nodes.gap) + np.linalg.norm(x[:, : self.nodes.dim], axis=1)
         return np.maximum(1e-12 * self.c_0 * reach, TINY)
 

@@ -39,10 +39,6 @@ class Proximal:
     about: Array
 
 
-#: Penetration at which a layer is looked at for saturation, over the size of the bodies.
-DEEP = 1e3
-
-
 @dataclass(frozen=True)
 class Interface:
     """Unilateral contact, friction, layer and surface charge at the owned contact nodes.
@@ -156,8 +152,8 @@ class Interface:
 
     @property
     def largest_pressure(self) -> Array:
-        """Bounds of the contact pressure, shape (n,); finite on saturated layers alone."""
-        return self.foundation.largest_pressure(DEEP * self.size)
+        """Bounds of the contact pressure, shape (n,); finite on saturating layers alone."""
+        return self.foundation.largest_pressure(self.size)
 
     @property
     def saturation(self) -> float:

@@ -6,8 +6,8 @@
    - all nodes open, by one linear solve from the best iterate, then a working set from there;
    - continuation in the conductivity, of a condensed problem alone, from the initial guess
      `problem.start()`;
+   - secants of a layer that saturates, where supports leave a body unconstrained, from that guess;
    - a rigid motion that separates the bodies, of a condensed problem alone;
-   - secants of a layer that alone holds a body, from that guess;
    - proximal points, from that guess;
    - the interior point from that guess, its first slacks from the gaps of the linear solve;
    - steps on the condensed body, of a whole problem alone, from that guess.
@@ -341,10 +341,11 @@ def conductivity_continuation(newton: SemismoothNewton) -> End | None:
 
 
 def layer_secants(newton: SemismoothNewton) -> End | None:
-    """Solve by secants of the layer that alone holds a body, if there is one that saturates.
+    """Solve by secants of a layer that saturates, where supports leave a body unconstrained.
 
-    It has no stiffness where it is saturated, nor before its first touch. Kacanov's method takes
-    p_nu(s)/s of the last iterate; where the forces nearly balance, Newton's method the last steps.
+    The tangent of the layer is zero where it is saturated, and before its first touch, so that
+    Newton's matrix may be singular. Kacanov's method takes the secant p_nu(s)/s of the last iterate
+    (it is positive); where the forces nearly balance, Newton's method the last steps.
     """
     problem, interface = newton.problem, newton.problem.interface
     if newton.modes.constrained_by_supports or interface.saturation == 0:

@@ -225,7 +225,7 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
     found = None if support is None else support.release(problem.time)
     if found is None:
         return
-    if found.borne == 0:
+    if found.resisted == 0:
         raise InputError(
             f"the loads {PULLED_OFF}, and no support holds it there; accepted: loads that press it "
             "on, or more displacement components fixed",
@@ -233,7 +233,7 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
         )
     words = described(found.motion[:, None], group.names)
     raise InputError(
-        f"the loads {PUSHED_THROUGH} ({words}): it bears {found.borne:.4g} at most, with its "
+        f"the loads {PUSHED_THROUGH} ({words}): it bears {found.resisted:.4g} at most, with its "
         f"largest pressure of {problem.interface.saturation:.4g} (stiffness x limit), the loads "
         f"are {found.power:.4g}; accepted: smaller loads, a larger limit, a layer on a rigid "
         "part, or supports",

@@ -5,10 +5,11 @@ contact nodes. Components joined by contact, a rigid part or the cut of a bolt a
 under a given force separates components, whose modes agree there but for the shortening.
 
 Limit analysis by linear programs says whether contact forces can balance the loads on modes that
-the supports do not constrain. Admissible contact forces do no positive work on rigid motions m with
-m.nu <= -mu |m_tau| at every node: if the loads do, no forces within the friction cones balance them
-(Farkas' lemma). With given friction bounds s, friction dissipates s |m_tau| at most: loads whose
-power is more slide the bodies.
+the supports do not constrain. Admissible contact forces do no negative work on rigid motions m with
+m.nu <= -mu |m_tau| at every node: if the loads do positive work, no forces within the friction
+cones balance them (Farkas' lemma). A layer of the largest pressure P resists a motion with the
+power P max(0, m.nu + mu |m_tau|) at most. With given friction bounds s, friction dissipates
+s |m_tau| at most: loads whose power is more slide the bodies.
 
 References
 ----------
@@ -303,13 +304,14 @@ class Release:
     ----------
     motion
         The mode, shape (m,).
-    power, borne
-        Power of the loads on it, and the largest of saturated layers, which is less (force).
+    power, resisted
+        Power of the loads on it, and the most with which layers resist it, friction included, which
+        is less: forces of a translation, since rotations are scaled by the size (force).
     """
 
     motion: Array
     power: float
-    borne: float
+    resisted: float
 
 
 #: The motion of a body by loads beyond the pressure of a layer without a rigid part.
@@ -327,10 +329,10 @@ class UnilateralSupport:
     free
         The modes that the supports do not constrain, shape (m, k).
     cone
-        Rows of all ranks, shape (rows, n, k): contact forces within the friction cone of a node do
-        at most the power of its largest pressure times max(0, row q) on a motion q.
+        Rows of all ranks, shape (rows, n, k): a node resists a motion q with the power
+        `bound` max(0, largest row q) at most.
     bound
-        Largest contact forces of the nodes, shape (n,) (force); infinite but on saturated layers.
+        Largest contact forces of the nodes, shape (n,) (force); infinite but on saturating layers.
     """
 
     group: Group
@@ -384,8 +386,8 @@ class UnilateralSupport:
         if found.status != 0 or -found.fun <= BALANCED:
             return None
         motion = found.x[: work.size]
-        power, borne = float(work @ motion), float(self.bound[gives] @ found.x[work.size :])
-        return Release(np.asarray(self.free @ motion), power, borne)
+        power, resisted = float(work @ motion), float(self.bound[gives] @ found.x[work.size :])
+        return Release(np.asarray(self.free @ motion), power, resisted)
 
 
 def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
@@ -405,12 +407,15 @@ def released(supports: Sequence[UnilateralSupport], begin: float, end: float) ->
         A time of equilibrium, and the time of the loads.
     """
     for support in supports:
-        if (found := support.release(end)) is None:
+        if (first := support.release(end)) is None:
             continue
         for _ in range(ROUNDS):
-            middle = (begin + end) / 2
-            begin, end = (middle, end) if support.release(middle) is None else (begin, middle)
-        return f"from t = {end:g} on the loads {PUSHED_THROUGH if found.borne else PULLED_OFF}"
+            half = (begin + end) / 2
+            if (found := support.release(half)) is None:
+                begin = half
+            else:
+                first, end = found, half
+        return f"from t = {end:g} on the loads {PUSHED_THROUGH if first.resisted else PULLED_OFF}"
     return ""
 
 

@@ -50,7 +50,7 @@ from contact.typing import Array
 #: Residual below which tangents take the place of frozen coefficients.
 NEAR = 1e-2
 
-#: Note of a step with a singular linear system.
+#: Note of a step of the penalty method with a singular linear system.
 LOST = "the linear system is singular: a rigid-body mode is unconstrained at this iterate"
 
 
@@ -172,7 +172,7 @@ class OuterLoop(ABC):
         return interface.nodes.norm(self.bound - old) / size if size > 0 else 0.0
 
     def _thesis_criterion(self, change: float, previous: State) -> bool:
-        """Tell whether (4.38) or (6.40) is met, on the change of the displacement."""
+        """Tell whether (4.38) or (6.40) is met, on the change of the unknowns in L2(Omega)."""
         assert self._norm is not None
         own = self.problem.body.owned_part
         now, before = own(self.state.x), own(previous.x)
@@ -303,7 +303,7 @@ class FixedPoint(OuterLoop):
             return
         self._fitted = True
         start = problem.start()
-        r = fitted_augmentation(problem, self.operator, start)
+        r = fitted_augmentation(problem, self._new_operator(symmetric=True), start)
         if r is not None:
             self.r, self.state, self._secant_at = r, start, problem.body.zero_displacement()
             self.bound = self._first_bound.copy()

@@ -1,8 +1,8 @@
 """The augmentation parameter of a slender body, from the stiffness of its softest mode.
 
 A mode of Gamma_3 with the stiffness sigma contracts by sigma/(sigma + r) in contact and by
-r/(sigma + r) without: r = sqrt(sigma_min sigma_max) is the best. A block has the ends 1.1 E'/H and
-1.92 E'/h, a body that bends has a smaller sigma_min.
+r/(sigma + r) without: r = sqrt(sigma_min sigma_max) is the best. A block has about the ends
+1.1 E'/H and 1.76 E'/h, whose r is r*; a body that bends has a smaller sigma_min.
 
 References
 ----------
@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from contact.errors import InputError
+from contact.errors import SingularError
 from contact.linear.operator import Operator
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -27,8 +27,9 @@ from contact.typing import Array
 #: Steps of the Rayleigh-Ritz method: the softest mode of a body that bends stands apart.
 STEPS = 12
 
-#: Stiffness added to all modes, over r*, and modes softer than `FREE` times it: rigid motions.
-SHIFT, FREE = 1e-12, 10.0
+#: Stiffness added to all modes, over r*. Modes below `FREE` times it are left out: they cannot be
+#: told from rigid motions (first modes of cantilevers more than 1600 times as long as thick).
+SHIFT, FREE = 1e-14, 10.0
 
 #: Least stiffness of a mode of a block, over E'/H.
 BLOCK = 1.1
@@ -42,7 +43,7 @@ def fitted_augmentation(problem: ContactProblem, operator: Operator, state: Stat
     problem
         The problem.
     operator
-        Its operator, which is assembled anew.
+        An operator of it, for this alone: it is left singular where the body is.
     state
         Where the body is linearised.
 
@@ -54,7 +55,7 @@ def fitted_augmentation(problem: ContactProblem, operator: Operator, state: Stat
     block = BLOCK * scales.plane_modulus / scales.height
     try:
         sigma = softest_mode(problem, operator, state, SHIFT * scales.augmentation)
-    except InputError:  # singular: contact alone holds a rigid-body mode
+    except SingularError:  # contact alone holds a rigid-body mode
         return None
     if not sigma < block:
         return None
@@ -64,8 +65,8 @@ def fitted_augmentation(problem: ContactProblem, operator: Operator, state: Stat
 def softest_mode(problem: ContactProblem, operator: Operator, state: State, shift: float) -> float:
     """Return the least stiffness of normal displacements, but for rigid motions. Collective.
 
-    The Ritz value of the compliance on a Krylov space, in L2(Gamma_3); `shift` is added to all
-    stiffnesses (stress/length).
+    1/(largest Ritz value of the compliance in L2(Gamma_3)) - shift, without rigid motions; `shift`
+    is added to all stiffnesses (stress/length).
     """
     interface, nodes = problem.interface, problem.interface.nodes
     blocks = augmentation(nodes, shift, False)

@@ -339,32 +339,32 @@ def uzawa_block_relaxation(
         increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.jump(increment)
         nodal, r_u = frozen.at + moved, frozen.augmented(moved)
-        # The contact force of this solve, in equilibrium with u.
-        force = 2 * multipliers - z + r_u
+        # The contact stress of this solve, in equilibrium with u.
+        stress = 2 * multipliers - z + r_u
         if iteration == 1:
-            stress_unit = interface.component_norms(force)
+            stress_unit = interface.component_norms(stress)
         layer: Array | float = 0.0
         if frozen.layer is not None:
             layer = frozen.layer.layer(nodes.normal_component(nodal))
-        forces = Multipliers.of(nodes, force[:, 0] - layer, force[:, 1:])
+        forces = Multipliers.of(nodes, stress[:, 0] - layer, stress[:, 1:])
         if options.single_loop and frozen.friction:
             bound = interface.bound(nodal, forces)
         residual = float(interface_residuals(interface, nodal, forces, bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
-        plain = multipliers + (1 - over) * (z - multipliers) + over * r_u
+        next_z = multipliers + (1 - over) * (z - multipliers) + over * r_u
         done = residual <= options.inner or not np.isfinite(residual)
         # The residual is small before contact, the defect of the fixed point is not.
-        defect = nodes.norm((force - frozen.project(force + r_u, bound)) / stress_unit[:, None])
+        defect = nodes.norm((stress - frozen.project(stress + r_u, bound)) / stress_unit[:, None])
         if criterion is not None:
-            done, change = criterion(increment, frozen.auxiliary(plain, bound))
+            done, change = criterion(increment, frozen.auxiliary(next_z, bound))
             defect = defect if change is None else change
         stalled = not done and stagnation(defect)
         if done or stalled:
-            return RelaxationResult(increment, forces, plain - r_u, iteration, stalled)
-        z = plain
+            return RelaxationResult(increment, forces, next_z - r_u, iteration, stalled)
+        z = next_z
         if accelerated:
             if accelerator is None:
                 accelerator = frozen.accelerator(options.depth, stress_unit, current_bound)
-            newest = (force + r_u).ravel()
-            z = accelerator.next(force.ravel(), newest, plain.ravel()).reshape(z.shape)
+            solved = (stress + r_u).ravel()
+            z = accelerator.next(stress.ravel(), solved, next_z.ravel()).reshape(z.shape)
     return RelaxationResult(increment, forces, z - r_u, options.max_inner)

@@ -240,6 +240,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"are at most [{fallbacks.NEARLY_BALANCED}]": True,
         f"below a residual of [{fallbacks.NEARLY_BALANCED}] Newton": True,
         f"of [{softest_mode.STEPS}] steps of the Krylov method": True,
+        f"at most\n   [{fallbacks.SECANTS}] times": True,
         f"Multiply k by [{fallbacks.SOFTER}]": True,
         f"multiply k by [{fallbacks.STIFFER:g}] until": True,
         f"after [{fallbacks.STAGNANT_PROBLEMS}] problems in succession": True,

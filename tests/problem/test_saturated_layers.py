@@ -1,14 +1,18 @@
 """Bodies that a layer without a rigid part alone holds: it bears stiffness x limit at most."""
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import Body, Contact, Fixed, Layer, Linear, Load, Problem
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.solving import solve
+from contact.problem.checks import check_rigid_modes
+from contact.solving import build_problem, solve
+from forms.laws import PotentialFactor
 
 SELF = MPI.COMM_SELF
 STIFFNESS, LIMIT = 500.0, 0.003
@@ -103,6 +107,32 @@ def test_a_saturated_layer_under_a_held_body_is_no_fault():
     solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
     assert solution.pressure.max() == pytest.approx(LARGEST, rel=1e-9)
+
+
+@dataclass
+class Falling:
+    """p_nu(s) = s e^(1 - s/a) is largest at s = a, and 0 far beyond."""
+
+    a: float = LIMIT
+
+    def __call__(self, s):
+        depth = np.maximum(s, 0.0)
+        return depth * np.exp(1 - depth / self.a)
+
+    def derivative(self, s):
+        depth = np.maximum(s, 0.0)
+        return np.where(s > 0, (1 - depth / self.a) * np.exp(1 - depth / self.a), 0.0)
+
+
+def test_a_layer_that_falls_is_not_said_to_be_saturated():
+    """It bears a load though its pressure far inside is 0, which was taken for its largest."""
+    domain = build_problem(parse_case(block("plane", 0.5)), SELF).domain
+    layer = Layer(np.inf, Falling(), PotentialFactor(STIFFNESS))
+    load = Load("top", [0.0, -0.5 * LARGEST])
+    body = Body(Linear(1e3, 0.0), [Fixed("left", [0.0, "free"])], [load])
+    problem = Problem(domain, body, Contact("bottom", layer=layer))
+    check_rigid_modes(problem)
+    assert np.isinf(problem.interface.largest_pressure).all()
 
 
 @pytest.mark.parallel
