@@ -38,7 +38,7 @@ from contact.problem.state import State
 from contact.ranks import on_root
 from contact.results.quantities import SUMMARY, SWEEP, is_of, quantities, values_of
 from contact.results.remarks import evaluate_extremes
-from contact.results.solution import Solution
+from contact.solution import Solution
 from contact.solving import solve_problem, step_times
 from contact.typing import Array
 

@@ -2,7 +2,7 @@
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
-node by node. Newton's method takes `force` and its full derivative.
+node by node. Newton's method takes `pressure_block` and `charge_block`, Picard's in part.
 
 The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer with the
 unilateral constraint, as the one monotone graph `NormalGraph` of Figure 1.6, and the charge

@@ -38,12 +38,12 @@ class Grouped(Generic[LawType]):
     ----------
     laws
         The law of each group.
-    bounds
+    offsets
         Where the groups begin on this rank, and the number of all nodes.
     """
 
     laws: tuple[LawType, ...]
-    bounds: tuple[int, ...]
+    offsets: tuple[int, ...]
 
     @classmethod
     def of(cls, laws: Iterable[LawType], nodes: Sequence[ContactNodes]) -> Self:
@@ -54,7 +54,7 @@ class Grouped(Generic[LawType]):
     def at_nodes(self, value: Callable[..., Value], *given: Array) -> Array:
         """Return the values of each law at its own nodes: `value` of the law and its arguments."""
         parts = []
-        for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
+        for law, (begin, end) in zip(self.laws, pairwise(self.offsets), strict=True):
             values = value(law, *(argument[begin:end] for argument in given))
             parts.append(np.broadcast_to(np.asarray(values, dtype=float), (end - begin,)))
         return np.concatenate(parts)
@@ -90,8 +90,9 @@ class GroupedConductivity(Grouped[Conductivity]):
 
     @property
     def delta(self) -> float:
-        """The steepest ramp."""
-        return max(psi.delta for psi in self.laws)
+        """Slope of the steepest ramp over k_e (1/length), of those that follow the gap."""
+        ramps = [psi.delta for psi in self.laws if psi.follows_gap]
+        return max(ramps, default=np.inf)
 
     @property
     def follows_gap(self) -> bool:

@@ -2,8 +2,8 @@
 
 - `guarded_active_set`: friction of nodes that go on slipping is raised to its bound; nodes whose
   slip reverses stick in one step.
-- `bound_by_slip`: the derivative of the friction bound by the slip only once the active set is
-  unchanged, and limited where the bound falls.
+- `bound_by_slip`: the derivative of the friction bound by the slip, limited where the bound falls;
+  `NewtonStep` takes it once the active set is unchanged.
 - `regularisation`: the Levenberg-Marquardt term of bodies that nothing constrains at first.
 - `ConductivityDerivative`: Newton's method or Picard's in the conductivity.
 

@@ -305,8 +305,8 @@ class Release:
     motion
         The mode, shape (m,).
     power, resisted
-        Power of the loads on it, and the most with which layers resist it, friction included, which
-        is less: forces of a translation, since rotations are scaled by the size (force).
+        f . m of the loads, and the sum of `bound` max(0, m.nu + mu |m_tau|) of the layers, which is
+        less; |m_k| <= 1, so that they are the forces of a translation (force).
     """
 
     motion: Array
@@ -341,8 +341,8 @@ class UnilateralSupport:
     bound: Array
 
     @staticmethod
-    def of(group: Group, at: NDArray[np.bool_] | slice = slice(None)) -> UnilateralSupport | None:
-        """Return the support of a group by some or all contact nodes of this rank. Collective.
+    def of(group: Group) -> UnilateralSupport | None:
+        """Return the support of a group by the contact nodes that face something. Collective.
 
         None if the supports constrain all modes, or if friction is not bounded by the pressure at
         its node: a given bound, a smoothed pressure.
@@ -354,15 +354,15 @@ class UnilateralSupport:
         if free.shape[1] == 0 or not np.isfinite(mu) or not friction.local:
             return None
         nodes, normal = problem.nodes, group.normal @ free
+        near = np.isfinite(nodes.gap)
         across = [
             mu * np.einsum("ni,nim->nm", along, group.tangential) @ free
             for along in _sideways(nodes.normal)
         ]
         rows = [normal + sign * part for part in across for sign in (-1, 1)]
         bound = nodes.weight * problem.interface.largest_pressure
-        return UnilateralSupport(
-            group, free, np.stack([nodes.gather(row[at]) for row in rows]), nodes.gather(bound[at])
-        )
+        cone = np.stack([nodes.gather(row[near]) for row in rows])
+        return UnilateralSupport(group, free, cone, nodes.gather(bound[near]))
 
     def release(self, time: float) -> Release | None:
         """Return the mode by which loads move the bodies off; None if balanced. Collective."""
@@ -376,17 +376,19 @@ class UnilateralSupport:
         from scipy.optimize import linprog  # takes a while to load
         from scipy.sparse import block_array, eye_array
 
-        gives = np.isfinite(self.bound)
-        bears, layer = self.cone[:, ~gives].reshape(-1, work.size), self.cone[:, gives]
-        cost = np.concatenate([-work, self.bound[gives]]) / scale
+        saturating = np.isfinite(self.bound)
+        rigid, layer = self.cone[:, ~saturating].reshape(-1, work.size), self.cone[:, saturating]
+        cost = np.concatenate([-work, self.bound[saturating]]) / scale
         bounds = [(-1, 1)] * work.size + [(0, None)] * layer.shape[1]
-        rows = [[bears, None], *([each, -eye_array(each.shape[0])] for each in layer)]
+        rows = [[rigid, None], *([each, -eye_array(each.shape[0])] for each in layer)]
         cone = block_array(rows, format="csr")
         found = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
         if found.status != 0 or -found.fun <= BALANCED:
             return None
         motion = found.x[: work.size]
-        power, resisted = float(work @ motion), float(self.bound[gives] @ found.x[work.size :])
+        power, resisted = float(work @ motion), float(self.bound[saturating] @ found.x[work.size :])
+        if resisted <= BALANCED * power:
+            resisted = 0.0
         return Release(np.asarray(self.free @ motion), power, resisted)
 
 
@@ -397,7 +399,9 @@ def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
 
 
 def released(supports: Sequence[UnilateralSupport], begin: float, end: float) -> str:
-    """Say when and how loads up to a time release a body; "" if they do not. Collective.
+    """Say when and how loads up to a time release the first body; "" if they do not. Collective.
+
+    The time is found by bisection: a release that passes before the end is not seen.
 
     Parameters
     ----------
@@ -406,17 +410,20 @@ def released(supports: Sequence[UnilateralSupport], begin: float, end: float) ->
     begin, end
         A time of equilibrium, and the time of the loads.
     """
+    earliest = None
     for support in supports:
-        if (first := support.release(end)) is None:
+        low, found = begin, support.release(end)
+        if found is None:
             continue
         for _ in range(ROUNDS):
-            half = (begin + end) / 2
-            if (found := support.release(half)) is None:
-                begin = half
-            else:
-                first, end = found, half
-        return f"from t = {end:g} on the loads {PUSHED_THROUGH if first.resisted else PULLED_OFF}"
-    return ""
+            half = (low + end) / 2
+            before = support.release(half)
+            low, end = (half, end) if before is None else (low, half)
+            found = before or found
+        earliest = found
+    if earliest is None:
+        return ""
+    return f"from t = {end:g} on the loads {PUSHED_THROUGH if earliest.resisted else PULLED_OFF}"
 
 
 def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:

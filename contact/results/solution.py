@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from dolfinx import fem
@@ -334,10 +334,11 @@ class Solution(Solved):
             return None
         return charge_balance(self.problem, self.state)
 
-    def at_step(self, state: State) -> Solution:
+    def at_step(self, state: State) -> Self:
         """Return the solution at the end of a step, without the records of the whole."""
         problem = self.problem.at(state.time, state.history)
-        return Solution(problem, state, self.outcome, self.history, self.counters, self.method, {})
+        of = self.outcome, self.history, self.counters, self.method
+        return type(self)(problem, state, *of, {})
 
     @property
     def dissipation(self) -> float:

@@ -7,7 +7,9 @@ from mpi4py import MPI
 from contact import parse_case, solve
 from contact.case.build import build_problem
 from contact.errors import InputError
+from contact.interface.grouping import GroupedConductivity
 from contact.results.contact_nodes import contact_table
+from forms.laws import PerfectConductivity, ShiftedConductivity
 from tests.problems.everywhere import displacements
 
 COMM = MPI.COMM_WORLD
@@ -39,6 +41,12 @@ def case(contact, cells=(32, 8), **more):
 
 def coulomb(mu):
     return {"law": "coulomb", "mu": mu}
+
+
+def test_the_ramp_of_several_contacts_is_the_steepest_of_those_that_have_one():
+    """Beside a contact without charge it had been a jump: 1/delta = 0."""
+    laws = ShiftedConductivity(1.0, 20.0), PerfectConductivity(0.0)
+    assert GroupedConductivity(laws, (0, 1, 2)).delta == 20.0
 
 
 LAYER = {"law": "compliance", "layer": 0.01, "stiffness": 5.0, "potential_factor": 1.0}

@@ -26,6 +26,7 @@ from contact import (
     Problem,
     Punch,
     Rigid,
+    Solution,
     Sphere,
     UserLaw,
     evolve,
@@ -188,6 +189,13 @@ def test_what_agrees_is_accepted() -> None:
     assert solve(again).converged
     start = solve(problem(), start=plain)
     assert start.contact_force == pytest.approx(plain.contact_force)
+
+
+def test_a_solution_at_a_step_is_a_start_and_has_figures():
+    solution = solve(problem())
+    step = solution.at_step(solution.state)
+    assert type(step) is Solution
+    assert solve(problem(), start=step).converged
 
 
 @pytest.mark.parallel(2)

@@ -44,3 +44,27 @@ def test_bad_motions_are_refused(changes, words):
 def test_bad_rigid_parts_are_refused(rigid, words):
     with pytest.raises(InputError, match=words):
         build_problem(plate(rigid=rigid), SELF)
+
+
+@pytest.mark.parametrize(("end", "held"), [(2.0, True), (1.2, False)])
+def test_nodes_beyond_the_foundation_hold_nothing(end, held):
+    """A block 2 x 1 on a ledge that ends at 1.2: pressed at its right end it tips."""
+    ledge = {"shape": "punch", "centre": [0.5 * end, 0.0], "axis": [0.0, -1.0]}
+    ledge["radius"] = 0.51 * end
+    case = {
+        "mesh": {
+            "generator": "rectangle",
+            "size": [2.0, 1.0],
+            "cells": [20, 10],
+            "parts": {"end": {"side": "top", "from": 1.6, "to": 2.0}},
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "load": [{"on": "end", "pressure": 1e-4}],
+        "contact": {"on": "bottom", "foundation": ledge},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    if held:
+        build_problem(parse_case(case), SELF)
+        return
+    with pytest.raises(InputError, match=r"\[pulled-off\]"):
+        build_problem(parse_case(case), SELF)
