@@ -116,10 +116,12 @@ class Mesh(Section):
         | None
     ) = None
     """Generator of the mesh. This or `file`."""
-    file: Annotated[File, Accepted("a mesh file (.msh, .inp, .vtu, .xdmf, .med, .e)")] | None = None
+    file: (
+        Annotated[File, Accepted("a mesh file (.msh, .inp, .vtu, .bdf, .xdmf, .med, .e)")] | None
+    ) = None
     """Mesh file: of Gmsh (.msh), whose named physical groups are the parts, of Abaqus or CalculiX
-    (.inp), VTK (.vtu), XDMF (.xdmf), MED (.med) or Exodus (.e, .exo, .ex2), with their sets.
-    Relative to the case file."""
+    (.inp), VTK (.vtu), Nastran (.bdf), XDMF (.xdmf), MED (.med) or Exodus (.e, .exo, .ex2), with
+    their sets. Relative to the case file."""
     origin: Vector | None = None
     """Lower left corner of a rectangle or box. Default: zeros."""
     size: (

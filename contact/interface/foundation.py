@@ -209,17 +209,21 @@ class FoundationLaw:
     def largest_pressure(self, size: float) -> Array:
         """Return bounds of the normal contact pressure, shape (n,): finite on saturating layers.
 
-        Infinite with a rigid part, beside a potential, on which h_nu may depend, and where p_nu
-        falls anywhere, or still grows at a thousand times the size of the bodies (length).
+        Infinite with a rigid part, and where p_nu falls anywhere, or still grows at a thousand
+        times the size of the bodies (length). h_nu is the largest of any potential.
         """
         unbounded = np.full(self.nodes.weight.size, np.inf)
-        if self.layer is None or self.nodes.block_size > self.nodes.dim:
+        if self.layer is None:
             return unbounded
         depths = size * np.logspace(-9, 3, 49)
         p_nu = np.array([self.layer.p_nu(np.full(unbounded.size, depth)) for depth in depths])
         steps = np.diff(p_nu, axis=0)
         saturates = np.isinf(self.layer.thickness) & (steps >= 0).all(axis=0) & (steps[-1] == 0)
-        return np.where(saturates, self.layer.h_nu(np.zeros_like(unbounded)) * p_nu[-1], np.inf)
+        differences = np.array([0.0])
+        if self.nodes.block_size > self.nodes.dim:
+            differences = np.outer([-1.0, 1.0], np.logspace(-6, 9, 46)).ravel()
+        h_nu = [np.asarray(self.layer.h_nu(np.full(unbounded.size, s))) for s in differences]
+        return np.where(saturates, np.max(h_nu, axis=0) * p_nu[-1], np.inf)
 
     def _layer_penetration(self, x: Array) -> Array:
         """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""

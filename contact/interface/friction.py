@@ -23,6 +23,7 @@ from contact.arguments import (
     expect,
     naming,
     real,
+    sampled,
 )
 from contact.errors import InputError
 from contact.interface.grouping import Grouped, GroupedFriction
@@ -165,11 +166,11 @@ def law_at(friction: Friction, nodes: ContactNodes) -> FrictionLaw | None:
         mu = _at("friction.mu", given, nodes)
         return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
     # Ranks without nodes ask too: mistakes are found by all.
-    rest, words = np.zeros(3), "one number for each slip"
+    rest = np.zeros(3)
     with on_all_ranks(nodes.comm), naming("Friction: mu"):
-        resists = real(given(rest), rest.shape, words)
+        resists = real(given(rest), rest.shape, EACH)
     with on_all_ranks(nodes.comm), naming("Friction: mu: derivative"):
-        slope = real(given.derivative(rest), rest.shape, words)
+        slope = real(given.derivative(rest), rest.shape, EACH)
         check_finite(slope, lambda _: "without slip")
     with on_all_ranks(nodes.comm):
         check_slope("Friction: mu: derivative", given, given.derivative, SAMPLES)
@@ -187,15 +188,26 @@ def _check_law(law: FrictionLaw) -> None:
         ("by_pressure", lambda p: law(slip, p), lambda p: law.by_pressure(slip, p), pressure),
     ):
         check_slope(f"Friction: law: {name}", bound, slope, at)
+    rest = np.zeros(3)
+    for name, value in (("s", law), ("by_slip", law.by_slip), ("by_pressure", law.by_pressure)):
+        with naming(f"Friction: law: {name}"), np.errstate(all="ignore"):
+            check_finite(real(value(rest, rest), rest.shape, EACH), lambda _: "without pressure")
     _check_constants("Friction: law", law)
 
 
 def _check_constants(name: str, law: FrictionLaw) -> None:
-    """Refuse an upper bound or a Lipschitz constant that is no number >= 0."""
+    """Refuse constants that are no numbers >= 0, and a maximum that s/p exceeds at samples."""
     for key in ("maximum", "lipschitz"):
         given = getattr(law, key)
         fits = isinstance(given, int | float | np.number) and given >= 0
         expect(f"{name}: {key}", given, "a number >= 0, or infinity", fits)
+    slip, pressure = np.tile(SAMPLES, PRESSURES.size), np.repeat(PRESSURES, SAMPLES.size)
+    found = sampled(name, slip.shape, lambda: law(slip, pressure))
+    if found is not None:
+        largest = float(np.nanmax(found[0] / pressure, initial=0.0))
+        fits = largest <= law.maximum * (1 + 1e-9)
+        words = f"an upper bound of s/p, which is {largest:.4g} at a sample"
+        expect(f"{name}: maximum", law.maximum, words, fits)
 
 
 def _at(name: str, given: Field | Moving, nodes: ContactNodes) -> Array:
@@ -213,6 +225,10 @@ def _check(name: str, values: Array, nodes: ContactNodes) -> None:
         raise InputError(
             f"{name} is {worst[0]:g} at a node; accepted: finite values >= 0", "negative"
         )
+
+
+#: Values of a user's law, in messages.
+EACH = "one number for each slip"
 
 
 @dataclass(frozen=True)

@@ -242,7 +242,9 @@ def _read(file: Path, ending: str) -> Contents:
     """Read a file in the format of an ending; any error of a library becomes one message."""
     if not file.is_file():
         raise InputError("no such file", "file-name")
-    program, read = FORMATS.get(ending, FORMATS[".msh"])
+    if ending not in FORMATS:
+        raise InputError(f"no mesh file ends in {ending!r}; accepted: {ACCEPTED}", "mesh-file")
+    program, read = FORMATS[ending]
     try:
         return read(file)
     except InputError:

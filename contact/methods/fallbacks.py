@@ -6,7 +6,7 @@
    - all nodes open, by one linear solve from the best iterate, then a working set from there;
    - continuation in the conductivity, of a condensed problem alone, from the initial guess
      `problem.start()`;
-   - secants of a layer that saturates, where supports leave a body unconstrained, from that guess;
+   - secants of a layer that saturates, from that guess;
    - a rigid motion that separates the bodies, of a condensed problem alone;
    - proximal points, from that guess;
    - the interior point from that guess, its first slacks from the gaps of the linear solve;
@@ -341,14 +341,15 @@ def conductivity_continuation(newton: SemismoothNewton) -> End | None:
 
 
 def layer_secants(newton: SemismoothNewton) -> End | None:
-    """Solve by secants of a layer that saturates, where supports leave a body unconstrained.
+    """Solve by secants of a layer that saturates, if any.
 
-    The tangent of the layer is zero where it is saturated, and before its first touch, so that
-    Newton's matrix may be singular. Kacanov's method takes the secant p_nu(s)/s of the last iterate
-    (it is positive); where the forces nearly balance, Newton's method the last steps.
+    The tangent of the layer is zero where it is saturated, and before its first touch: Newton's
+    matrix may be singular, or as weak as elastic supports. Kacanov's method takes the secant
+    p_nu(s)/s of the last iterate (it is positive); where the forces nearly balance, Newton's method
+    the last steps.
     """
     problem, interface = newton.problem, newton.problem.interface
-    if newton.modes.constrained_by_supports or interface.saturation == 0:
+    if interface.saturation == 0:
         return None
     foundation, near = interface.foundation, NEARLY_BALANCED
     state, largest = problem.start(), foundation.largest_secant(interface.size)

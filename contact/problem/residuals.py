@@ -292,6 +292,8 @@ class Balance:
         Plastic dissipation in the step; None without internal variables.
     energy, enthalpy
         Stored energy at its end; less charges times potentials of a piezoelectric body.
+    stated
+        Stored energy at its end of the laws with internal variables that state it.
     x, given, internal
         Local unknowns at its end; forces and charges on the owned ones, by loads and by stresses.
     """
@@ -301,6 +303,7 @@ class Balance:
     dissipation: float
     plastic: float | None
     enthalpy: float
+    stated: float
     x: Array
     given: Array
     internal: Array
@@ -310,7 +313,7 @@ class Balance:
         """Return that of the reference configuration."""
         x = problem.body.zero_displacement()
         zero = np.zeros_like(problem.body.owned_part(x))
-        return Balance(0.0, 0.0, 0.0, None, 0.0, x, zero, zero)
+        return Balance(0.0, 0.0, 0.0, None, 0.0, 0.0, x, zero, zero)
 
 
 def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]:
@@ -370,9 +373,8 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
     if stored is None:
         gained = -plastic
     else:
-        _, at_first = body.laws.energies(replace(state, x=before.x))
-        assert at_first is not None
-        forces_at, gained = body.forces_without_history, stored - at_first
+        # Not of the old strain: internal variables may change while it does not.
+        forces_at, gained = body.forces_without_history, stored - before.stated
     if body.linear:
         power = 0.5 * (internal + before.internal)
     else:
@@ -390,7 +392,8 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
     dissipation = dissipated(problem, state)
     done = body.product(work, np.ones_like(work))
     flow = plastic if body.laws.initial is not None else None
-    return Balance(done, enthalpy - charged, dissipation, flow, enthalpy, state.x, given, internal)
+    energies = done, enthalpy - charged, dissipation, flow, enthalpy, stored or 0.0
+    return Balance(*energies, state.x, given, internal)
 
 
 def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> Iterate | None:

@@ -200,7 +200,8 @@ def untouched(solution: Solution) -> Iterator[Remark]:
     # A method that fails may have left the body anywhere.
     if solution.converged and not met and problem.since is None:
         yield (
-            "nothing touches: the foundation is too far away, or narrower than the elements there"
+            "nothing touches: the loads open the contact, or the foundation is too far away, or "
+            "narrower than the elements there"
         )
 
 

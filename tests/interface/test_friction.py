@@ -1,5 +1,7 @@
 """Friction that is given in Python: what resists is a number that is not negative."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -68,3 +70,36 @@ def test_a_radius_is_a_length(radius):
 def test_a_gap_is_a_number():
     with pytest.raises(InputError, match=r"\[negative\]"):
         problem(Contact("bottom", lambda x: np.where(x[0] > 1.5, np.nan, 0.0)))
+
+
+@dataclass
+class Pressure:
+    """s = 0.3 p max(p, least)^a."""
+
+    maximum: float
+    a: float = 0.0
+    least: float = 1.0
+    lipschitz: float = 0.0
+
+    def __call__(self, slip, pressure):
+        return 0.3 * pressure * np.maximum(pressure, self.least) ** self.a + 0.0 * slip
+
+    def by_slip(self, slip, pressure):
+        return 0.0 * slip * pressure
+
+    def by_pressure(self, slip, pressure):
+        above = np.maximum(pressure, self.least)
+        return 0.3 * above**self.a * (1 + self.a * (pressure > self.least)) + 0.0 * slip
+
+
+def test_a_law_exceeds_its_maximum_nowhere():
+    """A body that it holds was said to be pulled off."""
+    assert problem(Contact("bottom", friction=Friction(law=Pressure(0.3)))) is not None
+    with pytest.raises(InputError, match=r"maximum: given 0\.1.*which is 0\.3 at a sample"):
+        problem(Contact("bottom", friction=Friction(law=Pressure(0.1))))
+
+
+def test_a_law_is_finite_without_pressure():
+    law = Pressure(np.inf, -1 / 3, 0.0)
+    with pytest.raises(InputError, match=r"Friction: law: .*not finite without pressure"):
+        problem(Contact("bottom", friction=Friction(law=law)))

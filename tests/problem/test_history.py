@@ -295,3 +295,34 @@ def test_the_error_of_a_law_on_one_rank_ends_the_others():
     problem = build_problem(case(cells=2, stages=1), MPI.COMM_WORLD, law=law)
     with pytest.raises(InputError, match=r"^Other: respond: the function raises ZeroDivisionError"):
         next(evolve(problem, [1.0]))
+
+
+class Aging(Damage):
+    """Stress q C eps whose q falls to 0.9 q in each step, also at a constant strain."""
+
+    def variables(self, size):
+        return {"q": 1.0}
+
+    def respond(self, strain, variables, kind=""):
+        q = 0.9 * variables["q"]
+        found = self.damaged(strain, 1 - q, {"q": q}, kind)
+        energy = 0.5 * np.einsum("ni,ni->n", found.stress, strain)
+        return replace(found, energy=energy, dissipation=energy / 9)
+
+
+def test_the_energy_of_a_law_that_ages_at_constant_strain():
+    """It had been that of the first step, as if the law aged at the old strain too."""
+    tables = {
+        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [2, 2]},
+        "material": {"young": 10.0, "poisson": 0.0},
+        "fixed": [
+            {"on": "top", "displacement": ["free", -0.01]},
+            {"on": "left", "symmetry": "x"},
+        ],
+        "contact": {"on": "bottom"},
+        "evolution": {"times": [0.0, 1.0, 2.0], "steps": [1, 3]},
+    }
+    found = solve(parse_case(tables), law=Aging(10.0, 0.0), comm=MPI.COMM_SELF)
+    assert found.converged
+    energies = [step.row["energy"] for step in found.steps]
+    assert energies == pytest.approx([5e-4 * 0.9**k for k in (1, 2, 3, 4)], rel=1e-8)
