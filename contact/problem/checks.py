@@ -232,11 +232,11 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
             "pulled-off",
         )
     words = described(found.motion[:, None], group.names)
-    sums = f"{found.power / found.resisted:.6g} times its resistance"
+    sums = f"{found.power / found.resisted:.6g} times its largest resistance"
     if words in group.names and words.startswith("translation"):
-        sums = f"{found.power:.6g}, it bears {found.resisted:.6g}"
+        sums = f"{found.power:.6g}, it bears {found.resisted:.6g} at most"
     raise InputError(
-        f"the loads {PUSHED_THROUGH} ({words}): they are {sums} at most, with its largest "
+        f"the loads {PUSHED_THROUGH} ({words}): they are {sums}, with its largest "
         f"pressure of {problem.interface.saturation:.4g} (stiffness x limit); accepted: smaller "
         "loads, a larger limit, a layer on a rigid part, or supports",
         "saturated",

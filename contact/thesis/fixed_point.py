@@ -306,7 +306,7 @@ class FixedPoint(OuterLoop):
         r = fitted_augmentation(problem, self._new_operator(symmetric=True), start)
         if r is not None:
             self.r, self.state, self._secant_at = r, start, problem.body.zero_displacement()
-            self.bound = self._first_bound.copy()
+            self.bound = self._first_bound
             self._z = self._initial_z(0.0, friction)
 
     def _charge_block(self, nodal: Array, pressure: Array) -> Array:
