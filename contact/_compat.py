@@ -222,3 +222,9 @@ def versions() -> dict[str, str]:
         "numpy": numpy.__version__,
         "blas": blas()[0],
     }
+
+
+def export_page(plotter: Any, path: Path) -> None:
+    """Write the scene of a PyVista plotter as a page; ImportError without its packages."""
+    # A method of the plotter itself up to 0.48.
+    getattr(plotter, "trame", plotter).export_html(path)

@@ -263,7 +263,8 @@ def parser() -> tuple[Parser, dict[str, Parser]]:
     plot.add_argument(
         "--html",
         **FLAG,
-        help="write figure-view.html instead, a body in 3-D to turn in a browser (needs trame)",
+        help="write figure-view.html instead, a body in 3-D to turn in a browser "
+        "(needs pyvista[jupyter])",
     )
     view.add_argument("folder", metavar="DIR", help="folder with the results of a run")
     view.add_argument(

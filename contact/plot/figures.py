@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import matplotlib
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
+from contact._compat import export_page
 from contact.errors import InputError
 from contact.io.folder import added, result_folder
 from contact.plot.body import body_figure, picture
@@ -106,19 +106,19 @@ def window(run: Run, field: str | None = None) -> Any:
 
 def export(folder: Path, fields: Sequence[str] = ()) -> list[Path]:
     """Write ``figure-view.html``, or ``figure-view-FIELD.html``, to be turned in a browser."""
-    missing = [name for name in ("trame", "trame_vtk", "trame_vuetify") if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"--html: no package {', '.join(missing)}; accepted: pip install trame trame-vtk "
-            "trame-vuetify first, or contact view",
-            "figure-option",
-        )
 
     def draw(new: Path) -> list[Path]:
         run, files = read_run(folder), []
         for field in fields or (None,):
             files.append(new / f"figure-view{f'-{field}' if field else ''}.html")
-            window(run, field).export_html(files[-1])
+            try:
+                export_page(window(run, field), files[-1])
+            except ImportError as error:
+                raise InputError(
+                    "--html: packages of pyvista are missing; accepted: "
+                    'pip install "pyvista[jupyter]" first, or contact view',
+                    "figure-option",
+                ) from error
         return files
 
     return _added(folder, draw)

@@ -439,8 +439,8 @@ def close_camera(run: Run, zone: Zone, side: int) -> Camera:
     size = float(np.ptp(own @ np.array([right, up]).T, axis=0).max())
     camera = Camera.along(right, up, own, 0.0)
     room = ROOM * size
-    low = np.maximum(camera.low - room, flat.min(axis=0) - 0.03 * extent)
-    high = np.minimum(camera.high + room, flat.max(axis=0) + 0.03 * extent)
+    low = np.maximum(camera.low - room, flat.min(axis=0) - 0.12 * extent)
+    high = np.minimum(camera.high + room, flat.max(axis=0) + 0.12 * extent)
     return Camera(right, up, low, high, camera.depth)
 
 

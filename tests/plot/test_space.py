@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from contact.cli.main import main
+from contact.plot import figures
 from contact.plot.body import picture
 from contact.plot.run import Run, linear
 from contact.plot.space import (
@@ -15,7 +17,7 @@ from contact.plot.space import (
 )
 from contact.plot.style import Look
 from contact.solving import solve
-from contact.writing import written
+from contact.writing import write_outputs, written
 from tests.problems.written import block
 
 AXES = {"left": -1, "right": 1, "front": -2, "back": 2, "bottom": -3, "top": 3}
@@ -66,3 +68,21 @@ def test_the_peak_is_that_of_all_nodes() -> None:
     body.point_data["potential"] = np.where(distance < 1e-9, 100.0, 1.0 + distance)
     made = picture(replace(run, body=body), "potential")
     assert max(made.norm.vmax, float(made.label.split()[-1]) if "peak" in made.label else 0) == 100
+
+
+def test_a_page_to_turn_a_body_in(tmp_path, capsys, monkeypatch):
+    """By PyVista's own packages; without them a message names these, and no file is left."""
+    out = tmp_path / "out"
+    write_outputs(solve(block(3)), out)
+    before = sorted(out.iterdir())
+
+    def missing(*_: Any) -> None:
+        raise ImportError("trame")
+
+    monkeypatch.setattr(figures, "export_page", missing)
+    assert main(["plot", str(out), "--html"]) == 2
+    assert 'accepted: pip install "pyvista[jupyter]"' in capsys.readouterr().err
+    assert sorted(out.iterdir()) == before
+    monkeypatch.setattr(figures, "export_page", lambda _, path: path.write_text("page"))
+    assert main(["plot", str(out), "--html"]) == 0
+    assert (out / "figure-view.html").exists()
