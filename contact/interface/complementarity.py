@@ -61,42 +61,39 @@ def project_disc(z: Array, radius: Array) -> Array:
 
 def interface_residuals(
     interface: Interface,
-    nodal: Array,
+    jump: Array,
     multipliers: Multipliers,
     bound: Array,
     rounding: Array | float = 0.0,
 ) -> tuple[Array, Array]:
-    """Return the relative contact and friction residuals and their floors, (2,). Collective.
+    """Return the contact and friction residuals (16) and their floors, (2,). Collective.
 
     The `worst` of the connected components, each relative to max(|p|, 1e-4 c_0 |g|), norms in
     L2(Gamma_3): g is |g_N|, at most the displacement of the node and the size.
 
     Parameters
     ----------
-    interface, nodal, multipliers, bound
-        The laws, unknowns and multipliers at the nodes, and the friction bound, shape (n,).
+    interface, jump, multipliers, bound
+        The laws, jumps and multipliers at the nodes, and the friction bound, shape (n,).
     rounding
         Rounding of the pressures of each component, in L2(Gamma_3).
     """
-    # Closing a gap at one node takes a stress of E/h: with stretched cells E/size would hide
-    # errors of the pressure far above the tolerance.
-    c = interface.elongation * interface.c_0
-    normal_gap = interface.normal_gap(nodal)
-    contact = multipliers.pressure - project_half_line(multipliers.pressure - c * normal_gap)
+    c_r, normal_gap = interface.c_r, interface.normal_gap(jump)
+    contact = multipliers.pressure - project_half_line(multipliers.pressure - c_r * normal_gap)
     # Friction along the normal violates the law wherever a node sticks or slips.
-    trial = interface.nodes.tangential_component(multipliers.friction) + c * interface.slip(nodal)
+    trial = interface.nodes.tangential_component(multipliers.friction) + c_r * interface.slip(jump)
     friction = multipliers.friction - project_disc(trial, bound)
     friction[np.isnan(bound)] = np.nan  # no comparison with NaN is true
     # The scale is max(|p|, 1e-4 c_0 |g|), with gaps g of at most the motion of their nodes.
     before = np.linalg.norm(interface.friction.history.jump, axis=1)
-    now = np.linalg.norm(nodal[:, : interface.dim], axis=1)
+    now = np.linalg.norm(jump[:, : interface.dim], axis=1)
     motion = np.maximum(now, before)
     gap_stress = interface.c_0 * interface.norms(
         np.minimum(np.minimum(np.abs(normal_gap), motion), interface.size)
     )
-    total = interface.norms(interface.pressure(nodal, multipliers))
+    total = interface.norms(interface.pressure(jump, multipliers))
     # Without pressure nodes may just touch: their gaps are rounding too.
-    rounding_stress = interface.norms(np.full_like(motion, interface.rounding(nodal)))
+    rounding_stress = interface.norms(np.full_like(motion, interface.rounding(jump)))
     motion_stress = interface.c_0 * interface.norms(np.minimum(now, interface.size))
     gap_stress = np.where(
         total <= rounding_stress, np.maximum(gap_stress, motion_stress), gap_stress
@@ -158,7 +155,7 @@ class LinearisedBound:
 
 def linearise(
     interface: Interface,
-    nodal: Array,
+    jump: Array,
     multipliers: Multipliers,
     active: ActiveSet,
     parameters: ComplementarityParameters,
@@ -168,8 +165,8 @@ def linearise(
 
     Parameters
     ----------
-    interface, nodal, multipliers
-        The contact nodes with their laws, the unknowns there, and the contact forces.
+    interface, jump, multipliers
+        The contact nodes with their laws, the jumps there, and the contact forces.
     active
         Active set: the pieces of the functions.
     parameters
@@ -181,7 +178,7 @@ def linearise(
     -------
     The multipliers lambda^0, and the blocks B, shape (n, block size, block size), without weights.
     """
-    nodes, normal_gap, gamma = interface.nodes, interface.normal_gap(nodal), parameters.gamma
+    nodes, normal_gap, gamma = interface.nodes, interface.normal_gap(jump), parameters.gamma
     n, d = nodes.normal, nodes.dim
     # (19a): p+ = p + gamma (u_nu+ - rho) where closed, 0 where open.
     pressure = np.where(active.closed, multipliers.pressure - gamma * normal_gap, 0.0)
@@ -193,9 +190,9 @@ def linearise(
 
     # (19d): s+ = s + ds/dp (p+ - p) + ds/d|u_tau| e_u.(u_tau+ - u_tau), with p+ - p of (19a) where
     # closed, and of the layer.
-    slip, s, by_pressure = interface.slip(nodal), bound.s, bound.by_pressure
+    slip, s, by_pressure = interface.slip(jump), bound.s, bound.by_pressure
     s_plus = s - by_pressure * gamma * np.where(active.closed, normal_gap, 0.0)
-    gradient = by_pressure[:, None] * interface.foundation.pressure_gradient(nodal)
+    gradient = by_pressure[:, None] * interface.foundation.pressure_gradient(jump)
     gradient[:, :d] += by_pressure[:, None] * slope + bound.by_slip[:, None] * unit_vectors(slip)
 
     friction, sticks, slips = np.zeros_like(n), active.sticks, active.slips

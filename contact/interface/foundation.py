@@ -165,10 +165,10 @@ class FoundationLaw:
         assert self.layer is not None
         return replace(self, layer=replace(self.layer, p_nu=ElasticBed(secant)))
 
-    def secant(self, x: Array) -> Array:
-        """Return p_nu(s)/s at nodal unknowns, shape (n,); 0 where the layer is not touched."""
+    def secant(self, jump: Array) -> Array:
+        """Return p_nu(s)/s at jumps, shape (n,); 0 where the layer is not touched."""
         assert self.layer is not None
-        s = self._layer_penetration(x)
+        s = self._layer_penetration(jump)
         return np.asarray(self.layer.p_nu(s) / np.where(s > 0, s, 1.0), dtype=float)
 
     def largest_secant(self, size: float) -> Array:
@@ -177,34 +177,34 @@ class FoundationLaw:
         depths = [np.full(self.nodes.weight.size, s) for s in size * np.logspace(-9, 0, 37)]
         return np.max([self.layer.p_nu(s) / s for s in depths], axis=0)
 
-    def normal_graph(self, x: Array) -> NormalGraph | None:
-        """Return the layer and the constraint as one graph, h_nu frozen at the nodal unknowns.
+    def normal_graph(self, jump: Array) -> NormalGraph | None:
+        """Return the layer and the constraint as one graph, h_nu frozen at the jumps.
 
         None where there is no layer, or where it is lagged and thus a given force.
         """
         if self.layer is None or self.layer.lagged:
             return None
-        stiffness = np.broadcast_to(self.layer.h_nu(self._difference(x)), x.shape[:1])
+        stiffness = np.broadcast_to(self.layer.h_nu(self._difference(jump)), jump.shape[:1])
         gap = self.signorini_gap
         return NormalGraph(self.layer.p_nu, stiffness, self.touch, gap)
 
-    def _difference(self, x: Array) -> Array:
+    def _difference(self, jump: Array) -> Array:
         """Return phi - phi_F at the nodes; 0 for a body without potential."""
         if self.nodes.block_size == self.nodes.dim:
-            return np.zeros(x.shape[0])
+            return np.zeros(jump.shape[0])
         phi_f = self.conductor.phi_f if self.conductor is not None else 0.0
-        return self.phi_scale * x[:, -1] - phi_f
+        return self.phi_scale * jump[:, -1] - phi_f
 
-    def _past_rigid_part(self, x: Array) -> Array:
+    def _past_rigid_part(self, jump: Array) -> Array:
         """Return u_nu - rho at the nodes."""
-        return self.nodes.normal_component(x) - self.nodes.gap
+        return self.nodes.normal_component(jump) - self.nodes.gap
 
-    def pressure(self, x: Array) -> Array:
-        """Return the pressure of the layer at nodal unknowns of shape (n, block size)."""
+    def pressure(self, jump: Array) -> Array:
+        """Return the pressure of the layer at jumps of shape (n, block size)."""
         if self.layer is None:
-            return np.zeros(x.shape[0])
-        stiffness = self.layer.h_nu(self._difference(x))
-        return np.asarray(stiffness * self.layer.p_nu(self._layer_penetration(x)), dtype=float)
+            return np.zeros(jump.shape[0])
+        stiffness = self.layer.h_nu(self._difference(jump))
+        return np.asarray(stiffness * self.layer.p_nu(self._layer_penetration(jump)), dtype=float)
 
     def largest_pressure(self, size: float) -> Array:
         """Return bounds of the normal contact pressure, shape (n,): finite on saturating layers.
@@ -225,53 +225,53 @@ class FoundationLaw:
         h_nu = [np.asarray(self.layer.h_nu(np.full(unbounded.size, s))) for s in differences]
         return np.where(saturates, np.max(h_nu, axis=0) * p_nu[-1], np.inf)
 
-    def _layer_penetration(self, x: Array) -> Array:
+    def _layer_penetration(self, jump: Array) -> Array:
         """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""
         # An iterate may go beyond the rigid part; the excess pressure belongs to the multiplier.
-        return np.minimum(self.nodes.normal_component(x), self.signorini_gap) - self.touch
+        return np.minimum(self.nodes.normal_component(jump), self.signorini_gap) - self.touch
 
-    def charge(self, x: Array, pressure: Array) -> Array:
+    def charge(self, jump: Array, pressure: Array) -> Array:
         """Return D.nu = psi phi_L(phi - phi_F) at the nodes; nodes with `pressure` are closed."""
         if self.conductor is None:
-            return np.zeros(x.shape[0])
-        return self._conductivity(x, pressure) * self.conductor.phi_l(self._difference(x))
+            return np.zeros(jump.shape[0])
+        return self._conductivity(jump, pressure) * self.conductor.phi_l(self._difference(jump))
 
-    def _conductivity(self, x: Array, pressure: Array) -> Array:
+    def _conductivity(self, jump: Array, pressure: Array) -> Array:
         """Return psi at the nodes."""
         assert self.conductor is not None
-        pressed = self._pressed(x, pressure)
+        pressed = self._pressed(jump, pressure)
         # A multiplier of the size of rounding on an open node is no pressure.
-        loaded = pressed | (self.pressure(x) > 0)
-        psi = self.conductor.psi.at(self._past_rigid_part(x), pressed, loaded)
+        loaded = pressed | (self.pressure(jump) > 0)
+        psi = self.conductor.psi.at(self._past_rigid_part(jump), pressed, loaded)
         return np.asarray(self.conductor.share * psi)
 
-    def resting(self, x: Array) -> Array:
+    def resting(self, jump: Array) -> Array:
         """Return pressures just above rounding, shape (n,), which mark fixed nodes as closed."""
-        reach = np.abs(self.nodes.gap) + np.linalg.norm(x[:, : self.nodes.dim], axis=1)
+        reach = np.abs(self.nodes.gap) + np.linalg.norm(jump[:, : self.nodes.dim], axis=1)
         return np.maximum(1e-12 * self.c_0 * reach, TINY)
 
-    def _pressed(self, x: Array, pressure: Array) -> NDArray[np.bool_]:
+    def _pressed(self, jump: Array, pressure: Array) -> NDArray[np.bool_]:
         """Return where the rigid part presses, shape (n,)."""
         # u_nu = rho holds to the tolerance of the inner loop, which a steep ramp makes a thousand
         # times larger; so large a multiplier at an open node is no pressure.
-        normal_gap = self.signorini_gap - self.nodes.normal_component(x)
-        return constraint_active(pressure - self.pressure(x), normal_gap, self.c_0)
+        normal_gap = self.signorini_gap - self.nodes.normal_component(jump)
+        return constraint_active(pressure - self.pressure(jump), normal_gap, self.c_0)
 
-    def force(self, x: Array, pressure: Array) -> Array:
-        """Return the nodal residual density, shape (n, block size), in scaled unknowns."""
-        total = np.zeros((x.shape[0], self.nodes.block_size))
-        total[:, : self.nodes.dim] = self.pressure(x)[:, None] * self.nodes.normal
+    def force(self, jump: Array, pressure: Array) -> Array:
+        """Return the residual density on Gamma_3, shape (n, block size), in scaled unknowns."""
+        total = np.zeros((jump.shape[0], self.nodes.block_size))
+        total[:, : self.nodes.dim] = self.pressure(jump)[:, None] * self.nodes.normal
         if self.conductor is not None:
-            total[:, -1] -= self.phi_scale * self.charge(x, pressure)
+            total[:, -1] -= self.phi_scale * self.charge(jump, pressure)
         return total
 
-    def pressure_gradient(self, x: Array) -> Array:
-        """Return the derivative of `pressure` by the nodal unknowns, (n, block size)."""
-        total = np.zeros((x.shape[0], self.nodes.block_size))
+    def pressure_gradient(self, jump: Array) -> Array:
+        """Return the derivative of `pressure` by the jumps, shape (n, block size)."""
+        total = np.zeros((jump.shape[0], self.nodes.block_size))
         if self.layer is None:
             return total
-        depth, difference = self._layer_penetration(x), self._difference(x)
-        inside = self.nodes.normal_component(x) < self.signorini_gap
+        depth, difference = self._layer_penetration(jump), self._difference(jump)
+        inside = self.nodes.normal_component(jump) < self.signorini_gap
         slope = self.layer.h_nu(difference) * self.layer.p_nu.derivative(depth) * inside
         total[:, : self.nodes.dim] = slope[:, None] * self.nodes.normal
         if self.nodes.block_size > self.nodes.dim:
@@ -279,50 +279,52 @@ class FoundationLaw:
             total[:, -1] = self.phi_scale * growth
         return total
 
-    def pressure_block(self, x: Array, full: bool) -> Array:
+    def pressure_block(self, jump: Array, full: bool) -> Array:
         """Return the derivative of the layer's force, shape (n, block size, block size).
 
         Without that of h_nu, which is not symmetric, unless `full`.
         """
-        gradient = self.pressure_gradient(x)
+        gradient = self.pressure_gradient(jump)
         if not full:
             gradient[:, self.nodes.dim :] = 0.0
         total = np.zeros((*gradient.shape, self.nodes.block_size))
         total[:, : self.nodes.dim] = self.nodes.normal[:, :, None] * gradient[:, None, :]
         return total
 
-    def charge_block(self, x: Array, pressure: Array, full: bool = False) -> Array:
+    def charge_block(self, jump: Array, pressure: Array, full: bool = False) -> Array:
         """Return the derivative of the charge in `force`, shape (n, block size, block size).
 
         Parameters
         ----------
-        x, pressure
-            Nodal unknowns and pressures.
+        jump, pressure
+            Jumps T x (`ContactNodes.jump`) and pressures.
         full
             With the derivative of psi by the gap, not symmetric. Else psi is frozen, and a lagged
             charge has no derivative, as in the fixed point.
         """
         d, bs = self.nodes.dim, self.nodes.block_size
-        total = np.zeros((x.shape[0], bs, bs))
+        total = np.zeros((jump.shape[0], bs, bs))
         if self.conductor is None or (self.conductor.lagged and not full):
             return total
-        conductor, difference = self.conductor, self._difference(x)
-        slope = self._conductivity(x, pressure) * conductor.phi_l.derivative(difference)
+        conductor, difference = self.conductor, self._difference(jump)
+        slope = self._conductivity(jump, pressure) * conductor.phi_l.derivative(difference)
         total[:, -1, -1] = -(self.phi_scale**2) * slope
         if full:
             # The contact flag of the perfect conductor is kept; at kinks a one-sided derivative.
-            closing = conductor.psi.gap_slope(self._past_rigid_part(x), self._pressed(x, pressure))
+            closing = conductor.psi.gap_slope(
+                self._past_rigid_part(jump), self._pressed(jump, pressure)
+            )
             closing = self.phi_scale * conductor.share * closing * conductor.phi_l(difference)
             total[:, -1, :d] = -np.asarray(closing)[:, None] * self.nodes.normal
         return total
 
-    def block(self, x: Array, pressure: Array, full: bool = False) -> Array:
+    def block(self, jump: Array, pressure: Array, full: bool = False) -> Array:
         """Return the derivative of `force`, shape (n, block size, block size).
 
         Without the derivatives of h_nu and psi, and thus symmetric, unless `full`; then that of a
         lagged layer and charge too.
         """
-        total = self.charge_block(x, pressure, full)
+        total = self.charge_block(jump, pressure, full)
         if self.layer is not None and (full or not self.layer.lagged):
-            total += self.pressure_block(x, full)
+            total += self.pressure_block(jump, full)
         return total

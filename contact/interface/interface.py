@@ -43,7 +43,8 @@ class Proximal:
 class Interface:
     """Unilateral contact, friction, layer and surface charge at the owned contact nodes.
 
-    Nodal unknowns have shape (n, block size): displacement, then scaled potential.
+    Its methods take jumps T x of shape (n, block size): of displacements, then of the scaled
+    potential (`ContactNodes.jump`). In front of a fixed foundation these are the nodal unknowns.
 
     Attributes
     ----------
@@ -60,12 +61,12 @@ class Interface:
     fixed_conducting
         The charge at nodes without a free displacement, but with a free potential, or None.
     c_0
-        Complementarity parameter c_0 = E/size (stress/length), E behind Gamma_3.
+        Reference stiffness c_0 = E/size (stress/length), E behind Gamma_3: the complementarity
+        parameter of the active set of a solution.
     size
         Largest extent of the body (length).
     elongation
-        Aspect ratio of the cells behind Gamma_3 (`contact.mesh.entities.elongation`), by which c
-        of the residuals is larger.
+        Aspect ratio >= 1 of the cells behind Gamma_3 (`contact.mesh.entities.elongation`).
     component, components
         Connected component of each contact node, shape (n,), and their number
         (`contact.body.equilibrium`).
@@ -84,6 +85,15 @@ class Interface:
     component: NDArray[np.intp]
     components: int
     proximal: Proximal | None = None
+
+    @property
+    def c_r(self) -> float:
+        """Complementarity parameter c_r = elongation c_0 of the residuals (16) (stress/length).
+
+        Closing a gap at one node takes a stress of E/h: with stretched cells c_0 would hide errors
+        of the pressure far above the tolerance.
+        """
+        return self.elongation * self.c_0
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -129,26 +139,26 @@ class Interface:
         count = component_sums(*of, np.ones_like(weight), self.components)
         return count, component_sums(*of, weight, self.components)
 
-    def normal_gap(self, nodal: Array) -> Array:
+    def normal_gap(self, jump: Array) -> Array:
         """Return g_N = gap - u_nu, shape (n,)."""
-        return self.gap - self.nodes.normal_component(nodal)
+        return self.gap - self.nodes.normal_component(jump)
 
-    def slip(self, nodal: Array) -> Array:
+    def slip(self, jump: Array) -> Array:
         """Return the slip of the step, u_tau less that at its beginning, shape (n, d)."""
-        return self.nodes.tangential_component(nodal[:, : self.dim] - self.friction.history.jump)
+        return self.nodes.tangential_component(jump[:, : self.dim] - self.friction.history.jump)
 
-    def commit(self, nodal: Array) -> SlipHistory:
-        """Return the slip history of the next step, where this one ends at nodal unknowns."""
-        accumulated = self.friction.history.accumulated + self.slip_length(nodal)
-        return SlipHistory(self.nodes.tangential_component(nodal), accumulated)
+    def commit(self, jump: Array) -> SlipHistory:
+        """Return the slip history of the next step, where this one ends at a jump."""
+        accumulated = self.friction.history.accumulated + self.slip_length(jump)
+        return SlipHistory(self.nodes.tangential_component(jump), accumulated)
 
-    def slip_length(self, nodal: Array) -> Array:
+    def slip_length(self, jump: Array) -> Array:
         """Return the lengths of `slip`, shape (n,)."""
-        return np.linalg.norm(self.slip(nodal), axis=1)
+        return np.linalg.norm(self.slip(jump), axis=1)
 
-    def pressure(self, nodal: Array, multipliers: Multipliers) -> Array:
+    def pressure(self, jump: Array, multipliers: Multipliers) -> Array:
         """Return -sigma_nu = lambda_c + p_l, p_l the layer's pressure, shape (n,)."""
-        return multipliers.pressure + self.foundation.pressure(nodal)
+        return multipliers.pressure + self.foundation.pressure(jump)
 
     @property
     def largest_pressure(self) -> Array:
@@ -161,18 +171,18 @@ class Interface:
         bound = self.largest_pressure
         return self.nodes.maximum(np.where(np.isfinite(bound), bound, 0.0))
 
-    def bound(self, nodal: Array, multipliers: Multipliers) -> Array:
+    def bound(self, jump: Array, multipliers: Multipliers) -> Array:
         """Return the friction bound s, shape (n,). Collective."""
-        return self.friction.bound(self.pressure(nodal, multipliers), self.slip_length(nodal))
+        return self.friction.bound(self.pressure(jump, multipliers), self.slip_length(jump))
 
-    def stress(self, nodal: Array, multipliers: Multipliers) -> Array:
+    def stress(self, jump: Array, multipliers: Multipliers) -> Array:
         """Return -sigma nu, layer included, shape (n, d)."""
-        pressure = self.pressure(nodal, multipliers)
+        pressure = self.pressure(jump, multipliers)
         return Multipliers(pressure, multipliers.friction).vectors(self.nodes)
 
     def active_set(
         self,
-        nodal: Array,
+        jump: Array,
         multipliers: Multipliers,
         bound: Array,
         c: float | None = None,
@@ -182,51 +192,51 @@ class Interface:
 
         Parameters
         ----------
-        nodal, multipliers, bound
-            Unknowns, multipliers and friction bound.
+        jump, multipliers, bound
+            Jumps, multipliers and friction bound.
         c, rounding
             As in `constraint_active`; c_0 by default.
         """
         c = self.c_0 if c is None else c
-        closed = constraint_active(multipliers.pressure, self.normal_gap(nodal), c, rounding)
+        closed = constraint_active(multipliers.pressure, self.normal_gap(jump), c, rounding)
         if not self.friction.acts:
             return ActiveSet.without_slip(closed, False)
-        return ActiveSet.of(closed, multipliers.friction, self.slip(nodal), bound, c, rounding)
+        return ActiveSet.of(closed, multipliers.friction, self.slip(jump), bound, c, rounding)
 
-    def node_counts(self, nodal: Array, active: ActiveSet) -> tuple[int, int, int]:
+    def node_counts(self, jump: Array, active: ActiveSet) -> tuple[int, int, int]:
         """Return the numbers of open, stick and slip nodes; layer contact is closed. Collective."""
-        closed = active.closed | (self.foundation.pressure(nodal) > 0)
+        closed = active.closed | (self.foundation.pressure(jump) > 0)
         sticks = closed & active.sticks
         local = [np.count_nonzero(nodes) for nodes in (~closed, sticks, closed & ~sticks)]
         opened, stick, slip = (int(count) for count in summed(self.comm, local))
         return opened, stick, slip
 
-    def rounding(self, nodal: Array) -> float:
+    def rounding(self, jump: Array) -> float:
         """Return the pressure of a rounding of the displacements (stress). Collective."""
-        displacement = np.abs(nodal[:, : self.nodes.dim]).max(axis=1, initial=0.0)
+        displacement = np.abs(jump[:, : self.nodes.dim]).max(axis=1, initial=0.0)
         return 2 * ROUNDING * self.c_0 * self.nodes.maximum(displacement)
 
-    def negligible(self, nodal: Array, pressure: Array) -> float:
+    def negligible(self, jump: Array, pressure: Array) -> float:
         """Return the rounding of pressures, by displacements or the largest one. Collective."""
-        return max(NEGLIGIBLE * self.nodes.maximum(pressure), self.rounding(nodal))
+        return max(NEGLIGIBLE * self.nodes.maximum(pressure), self.rounding(jump))
 
     def acting(
         self, x: Array, multipliers: Multipliers
     ) -> Iterator[tuple[FoundationLaw, Array, Array]]:
-        """Yield law, unknowns and pressures of contact, then fixed conducting nodes. Collective."""
-        nodal = self.nodes.jump(x)
-        yield self.foundation, nodal, self.pressure(nodal, multipliers)
+        """Yield law, jumps and pressures of contact, then fixed conducting nodes. Collective."""
+        jump = self.nodes.jump(x)
+        yield self.foundation, jump, self.pressure(jump, multipliers)
         if self.fixed_conducting is not None:
-            nodal = self.fixed_conducting.nodes.jump(x)
-            yield self.fixed_conducting, nodal, self.fixed_conducting.resting(nodal)
+            jump = self.fixed_conducting.nodes.jump(x)
+            yield self.fixed_conducting, jump, self.fixed_conducting.resting(jump)
 
     def add_forces(self, residual: Array, x: Array, multipliers: Multipliers) -> None:
         """Add the contact forces and the charge at local unknowns to owned values."""
         nodes = self.nodes
         nodes.add_jump_transposed(nodes.weight[:, None] * multipliers.vectors(nodes), residual)
-        for law, nodal, pressure in self.acting(x, multipliers):
+        for law, jump, pressure in self.acting(x, multipliers):
             law.nodes.add_jump_transposed(
-                law.nodes.weight[:, None] * law.force(nodal, pressure), residual
+                law.nodes.weight[:, None] * law.force(jump, pressure), residual
             )
         if self.proximal is not None:
             away = nodes.tangential_component(nodes.jump(x)) - self.proximal.about
@@ -238,8 +248,8 @@ class Interface:
         self, residual: Array, x: Array, change: Array, multipliers: Multipliers
     ) -> None:
         """Add the change of the charge with local unknowns, psi frozen, to owned values."""
-        for law, nodal, pressure in self.acting(x, multipliers):
-            block = law.charge_block(nodal, pressure)
+        for law, jump, pressure in self.acting(x, multipliers):
+            block = law.charge_block(jump, pressure)
             density = np.einsum("nij,nj->ni", block, law.nodes.jump(change))
             law.nodes.add_jump_transposed(law.nodes.weight[:, None] * density, residual)
 
@@ -267,6 +277,6 @@ class Interface:
         if self.fixed_conducting is None:
             return weighted
         there = self.fixed_conducting.nodes
-        nodal = there.jump(x)
-        block = self.fixed_conducting.charge_block(nodal, self.fixed_conducting.resting(nodal))
+        jump = there.jump(x)
+        block = self.fixed_conducting.charge_block(jump, self.fixed_conducting.resting(jump))
         return np.concatenate([weighted, there.weight[:, None, None] * block])

@@ -137,32 +137,32 @@ class ContactNodes:
     def jump(self, x: Array) -> Array:
         """Return the jumps T x, shape (n, block_size), of a local dof array. Collective.
 
-        These are the nodal unknowns, in front of a moving foundation relative to it.
+        In front of a foundation these are the nodal unknowns, relative to it if it moves.
         """
         values = self._nodal(x)
-        nodal = values[self.nodes]
+        jump = values[self.nodes]
         if self.coupling is not None:
-            nodal[self.coupling.places] = self.coupling.apply(values)
+            jump[self.coupling.places] = self.coupling.apply(values)
         if self.motion is None:
-            return nodal
-        return nodal - self.motion @ x[x.size - self.motion.shape[2] :]
+            return jump
+        return jump - self.motion @ x[x.size - self.motion.shape[2] :]
 
     def _nodal(self, values: Array) -> Array:
         """Return a view of the nodal values, without the global unknowns behind them."""
         count = values.size // self.block_size
         return values[: count * self.block_size].reshape(count, self.block_size)
 
-    def add_jump_transposed(self, nodal: Array, into: Array) -> None:
+    def add_jump_transposed(self, vectors: Array, into: Array) -> None:
         """Add T^T times vectors, (n, d) or (n, block_size), to a local dof array. Collective."""
-        size = nodal.shape[1]
+        size = vectors.shape[1]
         values = self._nodal(into)[:, :size]
         own = np.ones(self.nodes.size, dtype=bool)
         if self.coupling is not None:
             own[self.coupling.places] = False
-            self.coupling.transpose(nodal[self.coupling.places], values)
-        values[self.nodes[own]] += nodal[own]
+            self.coupling.transpose(vectors[self.coupling.places], values)
+        values[self.nodes[own]] += vectors[own]
         if self.motion is not None:
-            total = np.einsum("ni,nim->m", nodal, self.motion[:, :size])
+            total = np.einsum("ni,nim->m", vectors, self.motion[:, :size])
             into[into.size - total.size :] -= summed(self.comm, total)
 
     def normal_component(self, u: Array) -> Array:

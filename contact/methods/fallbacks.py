@@ -286,10 +286,10 @@ def _penetrating(
     interface: Interface, state: State, inside: NDArray[np.bool_]
 ) -> tuple[float, int]:
     """Return the largest penetration of nodes outside a set, and their number. Collective."""
-    nodal = interface.nodes.jump(state.x)
-    depth = np.where(inside, 0.0, -interface.normal_gap(nodal))
+    jump = interface.nodes.jump(state.x)
+    depth = np.where(inside, 0.0, -interface.normal_gap(jump))
     deepest = interface.nodes.maximum(depth)
-    rounding = interface.rounding(nodal) / interface.c_0
+    rounding = interface.rounding(jump) / interface.c_0
     count = int(summed(interface.comm, np.count_nonzero(depth > rounding)))
     return deepest, count
 

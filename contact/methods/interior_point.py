@@ -352,10 +352,10 @@ def interior_point(
         if aside is None and outcome.residuals.significant < PROGRESS * best:
             state = last
         best = min(best, outcome.residuals.significant)
-        nodal = interface.nodes.jump(state.x)
-        bound = interface.bound(nodal, state.forces)
+        jump = interface.nodes.jump(state.x)
+        bound = interface.bound(jump, state.forces)
         # With all nodes open the next bound is zero, and the solution the same.
-        if aside is not None and interface.nodes.maximum(bound) <= interface.rounding(nodal):
+        if aside is not None and interface.nodes.maximum(bound) <= interface.rounding(jump):
             break
         if modes.overloaded(bound):
             outcome = replace(outcome, residuals=evaluate(problem, state))
@@ -387,9 +387,9 @@ class InteriorPoint:
         total, limit = all_loads(problem), nodes.weight * bound
         count = max(nodes.size, 1)
         self._frictional = limit > EPS * max(nodes.maximum(limit), total / count)
-        nodal = nodes.jump(self._state.x)
-        moved = np.zeros_like(nodal) if begin is None else nodes.jump(begin.x) - nodal
-        normal_gap = interface.normal_gap(nodal + moved)[self._rigid]
+        jump = nodes.jump(self._state.x)
+        moved = np.zeros_like(jump) if begin is None else nodes.jump(begin.x) - jump
+        normal_gap = interface.normal_gap(jump + moved)[self._rigid]
         gap = interface.gap[self._rigid]
         scales = problem.scales
         block = scales.plane_modulus * scales.area / scales.height
@@ -406,7 +406,7 @@ class InteriorPoint:
         # Where the body lifts off without contact, the first slack is the normal gap.
         slack = np.maximum(np.maximum(gap, normal_gap), least)
         frictional = self._frictional
-        slips, limit = interface.slip_length(nodal + moved)[frictional], limit[frictional]
+        slips, limit = interface.slip_length(jump + moved)[frictional], limit[frictional]
         zeros = np.zeros((limit.size, nodes.dim))
         length = np.maximum(work / limit, slips)
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, nodes.comm)
@@ -435,9 +435,9 @@ class InteriorPoint:
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
             interface = self.problem.interface
-            nodal = interface.nodes.jump(state.x)
-            pressure = interface.nodes.maximum(interface.pressure(nodal, state.forces))
-            if pressure <= interface.rounding(nodal):
+            jump = interface.nodes.jump(state.x)
+            pressure = interface.nodes.maximum(interface.pressure(jump, state.forces))
+            if pressure <= interface.rounding(jump):
                 ended = f"nothing presses after {steps} steps"
                 break
             gap = self.relative_gap()
@@ -459,9 +459,9 @@ class InteriorPoint:
     def relative_gap(self) -> float:
         """Return the duality gap over the work of loads and contact. Collective."""
         body, interface, x = self.problem.body, self.problem.interface, self._state.x
-        nodes, cones, nodal = interface.nodes, self.cones, interface.nodes.jump(x)
-        ways = np.abs(interface.gap) + np.abs(nodes.normal_component(nodal))
-        slips = interface.slip_length(nodal)[self._frictional]
+        nodes, cones, jump = interface.nodes, self.cones, interface.nodes.jump(x)
+        ways = np.abs(interface.gap) + np.abs(nodes.normal_component(jump))
+        slips = interface.slip_length(jump)[self._frictional]
         contact = float(summed(nodes.comm, cones.force @ ways[self._rigid] + cones.bound @ slips))
         own = body.owned_part(x)[: body.owned]
         forces = self._evaluated.internal, body.external(self._state.time)
@@ -476,10 +476,10 @@ class InteriorPoint:
             return False
         nodes, rigid, frictional = interface.nodes, self._rigid, self._frictional
         body, d = self.problem.body, nodes.dim
-        nodal = nodes.jump(state.x)
+        jump = nodes.jump(state.x)
         residual = -residual_forces(self.problem, state, internal=self._evaluated.internal)
-        slack = interface.normal_gap(nodal)[rigid] - cones.slack
-        slip = interface.slip(nodal)[frictional] - cones.slip
+        slack = interface.normal_gap(jump)[rigid] - cones.slack
+        slip = interface.slip(jump)[frictional] - cones.slip
         cones.scale()
         stiff, across = cones.stiffness()
         blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))

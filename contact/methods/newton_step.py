@@ -167,9 +167,9 @@ class NewtonStep:
         """Assemble the operator with nodal blocks and those of layer and charge. Collective."""
         interface, body = problem.interface, problem.body
         if interface.foundation.active:
-            nodal = interface.nodes.jump(state.x)
+            jump = interface.nodes.jump(state.x)
             blocks = blocks + interface.foundation.block(
-                nodal, interface.pressure(nodal, state.forces)
+                jump, interface.pressure(jump, state.forces)
             )
         weighted = interface.weighted(blocks, state.x)
         self.operator.update("secant", state, weighted, constant=body.linear)
@@ -224,10 +224,10 @@ class NewtonStep:
     def _linearise(self, interface: Interface, state: State, residual: float) -> LinearisedLaws:
         """Linearise contact, friction, layer and charge. Collective."""
         parameters, before = self.parameters, state.active_set
-        nodal = interface.nodes.jump(state.x)
-        total, length = interface.pressure(nodal, state.forces), interface.slip_length(nodal)
+        jump = interface.nodes.jump(state.x)
+        total, length = interface.pressure(jump, state.forces), interface.slip_length(jump)
         s = interface.friction.bound(total, length)
-        active, forces = guarded_active_set(interface, nodal, state.forces, s, parameters.c, before)
+        active, forces = guarded_active_set(interface, jump, state.forces, s, parameters.c, before)
         changed = before is None or not active.same(before)
         unchanged = float(summed(interface.comm, changed)) == 0
         by_slip = np.zeros_like(s)
@@ -235,15 +235,15 @@ class NewtonStep:
             limit = self.options.softening * parameters.nodal_stiffness
             by_slip = bound_by_slip(interface, total, length, limit)
         bound = LinearisedBound(s, interface.friction.by_pressure(total, length), by_slip)
-        multipliers, contact = linearise(interface, nodal, forces, active, parameters, bound)
-        layer, shift = linearised_layer(interface, nodal, state, parameters, unchanged)
-        charge = self._charge(interface, nodal, multipliers, unchanged, residual)
+        multipliers, contact = linearise(interface, jump, forces, active, parameters, bound)
+        layer, shift = linearised_layer(interface, jump, state, parameters, unchanged)
+        charge = self._charge(interface, jump, multipliers, unchanged, residual)
         return LinearisedLaws(active, unchanged, multipliers, contact, layer, shift, charge)
 
     def _charge(
         self,
         interface: Interface,
-        nodal: Array,
+        jump: Array,
         multipliers: Multipliers,
         unchanged: bool,
         residual: float,
@@ -255,7 +255,7 @@ class NewtonStep:
         follow = unchanged
         if law.follows_gap:
             follow = self.conductivity_derivative(residual, unchanged)
-        return law.charge_block(nodal, interface.pressure(nodal, multipliers), follow)
+        return law.charge_block(jump, interface.pressure(jump, multipliers), follow)
 
     def _update(
         self,
@@ -307,7 +307,7 @@ def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: A
 
 def linearised_layer(
     interface: Interface,
-    nodal: Array,
+    jump: Array,
     state: State,
     parameters: ComplementarityParameters,
     full: bool,
@@ -318,14 +318,14 @@ def linearised_layer(
     about the displacement alone, a layer stiffer than the body cycles between its regimes.
     """
     law, nodes, c = interface.foundation, interface.nodes, parameters.c
-    graph = law.normal_graph(nodal)
+    graph = law.normal_graph(jump)
     if graph is None:
-        return law.pressure_block(nodal, full), np.zeros(nodal.shape[0])
-    u_n, layer = nodes.normal_component(nodal), law.pressure(nodal)
+        return law.pressure_block(jump, full), np.zeros(jump.shape[0])
+    u_n, layer = nodes.normal_component(jump), law.pressure(jump)
     last = layer if state.layer_pressure is None else state.layer_pressure
     place = graph.displacement(state.forces.pressure + last + c * u_n, c)
-    on_graph = nodal.copy()
+    on_graph = jump.copy()
     on_graph[:, : interface.dim] += (place - u_n)[:, None] * nodes.normal
     block = law.pressure_block(on_graph, full)
-    back = nodes.normal_component(np.einsum("nij,nj->ni", block, nodal - on_graph))
+    back = nodes.normal_component(np.einsum("nij,nj->ni", block, jump - on_graph))
     return block, law.pressure(on_graph) + back - layer

@@ -29,7 +29,7 @@ REGULARISATION = 1e-2
 
 def guarded_active_set(
     interface: Interface,
-    nodal: Array,
+    jump: Array,
     multipliers: Multipliers,
     bound: Array,
     c: float,
@@ -39,18 +39,18 @@ def guarded_active_set(
 
     Parameters
     ----------
-    interface, nodal, multipliers, bound, c
+    interface, jump, multipliers, bound, c
         As `Interface.active_set` takes them.
     before
         Active set of the last step; None in the first one, where closed nodes stick.
     """
     if before is None:
-        closed = interface.normal_gap(nodal) <= 1e-12 * interface.size
+        closed = interface.normal_gap(jump) <= 1e-12 * interface.size
         return ActiveSet.without_slip(closed, interface.friction.acts), multipliers
-    slip = interface.slip(nodal)
+    slip = interface.slip(jump)
     friction = at_bound(before, multipliers.friction, slip, bound)
     multipliers = replace(multipliers, friction=friction)
-    active = interface.active_set(nodal, multipliers, bound, c)
+    active = interface.active_set(jump, multipliers, bound, c)
     reverses = before.slips & active.slips & (_power(friction, slip) < 0)
     sticks, slips = active.sticks | reverses, active.slips & ~reverses
     return replace(active, sticks=sticks, slips=slips), multipliers

@@ -88,13 +88,13 @@ class SemismoothNewton:
     def started(self, start: State) -> State:
         """Return an initial guess with its active set."""
         interface, c = self.problem.interface, self.step.parameters.c
-        nodal = interface.nodes.jump(start.x)
+        jump = interface.nodes.jump(start.x)
         # Rounding of the pressure at an open node would be a friction bound, and make it stick.
-        closed = constraint_active(start.forces.pressure, interface.normal_gap(nodal), c)
+        closed = constraint_active(start.forces.pressure, interface.normal_gap(jump), c)
         pressure = np.where(closed, start.forces.pressure, 0.0)
         forces = Multipliers.of(interface.nodes, pressure, start.forces.friction)
-        bound = interface.bound(nodal, forces)
-        active_set = interface.active_set(nodal, forces, bound, c)
+        bound = interface.bound(jump, forces)
+        active_set = interface.active_set(jump, forces, bound, c)
         return replace(start, forces=forces, active_set=active_set, layer_pressure=None)
 
     def iterate(
@@ -233,8 +233,8 @@ class Iteration:
 
     def _largest_pressure(self, state: State) -> float:
         interface = self._problem.interface
-        nodal = interface.nodes.jump(state.x)
-        return interface.nodes.maximum(interface.pressure(nodal, state.forces))
+        jump = interface.nodes.jump(state.x)
+        return interface.nodes.maximum(interface.pressure(jump, state.forces))
 
     def _loss_of_contact(self, state: State) -> tuple[State, Outcome] | None:
         """Return zero displacement if contact is lost and no load acts; else None. Collective."""

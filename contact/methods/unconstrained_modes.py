@@ -151,9 +151,9 @@ class UnconstrainedModes:
         None without any. Collective.
         """
         interface = problem.interface
-        nodes, nodal = interface.nodes, interface.nodes.jump(state.x)
+        nodes, jump = interface.nodes, interface.nodes.jump(state.x)
         # Pressures that are rounding do not constrain.
-        pressed = interface.pressure(nodal, state.forces) > interface.rounding(nodal)
+        pressed = interface.pressure(jump, state.forces) > interface.rounding(jump)
         motions, columns = [], []
         for group in self._unsupported:
             free = null_space(group.constraints(self.problem.frictional, pressed))
@@ -169,12 +169,12 @@ class UnconstrainedModes:
             vectors = [*(body.local(column) for column in whole.T), state.x]
             rows, weights = _by_volume(problem, vectors)
         else:  # of a condensed body the jumps alone are known
-            values = np.concatenate([moved, nodal[:, : nodes.dim, None]], axis=2)
+            values = np.concatenate([moved, jump[:, : nodes.dim, None]], axis=2)
             rows, weights = values.reshape(-1, values.shape[2]), np.repeat(nodes.weight, nodes.dim)
         gram = nodes.comm.allreduce(rows.T @ (weights[:, None] * rows), op=MPI.SUM)
         products, sides = gram[:-1, :-1], gram[:-1, -1]
         wanted = amounts = np.linalg.lstsq(products, sides, rcond=EPS)[0]
-        near, normal_gap = np.isfinite(interface.gap), interface.normal_gap(nodal)
+        near, normal_gap = np.isfinite(interface.gap), interface.normal_gap(jump)
         rising = np.einsum("ni,nik->nk", nodes.normal, moved)
         depth = nodes.maximum(-(normal_gap + rising @ wanted)[near])
         limited = depth > NEGLIGIBLE * interface.size

@@ -322,8 +322,8 @@ def _flows(
     if state is None:
         return _conducts(law, interface.size), _conducts(held, interface.size)
     found = [
-        law.charge_block(nodal, pressure, full=True)[:, -1, -1] != 0
-        for law, nodal, pressure in interface.acting(state.x, state.forces)
+        law.charge_block(jump, pressure, full=True)[:, -1, -1] != 0
+        for law, jump, pressure in interface.acting(state.x, state.forces)
     ]
     return found[0], found[1] if held is not None else np.zeros(0, dtype=bool)
 

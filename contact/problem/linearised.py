@@ -67,22 +67,22 @@ class Equations:
 
 def active_set(problem: ContactProblem, state: State) -> ActiveSet:
     """Return the active set of a solution. Collective."""
-    interface, nodal = problem.interface, problem.nodal(state)
-    return interface.active_set(nodal, state.forces, interface.bound(nodal, state.forces))
+    interface, jump = problem.interface, problem.nodal(state)
+    return interface.active_set(jump, state.forces, interface.bound(jump, state.forces))
 
 
 def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equations:
     """Return the residuals of the equations of an active set. Collective."""
-    interface, nodes, nodal = problem.interface, problem.nodes, problem.nodal(state)
+    interface, nodes, jump = problem.interface, problem.nodes, problem.nodal(state)
     vectors = state.forces.vectors(nodes)
-    slip, pressure = interface.slip(nodal), interface.pressure(nodal, state.forces)
+    slip, pressure = interface.slip(jump), interface.pressure(jump, state.forces)
     length = np.linalg.norm(slip, axis=1)
     bound = interface.friction.bound(pressure, length)
     along = unit_vectors(slip)
     friction = nodes.tangential_component(vectors)
     slides = friction - np.where(active.slips, bound, 0.0)[:, None] * along
     tangential = np.where(active.sticks[:, None], interface.c_0 * slip, slides)
-    closing = -interface.c_0 * interface.normal_gap(nodal)
+    closing = -interface.c_0 * interface.normal_gap(jump)
     normal = np.where(active.closed, closing, nodes.normal_component(vectors))
     conditions = normal[:, None] * nodes.normal + tangential
     # Forces on nodes of a rigid part as forces on it: a parameter may be its moment arm.
@@ -106,14 +106,14 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     In contact without pressure, sticking at the friction bound, or slipping by nothing: there the
     solution has one-sided derivatives only.
     """
-    interface, nodal, forces = problem.interface, problem.nodal(state), state.forces
+    interface, jump, forces = problem.interface, problem.nodal(state), state.forces
     active, c = active_set(problem, state), interface.c_0
-    moved = c * np.linalg.norm(nodal[:, : problem.dim], axis=1)
-    small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(nodal, forces), moved))
-    normal_gap, length = np.abs(interface.normal_gap(nodal)), interface.slip_length(nodal)
+    moved = c * np.linalg.norm(jump[:, : problem.dim], axis=1)
+    small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(jump, forces), moved))
+    normal_gap, length = np.abs(interface.normal_gap(jump)), interface.slip_length(jump)
     weak = np.where(active.closed, np.abs(forces.pressure) <= small, c * normal_gap <= small)
     if interface.friction.acts:
-        bound = interface.bound(nodal, forces)
+        bound = interface.bound(jump, forces)
         left = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
         weak |= active.sticks & active.closed & (left < small) & (bound > 0)
         weak |= active.slips & (c * length < small)
@@ -147,10 +147,10 @@ class Linearised:
     ) -> None:
         self.problem, self.state = problem, state
         self.active = active_set(problem, state)
-        interface, nodes, nodal = problem.interface, problem.nodes, problem.nodal(state)
-        self._pressure = interface.pressure(nodal, state.forces)
-        law = interface.foundation.block(nodal, self._pressure, full=True)
-        self._conditions(nodal)
+        interface, nodes, jump = problem.interface, problem.nodes, problem.nodal(state)
+        self._pressure = interface.pressure(jump, state.forces)
+        law = interface.foundation.block(jump, self._pressure, full=True)
+        self._conditions(jump)
         regular = self._by_force.copy()
         normal = nodes.normal[:, :, None] * nodes.normal[:, None, :]
         small = interface.c_0 / parameters.gamma
@@ -164,10 +164,10 @@ class Linearised:
         self._operator = problem.operator(symmetric=False, counters=counters, kind=kind)
         self._operator.update("tangent", state, interface.weighted(law, state.x))
 
-    def _conditions(self, nodal: Array) -> None:
+    def _conditions(self, jump: Array) -> None:
         """Compute C_u, shape (n, d, block size), and C_f, shape (n, d, d)."""
         interface, nodes, active = self.problem.interface, self.problem.nodes, self.active
-        d, slip = nodes.dim, interface.slip(nodal)
+        d, slip = nodes.dim, interface.slip(jump)
         length = np.linalg.norm(slip, axis=1)
         size = np.where(active.slips, np.maximum(length, np.finfo(float).tiny), 1.0)
         along = slip / size[:, None]
@@ -186,7 +186,7 @@ class Linearised:
             total, smooth = friction.history.accumulated + length, friction.smooth(self._pressure)
             rate = np.asarray(friction.law.by_pressure(total, smooth), dtype=float)
             self._rate = np.broadcast_to(rate, length.shape) * (smooth > 0)
-        self._layer = interface.foundation.pressure_gradient(nodal)
+        self._layer = interface.foundation.pressure_gradient(jump)
         local = self._rate * friction.local
         self._by_jump = np.zeros((length.size, d, nodes.block_size))
         self._by_jump[:, :, :d] = np.where(closed, interface.c_0 * normal, 0.0)
@@ -287,9 +287,9 @@ class Linearised:
         # Rounding, or linear convergence; the first corrections may grow by the smoothed pressure.
         return (now >= last and now <= WEAK * size) or now**2 <= EPS * size * min(last, size)
 
-    def _norm(self, x: Array, nodal: Array) -> float:
+    def _norm(self, x: Array, f: Array) -> float:
         """Return |x| + EPS |f|."""
-        return self.problem.body.norm(x) + EPS * self.problem.nodes.norm(nodal)
+        return self.problem.body.norm(x) + EPS * self.problem.nodes.norm(f)
 
 
 def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> State:
@@ -332,10 +332,10 @@ def commit_transposed(problem: ContactProblem, state: State, after: History) -> 
     if variables is not None:
         problem.body.laws.commit_transposed(state, variables)
         by_x += problem.body.forces_of_laws()
-    nodes, nodal = problem.nodes, problem.nodal(state)
-    by_jump = np.zeros_like(nodal)
+    nodes, jump = problem.nodes, problem.nodal(state)
+    by_jump = np.zeros_like(jump)
     by_jump[:, : nodes.dim] = nodes.tangential_component(slip.jump)
-    by_jump[:, : nodes.dim] += slip.accumulated[:, None] * _direction(problem, nodal)
+    by_jump[:, : nodes.dim] += slip.accumulated[:, None] * _direction(problem, jump)
     nodes.add_jump_transposed(by_jump, by_x)
     return by_x
 
@@ -367,9 +367,9 @@ def before_transposed(
     return History(parts if before is None else {**parts, VARIABLES: before})
 
 
-def _direction(problem: ContactProblem, nodal: Array) -> Array:
+def _direction(problem: ContactProblem, jump: Array) -> Array:
     """Return the slip directions in a step, shape (n, d)."""
-    return unit_vectors(problem.interface.slip(nodal))
+    return unit_vectors(problem.interface.slip(jump))
 
 
 def _parts(history: History) -> tuple[SlipHistory, InternalVariables | None]:

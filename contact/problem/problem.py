@@ -403,7 +403,7 @@ class ContactProblem:
         return self.interface.nodes
 
     def nodal(self, state: State) -> Array:
-        """Return the unknowns at the owned contact nodes, shape (n, block size)."""
+        """Return the jumps T x at the owned contact nodes, shape (n, block size)."""
         return self.nodes.jump(state.x)
 
     def start(self, time: float | None = None) -> State:

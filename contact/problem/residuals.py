@@ -52,12 +52,12 @@ class Residuals:
         coupling forces of the potential and charges of the strain count as loads. Without any
         force the reference is the residual of the zero initial guess, and rounding counts as 0.
     contact
-        |lambda_c - max(0, lambda_c + c (u_nu - rho))| in L2(Gamma_3) over max(|p|, 1e-4 c_0 |g|),
-        p = -sigma_nu, g the gaps up to the displacements (`interface_residuals`); the largest of
-        all connected components. c = c_0 = E/size of the bodies, times the elongation
-        >= 1 of the cells behind Gamma_3 (`contact.mesh.entities.elongation`).
+        |lambda_c - max(0, lambda_c + c_r (u_nu - rho))| in L2(Gamma_3) over
+        max(|p|, 1e-4 c_0 |g|), p = -sigma_nu, g the gaps up to the displacements
+        (`interface_residuals`); the largest of all connected components. c_r = `Interface.c_r`,
+        c_0 = E/size of the bodies.
     friction
-        |lambda_f - proj_s(lambda_f + c u_tau)| over the same, with the final bound s.
+        |lambda_f - proj_s(lambda_f + c_r u_tau)| over the same, with the final bound s.
     floors
         Rounding floors of the three: `force_rounding` up to the `rounding_limit` of the body, and
         these forces as pressures.
@@ -208,10 +208,10 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
     Multipliers at open nodes, and pressures that are rounding, do not count as contact.
     """
-    nodal, own = interface.nodes.jump(state.x), state.forces.pressure
-    rounding = interface.rounding(nodal)
-    on = constraint_active(own, interface.normal_gap(nodal), interface.c_0, rounding)
-    pressed = interface.norms(interface.pressure(nodal, state.forces) - own * ~on)
+    jump, own = interface.nodes.jump(state.x), state.forces.pressure
+    rounding = interface.rounding(jump)
+    on = constraint_active(own, interface.normal_gap(jump), interface.c_0, rounding)
+    pressed = interface.norms(interface.pressure(jump, state.forces) - own * ~on)
     much = (pressed > 0) & (pressed > EPS * pressed.max())
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())
 
@@ -257,10 +257,10 @@ def evaluate_iterate(problem: AnyProblem, state: State) -> Iterate:
     scale = np.maximum(scale, EPS * scale.max())
     reference = np.where(scale > 0, scale, 1.0)
     balance = worst((unbalanced / reference).reshape(1, -1), (rounding / reference).reshape(1, -1))
-    nodal = interface.nodes.jump(state.x)
-    bound = interface.bound(nodal, state.forces)
+    jump = interface.nodes.jump(state.x)
+    bound = interface.bound(jump, state.forces)
     pressures = _as_pressures(interface, contact_rounding)
-    laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
+    laws = interface_residuals(interface, jump, state.forces, bound, pressures)
     accepted = np.where(loaded, np.minimum(rounding, unbalanced) / reference, 0.0)
     equilibrium_rounding = float(accepted.max())
     residuals, floors = (

@@ -88,5 +88,5 @@ class Scales:
     def complementarity_parameters(self, gamma: float) -> ComplementarityParameters:
         """Return c = r*, the stiffness r*^2 H/E' of a node, and gamma times the larger one."""
         c = self.augmentation
-        nodal = c**2 * self.height / self.plane_modulus
-        return ComplementarityParameters(c, nodal, gamma * max(c, nodal))
+        stiffness = c**2 * self.height / self.plane_modulus
+        return ComplementarityParameters(c, stiffness, gamma * max(c, stiffness))

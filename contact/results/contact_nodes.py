@@ -79,7 +79,7 @@ class Solved:
 
     @property
     def nodal(self) -> Array:
-        """Displacement (and scaled potential) at the contact nodes, shape (n, block size)."""
+        """Jumps of displacement and scaled potential at the contact nodes, (n, block size)."""
         return self.problem.nodal(self.state)
 
     @property
@@ -126,10 +126,10 @@ class Solved:
         exceeds the friction bound (always where that is 0), and sticks else. Pressures
         below 1e-9 of the largest count as rounding, and those that rounding of displacements makes.
         """
-        interface, nodal = self.problem.interface, self.nodal
-        rounding = interface.negligible(nodal, self.pressure)
-        active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
-        layer = interface.foundation.pressure(nodal) > rounding
+        interface, jump = self.problem.interface, self.nodal
+        rounding = interface.negligible(jump, self.pressure)
+        active = interface.active_set(jump, self.forces, self.friction_bound, rounding=rounding)
+        layer = interface.foundation.pressure(jump) > rounding
         touches = active.closed | layer
         sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")
@@ -338,9 +338,9 @@ def contact_shares(
     problem: ContactProblem, state: State, status: NDArray[np.str_]
 ) -> dict[str, ContactShare]:
     """Return the results of each contact by its name, with the status of its nodes. Collective."""
-    nodes, nodal = problem.nodes, problem.nodal(state)
-    pressure = problem.interface.pressure(nodal, state.forces)
-    forces = nodes.weight[:, None] * problem.interface.stress(nodal, state.forces)
+    nodes, jump = problem.nodes, problem.nodal(state)
+    pressure = problem.interface.pressure(jump, state.forces)
+    forces = nodes.weight[:, None] * problem.interface.stress(jump, state.forces)
     found = {}
     for number, contact in enumerate(problem.contacts):
         own = problem.entry_numbers == number

@@ -313,7 +313,7 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     # load does, with S = h/(2 pi g) int |lambda|^2 as of a load that nodes do not see. Where S < D
     # the sum is least for b/h = S/D: S (1 + log(D/S)).
     body, interface = problem.body, problem.interface
-    domain, d, nodal = body.domain, body.dim, problem.nodal(state)
+    domain, d, jump = body.domain, body.dim, problem.nodal(state)
     sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
     squares = np.zeros(domain.mesh.topology.index_map(d).size_local)
     cells, place = cells_at(domain.mesh, domain.facets(part_name(sides)))
@@ -323,13 +323,13 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     index_map = body.space.dofmap.index_map
     vector = la.vector(index_map, 3 + 2 * d)
     values = vector.array.reshape(-1, 3 + 2 * d)
-    normal_gap = interface.normal_gap(nodal)
+    normal_gap = interface.normal_gap(jump)
     values[interface.nodes.nodes] = np.column_stack(
         [
             state.forces.pressure,
             np.where(np.isfinite(normal_gap), normal_gap, 0.0),  # no rigid part: no pressure on it
-            interface.bound(nodal, state.forces),
-            interface.slip(nodal),
+            interface.bound(jump, state.forces),
+            interface.slip(jump),
             state.forces.friction,
         ]
     )
@@ -352,7 +352,7 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     moved = share * np.sum(areas * (pressure**2 + np.sum(friction**2, axis=-1)), axis=1)
     ratio = np.divide(products, moved, out=np.ones_like(moved), where=moved > 0)
     # Beside a facet that touches with all of its nodes there is room, and b is h.
-    touches = values[nodes, 0] > interface.negligible(nodal, state.forces.pressure)
+    touches = values[nodes, 0] > interface.negligible(jump, state.forces.pressure)
     within = la.vector(index_map)
     within.array[nodes[touches.all(axis=1)]] = 1.0
     within.scatter_reverse(la.InsertMode.add)

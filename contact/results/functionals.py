@@ -267,8 +267,8 @@ class Reaction:
         by_x = body.tangent_transposed(state, weights)
         seen = nodes.jump(body.local(weights))
         by_force = nodes.weight[:, None] * seen[:, : nodes.dim]
-        for law, nodal, pressure in interface.acting(state.x, state.forces):
-            block = law.block(nodal, pressure, full=law is interface.foundation)
+        for law, jump, pressure in interface.acting(state.x, state.forces):
+            block = law.block(jump, pressure, full=law is interface.foundation)
             there = law.nodes.jump(body.local(weights))
             law.nodes.add_jump_transposed(
                 law.nodes.weight[:, None] * np.einsum("nji,nj->ni", block, there), by_x
@@ -283,16 +283,16 @@ class FoundationCharge:
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
         found = 0.0
-        for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
-            found += law.nodes.sum(law.charge(nodal, pressure))
+        for law, jump, pressure in problem.interface.acting(state.x, state.forces):
+            found += law.nodes.sum(law.charge(jump, pressure))
         return found
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
         by_x = np.zeros_like(problem.body.owned_part(state.x))
-        for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
+        for law, jump, pressure in problem.interface.acting(state.x, state.forces):
             full = law is problem.interface.foundation
-            slope = -law.charge_block(nodal, pressure, full)[:, -1] / law.phi_scale
+            slope = -law.charge_block(jump, pressure, full)[:, -1] / law.phi_scale
             law.nodes.add_jump_transposed(law.nodes.weight[:, None] * slope, by_x)
         return by_x, np.zeros_like(problem.nodes.normal)
 

@@ -280,9 +280,9 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     """Return the charges that leave the owned nodes through contact; between bodies they cancel."""
     body = problem.body
     leaving = np.zeros_like(body.external(state.time))
-    for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
-        density = np.zeros((nodal.shape[0], body.block_size))
-        density[:, -1] = law.nodes.weight * law.charge(nodal, pressure)
+    for law, jump, pressure in problem.interface.acting(state.x, state.forces):
+        density = np.zeros((jump.shape[0], body.block_size))
+        density[:, -1] = law.nodes.weight * law.charge(jump, pressure)
         law.nodes.add_jump_transposed(density, leaving)
     return np.asarray(body.nodal(leaving)[:, -1])
 

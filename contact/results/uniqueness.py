@@ -68,19 +68,19 @@ def uniqueness(
         return np.nan, False
     if condensation is None and not condensation_pays(problem, "auto"):
         return np.inf, False
-    nodal = nodes.jump(state.x)
-    pressure = interface.pressure(nodal, state.forces)
-    rounding = interface.negligible(nodal, pressure)
-    closed = constraint_active(pressure, interface.normal_gap(nodal), interface.c_0, rounding)
+    jump = nodes.jump(state.x)
+    pressure = interface.pressure(jump, state.forces)
+    rounding = interface.negligible(jump, pressure)
+    closed = constraint_active(pressure, interface.normal_gap(jump), interface.c_0, rounding)
     if nodes.maximum(closed.astype(float)) == 0:
         closed = interface.gap <= EPS * interface.size
-    mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(nodal))
+    mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(jump))
     condensation = condensation or Condensation(problem, Counters())
     stiffness = condensation.stiffness(state)
     if stiffness is None:
         return np.inf, False
     columns, body = [], problem.body
-    balanced = nodes.maximum(pressure) > interface.rounding(nodal)
+    balanced = nodes.maximum(pressure) > interface.rounding(jump)
     external = body.external(state.time)
     for group in groups(problem):
         free = null_space(group.supports)
@@ -94,7 +94,7 @@ def uniqueness(
         (
             *(nodes.admissible_normal, nodes.tangent, state.forces.friction, closed, mu, motions),
             nodes.weight[:, None] * state.forces.vectors(nodes),
-            interface.normal_gap(nodal),
+            interface.normal_gap(jump),
         )
     )
 

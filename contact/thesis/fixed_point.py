@@ -162,12 +162,12 @@ class OuterLoop(ABC):
         interface, forces, old = self.problem.interface, self.state.forces, self.bound
         if not interface.friction.acts:
             return np.nan
-        nodal = interface.nodes.jump(self.state.x)
+        jump = interface.nodes.jump(self.state.x)
         if iteration == 0:  # frictionless start: bound of zero slip
-            pressure = interface.pressure(nodal, forces)
+            pressure = interface.pressure(jump, forces)
             self.bound = interface.friction.bound(pressure, np.zeros_like(pressure))
         else:
-            self.bound = interface.bound(nodal, forces)
+            self.bound = interface.bound(jump, forces)
         size = interface.nodes.norm(self.bound)
         return interface.nodes.norm(self.bound - old) / size if size > 0 else 0.0
 
@@ -248,19 +248,19 @@ class FixedPoint(OuterLoop):
         else:
             self.state, first = start, 1
             self._secant_at = start.x if secant_at is None else secant_at
-            nodal, pressure = interface.nodes.jump(start.x), start.forces.pressure
-            if interface.foundation.normal_graph(nodal) is not None:
-                pressure = interface.pressure(nodal, start.forces)
+            jump, pressure = interface.nodes.jump(start.x), start.forces.pressure
+            if interface.foundation.normal_graph(jump) is not None:
+                pressure = interface.pressure(jump, start.forces)
             self._z = np.column_stack([pressure, start.forces.friction])
-            self.bound = interface.bound(nodal, start.forces)
+            self.bound = interface.bound(jump, start.forces)
         self._first, self._tangent, self._first_bound = first, False, self.bound
         outcome = self._iterate(first)
         return self.state, outcome
 
     def _initial_z(self, z: Array | float, friction: bool) -> Array:
         """Return z = lambda + r (u - u_0) of lambda + r u, with u_0 of the iterate."""
-        nodal = self.problem.interface.nodes.jump(self.state.x)
-        return z - self.r * displacement_and_slip(self.problem.interface, nodal, friction)
+        jump = self.problem.interface.nodes.jump(self.state.x)
+        return z - self.r * displacement_and_slip(self.problem.interface, jump, friction)
 
     def _step(self, iteration: int) -> tuple[int, str]:
         """Freeze, and solve by the Uzawa block relaxation."""
@@ -271,10 +271,10 @@ class FixedPoint(OuterLoop):
             self._z = self._initial_z(0.0, friction)
         if self._stalled and self._residual > NEAR:
             self._fit_to_softest_mode(friction)
-        state, nodal = self.state, interface.nodes.jump(self.state.x)
+        state, jump = self.state, interface.nodes.jump(self.state.x)
         blocks = augmentation(interface.nodes, self.r, friction)
         if interface.foundation.active:
-            blocks = blocks + self._charge_block(nodal, interface.pressure(nodal, state.forces))
+            blocks = blocks + self._charge_block(jump, interface.pressure(jump, state.forces))
         # At zero strain the tangent is the secant.
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
         linearised_at = self._secant_at if kind == "secant" else state.x
@@ -309,14 +309,14 @@ class FixedPoint(OuterLoop):
             self.bound = self._first_bound
             self._z = self._initial_z(0.0, friction)
 
-    def _charge_block(self, nodal: Array, pressure: Array) -> Array:
+    def _charge_block(self, jump: Array, pressure: Array) -> Array:
         """Linearise the charge, near the solution with the derivative of psi by the gap."""
         law = self.problem.interface.foundation
         if not law.follows_gap or not self._gap_derivative(self._residual):
-            return law.charge_block(nodal, pressure)
+            return law.charge_block(jump, pressure)
         if self.operator.symmetric:
             self.operator = self._new_operator(symmetric=False)
-        return law.charge_block(nodal, pressure, full=True)
+        return law.charge_block(jump, pressure, full=True)
 
     def _target(self, residuals: Residuals) -> float:
         """Return the largest residual."""

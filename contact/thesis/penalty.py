@@ -65,7 +65,7 @@ def outer(a: Array, b: Array) -> Array:
 
 
 class PenalisedLaw:
-    """Contact forces as a function of the nodal unknowns, with their derivative.
+    """Contact forces as a function of the jumps, with their derivative.
 
     Parameters
     ----------
@@ -91,39 +91,39 @@ class PenalisedLaw:
         """Set the friction modulus to 1/eps_contact at all nodes."""
         self._modulus = np.full(self._interface.gap.shape, 1 / self._eps.contact)
 
-    def _pressed(self, nodal: Array) -> tuple[Multipliers, Array]:
+    def _pressed(self, jump: Array) -> tuple[Multipliers, Array]:
         """Return the pressures, and their derivative in u_nu: 1/eps also at first touch."""
         interface, nodes = self._interface, self._interface.nodes
-        normal = nodes.normal_component(nodal)
+        normal = nodes.normal_component(jump)
         pressure = np.asarray(penalty_pressure(normal, interface.gap, self._eps.contact))
         multipliers = Multipliers(pressure, np.zeros(nodes.normal.shape))
         return multipliers, (normal >= interface.gap) / self._eps.contact
 
-    def _modulus_at(self, nodal: Array) -> Array:
+    def _modulus_at(self, jump: Array) -> Array:
         """Return the friction modulus, shape (n,). Collective."""
         interface = self._interface
-        bound = interface.bound(nodal, self._pressed(nodal)[0])
+        bound = interface.bound(jump, self._pressed(jump)[0])
         return np.asarray(
-            penalty_friction_modulus(bound, interface.slip_length(nodal), self._eps.slip)
+            penalty_friction_modulus(bound, interface.slip_length(jump), self._eps.slip)
         )
 
-    def forces(self, nodal: Array) -> Multipliers:
+    def forces(self, jump: Array) -> Multipliers:
         """Return the forces. Collective."""
-        modulus = self._modulus_at(nodal) if self._modulus is None else self._modulus
-        tangential = self._interface.slip(nodal)
-        return Multipliers(self._pressed(nodal)[0].pressure, modulus[:, None] * tangential)
+        modulus = self._modulus_at(jump) if self._modulus is None else self._modulus
+        tangential = self._interface.slip(jump)
+        return Multipliers(self._pressed(jump)[0].pressure, modulus[:, None] * tangential)
 
-    def block(self, nodal: Array) -> Array:
+    def block(self, jump: Array) -> Array:
         """Return their derivative, shape (n, d, d). Collective."""
         interface, nodes = self._interface, self._interface.nodes
-        multipliers, slope = self._pressed(nodal)
-        modulus = self._modulus_at(nodal) if self._modulus is None else self._modulus
+        multipliers, slope = self._pressed(jump)
+        modulus = self._modulus_at(jump) if self._modulus is None else self._modulus
         block = slope[:, None, None] * outer(nodes.normal, nodes.normal)
         block = block + modulus[:, None, None] * nodes.tangent
         if self._modulus is not None:
             return block
-        slip, unit = interface.slip_length(nodal), unit_vectors(interface.slip(nodal))
-        total, share = interface.pressure(nodal, multipliers), slip / (slip + self._eps.slip)
+        slip, unit = interface.slip_length(jump), unit_vectors(interface.slip(jump))
+        total, share = interface.pressure(jump, multipliers), slip / (slip + self._eps.slip)
         along = (interface.friction.by_slip(total, slip) - modulus) * share
         across = interface.friction.by_pressure(total, slip) * slope * share
         block = block + along[:, None, None] * outer(unit, unit)
@@ -228,14 +228,14 @@ class PenalisedProblem:
         with lagged laws.
         """
         body, interface = self._body, self._interface
-        nodal = interface.nodes.jump(state.x)
-        self._law, self._implicit, self._nodal = law, implicit, nodal
+        jump = interface.nodes.jump(state.x)
+        self._law, self._implicit, self._jump = law, implicit, jump
         self._state = state
         self._assembled = body.linear
-        pressure = interface.pressure(nodal, state.forces)
-        self._response = interface.foundation.force(nodal, pressure)
-        self._current_block = interface.foundation.charge_block(nodal, pressure)
-        self._layer = interface.foundation.normal_graph(nodal)
+        pressure = interface.pressure(jump, state.forces)
+        self._response = interface.foundation.force(jump, pressure)
+        self._current_block = interface.foundation.charge_block(jump, pressure)
+        self._layer = interface.foundation.normal_graph(jump)
         if self._layer is not None:
             # Of the new iterate, as [.]^+, but for h_nu.
             self._response[:, : body.dim] = 0.0
@@ -267,10 +267,10 @@ class PenalisedProblem:
 
         Without contact the first system may be singular.
         """
-        body, interface, nodal = self._body, self._interface, self._nodal
+        body, interface, jump = self._body, self._interface, self._jump
         nodes, state = interface.nodes, self._state
         # Gap of the rigid part, or of the layer alone.
-        penetration = nodes.normal_component(nodal) - nodes.gap
+        penetration = nodes.normal_component(jump) - nodes.gap
         closest = nodes.maximum(penetration, -np.inf)
         if closest >= 0:
             return np.zeros_like(body.owned_part(state.x))
@@ -278,7 +278,7 @@ class PenalisedProblem:
         n, d = nodes.normal.shape
         blocks = np.zeros((n, nodes.block_size, nodes.block_size))
         blocks[:, :d, :d] = stiffness[:, None, None] * outer(nodes.normal, nodes.normal)
-        blocks[:, :d, :d] += self._law.block(nodal)
+        blocks[:, :d, :d] += self._law.block(jump)
         self.operator.update("secant", state, interface.weighted(blocks, state.x))
         rhs = body.external(state.time) - body.internal_forces(state)
         nodes.add_jump_transposed(
@@ -292,16 +292,16 @@ class PenalisedProblem:
 
     def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
         body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
-        nodal = nodes.jump(x)
+        jump = nodes.jump(x)
         secant_at = None if self._implicit else self._state.x
         values = body.internal_forces(replace(self._state, x=x), secant_at)
         values = values - body.external(self._state.time)
         nodes.add_jump_transposed(
-            nodes.weight[:, None] * self._law.forces(nodal).vectors(nodes), values
+            nodes.weight[:, None] * self._law.forces(jump).vectors(nodes), values
         )
-        change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
+        change = np.einsum("nij,nj->ni", self._current_block, jump - self._jump)
         if self._layer is not None:
-            u_n = np.minimum(nodes.normal_component(nodal), self._interface.gap)
+            u_n = np.minimum(nodes.normal_component(jump), self._interface.gap)
             change[:, : nodes.dim] += self._layer.layer(u_n)[:, None] * nodes.normal
         nodes.add_jump_transposed(nodes.weight[:, None] * (self._response + change), values)
         residual.array[:] = self._packed(body.unbalanced(values) / self._units)
@@ -310,11 +310,11 @@ class PenalisedProblem:
         self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
     ) -> None:
         body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
-        nodal, d = nodes.jump(x), body.dim
+        jump, d = nodes.jump(x), body.dim
         blocks = self._current_block.copy()
-        blocks[:, :d, :d] += self._law.block(nodal)
+        blocks[:, :d, :d] += self._law.block(jump)
         if self._layer is not None:
-            u_n = nodes.normal_component(nodal)
+            u_n = nodes.normal_component(jump)
             slope = np.where(u_n < self._interface.gap, self._layer.layer_slope(u_n), 0.0)
             blocks[:, :d, :d] += slope[:, None, None] * outer(nodes.normal, nodes.normal)
         kind, linearised_at = ("tangent", x) if self._implicit else ("secant", self._state.x)
@@ -405,8 +405,8 @@ class Penalty(OuterLoop):
     def _solve(self, implicit: bool) -> tuple[Array, int, str]:
         """Return unknowns, number of iterations, and fault or ""."""
         interface = self.problem.interface
-        nodal = interface.nodes.jump(self.state.x)
-        law = PenalisedLaw(interface, self._eps) if implicit else self._lagged(nodal)
+        jump = interface.nodes.jump(self.state.x)
+        law = PenalisedLaw(interface, self._eps) if implicit else self._lagged(jump)
         symmetric = not (implicit and interface.friction.acts)
         if symmetric not in self._solvers:
             self._solvers[symmetric] = PenalisedProblem(
@@ -422,12 +422,12 @@ class Penalty(OuterLoop):
             del self._solvers[symmetric]  # MUMPS does not recover
             return self.state.x, taken, LOST
 
-    def _lagged(self, nodal: Array) -> PenalisedLaw:
+    def _lagged(self, jump: Array) -> PenalisedLaw:
         """Return the laws with the friction modulus of an iterate; sticking if it has no pressure.
 
         A mode that friction alone constrains would be unconstrained at zero displacement.
         """
-        law = PenalisedLaw(self.problem.interface, self._eps, nodal)
+        law = PenalisedLaw(self.problem.interface, self._eps, jump)
         if not law.acts() and UnconstrainedModes(self.problem).friction_alone:
             law.stick()
         return law

@@ -71,8 +71,8 @@ def softest_mode(problem: ContactProblem, operator: Operator, state: State, shif
     interface, nodes = problem.interface, problem.interface.nodes
     blocks = augmentation(nodes, shift, False)
     if interface.foundation.active:
-        nodal = nodes.jump(state.x)
-        blocks += interface.foundation.charge_block(nodal, interface.pressure(nodal, state.forces))
+        jump = nodes.jump(state.x)
+        blocks += interface.foundation.charge_block(jump, interface.pressure(jump, state.forces))
     weighted = interface.weighted(blocks, state.x)
     operator.update("secant", state, weighted, constant=problem.body.linear)
 

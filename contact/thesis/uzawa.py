@@ -71,17 +71,17 @@ def augmentation(nodes: ContactNodes, r: float, friction: bool) -> Array:
     return r * blocks
 
 
-def displacement_and_slip(interface: Interface, nodal: Array, friction: bool) -> Array:
+def displacement_and_slip(interface: Interface, jump: Array, friction: bool) -> Array:
     """Return normal displacement and slip, shape (n, 1 + d); slip 0 without friction."""
-    parts = normal_and_tangential(interface.nodes, nodal, friction)
+    parts = normal_and_tangential(interface.nodes, jump, friction)
     parts[:, 1:] -= friction * interface.friction.history.jump
     return parts
 
 
-def normal_and_tangential(nodes: ContactNodes, nodal: Array, friction: bool) -> Array:
+def normal_and_tangential(nodes: ContactNodes, jump: Array, friction: bool) -> Array:
     """Return normal and tangential displacement, shape (n, 1 + d); 0 without friction."""
-    tangential = friction * nodes.tangential_component(nodal)
-    return np.column_stack([nodes.normal_component(nodal), tangential])
+    tangential = friction * nodes.tangential_component(jump)
+    return np.column_stack([nodes.normal_component(jump), tangential])
 
 
 @dataclass
@@ -282,10 +282,10 @@ class ThesisCriterion:
         before, self.last = self.last, (increment, phi)
         if before is None:
             return False, None
-        norm, nodal = self.domain_norm, self.frozen.nodes.norm
+        norm, on_contact = self.domain_norm, self.frozen.nodes.norm
         own = self.frozen.problem.body.owned_part(self.frozen.state.x)
-        change = norm(increment - before[0]) ** 2 + nodal(phi - before[1]) ** 2
-        size = norm(own + increment) ** 2 + nodal(phi) ** 2
+        change = norm(increment - before[0]) ** 2 + on_contact(phi - before[1]) ** 2
+        size = norm(own + increment) ** 2 + on_contact(phi) ** 2
         return change < self.eps**2 * size, float(np.sqrt(change / size)) if size > 0 else 0.0
 
 
@@ -338,18 +338,18 @@ def uzawa_block_relaxation(
         load = frozen.displacement_load(multipliers, z)
         increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.jump(increment)
-        nodal, r_u = frozen.at + moved, frozen.augmented(moved)
+        jump, r_u = frozen.at + moved, frozen.augmented(moved)
         # The contact stress of this solve, in equilibrium with u.
         stress = 2 * multipliers - z + r_u
         if iteration == 1:
             stress_unit = interface.component_norms(stress)
         layer: Array | float = 0.0
         if frozen.layer is not None:
-            layer = frozen.layer.layer(nodes.normal_component(nodal))
+            layer = frozen.layer.layer(nodes.normal_component(jump))
         forces = Multipliers.of(nodes, stress[:, 0] - layer, stress[:, 1:])
         if options.single_loop and frozen.friction:
-            bound = interface.bound(nodal, forces)
-        residual = float(interface_residuals(interface, nodal, forces, bound)[0].max())
+            bound = interface.bound(jump, forces)
+        residual = float(interface_residuals(interface, jump, forces, bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         next_z = multipliers + (1 - over) * (z - multipliers) + over * r_u
         done = residual <= options.inner or not np.isfinite(residual)

@@ -71,9 +71,9 @@ class CouplingOperator:
         """Return the jumps at `places` of local unknowns, (nodes, block size). Collective."""
         return np.asarray(self._here @ self.halo.forward(x[: self.halo.count]))
 
-    def transpose(self, nodal: Array, into: Array) -> None:
+    def transpose(self, vectors: Array, into: Array) -> None:
         """Add the transpose of vectors at `places` to owned nodes, (nodes, k). Collective."""
-        into[: self.halo.count] += self.halo.reverse(np.asarray(self._here.T @ nodal))
+        into[: self.halo.count] += self.halo.reverse(np.asarray(self._here.T @ vectors))
 
 
 def coupling_operator(
