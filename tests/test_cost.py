@@ -527,9 +527,7 @@ def test_coarse_levels_that_are_new_are_not_renewed_for_a_correction(monkeypatch
     operator, x = SparseOperator(body, nodes), problem.start().x
     blocks = np.zeros((nodes.size, body.block_size, body.block_size))
     for stiffness, made in ((0.0, 1), (1.0, 2)):
-        operator.update(
-            "secant", BodyState(x), blocks + stiffness * np.eye(body.block_size), constant=True
-        )
+        operator.update("secant", BodyState(x), blocks + stiffness * np.eye(body.block_size))
         operator.solve(body.external(), 1e-8)
         assert operator.counters.factorizations == made
 
@@ -549,9 +547,7 @@ def test_the_iterations_a_digit_are_those_that_were_gained(monkeypatch, rtol):
     body, nodes = problem.body, problem.nodes.nodes
     operator, x = SparseOperator(body, nodes), problem.start().x
     for stiffness in (0.0, 1.0):
-        operator.update(
-            "secant", BodyState(x), stiffness * np.stack(nodes.size * [np.eye(3)]), constant=True
-        )
+        operator.update("secant", BodyState(x), stiffness * np.stack(nodes.size * [np.eye(3)]))
         operator.solve(body.external(), 1e-8)
         monkeypatch.setattr(multigrid, "refine", correct)
     assert operator.counters.factorizations == 2
@@ -586,14 +582,14 @@ def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
     operator.solve(load, 1e-6)
     fresh = operator.counters.linear_iterations
     for step in range(1, 5):
-        operator.update("secant", BodyState(x), (1 + 0.1 * step) * sticks, constant=True)
+        operator.update("secant", BodyState(x), (1 + 0.1 * step) * sticks)
         operator.solve(load, 1e-6)
     counters = operator.counters
     assert (counters.factorizations, counters.linear_solves) == (1, 5)
     assert counters.linear_iterations <= 5 * fresh + PRICE
     before = counters.linear_iterations
     # Nothing holds the nodes, and the coarse levels take them for held.
-    operator.update("secant", BodyState(x), 0 * sticks, constant=True)
+    operator.update("secant", BodyState(x), 0 * sticks)
     found = operator.solve(load, 1e-6)
     assert counters.factorizations == 2
     assert counters.linear_iterations - before <= 3 * fresh + PRICE

@@ -223,6 +223,11 @@ class ConstrainedBulk:
         """The unknowns; fixed ones are the same in x and y."""
         return self.constraint.layout
 
+    @property
+    def linear(self) -> bool:
+        """Whether the matrices of a kind are the same at all states."""
+        return self._bulk.linear
+
     def create_matrix(self) -> PETSc.Mat:
         """Return a matrix with the pattern of Q^T K Q. Collective."""
         made = self._bulk.create_matrix()
@@ -325,10 +330,10 @@ class ConstrainedOperator:
         return self._inner.symmetric
 
     def update(
-        self, kind: str, state: LinearisationPoint, blocks: Array, *, constant: bool = False
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
     ) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
-        if not self._inner.update(kind, state, blocks, constant=constant):
+        if not self._inner.update(kind, state, blocks, keep=keep):
             return False
         self._bordered = None
         if self._inner.iterative and self._free.size > 0:

@@ -145,6 +145,10 @@ class Bulk(Protocol):
     def layout(self) -> Layout:
         """The unknowns."""
 
+    @property
+    def linear(self) -> bool:
+        """Whether the matrices of a kind are the same at all states."""
+
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective.
 
@@ -188,7 +192,7 @@ class Operator(Protocol):
         """Whether the blocks are symmetric too."""
 
     def update(
-        self, kind: str, state: LinearisationPoint, blocks: Array, *, constant: bool = False
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
     ) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
 
@@ -261,7 +265,7 @@ class SparseOperator:
         return times(self.matrix, values, transposed)
 
     def update(
-        self, kind: str, state: LinearisationPoint, blocks: Array, *, constant: bool = False
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
     ) -> bool:
         """Assemble the operator at a state. Collective.
 
@@ -273,14 +277,16 @@ class SparseOperator:
             Where the body is linearised.
         blocks
             Weighted blocks at the nodes, shape (n, block size, block size).
-        constant
-            Whether the bulk matrix is that of the last call with the same kind.
+        keep
+            Whether to keep the bulk matrix of the last call if its kind is the same; that of a
+            linear body is always kept.
 
         Returns
         -------
         Whether matrix or blocks have changed.
         """
-        nodes, last, same = self._nodes, self._blocks, constant and kind == self._kind
+        nodes, last = self._nodes, self._blocks
+        same = kind == self._kind and (keep or self.bulk.linear)
         if same and last is not None and self._all(np.array_equal(blocks, last)):
             return False
         self._kind, self._blocks = kind, blocks.copy()

@@ -338,9 +338,9 @@ class DenseOperator:
         self.counters = counters
 
     def update(
-        self, kind: str, state: LinearisationPoint, blocks: Array, *, constant: bool = False
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
     ) -> bool:
-        """Factorise with blocks; see `operator.SparseOperator.update`. Collective."""
+        """Factorise with blocks, the matrix being that of all kinds and states. Collective."""
         gathered = self._comm.gather(masked_blocks(self._free, self._inclined, blocks))
         self._blocks = np.concatenate(gathered or [blocks])
         made = on_root(self._comm, lambda: self._stiffness.factorise(self._blocks))

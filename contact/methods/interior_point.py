@@ -47,7 +47,7 @@ from contact.interface.nodes import unit_vectors
 from contact.methods.report import PROGRESS, Outcome
 from contact.methods.semismooth import SemismoothNewton
 from contact.methods.unconstrained_modes import all_loads
-from contact.problem.residuals import evaluate, evaluate_iterate, residual_forces
+from contact.problem.residuals import evaluate, evaluate_state, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
 from contact.tolerances import EPS, HUGE
@@ -416,7 +416,7 @@ class InteriorPoint:
     def iterate(self, most: int = LIMIT) -> Outcome:
         """Take steps until the duality gap is closed, or as many as given. Collective."""
         newton = self._newton
-        self._evaluated = evaluate_iterate(self.problem, self.state)
+        self._evaluated = evaluate_state(self.problem, self.state)
         ended = "the interior point was given no step"
         for steps in range(1, most + 1):
             try:
@@ -426,7 +426,7 @@ class InteriorPoint:
                 if error.identifier == "memory":
                     raise
                 taken = False
-            self._evaluated = evaluate_iterate(self.problem, self.state)
+            self._evaluated = evaluate_state(self.problem, self.state)
             state, residuals = self._evaluated.state, self._evaluated.residuals
             newton.see(state, residuals)
             newton.recorder.record(residuals, INTERIOR_POINT, 2)

@@ -249,8 +249,9 @@ class Newton:
             enough = 0.1 * options.tolerance
             if not body.linear and not keep:
                 enough = max(enough, CONTACT_PART * min(largest, 1.0))
-            begin = replace(state, x=condensed.body.at)
-            end, outcome, records = self._on_contact_nodes(condensed, begin, enough)
+            method = self._on_contact_nodes(condensed, enough)
+            end, outcome = solve_contact(method, replace(state, x=condensed.body.at))
+            records = tuple(method.recorder.records)
             self.counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
             unsolved = outcome.residuals.significant > max(enough, UNSOLVED * largest)
@@ -275,14 +276,10 @@ class Newton:
                 return state, stalled
         return state, loop.out_of_steps()
 
-    def _on_contact_nodes(
-        self, problem: CondensedProblem, begin: State, tolerance: float
-    ) -> tuple[State, Outcome, tuple[Record, ...]]:
-        """Solve a condensed problem to a tolerance; return its records too. Collective."""
+    def _on_contact_nodes(self, problem: CondensedProblem, tolerance: float) -> SemismoothNewton:
+        """Return the method on a condensed problem, to a tolerance."""
         # Each stage has a limit of its own.
         options = self.options.model_copy(update={"tolerance": tolerance, "max_outer": sys.maxsize})
         step = self._newton_step(problem, options, Counters())
         recorder = Recorder(lambda _: self.recorder.poll(), logging.DEBUG)
-        method = SemismoothNewton(problem, options, step, self._modes, recorder)
-        state, outcome = solve_contact(method, begin)
-        return state, outcome, tuple(recorder.records)
+        return SemismoothNewton(problem, options, step, self._modes, recorder)

@@ -32,7 +32,7 @@ from contact.methods.safeguards import (
     regularisation,
 )
 from contact.problem.condensed import AnyProblem
-from contact.problem.residuals import Iterate, residual_forces
+from contact.problem.residuals import EvaluatedState, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
 from contact.typing import Array
@@ -45,8 +45,8 @@ FORCING = 1e-2
 #: the active set may cycle. Its least value is the tolerance.
 STAGNANT, REDUCTION = 3, 1e-2
 
-#: Ratio of the equilibrium residual to the largest one below which the linearised material of the
-#: last step is kept: the error is in contact and friction.
+#: Ratio of the equilibrium residual to the largest one below which the stiffness of the last step
+#: is kept: the error is in contact and friction.
 SMALL = 0.1
 
 
@@ -76,8 +76,8 @@ class LinearisedLaws:
 
 
 @dataclass(frozen=True)
-class MaterialStep:
-    """How a step linearises the material.
+class MaterialLinearisation:
+    """The linearisation of the material in a step: its kind, and where the secant is taken.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class NewtonStep:
     def begin(self) -> None:
         """Begin another iteration: forcing term and conductivity derivative anew."""
         self.conductivity_derivative = ConductivityDerivative()
-        self._kind = ""
+        self._assembled = False
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
     def solve(self, rhs: Array, rtol: float | None = None) -> Array:
@@ -138,7 +138,7 @@ class NewtonStep:
         try:
             return self.operator.solve(rhs, rtol)
         except InputError:
-            self._kind, self._operator = "", None
+            self._operator = None
             raise
 
     def _forcing_term(self, residual: float) -> float:
@@ -165,14 +165,14 @@ class NewtonStep:
 
     def assemble(self, problem: AnyProblem, state: State, blocks: Array) -> None:
         """Assemble the operator with nodal blocks and those of layer and charge. Collective."""
-        interface, body = problem.interface, problem.body
+        interface = problem.interface
         if interface.foundation.active:
             jump = interface.nodes.jump(state.x)
             blocks = blocks + interface.foundation.block(
                 jump, interface.pressure(jump, state.forces)
             )
         weighted = interface.weighted(blocks, state.x)
-        self.operator.update("secant", state, weighted, constant=body.linear)
+        self.operator.update("secant", state, weighted)
 
     def without_contact(self, problem: AnyProblem, state: State) -> State:
         """Return the state after one linear solve with all nodes open. Collective."""
@@ -186,8 +186,8 @@ class NewtonStep:
     def __call__(
         self,
         problem: AnyProblem,
-        iterate: Iterate,
-        material: MaterialStep,
+        iterate: EvaluatedState,
+        material: MaterialLinearisation,
         exact: bool = False,
     ) -> State | None:
         """Return the next iterate; None if the matrix is singular there. Collective.
@@ -260,9 +260,9 @@ class NewtonStep:
     def _update(
         self,
         problem: AnyProblem,
-        iterate: Iterate,
+        iterate: EvaluatedState,
         laws: LinearisedLaws,
-        material: MaterialStep,
+        material: MaterialLinearisation,
     ) -> None:
         """Assemble and factorise the operator. Collective."""
         interface, body = problem.interface, problem.body
@@ -272,16 +272,19 @@ class NewtonStep:
             blocks[:, : body.dim, : body.dim] += regularisation(
                 interface, residuals.significant, self.parameters.nodal_stiffness
             )
-        kind, last = "tangent" if material.tangent else "secant", self._kind
-        remains = kind == last and residuals.equilibrium < SMALL * residuals.significant
+        keep = self._assembled and residuals.equilibrium < SMALL * residuals.significant
+        kind = "tangent" if material.tangent else "secant"
         at = state if material.secant_at is None else replace(state, x=material.secant_at)
         weighted = interface.weighted(blocks, state.x)
-        self.operator.update(kind, at, weighted, constant=body.linear or remains)
-        self._kind = kind
+        self.operator.update(kind, at, weighted, keep=keep)
+        self._assembled = True
 
 
 def _residual(
-    problem: AnyProblem, iterate: Iterate, laws: LinearisedLaws, material: MaterialStep
+    problem: AnyProblem,
+    iterate: EvaluatedState,
+    laws: LinearisedLaws,
+    material: MaterialLinearisation,
 ) -> Array:
     """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
     here, nodes = replace(iterate.state, forces=laws.multipliers), problem.interface.nodes

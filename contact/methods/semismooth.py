@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from contact.interface.multipliers import Multipliers, constraint_active
-from contact.methods.newton_step import MaterialStep, NewtonStep
+from contact.methods.newton_step import MaterialLinearisation, NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import PROGRESS, Best, Outcome, Record, Recorder, Stagnation
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.condensed import AnyProblem
 from contact.problem.residuals import (
     Residuals,
-    evaluate_iterate,
+    evaluate_state,
     residual_forces,
     undeformed_equilibrium,
 )
@@ -136,7 +136,7 @@ class SemismoothNewton:
         tangent = state.active_set is not None and secant_at is None and not linear
         for _ in range(min(options.max_iterations, self.steps_left if steps is None else steps)):
             previous = loop.iterate
-            taken = step(problem, previous, MaterialStep(tangent, secant_at), exact)
+            taken = step(problem, previous, MaterialLinearisation(tangent, secant_at), exact)
             if taken is None:
                 return state, loop.outcome(step.fault)
             state, secant_at = taken, None
@@ -172,7 +172,7 @@ class Iteration:
         self._problem, self._options = newton.problem, newton.options
         limit = stagnation_limit or self._options.stagnation_limit
         self._stagnation = Stagnation(limit, PROGRESS, cumulative=True)
-        self.iterate = evaluate_iterate(self._problem, state)
+        self.iterate = evaluate_state(self._problem, state)
         self._pressed = self._largest_pressure(state)
         self.starts_converged = state.active_set is not None and self.converged
         if self.starts_converged:
@@ -191,7 +191,7 @@ class Iteration:
 
     def evaluate(self, state: State) -> None:
         """Evaluate the residuals of an iterate. Collective."""
-        self.iterate = evaluate_iterate(self._problem, state)
+        self.iterate = evaluate_state(self._problem, state)
         self._newton.see(state, self.residuals)
 
     def record(self, *words: str, steps: tuple[Record, ...] = ()) -> None:

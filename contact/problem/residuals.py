@@ -54,8 +54,7 @@ class Residuals:
     contact
         |lambda_c - max(0, lambda_c + c_r (u_nu - rho))| in L2(Gamma_3) over
         max(|p|, 1e-4 c_0 |g|), p = -sigma_nu, g the gaps up to the displacements
-        (`interface_residuals`); the largest of all connected components. c_r = `Interface.c_r`,
-        c_0 = E/size of the bodies.
+        (`interface_residuals`); the largest of all connected components. c_r = `Interface.c_r`, c_0 = E/size of the bodies.
     friction
         |lambda_f - proj_s(lambda_f + c_r u_tau)| over the same, with the final bound s.
     floors
@@ -119,7 +118,7 @@ class Residuals:
 
 
 @dataclass(frozen=True)
-class Iterate:
+class EvaluatedState:
     """A state with its residuals and the internal forces F(x) on the owned unknowns."""
 
     state: State
@@ -218,11 +217,11 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
 def evaluate(problem: AnyProblem, state: State) -> Residuals:
     """Return the residuals of a state; NaN where numbers overflow. Collective."""
-    return evaluate_iterate(problem, state).residuals
+    return evaluate_state(problem, state).residuals
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def evaluate_iterate(problem: AnyProblem, state: State) -> Iterate:
+def evaluate_state(problem: AnyProblem, state: State) -> EvaluatedState:
     """Return a state with its residuals and the internal forces there. Collective."""
     body, interface = problem.body, problem.interface
     loads = body.load_norms(state.time)
@@ -269,7 +268,7 @@ def evaluate_iterate(problem: AnyProblem, state: State) -> Iterate:
     )
     pressure_rounding = _over_pressed(interface, state, pressures)
     evaluated = Residuals(*residuals, floors, equilibrium_rounding, pressure_rounding)
-    return Iterate(state, evaluated, internal)
+    return EvaluatedState(state, evaluated, internal)
 
 
 #: Gauss points of the stress power in a step of a nonlinear material.
@@ -396,7 +395,7 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
     return Balance(*energies, state.x, given, internal)
 
 
-def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> Iterate | None:
+def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> EvaluatedState | None:
     """Return `problem.start()` if it is in equilibrium, else None. Collective.
 
     That is zero displacement but for the prescribed values; of a whole problem each free foundation
@@ -404,5 +403,5 @@ def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> Iterate | N
     approaching a state without forces, none becomes small. With friction there may be other
     solutions, so a method asks for this where it fails.
     """
-    found = evaluate_iterate(problem, problem.start())
+    found = evaluate_state(problem, problem.start())
     return found if found.residuals.significant <= tolerance else None

@@ -32,9 +32,9 @@ from contact.methods.report import Best, Monitor, Outcome, Record, Recorder, Sta
 from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads, sum_of_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import (
-    Iterate,
+    EvaluatedState,
     Residuals,
-    evaluate_iterate,
+    evaluate_state,
     undeformed_equilibrium,
 )
 from contact.problem.state import State
@@ -122,12 +122,12 @@ class OuterLoop(ABC):
         """Iterate until convergence, stagnation or the limit; keep the best iterate."""
         begin, problem, options = time.perf_counter(), self.problem, self.options
         stagnation = Stagnation(*self.stagnation)
-        best: Best[Iterate] = Best()
+        best: Best[EvaluatedState] = Best()
         by_thesis = options.stopping == "thesis"
         for iteration in range(first, options.max_outer + 1):
             previous = self.state
             inner, note = self._step(iteration)
-            iterate = evaluate_iterate(problem, self.state)
+            iterate = evaluate_state(problem, self.state)
             residuals = iterate.residuals
             residual = self._target(residuals)
             best.see(iterate, residual)
@@ -279,7 +279,7 @@ class FixedPoint(OuterLoop):
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
         linearised_at = self._secant_at if kind == "secant" else state.x
         weighted = interface.weighted(blocks, state.x)
-        self.operator.update(kind, replace(state, x=linearised_at), weighted, constant=body.linear)
+        self.operator.update(kind, replace(state, x=linearised_at), weighted)
         frozen = FrozenProblem(problem, state, self._secant_at, friction, self.r)
         result = uzawa_block_relaxation(
             frozen,

@@ -231,7 +231,7 @@ class PenalisedProblem:
         jump = interface.nodes.jump(state.x)
         self._law, self._implicit, self._jump = law, implicit, jump
         self._state = state
-        self._assembled = body.linear
+        self._assembled = False
         pressure = interface.pressure(jump, state.forces)
         self._response = interface.foundation.force(jump, pressure)
         self._current_block = interface.foundation.charge_block(jump, pressure)
@@ -318,10 +318,10 @@ class PenalisedProblem:
             slope = np.where(u_n < self._interface.gap, self._layer.layer_slope(u_n), 0.0)
             blocks[:, :d, :d] += slope[:, None, None] * outer(nodes.normal, nodes.normal)
         kind, linearised_at = ("tangent", x) if self._implicit else ("secant", self._state.x)
-        unchanged = body.linear or (self._assembled and not self._implicit)
         blocks = self._interface.weighted(blocks, x)
         at = replace(self._state, x=linearised_at)
-        self.operator.update(kind, at, blocks, constant=unchanged)
+        keep = self._assembled and not self._implicit  # SNES asks again at each iterate
+        self.operator.update(kind, at, blocks, keep=keep)
         self._assembled = True
 
 

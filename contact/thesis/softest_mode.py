@@ -74,7 +74,7 @@ def softest_mode(problem: ContactProblem, operator: Operator, state: State, shif
         jump = nodes.jump(state.x)
         blocks += interface.foundation.charge_block(jump, interface.pressure(jump, state.forces))
     weighted = interface.weighted(blocks, state.x)
-    operator.update("secant", state, weighted, constant=problem.body.linear)
+    operator.update("secant", state, weighted)
 
     def inner(a: Array, b: Array) -> Array:
         return summed(nodes.comm, a.T @ (nodes.weight[:, None] * b))

@@ -129,7 +129,7 @@ def one_linear_solve(problem: ContactProblem) -> tuple[float, int]:
     begin = time.process_time()
     operator = SparseOperator(body, nodes)
     blocks = np.zeros((nodes.size, body.block_size, body.block_size))
-    operator.update("secant", problem.start(), blocks, constant=True)
+    operator.update("secant", problem.start(), blocks)
     operator.solve(body.external(), 1e-8)
     return time.process_time() - begin, operator.counters.linear_iterations
 

@@ -54,7 +54,7 @@ def test_no_solve_takes_more_iterations_than_are_allowed() -> None:
     try:
         operator = operator_of(problem, "iterative")
         for count, blocks in enumerate((sticks, 1.1 * sticks, 0 * sticks, 0 * sticks), start=1):
-            operator.update("secant", BodyState(x), blocks, constant=count > 1)
+            operator.update("secant", BodyState(x), blocks)
             operator.solve(load, 1e-9)
             assert operator.counters.linear_iterations == count * most
     finally:
