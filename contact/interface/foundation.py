@@ -156,7 +156,7 @@ class FoundationLaw:
         return replace(self, conductor=self.conductor.at(time))
 
     def conducting(self, share: float) -> FoundationLaw:
-        """Return the foundation with a part of its conductivity."""
+        """Return the foundation with a part of its psi."""
         assert self.conductor is not None
         return replace(self, conductor=replace(self.conductor, share=share))
 
@@ -234,9 +234,9 @@ class FoundationLaw:
         """Return D.nu = psi phi_L(phi - phi_F) at the nodes; nodes with `pressure` are closed."""
         if self.conductor is None:
             return np.zeros(jump.shape[0])
-        return self._conductivity(jump, pressure) * self.conductor.phi_l(self._difference(jump))
+        return self._psi(jump, pressure) * self.conductor.phi_l(self._difference(jump))
 
-    def _conductivity(self, jump: Array, pressure: Array) -> Array:
+    def _psi(self, jump: Array, pressure: Array) -> Array:
         """Return psi at the nodes."""
         assert self.conductor is not None
         pressed = self._pressed(jump, pressure)
@@ -307,7 +307,7 @@ class FoundationLaw:
         if self.conductor is None or (self.conductor.lagged and not full):
             return total
         conductor, difference = self.conductor, self._difference(jump)
-        slope = self._conductivity(jump, pressure) * conductor.phi_l.derivative(difference)
+        slope = self._psi(jump, pressure) * conductor.phi_l.derivative(difference)
         total[:, -1, -1] = -(self.phi_scale**2) * slope
         if full:
             # The contact flag of the perfect conductor is kept; at kinks a one-sided derivative.

@@ -73,7 +73,7 @@ class GroupedLaw(Grouped[PenetrationLaw | StiffnessLaw | PotentialLaw]):
 
 
 class GroupedConductivity(Grouped[Conductivity]):
-    """The conductivity psi of several contacts."""
+    """psi of the charge of several contacts."""
 
     def at(self, s: Any, pressed: Any, loaded: Any) -> Array:
         """Return psi."""
@@ -85,7 +85,7 @@ class GroupedConductivity(Grouped[Conductivity]):
 
     @property
     def k_e(self) -> float:
-        """The largest conductivity."""
+        """The largest value of psi."""
         return max(psi.k_e for psi in self.laws)
 
     @property

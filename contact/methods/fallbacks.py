@@ -4,7 +4,7 @@
 2. Fallbacks, where these end without convergence, in turn (`fall_back`):
 
    - all nodes open, by one linear solve from the best iterate, then a working set from there;
-   - continuation in the conductivity, of a condensed problem alone, from the initial guess
+   - continuation in psi of the charge, of a condensed problem alone, from the initial guess
      `problem.start()`;
    - secants of a layer that saturates, from that guess;
    - a rigid motion that separates the bodies, of a condensed problem alone;
@@ -67,13 +67,13 @@ SECANT = "secant of the layer"
 #: trial of Newton's last steps to the next.
 SECANTS, SOFTEST, NEARER_BY = 50, 1e-6, 0.1
 
-#: Factor by which the conductivity grows: the first, and the least one that is tried.
+#: Factor by which k_e of the charge grows: the first, and the least one that is tried.
 FACTOR, LEAST_FACTOR = 1e3, 1.2
 
-#: First part of the conductivity.
+#: First part of k_e.
 FIRST_PART = FACTOR**-3
 
-#: Stagnation limit in a continuation; Example 8.4 with ten times its conductivity needs it.
+#: Stagnation limit in a continuation; Example 8.4 with ten times its k_e needs it.
 CONTINUATION_LIMIT = 20
 
 #: Proximal points: first stiffness of the bed over c, and its factors after success and failure.
@@ -323,10 +323,10 @@ def continuation(solve: Callable[[float, State], End], start: State) -> End | No
 
 
 def conductivity_continuation(newton: SemismoothNewton) -> End | None:
-    """Solve a condensed body by continuation in the conductivity k_e of the foundation, if any.
+    """Solve a condensed body by continuation in k_e of a conductive foundation, if any.
 
-    A foundation of high conductivity fixes the potential of a node that comes near, and releases it
-    where the node leaves: the active set cycles. With little of it contact is nearly uncoupled.
+    With a large k_e the foundation fixes the potential of a node that comes near, and releases it
+    where the node leaves: the active set cycles. With a small one contact is nearly uncoupled.
     """
     problem, interface = newton.problem, newton.problem.interface
     if not isinstance(problem, CondensedProblem) or interface.foundation.conductor is None:

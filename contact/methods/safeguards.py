@@ -5,7 +5,7 @@
 - `bound_by_slip`: the derivative of the friction bound by the slip, limited where the bound falls;
   `NewtonStep` takes it once the active set is unchanged.
 - `regularisation`: the Levenberg-Marquardt term of bodies that nothing constrains at first.
-- `ConductivityDerivative`: Newton's method or Picard's in the conductivity.
+- `ConductivityDerivative`: Newton's method or Picard's in psi of the charge.
 
 References
 ----------

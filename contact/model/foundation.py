@@ -1,6 +1,7 @@
-"""Laws of a foundation: a compliant layer in front of its rigid part, and its conductivity.
+"""Laws of a foundation: a compliant layer in front of its rigid part, and its charge.
 
-The layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2.
+The layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2. The charge per area is
+psi(u_nu - rho) phi_L(phi - phi_F), psi a capacitance per area (`forms.laws`).
 """
 
 from __future__ import annotations
@@ -125,7 +126,7 @@ class Conductor:
     Parameters
     ----------
     psi
-        Conductivity law (capacitance/area), for instance `ShiftedConductivity`.
+        Law psi of the charge (capacitance/area), for instance `ShiftedConductivity`.
     phi_f
         Potential of the foundation; of several conductors in one, one value per node, shape (n,).
     phi_l
@@ -137,7 +138,7 @@ class Conductor:
     phi_f_at
         phi_f as a function of time; None where it is always the same.
     share
-        Continuation factor of the conductivity, from 0 to 1.
+        Continuation factor of psi, from 0 to 1.
     """
 
     psi: Conductivity

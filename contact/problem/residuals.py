@@ -54,7 +54,8 @@ class Residuals:
     contact
         |lambda_c - max(0, lambda_c + c_r (u_nu - rho))| in L2(Gamma_3) over
         max(|p|, 1e-4 c_0 |g|), p = -sigma_nu, g the gaps up to the displacements
-        (`interface_residuals`); the largest of all connected components. c_r = `Interface.c_r`, c_0 = E/size of the bodies.
+        (`interface_residuals`); the largest of all connected components. c_r = `Interface.c_r`,
+        c_0 = E/size of the bodies.
     friction
         |lambda_f - proj_s(lambda_f + c_r u_tau)| over the same, with the final bound s.
     floors
@@ -170,7 +171,7 @@ def force_rounding(
     """Return norms of the rounding errors of forces and charges, by component. Collective.
 
     |K| |x| EPS, estimated by a random perturbation of x: large where forces cancel, in slender
-    bodies, after far motions, or in potentials across a contact of high conductivity. No backward
+    bodies, after far motions, or in potentials across a contact with a large psi. No backward
     stable method leaves less (Rigal and Gaches, J. ACM 14 (1967) 543).
     """
     body, (moved, there) = problem.body, perturbed or _perturbed(problem, state)

@@ -1,4 +1,8 @@
-"""The charge psi phi_L on a conductive foundation: its conductivity psi, and phi_L."""
+"""The charge psi phi_L per area of a contact surface on a conductive foundation.
+
+phi_L is a difference of potentials (potential), psi a capacitance per area. The thesis calls psi
+and its largest value k_e conductivities, and so do the names here; no current flows.
+"""
 
 from __future__ import annotations
 
@@ -38,11 +42,11 @@ class Truncation:
 
 
 class Conductivity(Protocol):
-    """Surface conductivity psi, assumption (h5). A new law is a class with these."""
+    """psi (capacitance/area), assumption (h5). A new law is a class with these."""
 
     @property
     def k_e(self) -> float:
-        """The largest conductivity."""
+        """The largest value of psi."""
 
     @property
     def delta(self) -> float:
@@ -53,7 +57,7 @@ class Conductivity(Protocol):
         """Whether it is a differentiable function of the gap."""
 
     def at(self, s: Value, pressed: Condition, loaded: Condition) -> Value:
-        """Return the conductivity at nodes, k_e at most.
+        """Return psi at nodes, k_e at most.
 
         Parameters
         ----------
@@ -78,7 +82,7 @@ class RampConductivity:
     Parameters
     ----------
     k_e
-        Largest conductivity k_e >= 0 (capacitance/area).
+        Largest value k_e >= 0 of psi (capacitance/area).
     delta
         Slope of psi over k_e (1/length).
     """
@@ -95,7 +99,7 @@ class RampConductivity:
         return self.k_e > 0 and self.delta > 0
 
     def __call__(self, s: Value) -> Value:
-        """Return the conductivity at s = u_nu - rho."""
+        """Return psi at s = u_nu - rho."""
         return self.k_e * clip(self.at_closing + self.delta * s, 0.0, 1.0)
 
     def derivative(self, s: Value) -> Value:
@@ -104,7 +108,7 @@ class RampConductivity:
         return where(less(0.0, height), where(less(height, 1.0), slope, 0.0), 0.0)
 
     def at(self, s: Value, pressed: Condition, loaded: Condition) -> Value:
-        """Return the conductivity: that of s = 0 where the rigid part presses."""
+        """Return psi: that of s = 0 where the rigid part presses."""
         return self(where(pressed, 0.0, s))
 
     def gap_slope(self, s: Value, pressed: Condition) -> Value:
@@ -115,16 +119,9 @@ class RampConductivity:
 class ShiftedConductivity(RampConductivity):
     """psi(s) = k_e clip(1 + delta s, 0, 1): the ramp moved to the closing gap.
 
-    Full conductivity in contact, none beyond the distance 1/delta. Bounded and Lipschitz, as
-    (h~5)(b) and (e) of the thesis ask; but (h~5)(d), psi = 0 for s <= 0, is given up: with it no
-    contact conducts, for s never exceeds 0.
-
-    Parameters
-    ----------
-    k_e
-        Largest conductivity k_e >= 0 (capacitance/area).
-    delta
-        Slope of psi over k_e (1/length).
+    k_e in contact, 0 beyond the distance 1/delta. Bounded and Lipschitz, as (h~5)(b) and (e) of the
+    thesis ask; but (h~5)(d), psi = 0 for s <= 0, is given up: with it no contact has a charge, for
+    s never exceeds 0. Its parameters are those of `RampConductivity`.
 
     Examples
     --------
@@ -144,7 +141,7 @@ class PerfectConductivity:
     Parameters
     ----------
     k_e
-        Conductivity k_e >= 0 of the contact (capacitance/area).
+        Value k_e >= 0 of psi in contact (capacitance/area).
     """
 
     k_e: float
