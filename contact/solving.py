@@ -20,7 +20,7 @@ from mpi4py import MPI
 
 from contact._compat import destroy_unused
 from contact.arguments import expect
-from contact.case.build import REPLACEMENTS, Replacements, build_problem, named
+from contact.case.build import REPLACEMENTS, Replacements, build_problem, naming_case
 from contact.case.file import Case, load_case, to_toml
 from contact.errors import InputError
 from contact.methods.load_stepping import METHODS, LoadStepping, Method, solve_step
@@ -120,7 +120,7 @@ def solve(
     if isinstance(case, ContactProblem):
         return reviewed(solve_problem(case, options, monitor, start))
     solver = partial(solve_problem, settings=options, monitor=monitor, times=step_times(case))
-    with named(case.source):
+    with naming_case(case.source):
         if case.adapt is not None:
             solution = adapted(case, comm, partial(solver, guess=COARSE))
         else:

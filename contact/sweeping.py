@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact.case.build import build_problem, named
+from contact.case.build import build_problem, naming_case
 from contact.case.digest import check_files, check_same, digest
 from contact.case.file import Case, literal, load_case, to_toml
 from contact.errors import InputError, counted, nearest
@@ -205,7 +205,7 @@ def sweep(
             row = kept.pop(tuple(point.values()), None)
             if row is None or row["converged"] != "True":
                 begin = time.perf_counter()
-                with named(", ".join(_set(point))):
+                with naming_case(", ".join(_set(point))):
                     solution = runner.solve(case)
                 if solution.outcome.signal:
                     raise Interrupted(solution.outcome.signal)
@@ -319,7 +319,7 @@ class _Runner:
             self._domain = None
         problem = build_problem(case, self._comm, domain=self._domain)
         self._domain = problem.domain
-        with named(case.source):
+        with naming_case(case.source):
             if case.evolution is not None:
                 return solve_problem(problem, case.solver, self._monitor, times=step_times(case))
             if self._method is None or before is None or not _alike(before, case):

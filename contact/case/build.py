@@ -76,7 +76,7 @@ def build_problem(
         If the case does not fit the mesh, a formula has no value at a node or a wrong sign,
         or a rigid-body mode is not constrained.
     """
-    with named(case.source):
+    with naming_case(case.source):
         if domain is None:
             if case.mesh is None:
                 raise _missing("mesh", "domain")
@@ -106,7 +106,7 @@ def build_problem(
 
 
 @contextmanager
-def named(source: str) -> Iterator[None]:
+def naming_case(source: str) -> Iterator[None]:
     """Let messages name the case file, as those of the case itself do."""
     try:
         yield

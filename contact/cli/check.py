@@ -199,7 +199,7 @@ def parts(domain: Domain) -> list[str]:
                     row[4] = f"normal {vector(across)}"
                     row[4] = row[4] if length >= FLAT else f"not plane, mean {row[4]}"
             rows.append(row)
-        found += [f"# parts {title}:", *table(rows)] if rows else []
+        found += [f"# parts {title}:", *aligned(rows)] if rows else []
     return found
 
 
@@ -229,7 +229,7 @@ def regions(domain: Domain) -> list[str]:
         local = np.array([cells.size, size[cells].sum()])
         count, volume = domain.comm.allreduce(local, op=MPI.SUM)
         rows.append([name, counted(round(count), "cell"), f"{word} {volume:.6g}"])
-    return ["# regions:", *table(rows)]
+    return ["# regions:", *aligned(rows)]
 
 
 def acting(problem: ContactProblem) -> list[str]:
@@ -252,7 +252,7 @@ def acting(problem: ContactProblem) -> list[str]:
     if not rows and least >= 0 and not layers:
         return ["# warning: nothing is loaded or moved: all results will be 0"]
     over = " (below 0: an overlap, which is pressed apart)" if least < 0 else ""
-    lines = ["# acting:", *table([*rows, ["gap", f"{least:.4g} to {largest:.4g}{over}"]])]
+    lines = ["# acting:", *aligned([*rows, ["gap", f"{least:.4g} to {largest:.4g}{over}"]])]
     if moved > LARGE:
         lines.append(
             f"# warning: displacements of {moved:.0%} of the body are prescribed, and strains are "
@@ -325,7 +325,7 @@ def vector(values: NDArray[np.floating]) -> str:
     return text if values.size == 1 else f"({text})"
 
 
-def table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """Give the rows with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:

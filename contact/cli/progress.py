@@ -81,7 +81,7 @@ class Console(logging.Handler):
         """Show an outer iteration in the table."""
         if not self._table:
             return
-        for line in ([] if self._headed else [HEAD]) + table(record):
+        for line in ([] if self._headed else [HEAD]) + rows_of(record):
             self._write(line)
         self._headed = True
         if self._bar is not None:
@@ -113,7 +113,7 @@ class Console(logging.Handler):
         super().close()
 
 
-def table(record: Record, within: str = "") -> list[str]:
+def rows_of(record: Record, within: str = "") -> list[str]:
     """Return the rows of an outer iteration and of those within it, below `HEAD`."""
     if not shown(record.iteration):
         return []
@@ -123,7 +123,7 @@ def table(record: Record, within: str = "") -> list[str]:
         f"{number:>7} {record.inner:6}  {kkt.equilibrium:11.1e} {kkt.contact:8.1e} "
         f"{kkt.friction:8.1e} {sets[0]:6} {sets[1]:6} {sets[2]:6}  {record.note}"
     )
-    inner = [line for step in record.steps for line in table(step, f"{number}.")]
+    inner = [line for step in record.steps for line in rows_of(step, f"{number}.")]
     return [*inner, row.rstrip()]
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from contact.case.build import build_problem, named
+from contact.case.build import build_problem, naming_case
 from contact.case.digest import check_same
 from contact.case.file import Case, load_case, override, parse_case, to_toml
 from contact.cli.check import amplitude_notes
@@ -123,7 +123,7 @@ def solve_and_keep(
         return solve(case, monitor=monitor, comm=comm)
     clock = time.perf_counter()
     problem = build_problem(case, comm)
-    with named(case.source):
+    with naming_case(case.source):
         kept = [] if restart is None else read_steps(restart, problem)
         here = restart is not None and restart.samefile(folder)
         keep = Checkpoints(folder, problem, case, kept, here).keep

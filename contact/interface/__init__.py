@@ -1,11 +1,12 @@
-"""Gamma_3: the contact nodes and their jump, rigid shapes, mortar coupling, and the laws.
+"""Gamma_3: the contact nodes and their jump, mortar coupling, and the laws.
 
 Imports: `contact.body` and the packages above it. Every law is stated once, node by node.
 
 Where to find
 -------------
 complementarity functions, their residuals and generalised derivative
-    `complementarity`, with the parameters c and gamma (`ComplementarityParameters`).
+    `complementarity`, with the parameters c and gamma of Newton's method
+    (`ComplementarityParameters`); that of the residuals is `interface.Interface.c_r`.
 active set (open, stick, slip)
     `multipliers`: `ActiveSet` and `constraint_active`, its only definition.
 all laws together

@@ -194,7 +194,10 @@ class Operator(Protocol):
     def update(
         self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
     ) -> bool:
-        """Assemble and factorise; see `SparseOperator.update`. Collective."""
+        """Assemble and factorise; see `SparseOperator.update`. Collective.
+
+        The matrix of a condensed body is given: `kind`, `state` and `keep` do not change it.
+        """
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns; see `SparseOperator.solve`. Collective."""

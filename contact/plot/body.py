@@ -28,7 +28,7 @@ from contact.plot.style import (
     colour_bar,
     colour_range,
     fitted,
-    named,
+    name_and_label,
     page_width,
     sheet,
     smooth,
@@ -153,7 +153,7 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
         places = (skin.cell_centers() if in_cells else skin).points[:, :2]
         seen = np.asarray(skin["values"])[np.all((places >= box[0]) & (places <= box[1]), axis=1)]
         values = seen if seen.size else values
-    label = named(field, run.units)[1]
+    label = name_and_label(field, run.units)[1]
     if field != REGION:
         return Picture(run, body, skin, *colour_range(values, label), scale, box, look, near)
     found = np.unique(values)

@@ -19,7 +19,7 @@ from contact.plot.contact import draw_line
 from contact.plot.run import Run, read_run, read_step
 from contact.plot.series import steps_figures
 from contact.plot.space import Scene, contact_figure
-from contact.plot.style import DEFORMED, PAGE, STYLE, Look, fitted, image, named
+from contact.plot.style import DEFORMED, PAGE, STYLE, Look, fitted, image, name_and_label
 from contact.ranks import refused
 
 #: Endings of files that figures may have.
@@ -58,7 +58,7 @@ def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Galle
         for field in fields or [field for field in DEFORMED if field in run.body.point_data]:
             figure = body_figure(picture(run, field, look=look))
             if figure is not None:
-                found[named(field, run.units)[0]] = figure
+                found[name_and_label(field, run.units)[0]] = figure
     return found
 
 

@@ -123,7 +123,7 @@ def fitted(title: str) -> str:
     return "\n".join(textwrap.wrap(title, int(page_width() / letter)))
 
 
-def named(field: str, units: Units) -> tuple[str, str]:
+def name_and_label(field: str, units: Units) -> tuple[str, str]:
     """Return the name of the figure of a field, and the label of its colours."""
     name, words = DEFORMED.get(field, (field, field.replace("_", " ")))
     known = [each for each in quantities(BODY) if f"{field}_".startswith(f"{each.name}_")]

@@ -251,10 +251,10 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
         If the body is not piezoelectric.
     """
     _demand_potential(problem)
-    equilibrium, time = problem.body, state.time
-    d, bs = problem.dim, equilibrium.block_size
-    residual = equilibrium.nodal(residual_forces(problem, state))[:, d:]
-    residual = np.asarray(residual / equilibrium.phi_scale)
+    body, time = problem.body, state.time
+    d, bs = problem.dim, body.block_size
+    residual = body.nodal(residual_forces(problem, state))[:, d:]
+    residual = np.asarray(residual / body.phi_scale)
     parts = holding(problem, electric=True)
     on_parts = {part: held[:, 0] * residual[nodes] for part, (nodes, held) in parts.items()}
     on_parts |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.description.electrodes}
@@ -265,15 +265,15 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
         load for load in problem.description.loads if {"charge", "body_charge"} & load.named.keys()
     ]
     for on in dict.fromkeys(load.on for load in loads):  # None is the whole body
-        acting = equilibrium.loads_along(equilibrium.space, [on]).at(time)
-        nodal = acting.reshape(-1, bs)[:, d]
-        given[on] = _sum(problem, nodal) / equilibrium.phi_scale
-        magnitude += _sum(problem, np.abs(nodal)) / equilibrium.phi_scale
-    body = -given.pop(None, 0.0)
+        acting = body.loads_along(body.space, [on]).at(time)
+        charges = acting.reshape(-1, bs)[:, d]
+        given[on] = _sum(problem, charges) / body.phi_scale
+        magnitude += _sum(problem, np.abs(charges)) / body.phi_scale
+    in_volume = -given.pop(None, 0.0)
     passed = _foundation_charges(problem, state)
     magnitude += _sum(problem, np.abs(passed))
     surface = {str(part): charge for part, charge in given.items()}
-    return ChargeBalance(electrodes, surface, _sum(problem, passed), body, magnitude)
+    return ChargeBalance(electrodes, surface, _sum(problem, passed), in_volume, magnitude)
 
 
 def _foundation_charges(problem: ContactProblem, state: State) -> Array:

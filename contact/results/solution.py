@@ -117,7 +117,7 @@ class Solution(Solved):
     seconds
         Spent on setup, solve and output.
     notes, warnings
-        Remarks in words that are no reason for care, and those that are, each with its identifier.
+        Informational notes, and warnings, each with its identifier.
     max_dev_strain, max_von_mises
         The largest |dev eps| and von Mises stress over the cells (their nodes, for degree 2).
     plastic_share
