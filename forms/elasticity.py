@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import ufl
@@ -18,6 +19,26 @@ from forms.crystal import (
     turned,
 )
 from forms.kinematics import embed
+
+
+class ElasticConstants(Protocol):
+    """The elastic constants of small strains, which every law of the stress has."""
+
+    @property
+    def young(self) -> float:
+        """Young's modulus E > 0 (stress)."""
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio, -1 < nu < 1/2."""
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus k0 = E / (3 - 6 nu), equation (7.9)."""
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus mu1 = E / (2 + 2 nu), equation (7.9)."""
 
 
 @dataclass(frozen=True, eq=False)

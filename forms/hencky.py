@@ -16,30 +16,14 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from forms.elasticity import Anisotropic, moduli
+from forms.elasticity import Anisotropic, ElasticConstants, moduli
 from forms.history import HistoryLaw, QuadratureLaw
 from forms.kinematics import CARTESIAN, Strained, deviator_squared, embed, strain
 from forms.ops import Value, log, maximum, sqrt
 
 
-class Hencky(Protocol):
-    """A material as the forms see it: two elastic constants and a secant shear modulus."""
-
-    @property
-    def young(self) -> float:
-        """Young's modulus E > 0 (stress)."""
-
-    @property
-    def poisson(self) -> float:
-        """Poisson's ratio, -1 < nu < 1/2."""
-
-    @property
-    def bulk(self) -> float:
-        """Bulk modulus k0 = E / (3 - 6 nu), equation (7.9)."""
-
-    @property
-    def shear(self) -> float:
-        """Initial shear modulus mu1 = E / (2 + 2 nu), equation (7.9)."""
+class Hencky(ElasticConstants, Protocol):
+    """A material as the forms see it: elastic constants and a secant shear modulus."""
 
     def secant_modulus(self, q: Value) -> Value:
         """Return g (stress) at q = |dev eps|^2, a number, an array or a UFL expression."""

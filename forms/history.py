@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ufl.core.expr import Expr
 
 from forms.crystal import VOIGT
-from forms.elasticity import moduli
+from forms.elasticity import ElasticConstants, moduli
 from forms.kinematics import embed
 
 #: Number of components -> the pairs of tensor indices that they stand for.
@@ -91,7 +91,7 @@ class Response:
 
 
 @runtime_checkable
-class HistoryLaw(Protocol):
+class HistoryLaw(ElasticConstants, Protocol):
     """A law of the stress with internal variables; see `hencky.Hencky`.
 
     A subclass of `forms.hencky.Isotropic` has the elastic constants. `symmetric`, where a law has
@@ -103,22 +103,6 @@ class HistoryLaw(Protocol):
     A user's own return mapping is a class with these methods: `forms.j2.J2` is one, and
     ``tests/problem/test_history.py`` has another, scalar damage in ten lines.
     """
-
-    @property
-    def young(self) -> float:
-        """Young's modulus of small strains."""
-
-    @property
-    def poisson(self) -> float:
-        """Poisson's ratio of these."""
-
-    @property
-    def bulk(self) -> float:
-        """Bulk modulus of these."""
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus of these."""
 
     def variables(self, size: int) -> Mapping[str, ArrayLike]:
         """Return the names of the variables, with their values in the reference configuration.
