@@ -171,7 +171,7 @@ def differential(
     moved: NDArray[np.float64],
     changed: Mapping[str, NDArray[np.float64]],
 ) -> Response:
-    """Return how stress and variables at the end of a step change: the linearised response.
+    """Return the differential of stress and variables at the end of a step.
 
     Central differences, one component after the other, where the law has none of its own: the sum
     is linear in the changes, so that its transpose is made of the same numbers.

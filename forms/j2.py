@@ -247,7 +247,7 @@ class J2(Isotropic):
         moved: Array,
         changed: Mapping[str, Array],
     ) -> Response:
-        """Return how stress and variables change at n points; see `forms.history.differential`."""
+        """Return the differential of the response at n points; see `forms.history.differential`."""
         size, g2 = strain.shape[1], 2 * self.shear
         _, plastic, flow = self._flow(strain, variables)
         trial = moved @ isotropic_stiffness(0.0, self.shear, size) - g2 * changed["plastic_strain"]
@@ -378,7 +378,7 @@ class _Flow:
         return dg
 
     def differential(self, trial: Array, a: Array, back: Sequence[Array]) -> tuple[Array, Array]:
-        """Return how dg and de_p change with the trial stress, a and the back stresses.
+        """Return the differentials of dg and de_p by the trial stress, a and the back stresses.
 
         Parameters
         ----------

@@ -126,7 +126,7 @@ class PlaneStressHistory(_Around):
         return bool(getattr(self.base, "symmetric", True))
 
     def variables(self, size: int) -> Mapping[str, ArrayLike]:
-        """Return those of the law, and the strain across."""
+        """Return the variables of the law, and the strain across the plane."""
         return {**self.base.variables(size), ACROSS: 0.0}
 
     def respond(self, strain: Array, variables: Mapping[str, Array], kind: str = "") -> Response:

@@ -246,7 +246,7 @@ class Electric(Described):
 
 
 def conduction_ramp(domain: Domain, part: str) -> float:
-    """Return how far in front of a foundation it conducts by default (length). Collective.
+    """Return the default width 1/delta of the ramp of psi (length). Collective.
 
     A tenth of the body's height over its contact part: of a length of the problem, so that
     refined meshes resolve it and solutions have a limit. A fixed small number of the thesis's

@@ -198,7 +198,7 @@ class Zone:
 
     @staticmethod
     def of(run: Run) -> Zone:
-        """Return that of a run."""
+        """Return the zone of a run."""
         skin = linear(run.surface)
         faces, area = skin.regular_faces, areas(run, skin)
         touching = (skin["status"] > STATUS["open"])[faces].any(axis=1)

@@ -310,7 +310,7 @@ class Balance:
 
     @staticmethod
     def rest(problem: ContactProblem) -> Balance:
-        """Return that of the reference configuration."""
+        """Return the balance of the reference configuration."""
         x = problem.body.zero_displacement()
         zero = np.zeros_like(problem.body.owned_part(x))
         return Balance(0.0, 0.0, 0.0, None, 0.0, 0.0, x, zero, zero)

@@ -97,7 +97,7 @@ def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) ->
 
 
 def _slip(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> float:
-    """Return how far points in contact have slid from the points they faced. Collective."""
+    """Return the largest tangential jump of nodes in contact (length). Collective."""
     along = np.linalg.norm(problem.nodes.tangential_component(problem.nodal(state)), axis=1)
     return problem.nodes.maximum(np.where(_pressed(problem, state, nodes), along, 0.0))
 
@@ -247,7 +247,7 @@ def _least_constrained(
 
 
 def _reach(group: Group, motion: Array) -> float:
-    """Return how far a motion moves a node at most. Collective."""
+    """Return the largest displacement of a node by a motion. Collective."""
     body = group.problem.body
     moved = body.nodal(group.moved @ motion)[:, : body.dim]
     here = float(np.linalg.norm(moved, axis=1).max(initial=0.0))

@@ -194,7 +194,7 @@ class ContactResult:
     charge: Array | None = None
 
     def __repr__(self) -> str:
-        """Return how many nodes there are, and how many of them touch."""
+        """Return the numbers of nodes and of nodes in contact, and the largest pressure."""
         closed = np.count_nonzero(self.status != "open")
         words = f"{counted(self.status.size, 'node')}, {closed} in contact"
         return f"<ContactResult: {words}, pressure up to {self.pressure.max(initial=0.0):.4g}>"

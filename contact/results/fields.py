@@ -387,7 +387,7 @@ class Deformation(NamedTuple):
 
 
 def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
-    """Return how large the deformation is at local unknowns of a body. Collective."""
+    """Return the extremes of strain and volume at local unknowns of a body. Collective."""
     mesh, kinematics = body.domain.mesh, body.domain.kinematics
     nodal, middle = body.nodal(x).ravel(), shape_of(mesh).middle
     if body.cuts is not None:

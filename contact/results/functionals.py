@@ -100,7 +100,7 @@ class Integral:
 
 
 def _of_contact(problem: ContactProblem, number: int | None) -> NDArray[np.bool_]:
-    """Return which owned contact nodes are those of one contact; of all for None."""
+    """Return the owned contact nodes of one contact, or all for None, as a mask (n,)."""
     if number is None:
         return np.ones(problem.nodes.weight.size, bool)
     return problem.entry_numbers == number
@@ -126,23 +126,23 @@ class ContactForce:
         nodes = problem.nodes
         stress = problem.interface.stress(problem.nodal(state), state.forces)
         own = _of_contact(problem, self.contact)
-        return self._turn(problem) * nodes.sum(np.where(own, stress[:, self.axis], 0.0))
+        return self._share(problem) * nodes.sum(np.where(own, stress[:, self.axis], 0.0))
 
-    def _turn(self, problem: ContactProblem) -> float:
-        """Return how much of a force per radian there is: the full turn of a ring."""
+    def _share(self, problem: ContactProblem) -> float:
+        """Return the share of the resultant: 0 across an axis of revolution, else 1."""
         unit = np.eye(problem.dim)[self.axis]
         return float(problem.domain.resultant(unit)[self.axis])
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
         nodes = problem.nodes
-        turn = np.where(_of_contact(problem, self.contact), self._turn(problem), 0.0)
+        share = np.where(_of_contact(problem, self.contact), self._share(problem), 0.0)
         by_force = np.zeros_like(nodes.normal)
-        by_force[:, self.axis] = turn * nodes.weight
+        by_force[:, self.axis] = share * nodes.weight
         layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.body.owned_part(state.x))
         nodes.add_jump_transposed(
-            (turn * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x
+            (share * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x
         )
         return by_x, by_force
 

@@ -155,7 +155,7 @@ class DrivenPart:
 
     @staticmethod
     def of(problem: ContactProblem) -> DrivenPart | None:
-        """Return that of a problem; None without any. Collective.
+        """Return the driven part of a problem; None without any. Collective.
 
         It is the first one whose displacement is prescribed as a function of time, or the first
         one with a load.
@@ -322,12 +322,12 @@ def _sum(problem: ContactProblem, values: Array) -> float:
     return float(problem.comm.allreduce(float(np.sum(values)), op=MPI.SUM))
 
 
-#: How rigid bodies have moved, and the state of electrodes and bolts, by part: see `movements`.
+#: Motions of rigid bodies, states of electrodes and bolts, by part: see `movements`.
 Movements = dict[str, dict[str, Any]]
 
 
 def movements(problem: ContactProblem, state: State) -> Movements:
-    """Return how rigid bodies have moved, and the potentials of electrodes. Collective.
+    """Return the motions of rigid bodies, and the potentials of electrodes. Collective.
 
     ``rigid`` is the foundation that moves, its `displacement`, `rotation` (degrees), `force` and
     `moment`; of several it has one entry each, by part. ``rigid_parts`` are the parts that move as

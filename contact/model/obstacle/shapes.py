@@ -161,7 +161,7 @@ class Shape(ABC):
         """
 
     def ray(self, points: Array, rays: Array) -> Array:
-        """Return how far the surface is along unit vectors, (n,). Infinite where it is never met.
+        """Return the distance of the surface along unit vectors, (n,); infinite if they miss it.
 
         NaN where the distance of the point is.
 
