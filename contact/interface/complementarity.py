@@ -93,7 +93,7 @@ def interface_residuals(
     )
     total = interface.norms(interface.pressure(jump, multipliers))
     # Without pressure nodes may just touch: their gaps are rounding too.
-    rounding_stress = interface.norms(np.full_like(motion, interface.rounding(jump)))
+    rounding_stress = interface.norms(np.full_like(motion, interface.rounding_pressure(jump)))
     motion_stress = interface.c_0 * interface.norms(np.minimum(now, interface.size))
     gap_stress = np.where(
         total <= rounding_stress, np.maximum(gap_stress, motion_stress), gap_stress

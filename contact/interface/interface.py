@@ -211,14 +211,14 @@ class Interface:
         opened, stick, slip = (int(count) for count in summed(self.comm, local))
         return opened, stick, slip
 
-    def rounding(self, jump: Array) -> float:
+    def rounding_pressure(self, jump: Array) -> float:
         """Return the pressure of a rounding of the displacements (stress). Collective."""
         displacement = np.abs(jump[:, : self.nodes.dim]).max(axis=1, initial=0.0)
         return 2 * ROUNDING * self.c_0 * self.nodes.maximum(displacement)
 
     def negligible(self, jump: Array, pressure: Array) -> float:
         """Return the rounding of pressures, by displacements or the largest one. Collective."""
-        return max(NEGLIGIBLE * self.nodes.maximum(pressure), self.rounding(jump))
+        return max(NEGLIGIBLE * self.nodes.maximum(pressure), self.rounding_pressure(jump))
 
     def acting(
         self, x: Array, multipliers: Multipliers

@@ -289,7 +289,7 @@ def _penetrating(
     jump = interface.nodes.jump(state.x)
     depth = np.where(inside, 0.0, -interface.normal_gap(jump))
     deepest = interface.nodes.maximum(depth)
-    rounding = interface.rounding(jump) / interface.c_0
+    rounding = interface.rounding_pressure(jump) / interface.c_0
     count = int(summed(interface.comm, np.count_nonzero(depth > rounding)))
     return deepest, count
 

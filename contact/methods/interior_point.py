@@ -355,7 +355,9 @@ def interior_point(
         jump = interface.nodes.jump(state.x)
         bound = interface.bound(jump, state.forces)
         # With all nodes open the next bound is zero, and the solution the same.
-        if aside is not None and interface.nodes.maximum(bound) <= interface.rounding(jump):
+        if aside is not None and interface.nodes.maximum(bound) <= interface.rounding_pressure(
+            jump
+        ):
             break
         if modes.overloaded(bound):
             outcome = replace(outcome, residuals=evaluate(problem, state))
@@ -437,7 +439,7 @@ class InteriorPoint:
             interface = self.problem.interface
             jump = interface.nodes.jump(state.x)
             pressure = interface.nodes.maximum(interface.pressure(jump, state.forces))
-            if pressure <= interface.rounding(jump):
+            if pressure <= interface.rounding_pressure(jump):
                 ended = f"nothing presses after {steps} steps"
                 break
             gap = self.relative_gap()

@@ -153,7 +153,7 @@ class UnconstrainedModes:
         interface = problem.interface
         nodes, jump = interface.nodes, interface.nodes.jump(state.x)
         # Pressures that are rounding do not constrain.
-        pressed = interface.pressure(jump, state.forces) > interface.rounding(jump)
+        pressed = interface.pressure(jump, state.forces) > interface.rounding_pressure(jump)
         motions, columns = [], []
         for group in self._unsupported:
             free = null_space(group.constraints(self.problem.frictional, pressed))

@@ -209,7 +209,7 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     Multipliers at open nodes, and pressures that are rounding, do not count as contact.
     """
     jump, own = interface.nodes.jump(state.x), state.forces.pressure
-    rounding = interface.rounding(jump)
+    rounding = interface.rounding_pressure(jump)
     on = constraint_active(own, interface.normal_gap(jump), interface.c_0, rounding)
     pressed = interface.norms(interface.pressure(jump, state.forces) - own * ~on)
     much = (pressed > 0) & (pressed > EPS * pressed.max())

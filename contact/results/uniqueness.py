@@ -1,11 +1,11 @@
-"""Whether friction is strong enough for several solutions, by the solution's own Jacobian.
+"""Critical friction, from which on several solutions may exist, by the Jacobian at a solution.
 
 Where nodes slide in given directions t, the increments of pressures and of slips satisfy
 S_nt du + w dp = 0 and S_tt du + w mu dp = 0, S being the stiffness of the body condensed onto them
 with nodes that are open left free. So S_tt - mu S_nt is singular at a critical mu: the pencil's
-real eigenvalues (Hassani, Hild, Ionescu and Sakki 2003). A body that no support holds slides nearly
-like a rigid one against next to nothing, so that the pencil, and the body, are looked at without
-that: such slips say nothing about its deformation.
+real eigenvalues (Hassani, Hild, Ionescu and Sakki 2003). Modes in which a
+body without supports slides nearly as a rigid one are left out: they say nothing about its
+deformation.
 
 Where the bodies, without any contact force, can be in balance where they do not meet, that is a
 solution too, whatever the friction: rings in a row, which roll out of a pinch or are jammed in it.
@@ -80,7 +80,7 @@ def uniqueness(
     if stiffness is None:
         return np.inf, False
     columns, body = [], problem.body
-    balanced = nodes.maximum(pressure) > interface.rounding(jump)
+    balanced = nodes.maximum(pressure) > interface.rounding_pressure(jump)
     external = body.external(state.time)
     for group in groups(problem):
         free = null_space(group.supports)
