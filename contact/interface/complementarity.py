@@ -189,7 +189,8 @@ def linearise(
         return Multipliers(pressure, np.zeros_like(n)), blocks
 
     # (19d): s+ = s + ds/dp (p+ - p) + ds/d|u_tau| e_u.(u_tau+ - u_tau), with p+ - p of (19a) where
-    # closed, and of the layer.
+    # closed, and of the layer by its tangent at the iterate u_nu: not at the place on its graph
+    # about which the layer itself is linearised.
     slip, s, by_pressure = interface.slip(jump), bound.s, bound.by_pressure
     s_plus = s - by_pressure * gamma * np.where(active.closed, normal_gap, 0.0)
     gradient = by_pressure[:, None] * interface.foundation.pressure_gradient(jump)

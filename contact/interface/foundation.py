@@ -25,6 +25,9 @@ from contact.typing import Array
 from forms.laws import PenetrationLaw
 from forms.ops import Value
 
+#: A pressure, or a penetration, above zero.
+TINY = np.finfo(float).tiny
+
 
 @dataclass(frozen=True)
 class NormalGraph:
@@ -50,8 +53,9 @@ class NormalGraph:
         return self.stiffness * self.p_nu(u_n - self.touch)
 
     def layer_slope(self, u_n: Array) -> Array:
-        """Return the derivative of `layer`."""
-        return self.stiffness * self.p_nu.derivative(u_n - self.touch)
+        """Return the derivative of `layer`; at the first touch that of the pressed layer."""
+        s = u_n - self.touch
+        return self.stiffness * self.p_nu.derivative(np.where(s == 0, TINY, s))
 
     def pressure(self, z: Array, r: float) -> Array:
         """Return the resolvent of the maximal monotone graph: p(u_nu) with p + r u_nu = z.
@@ -104,10 +108,6 @@ class ElasticBed:
     def derivative(self, s: Value) -> Value:
         """Return its derivative."""
         return self.stiffness + 0.0 * s
-
-
-#: A pressure above zero.
-TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
@@ -170,6 +170,15 @@ class FoundationLaw:
         assert self.layer is not None
         s = self._layer_penetration(jump)
         return np.asarray(self.layer.p_nu(s) / np.where(s > 0, s, 1.0), dtype=float)
+
+    def regimes(self, jump: Array) -> NDArray[np.int8]:
+        """Return 0 where the layer is open, 1 below saturation, 2 beyond, shape (n,).
+
+        Saturated is a tangent of less than half of the secant.
+        """
+        assert self.layer is not None
+        secant, slope = self.secant(jump), self.layer.p_nu.derivative(self._layer_penetration(jump))
+        return np.where(secant > 0, np.where(slope < secant / 2, 2, 1), 0).astype(np.int8)
 
     def largest_secant(self, size: float) -> Array:
         """Return the largest p_nu(s)/s of penetrations up to the size of the body, shape (n,)."""

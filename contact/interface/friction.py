@@ -290,6 +290,17 @@ class NodalFriction:
         rate = self.law.by_pressure(self._accumulated(slip), self.smooth(pressure))
         return np.where(pressure >= 0, np.asarray(rate, dtype=float), 0.0)
 
+    def largest_bound(self, pressure: Array, nodes: ContactNodes) -> Array:
+        """Return an upper bound of s for pressures up to given ones, shape (n,). Collective.
+
+        Infinite without one: `maximum` times the pressure, of all nodes where it is smoothed.
+        """
+        if self.law is None:
+            return np.zeros_like(pressure)
+        reached = pressure if self.local else np.full_like(pressure, nodes.maximum(pressure))
+        assert isinstance(self.law, GroupedFriction)
+        return self.law.largest(reached)
+
     def smooth(self, pressure: Array) -> Array:
         """Return max(R p, 0), shape (n,): of an iterate R p may be negative. Collective."""
         return np.maximum(self.smoothing(pressure), 0.0)

@@ -23,6 +23,7 @@ from forms.laws import (
     PotentialFactor,
     PotentialLaw,
     StiffnessLaw,
+    Tresca,
     Truncation,
 )
 from forms.ops import Value
@@ -114,6 +115,17 @@ class GroupedFriction(Grouped[FrictionLaw]):
     def by_pressure(self, slip: Any, pressure: Any) -> Array:
         """Return the derivative by the pressure."""
         return self.at_nodes(lambda law, slip, p: law.by_pressure(slip, p), slip, pressure)
+
+    def largest(self, pressure: Array) -> Array:
+        """Return upper bounds of s for pressures up to given ones; infinite without one."""
+
+        def most(law: FrictionLaw, own: Array) -> Value:
+            if isinstance(law, Tresca):
+                return law.bound
+            some = (own > 0) & (law.maximum > 0)
+            return np.multiply(law.maximum, own, out=np.zeros_like(own), where=some)
+
+        return self.at_nodes(most, pressure)
 
     @property
     def maximum(self) -> float:

@@ -345,8 +345,10 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
 
     The tangent of the layer is zero where it is saturated, and before its first touch: Newton's
     matrix may be singular, or as weak as elastic supports. Kacanov's method takes the secant
-    p_nu(s)/s of the last iterate (it is positive); where the forces nearly balance, Newton's method
-    the last steps.
+    p_nu(s)/s of the last iterate (it is positive). Newton's method takes the last steps, where the
+    forces nearly balance, and once from each set of regimes (open, below saturation, saturated)
+    that a secant leaves unchanged: supports that bear little bring the load to balance slowly.
+    After a failure that is not the layer's, the first problems are not solved either.
     """
     problem, interface = newton.problem, newton.problem.interface
     if interface.saturation == 0:
@@ -354,18 +356,27 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     foundation, near = interface.foundation, NEARLY_BALANCED
     state, largest = problem.start(), foundation.largest_secant(interface.size)
     secant = largest
+    regimes: NDArray[np.int8] = np.full(largest.size, -1, dtype=np.int8)
+    tried = regimes
     for _ in range(SECANTS):
         bed = foundation.elastic_bed(np.maximum(secant, SOFTEST * largest))
         method = newton.on(problem.with_interface(replace(interface, foundation=bed)))
         state, outcome = method.iterate(state, note=SECANT)
         if not outcome.converged:
             return None
-        if evaluate(problem, state).significant <= near:
+        jump = interface.nodes.jump(state.x)
+        before, regimes = regimes, foundation.regimes(jump)
+        changed, untried = (
+            float(summed(interface.comm, not np.array_equal(regimes, others))) > 0
+            for others in (before, tried)
+        )
+        balanced = evaluate(problem, state).significant <= near
+        if balanced or (untried and not changed):
             found = newton.iterate(newton.started(state), note=SECANT)
             if found[1].converged:
                 return found
-            near *= NEARER_BY
-        secant = foundation.secant(interface.nodes.jump(state.x))
+            near, tried = near * NEARER_BY if balanced else near, regimes
+        secant = foundation.secant(jump)
     return None
 
 

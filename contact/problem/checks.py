@@ -225,16 +225,17 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
     found = None if support is None else support.release(problem.time)
     if found is None:
         return
-    if found.resisted == 0:
+    if not found.saturated:
         raise InputError(
             f"the loads {PULLED_OFF}, and no support holds it there; accepted: loads that press it "
             "on, or more displacement components fixed",
             "pulled-off",
         )
-    words = described(found.motion[:, None], group.names)
-    sums = f"{found.power / found.resisted:.6g} times its largest resistance"
-    if words in group.names and words.startswith("translation"):
-        sums = f"{found.power:.6g}, it bears {found.resisted:.6g} at most"
+    words, along = described(found.motion[:, None], group.names), group.translation(found.motion)
+    if along is None:
+        sums = f"{found.power / found.resisted:.6g} times its largest resistance"
+    else:
+        sums = f"{found.power / along:.6g}, it bears {found.resisted / along:.6g} at most"
     raise InputError(
         f"the loads {PUSHED_THROUGH} ({words}): they are {sums}, with its largest "
         f"pressure of {problem.interface.saturation:.4g} (stiffness x limit); accepted: smaller "

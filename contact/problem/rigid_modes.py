@@ -8,8 +8,9 @@ Limit analysis by linear programs says whether contact forces can balance the lo
 the supports do not constrain. Admissible contact forces do no negative work on rigid motions m with
 m.nu <= -mu |m_tau| at every node: if the loads do positive work, no forces within the friction
 cones balance them (Farkas' lemma). A layer of the largest pressure P resists a motion with the
-power P max(0, m.nu + mu |m_tau|) at most. With given friction bounds s, friction dissipates
-s |m_tau| at most: loads whose power is more slide the bodies.
+power P max(0, m.nu + mu |m_tau|) at most; with a friction bound of at most s that is not mu times
+the pressure of its node, P max(0, m.nu) + s |m_tau|. With given friction bounds s, friction
+dissipates s |m_tau| at most: loads whose power is more slide the bodies.
 
 References
 ----------
@@ -59,8 +60,9 @@ class Group:
         Components of the group.
     moved
         The modes in owned and global unknowns, shape (owned + global, m).
-    names, centres
-        Names of the modes, and centres of the components.
+    names, axes, centres
+        Names of the modes, axes of the translations among them (-1: none), shape (m,), and centres
+        of the components.
     supports
         Gram matrix of the modes at the supports, shape (m, m).
     cut
@@ -73,6 +75,7 @@ class Group:
     components: list[int]
     moved: Array
     names: list[str]
+    axes: NDArray[np.intp]
     centres: Array
     supports: Array
     cut: bool
@@ -87,6 +90,17 @@ class Group:
         each = 1 if self.problem.domain.revolved else 3 * (self.problem.dim - 1)
         own = motions[: each * len(self.components)]
         return own.reshape(len(self.components), each, motions.shape[1])
+
+    def translation(self, motion: Array) -> float | None:
+        """Return the amount of a motion, (m,), that is a translation along one axis; else None.
+
+        All parts that move do so by the same amount.
+        """
+        amounts = np.abs(motion)
+        moving = amounts > 1e-6 * amounts.max()
+        alike = np.ptp(motion[moving]) <= 1e-6 * amounts.max()
+        axes = self.axes[moving]
+        return float(amounts.max()) if alike and axes[0] >= 0 and np.ptp(axes) == 0 else None
 
     @cached_property
     def _at_contact(self) -> Array:
@@ -132,17 +146,17 @@ def constrained_by_supports(problem: ContactProblem) -> bool:
     return all([null_space(group.supports).size == 0 for group in groups(problem)])
 
 
-def _free_motions(problem: ContactProblem) -> dict[int, str]:
-    """Return the free motions among the global unknowns, with their names."""
-    members = problem.body.global_unknowns.members
+def _free_motions(problem: ContactProblem) -> dict[int, tuple[str, int]]:
+    """Return the free motions among the global unknowns: names, axes of translations, else -1."""
+    members, names = problem.body.global_unknowns.members, NAMES[problem.dim]
     rigid = {
-        member.begin + k: f"{NAMES[problem.dim][k]} of the rigid part"
+        member.begin + k: (f"{names[k]} of the rigid part", k if k < problem.dim else -1)
         for member in members
         if isinstance(member.description, Rigid)
         for k in map(int, np.flatnonzero(member.free))
     }
     return rigid | {
-        member.begin: f"shortening of the bolt on {member.description.on!r}"
+        member.begin: (f"shortening of the bolt on {member.description.on!r}", -1)
         for member in members
         if isinstance(member.description, Bolt) and member.free.any()
     }
@@ -181,18 +195,21 @@ def _group(
     component: NDArray[np.int32],
     components: list[int],
     count: int,
-    moving: Mapping[int, str] = MappingProxyType({}),
+    moving: Mapping[int, tuple[str, int]] = MappingProxyType({}),
 ) -> Group:
     """Return a group with its modes; `moving`: global unknowns among these. Collective."""
     body, d = problem.body, problem.dim
     points, global_unknowns = body.layout.points, body.global_unknowns
     names: list[str] = []
+    axes: list[int] = []
     # Rotations about the mean of the contact nodes: well scaled.
     contact = problem.nodes
     weight = contact.sum(np.ones_like(contact.weight))
     centres, centre = [], np.array([contact.sum(x) for x in contact.points.T]) / weight
     pieces = _pieces(problem) if moving else None
-    own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
+    own_names, own_axes = NAMES[d], [*range(d), *[-1] * (len(NAMES[d]) - d)]
+    if problem.domain.revolved:
+        own_names, own_axes = own_names[1:2], own_axes[1:2]
     many = len(own_names) * len(components) + len(moving)
     moved = np.zeros((body.owned + global_unknowns.size, many))
     motions = moved[: body.owned].reshape(*body.free.shape, many)
@@ -210,11 +227,13 @@ def _group(
         joints[:, :, columns] = side[:, None, None] * rigid
         centres.append(centre)
         names += own_names
-    for k, name in moving.items():
+        axes += own_axes
+    for k, (name, axis) in moving.items():
         moved[body.owned + k, len(names)] = 1.0
         if pieces is not None and k in pieces.places:
             joints[:, :, len(names)] = pieces.normals[:, :, pieces.places.index(k)]
         names.append(name)
+        axes.append(axis)
     # Relative to supports, to rigid parts that nodes follow, and to the other side of a cut.
     nodes = body.layout.restrained
     dofs = nodes[:, None] * body.block_size + np.arange(d)
@@ -228,6 +247,7 @@ def _group(
         components,
         moved,
         names,
+        np.array(axes),
         np.array(centres),
         _gram(problem, fixed) + _elastic_gram(problem, moved) + _gram(problem, joints),
         pieces is not None,
@@ -305,13 +325,15 @@ class Release:
     motion
         The mode, shape (m,).
     power, resisted
-        f . m of the loads, and the sum of `bound` max(0, m.nu + mu |m_tau|) of the layers, which is
-        less; |m_k| <= 1, so that they are the forces of a translation (force).
+        f . m of the loads, and the largest resistance of layers and friction, which is less.
+    saturated
+        Whether layers resist it.
     """
 
     motion: Array
     power: float
     resisted: float
+    saturated: bool
 
 
 #: The motion of a body by loads beyond the pressure of a layer without a rigid part.
@@ -330,39 +352,60 @@ class UnilateralSupport:
         The modes that the supports do not constrain, shape (m, k).
     cone
         Rows of all ranks, shape (rows, n, k): a node resists a motion q with the power
-        `bound` max(0, largest row q) at most.
+        `bound` max(0, largest row q) at most. n counts each node twice where friction is not
+        bounded by the pressure there: `normal`, then along the surface.
     bound
-        Largest contact forces of the nodes, shape (n,) (force); infinite but on saturating layers.
+        Largest forces of the nodes, shape (n,) (force); infinite but on saturating layers, and for
+        the friction there.
+    normal
+        Which are contact forces, shape (n,).
     """
 
     group: Group
     free: Array
     cone: Array
     bound: Array
+    normal: NDArray[np.bool_]
 
     @staticmethod
     def of(group: Group) -> UnilateralSupport | None:
         """Return the support of a group by the contact nodes that face something. Collective.
 
         None if the supports constrain all modes, or if friction is not bounded by the pressure at
-        its node: a given bound, a smoothed pressure.
+        its node, by Tresca's law or with a smoothed pressure, and no layer saturates.
         """
         problem, free = group.problem, null_space(group.supports)
-        friction, comm = problem.interface.friction, problem.comm
-        mu = 0.0 if friction.law is None else friction.law.maximum
-        mu = comm.allreduce(mu, op=MPI.MAX)
-        if free.shape[1] == 0 or not np.isfinite(mu) or not friction.local:
+        interface, friction = problem.interface, problem.interface.friction
+        if free.shape[1] == 0:
             return None
-        nodes, normal = problem.nodes, group.normal @ free
+        mu = 0.0 if friction.law is None else friction.law.maximum
+        mu = problem.comm.allreduce(mu, op=MPI.MAX)
+        by_pressure = np.isfinite(mu) and friction.local
+        if not by_pressure and interface.saturation == 0:
+            return None
+        nodes, normal, largest = problem.nodes, group.normal @ free, interface.largest_pressure
         near = np.isfinite(nodes.gap)
         across = [
-            mu * np.einsum("ni,nim->nm", along, group.tangential) @ free
+            np.einsum("ni,nim->nm", along, group.tangential) @ free
             for along in _sideways(nodes.normal)
         ]
-        rows = [normal + sign * part for part in across for sign in (-1, 1)]
-        bound = nodes.weight * problem.interface.largest_pressure
-        cone = np.stack([nodes.gather(row[near]) for row in rows])
-        return UnilateralSupport(group, free, cone, nodes.gather(bound[near]))
+        sideways = [sign * part for part in across for sign in (-1, 1)]
+        bound = nodes.gather((nodes.weight * largest)[near])
+        if by_pressure:
+            cone = np.stack([nodes.gather((normal + mu * part)[near]) for part in sideways])
+            return UnilateralSupport(group, free, cone, bound, np.ones(bound.size, dtype=bool))
+        pressing, sliding = (
+            np.stack([nodes.gather(part) for part in parts])
+            for parts in ([normal[near]] * len(sideways), sideways)
+        )
+        most = nodes.gather(nodes.weight * friction.largest_bound(largest, nodes))
+        return UnilateralSupport(
+            group,
+            free,
+            np.concatenate([pressing, sliding], axis=1),
+            np.concatenate([bound, most]),
+            np.arange(bound.size + most.size) < bound.size,
+        )
 
     def release(self, time: float) -> Release | None:
         """Return the mode by which loads move the bodies off; None if balanced. Collective."""
@@ -376,20 +419,19 @@ class UnilateralSupport:
         from scipy.optimize import linprog  # takes a while to load
         from scipy.sparse import block_array, eye_array
 
-        saturating = np.isfinite(self.bound)
-        rigid, layer = self.cone[:, ~saturating].reshape(-1, work.size), self.cone[:, saturating]
-        cost = np.concatenate([-work, self.bound[saturating]]) / scale
-        bounds = [(-1, 1)] * work.size + [(0, None)] * layer.shape[1]
-        rows = [[rigid, None], *([each, -eye_array(each.shape[0])] for each in layer)]
+        finite = np.isfinite(self.bound)
+        rigid, yielding = self.cone[:, ~finite].reshape(-1, work.size), self.cone[:, finite]
+        cost = np.concatenate([-work, self.bound[finite]]) / scale
+        bounds = [(-1, 1)] * work.size + [(0, None)] * yielding.shape[1]
+        rows = [[rigid, None], *([each, -eye_array(each.shape[0])] for each in yielding)]
         cone = block_array(rows, format="csr")
         found = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
         if found.status != 0 or -found.fun <= BALANCED:
             return None
         motion = found.x[: work.size]
-        power, resisted = float(work @ motion), float(self.bound[saturating] @ found.x[work.size :])
-        if resisted <= BALANCED * power:
-            resisted = 0.0
-        return Release(np.asarray(self.free @ motion), power, resisted)
+        power, resisted = float(work @ motion), self.bound[finite] * found.x[work.size :]
+        saturated = resisted[self.normal[finite]].sum() > BALANCED * power
+        return Release(self.free @ motion, power, float(resisted.sum()), bool(saturated))
 
 
 def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
@@ -423,7 +465,7 @@ def released(supports: Sequence[UnilateralSupport], begin: float, end: float) ->
         earliest = found
     if earliest is None:
         return ""
-    return f"from t = {end:g} on the loads {PUSHED_THROUGH if earliest.resisted else PULLED_OFF}"
+    return f"from t = {end:g} on the loads {PUSHED_THROUGH if earliest.saturated else PULLED_OFF}"
 
 
 def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:

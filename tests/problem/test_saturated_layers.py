@@ -74,6 +74,97 @@ def test_loads_beyond_the_limit_are_refused_with_both(kind):
     assert f"largest pressure of {LARGEST:.4g} (stiffness x limit)" in message
 
 
+#: Friction whose bound is no multiple of the pressure at its node.
+GIVEN_BOUNDS = {
+    "tresca": {"law": "tresca", "bound": 0.4 * LARGEST},
+    "smoothed": {"law": "coulomb", "mu": 0.3, "radius": 0.7},
+}
+
+
+@pytest.mark.parametrize("friction", GIVEN_BOUNDS)
+@pytest.mark.parametrize("kind", BLOCKS)
+def test_other_friction_laws_leave_the_limit_as_it_is(kind, friction):
+    """They were not analysed: the body fell through the layer."""
+    more = {"friction": GIVEN_BOUNDS[friction]}
+    solution = solve(parse_case(block(kind, 0.97, **more)), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert solution.pressure == pytest.approx(0.97 * LARGEST, rel=1e-6)
+    with pytest.raises(InputError, match=r"\[saturated\]"):
+        solve(parse_case(block(kind, 1.02, **more)), comm=SELF)
+
+
+@pytest.mark.parametrize(("share", "held"), [(0.95, True), (1.05, False)])
+@pytest.mark.parametrize("kind", ["plane", "solid"])
+def test_a_given_friction_bound_holds_along_the_layer(kind, share, held):
+    """A body force along the base slides the block where it is more than the bound on its area."""
+    case = block(kind, 0.5, friction=GIVEN_BOUNDS["tresca"])
+    case["fixed"] = case["fixed"][1:]
+    along = [share * 0.4 * LARGEST, *[0.0] * (1 if kind == "plane" else 2)]
+    case["load"].append({"everywhere": True, "body_force": along})
+    if held:
+        build_problem(parse_case(case), SELF)
+        return
+    with pytest.raises(InputError, match=r"along it by more than friction holds.*\[pulled-off\]"):
+        build_problem(parse_case(case), SELF)
+
+
+@pytest.mark.parametrize("kind", BLOCKS)
+def test_forces_are_told_of_a_translation_of_several_parts(kind):
+    """Of a body and the plate on top of it, which move as one, a ratio was told."""
+    case = block(kind, 0.0)
+    force = 1.02 * LARGEST * BLOCKS[kind][2]
+    across = [0.0] * (2 if kind == "solid" else 1)
+    plate = {"on": "top", "displacement": [*across, "free"], "force": [*across, -force]}
+    case |= {"load": [], "fixed": [], "rigid": [plate]}
+    with pytest.raises(InputError, match=r"\[saturated\]") as refused:
+        build_problem(parse_case(case), SELF)
+    assert f"they are {force:.6g}, it bears {force / 1.02:.6g} at most" in str(refused.value)
+
+
+def tilted(kind: str, stiffness: float) -> tuple[dict, float]:
+    """Return a block that tilts on its saturated layer against springs, and its displacement.
+
+    Of its load P the half of the layer next to it bears all, with the moment P/2; the linear part
+    of the load has the moment 2/3 P. Springs along x on the right side bear the rest, by a rotation
+    about their middle with the stiffness k/12. The node in the middle of the base stays.
+    """
+    case = block(kind, 0.0, elastic=[{"on": "right", "stiffness": [stiffness, 0.0, 0.0]}])
+    if kind == "plane":
+        case["elastic"][0]["stiffness"].pop()
+    case["fixed"] = case["fixed"][1:]
+    case["material"]["young"] = 1e6
+    case["load"] = [{"on": "top", "pressure": f"{LARGEST}*(0.5 + x - 1)"}]
+    rotation = LARGEST / 6 / (stiffness / 12)
+    return case, rotation * np.hypot(1.0, 0.5)
+
+
+@pytest.mark.core
+@pytest.mark.parametrize("stiffness", [1.0, 30.0])
+@pytest.mark.parametrize("kind", ["plane", "solid"])
+def test_springs_bear_a_moment_that_is_too_large_for_the_layer(kind, stiffness):
+    """Secants came nearer by 8 % each, and Newton's method ended at displacements of 1e11."""
+    case, displacement = tilted(kind, stiffness)
+    case["mesh"]["cells"][0] = 6
+    for method in ("newton", "uzawa", "penalty"):
+        solution = solve(parse_case({**case, "solver": {"method": method}}), comm=SELF)
+        assert solution.converged, solution.outcome.reason
+        assert solution.max_displacement == pytest.approx(displacement, rel=2e-2)
+
+
+@pytest.mark.parametrize("limit", [LIMIT, np.inf])
+@pytest.mark.parametrize("share", [0.05, 0.6, 0.95])
+@pytest.mark.parametrize("kind", BLOCKS)
+def test_the_penalty_method_presses_on_a_layer_that_touches(kind, share, limit):
+    """Its first matrix had no stiffness at a layer that just touches, and all of it stayed at 0."""
+    case = block(kind, share, solver={"method": "penalty"})
+    case["contact"]["limit"] = limit
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    pressed = share * LARGEST
+    assert solution.pressure == pytest.approx(pressed, rel=1e-6)
+    assert solution.max_displacement == pytest.approx(pressed / STIFFNESS + pressed / 1e3, rel=1e-6)
+
+
 def test_a_load_aside_tilts_a_block_until_the_layer_is_saturated_there():
     """Its moment is M; rigid and linear, the pressure F/A + M x/I would be above the limit."""
     case = block("plane", 0.0, fixed=[{"on": "left", "displacement": ["free", 0.0]}])
