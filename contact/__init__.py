@@ -41,6 +41,7 @@ from __future__ import annotations
 
 import ast
 import os
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -61,12 +62,20 @@ __all__ = ["__version__", *_PUBLIC]
 # MPI_Dist_graph_create, by which checkpoints are read, may hang (open-mpi/ompi issue 13918).
 os.environ.setdefault("OMPI_MCA_topo", "basic")
 
+# The wheels of dolfinx and PETSc do not find the library of MPI by themselves, but take the one
+# that mpi4py has loaded.
+with suppress(ImportError):
+    import_module("mpi4py.MPI")
+
 
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from contact.errors import installed
+
     module, there = _PUBLIC[name]
-    return getattr(import_module(module), there)
+    with installed():
+        return getattr(import_module(module), there)
 
 
 def __dir__() -> list[str]:

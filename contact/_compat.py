@@ -94,6 +94,15 @@ def collapse(
     return space, np.asarray(dofs[0] if several else dofs, dtype=np.int32)
 
 
+def surface(grid: Any) -> Any:
+    """Surface of a pyvista grid; of cells of degree 2 four facets of each."""
+    extract = grid.extract_surface
+    # Without it pyvista warns since 0.47.
+    known = "algorithm" in inspect.signature(extract).parameters
+    algorithm = {"algorithm": "dataset_surface"} if known else {}
+    return extract(nonlinear_subdivision=1, **algorithm)
+
+
 def keeps_inverted_blocks() -> bool:
     """Whether PETSc takes a matrix's inverted nodal blocks for valid when its values change.
 
@@ -212,13 +221,14 @@ def versions() -> dict[str, str]:
     from mpi4py import MPI
     from petsc4py import PETSc
 
+    vendor, numbers = MPI.get_vendor()
     return {
         "python": platform.python_version(),
         "dolfinx": dolfinx.__version__,
         "ufl": ufl.__version__,
         "petsc": ".".join(str(part) for part in PETSc.Sys.getVersion()),
         "mpi4py": mpi4py.__version__,
-        "mpi": MPI.Get_library_version().splitlines()[0].split(",")[0].rstrip("\0"),
+        "mpi": f"{vendor} v{'.'.join(str(part) for part in numbers)}",
         "numpy": numpy.__version__,
         "blas": blas()[0],
     }

@@ -5,11 +5,29 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 #: A number of NumPy as its repr.
 NUMBER = re.compile(r"\bnp\.(?:u?int|float|bool|str)\d*_?\(([^()]*)\)|\bnp\.(True|False)_?\b")
+
+#: Modules that are no dependencies of the plain package, and ways to them.
+OF_EXTRAS = (
+    "mpi4py",
+    "petsc4py",
+    "dolfinx",
+    "basix",
+    "ffcx",
+    "ufl",
+    "cffi",
+    "pyvista",
+    "vtkmodules",
+)
+WAYS = (
+    'pip install "contact-fenicsx[fenicsx]" (Linux on x86-64, Python >= 3.12), or in a clone '
+    "conda env create -f environment.yml, scripts/fx COMMAND (Debian's packages), docker build ."
+)
 
 #: Most characters of a quoted value.
 VALUE = 60
@@ -75,3 +93,24 @@ class InputError(ValueError):
 
 class SingularError(InputError):
     """A singular linear system: a rigid-body mode is unconstrained where it is linearised."""
+
+
+@contextmanager
+def installed() -> Iterator[None]:
+    """Raise an InputError where FEniCSx, pyvista or a C compiler is missing."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        name = (error.name or "").partition(".")[0]
+        if name not in OF_EXTRAS:
+            raise
+        text = f"the Python module {name} is needed; accepted: {WAYS}"
+        raise InputError(text, "fenicsx") from error
+    except Exception as error:
+        # cffi's, and dolfinx's on several ranks.
+        of_ranks = re.search("(JIT|just-in-time) compilation", str(error))
+        if not of_ranks and type(error).__name__ != "VerificationError":
+            raise
+        reason = str(error).strip().splitlines()[-1]
+        text = f"a form cannot be compiled ({reason}); accepted: a C compiler, Python's headers"
+        raise InputError(text, "compiler") from error

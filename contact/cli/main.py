@@ -14,12 +14,11 @@ import time
 import traceback
 from collections.abc import Sequence
 from importlib import import_module
-from typing import NoReturn
 
 from mpi4py import MPI
 
 from contact.cli.arguments import parse
-from contact.errors import InputError
+from contact.errors import InputError, installed
 from contact.methods.signals import (
     SIGNALLED,
     Interrupted,
@@ -63,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     comm = MPI.COMM_WORLD
     try:
-        with ending_on_signal():
+        with ending_on_signal(), installed():
             with signals_held():  # C++ libraries that are being loaded take no exceptions
                 options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
                 import petsc4py
@@ -95,8 +94,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception:
         traceback.print_exc()
         return _end(comm, "this is a fault of the program, not of its input", CRASH)
-
-
-def run() -> NoReturn:
-    """Run the command line and leave with its status."""
-    sys.exit(main())

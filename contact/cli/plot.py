@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import re
+import sys
 from pathlib import Path
 
 import pyvista
@@ -65,7 +67,8 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 def show(folder: Path, field: str | None) -> None:
     """Show the body of a run in 3-D in a window, until that is closed."""
     opened = window(read_run(folder), field)
-    if pyvista.OFF_SCREEN:
+    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if pyvista.OFF_SCREEN or (sys.platform == "linux" and not display):
         opened.close()
         raise InputError(
             "contact view: no display for a window; accepted: a session with a display, contact "

@@ -314,6 +314,8 @@ def side_by_side(
     first = pieces[0]
     names = ["nodes", "points", "weight", "normal", "admissible_normal", "tangent", "gap"]
     names += ["deviation"] if first.motion is None else ["deviation", "motion"]
-    arrays = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in names}
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in names
+    }
     cut = max(piece.cut for piece in pieces)
     return replace(first, cut=cut, coupling=coupling, **arrays)

@@ -161,6 +161,8 @@ def described(**options: Any) -> Callable[[type[Kind]], type[Kind]]:
 
     def decorate(cls: type[Kind]) -> type[Kind]:
         made: Any = pydantic_dataclass(frozen=True, config=CONFIG, **options)(cls)
+        # Else pydantic 2.14 takes the strict validator of the class for that of `FromTable`.
+        made.__pydantic_complete__ = False
         init = made.__init__
         names = [field.name for field in fields(made) if not field.kw_only]
 

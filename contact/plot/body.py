@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.tri import Triangulation
 
+from contact import _compat
 from contact.errors import InputError
 from contact.mesh.cells import LINEAR
 from contact.plot.foundation import HATCHED, foundation, magnification, profiles
@@ -146,7 +147,7 @@ def picture(run: Run, field: str, scale: float | None = None, look: Look = PAGE)
         scale = magnification(run, box=near)
     body = run.body.warp_by_vector("displacement", factor=scale)
     (body.cell_data if in_cells else body.point_data)["values"] = values
-    skin = body.extract_surface(nonlinear_subdivision=1)  # triangles; at degree 2 four of each
+    skin = _compat.surface(body)  # triangles; at degree 2 four of each
     box = np.array([skin.points.min(axis=0), skin.points.max(axis=0)])[:, : len(run.axes)]
     if near is not None:
         box = np.clip(near, *box)
@@ -178,7 +179,7 @@ def draw_plane(picture: Picture) -> Figure:
     figure = sheet(tall + (1.4 + more) / page_width())
     figure.set_layout_engine("compressed")  # made for axes of equal scale
     ax = figure.subplots()
-    skin = run.body.extract_surface(nonlinear_subdivision=1)
+    skin = _compat.surface(run.body)
     edges = skin.extract_feature_edges(
         feature_edges=False, manifold_edges=False, non_manifold_edges=False
     )

@@ -197,7 +197,7 @@ def facing(corners: Array, gap: Array, diameter: float) -> Any:
         return shape
     shape["gap"] = gap[known].ravel()
     room = BEYOND * diameter + max(float(shape["gap"].min()), 0.0)
-    return shape.clean().clip_scalar("gap", value=room)
+    return shape.clean().clip_scalar(scalars="gap", value=room)
 
 
 def add_foundation(plotter: Any, shape: Any) -> None:

@@ -16,6 +16,7 @@ import pyvista
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from contact import _compat
 from contact.errors import InputError
 from contact.plot.style import heading
 from contact.ranks import refused
@@ -204,7 +205,7 @@ def read_grid(path: Path) -> Any:
 
 def linear(grid: Any) -> Any:
     """Return the surface of a grid in triangles: of cells of degree 2 four of each."""
-    return grid.extract_surface(nonlinear_subdivision=1).triangulate()
+    return _compat.surface(grid).triangulate()
 
 
 def polygons(corners: Array) -> Any:

@@ -15,7 +15,9 @@ from matplotlib.colors import ListedColormap, Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.spatial import KDTree
+from vtkmodules.vtkCommonCore import vtkLogger
 
+from contact import _compat
 from contact.plot.foundation import add_foundation, foundation, magnification
 from contact.plot.run import Run, linear, polygons
 from contact.plot.style import BLUE, NARROW, ORANGE, SKY, ZONES, Look, colour_bar, page_width, sheet
@@ -23,6 +25,9 @@ from contact.results.quantities import STATUS
 from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")
+
+if not os.environ.get("DISPLAY"):  # VTK would warn of it, and draws all the same
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
 
 #: Cosine from which on a normal counts as that of a coordinate plane.
 SNAPPED = 0.966
@@ -305,7 +310,7 @@ class Scene:
         grid = self.body
         if cut:
             grid = grid.clip(normal=view, origin=self.zone.points.mean(axis=0))
-        skin = grid.extract_surface(nonlinear_subdivision=1)
+        skin = _compat.surface(grid)
         faint = {"show_edges": skin.n_cells < FACETS, "line_width": 0.5, "edge_opacity": 0.2}
         lit = {"ambient": 0.6, "diffuse": 0.45, "smooth_shading": True, "split_sharp_edges": True}
         lines = {"manifold_edges": False, "non_manifold_edges": False}

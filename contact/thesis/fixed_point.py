@@ -38,7 +38,7 @@ from contact.problem.residuals import (
     undeformed_equilibrium,
 )
 from contact.problem.state import State
-from contact.thesis.softest_mode import conditioning, fitted_augmentation
+from contact.thesis.softest_mode import fitted_augmentation
 from contact.thesis.uzawa import (
     FrozenProblem,
     augmentation,
@@ -216,8 +216,10 @@ class FixedPoint(OuterLoop):
     stagnation: ClassVar[tuple[int, float]] = (25, 0.9)
 
     def __post_init__(self) -> None:
-        """Set up the operator."""
+        """Choose r and set up the operator."""
         super().__post_init__()
+        given = self.options.r
+        self.r = self.problem.scales.augmentation if given == "auto" else given
         self.operator = self._new_operator(symmetric=True)
 
     def _new_operator(self, symmetric: bool) -> Operator:
@@ -228,9 +230,7 @@ class FixedPoint(OuterLoop):
         self, start: State | None = None, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit; see `Method`. Collective."""
-        given = self.options.r
-        self.r = self.problem.scales.augmentation if given == "auto" else given
-        self._stalled, self._residual, self._fitted, self._slender = False, np.inf, False, False
+        self._stalled, self._residual, self._fitted = False, np.inf, False
         self._gap_derivative = ConductivityDerivative(NEAR)
         if not self.operator.symmetric:  # of an earlier solve
             self.operator = self._new_operator(symmetric=True)
@@ -305,7 +305,6 @@ class FixedPoint(OuterLoop):
         start = problem.start()
         r = fitted_augmentation(problem, self._new_operator(symmetric=True), start)
         if r is not None:
-            self._slender = True
             self.r, self.state, self._secant_at = r, start, problem.body.zero_displacement()
             self.bound = self._first_bound
             self._z = self._initial_z(0.0, friction)
@@ -333,8 +332,7 @@ class FixedPoint(OuterLoop):
             self._tangent = choice == "tangent"
 
     def _limit(self) -> int:
-        # Of slender bodies each relaxation brings contact or friction nearer, in turn.
-        return STALLED if self._stalled and not self._slender else self.stagnation[0]
+        return STALLED if self._stalled else self.stagnation[0]
 
     def _thesis_criterion(self, change: float, previous: State) -> bool:
         """Tell whether (3.46) is met, or (6.40) without friction."""
@@ -344,6 +342,5 @@ class FixedPoint(OuterLoop):
 
     def _advice(self, residual: float | None = None) -> str:
         if self._stalled:
-            words = f": the Uzawa block relaxation with r = {self.r:.3g} stalls"
-            return words + (conditioning(self.problem.scales, self.r) if self._slender else "")
+            return f": the Uzawa block relaxation with r = {self.r:.3g} stalls"
         return FROZEN if residual is not None and residual > NEAR else ""

@@ -25,15 +25,28 @@ def _own_cache() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory()
 
 
+@cache
+def _open_mpi() -> bool:
+    """Whether mpirun is that of Open MPI; else it is MPICH's."""
+    asked = subprocess.run(["mpirun", "--version"], capture_output=True, text=True)
+    return "Open MPI" in asked.stdout or "OpenRTE" in asked.stdout
+
+
+def launcher(ranks: int) -> list[str]:
+    """Return the words that start a command on ranks, of which there may be more than cores."""
+    if ranks == 1:
+        return []
+    return ["mpirun", *(["--oversubscribe"] if _open_mpi() else []), "-n", str(ranks)]
+
+
 def started(
     words: Sequence[str], ranks: int = 1, limit: float | None = None, **variables: str
 ) -> str:
     """Return the output of a process, within a limit (seconds), with environment variables."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
     environment |= variables
-    parallel = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
     done = subprocess.run(
-        [*parallel, *words], env=environment, capture_output=True, text=True, timeout=limit
+        [*launcher(ranks), *words], env=environment, capture_output=True, text=True, timeout=limit
     )
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(words)} failed:\n{done.stderr[-2000:]}")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from scripts.cases import CASES
 from tests.problems.processes import BAR, RANKS, SMALL, command, environment
 
 BOX = """
@@ -55,6 +56,49 @@ def run(*arguments: str, ranks: int = 1, before: str = "") -> tuple[int, str]:
 def test_petsc_is_loaded_after_its_options() -> None:
     """Loaded before, it would not look at those of the command line."""
     program = "import sys, contact.cli.main; sys.exit('petsc4py.PETSc' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program]).returncode == 0
+
+
+@pytest.mark.parametrize("module", ["mpi4py", "petsc4py", "dolfinx", "pyvista"])
+def test_without_fenicsx_one_message_has_the_ways_to_it(module: str) -> None:
+    status, text = run("plot", "none", before=f"sys.modules['{module}'] = None")
+    assert status == 2
+    line = text.splitlines()[0]
+    assert f"module {module} is needed" in line and line.endswith("[fenicsx]")
+    assert "Traceback" not in text
+    assert all(way in line for way in ("pip install", "conda", "scripts/fx", "docker"))
+
+
+@RANKS
+def test_without_a_compiler_one_message_tells(
+    ranks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("CC", "no-compiler")
+    status, text = run("solve", str(BAR), "--out", str(tmp_path / "out"), *SMALL, ranks=ranks)
+    assert status == 2
+    assert "[compiler]\n" in text and "Traceback" not in text
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize(
+    ("case", "changes"),
+    {
+        "bar": ["mesh.cells=[8, 2]"],
+        "press-shear-unload": ["mesh.cells=[2, 2, 2]", "evolution.steps=[1, 1, 1]"],
+    }.items(),
+)
+def test_no_library_says_a_word(case: str, changes: list[str], ranks: int, tmp_path: Path) -> None:
+    """In 2-D and 3-D, with pictures: VTK writes past Python."""
+    given = [str(CASES / f"{case}.toml"), "--out", str(tmp_path / "out"), "--quiet", "--plot"]
+    status, text = run("solve", *given, *(f"--set={change}" for change in changes), ranks=ranks)
+    assert status == 0
+    assert [line for line in text.splitlines() if not line.startswith("warning: ")] == []
+
+
+def test_names_of_the_package_come_in_any_order() -> None:
+    """The wheels' dolfinx needs the library of MPI that mpi4py loads."""
+    program = "from contact import load_case, solve"
     assert subprocess.run([sys.executable, "-c", program]).returncode == 0
 
 

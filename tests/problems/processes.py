@@ -12,15 +12,19 @@ from typing import NamedTuple
 
 import pytest
 
+from scripts.benchmarks.processes import launcher
+
 CLONE = Path(__file__).parents[2]
 BAR = CLONE / "scripts/cases/bar.toml"
 SMALL = ["--set", "mesh.cells=[16, 4]", "--quiet"]
+#: Variables of Open MPI and of MPICH.
+OF_RANKS = ("OMPI_", "PMIX_", "PRTE_", "PMI_", "HYDI_", "MPI_LOCAL")
 RANKS = pytest.mark.parametrize("ranks", [1, 2])
 
 
 def environment() -> dict[str, str]:
     """Return the environment without what says that this is a rank itself."""
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(OF_RANKS)}
     own = {"btl": "self,sm", "topo": "basic", "mpi_yield_when_idle": "1"}
     root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     mca = {f"OMPI_MCA_{key}": value for key, value in own.items()}
@@ -29,12 +33,9 @@ def environment() -> dict[str, str]:
 
 def command(*arguments: str, ranks: int = 1, before: str = "") -> list[str]:
     """Return what starts the command line, after some Python."""
-    program = f"import sys\n{before}\nfrom contact.cli.main import run\nrun()"
-    return [*_launch(ranks), sys.executable, "-c", program, *arguments]
-
-
-def _launch(ranks: int) -> list[str]:
-    return [] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks)]
+    # PETSc takes -c for an option of its own.
+    program = f"import sys\n{before}\nfrom contact.__main__ import run\nsys.argv[0] = ''\nrun()"
+    return [*launcher(ranks), sys.executable, "-c", program, *arguments]
 
 
 #: Runs the command lines that it reads, and says with which status each has ended.
@@ -58,7 +59,7 @@ def served(
 ) -> Iterator[Callable[..., tuple[int, str]]]:
     """Yield a function that runs a command line in a kept process: its status and what it said."""
     process = subprocess.Popen(
-        [*_launch(ranks), sys.executable, "-c", SERVER.format(before=before)],
+        [*launcher(ranks), sys.executable, "-c", SERVER.format(before=before)],
         env=environment(), text=True,
         stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
     )  # fmt: skip

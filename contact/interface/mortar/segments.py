@@ -274,8 +274,8 @@ def _within(begin: Array, along: Array, polygons: Array) -> tuple[Array, Array, 
     high = np.where(~level & (slope < 0), at, 1.0).min(axis=1)
     beyond = (level & (height < -ROUNDING)).any(axis=1)
     on_edge = (level & (np.abs(height) <= ROUNDING)).any(axis=1)
-    zero = np.zeros(len(begin))
-    return np.maximum(low, zero), np.where(beyond, zero, np.minimum(high, 1.0)), 1 - 0.5 * on_edge
+    zero, share = np.zeros(len(begin)), np.where(on_edge, 0.5, 1.0)
+    return np.maximum(low, zero), np.where(beyond, zero, np.minimum(high, 1.0)), share
 
 
 def _slopes(gradients: Array, nodes: Array) -> Array:
