@@ -23,7 +23,7 @@ help:
 	@echo "make docs     the documentation, into build/docs (notebooks are executed)"
 	@echo "make release  wheel and source distribution, built, installed and tried elsewhere"
 	@echo "make clean    remove results and caches in this folder"
-	@echo "FENICSX_SUITE=sid make test   the same on dolfinx 0.11"
+	@echo "FENICSX=wheels make test   the same in another place: wheels, sid (both dolfinx 0.11), debian"
 
 demo:
 	$(FX) python3 -m contact solve scripts/cases/bar.toml --out results/bar --plot

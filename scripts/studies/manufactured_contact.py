@@ -12,6 +12,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact._compat import geometry_dofmap
 from contact.body.description import Body
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
@@ -166,7 +167,7 @@ class Sliding:
             number = [n, 3 * n // 4][k]
             corners = [[0.0] * (d - 1) + [-float(k)], [1.0] * (d - 1) + [1.0 - k]]
             grid = make(MPI.COMM_SELF, corners, [number] * d, cell_type=kind)
-            cells.append(grid.geometry.dofmap + sum(map(len, points)))
+            cells.append(geometry_dofmap(grid) + sum(map(len, points)))
             points.append(grid.geometry.x[:, :d])
         comm = MPI.COMM_WORLD
         mine = slice(None if comm.rank == 0 else 0)

@@ -20,6 +20,7 @@ from itertools import product
 from pathlib import Path
 
 from contact.errors import InputError
+from scripts.benchmarks.processes import launcher
 from scripts.reporting import Report, append, empty, parser
 
 ROOT = Path(__file__).parents[2]
@@ -293,7 +294,7 @@ def found_by(tree: Path, files: Sequence[str], ranks: int) -> str:
     run = [sys.executable, "-m", "pytest", *files, *options, "-m", "core", "-n", "0"]
     if ranks > 1:
         run[1:2] = ["-m", "mpi4py", "-m"]
-        run = ["mpirun", "--oversubscribe", "-n", str(ranks), *run[:-3], "core and parallel"]
+        run = [*launcher(ranks), *run[:-3], "core and parallel"]
     ended = subprocess.run(
         ["timeout", str(LIMIT), *run],
         cwd=tree,

@@ -6,6 +6,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 import meshes
+from contact._compat import geometry_dofmap
 from contact.mesh.cells import shape_of
 from contact.mesh.reader import from_generator, from_msh
 from meshes.__main__ import main
@@ -193,7 +194,7 @@ def test_cells_have_positive_volumes(name):
     """As other programs ask for, which read the files that are written."""
     mesh = from_generator(COMM, name).mesh
     dim = mesh.topology.dim
-    corners = mesh.geometry.x[mesh.geometry.dofmap][..., :dim]
+    corners = mesh.geometry.x[geometry_dofmap(mesh)][..., :dim]
     assert np.linalg.det(corners[:, 1:] - corners[:, :1]).min() > 0
 
 

@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import parse_case, solve
+from contact._compat import geometry_dofmap
 from contact.body.description import Body
 from contact.case.build import build_problem
 from contact.cli.check import expectations
@@ -65,7 +66,7 @@ def test_what_is_refused(more, message):
 
 def test_overlapping_bodies_are_refused():
     domain = Blocks(2, 5, 8).domain(MPI.COMM_SELF)
-    nodes = np.unique(domain.mesh.geometry.dofmap[domain.cells("upper")])
+    nodes = np.unique(geometry_dofmap(domain.mesh)[domain.cells("upper")])
     domain.mesh.geometry.x[nodes, 1] -= 0.2
     body = Body(Linear(1.0, 0.3), [Fixed("bottom", [ZERO, ZERO])])
     problem = ContactProblem(

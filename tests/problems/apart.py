@@ -6,6 +6,7 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact._compat import geometry_dofmap
 from contact.body.description import Body
 from contact.mesh.domain import Domain, from_mesh
 from contact.model.body import Fixed, Load
@@ -24,7 +25,7 @@ def blocks(comm: MPI.Intracomm, heights: Sequence[float] = (1.0, 3.0), n: int = 
     for k, height in enumerate(heights):
         corners = [[2.0 * k, 0.0], [2.0 * k + 1, height]]
         block = dmesh.create_rectangle(MPI.COMM_SELF, corners, [n, round(n * height)])
-        cells = np.concatenate([cells, block.geometry.dofmap + len(points)])
+        cells = np.concatenate([cells, geometry_dofmap(block) + len(points)])
         points = np.concatenate([points, block.geometry.x[:, :2]])
     mesh = assembled(comm, points, cells)
 

@@ -9,30 +9,57 @@ import pytest
 
 CLONE = Path(__file__).resolve().parents[2]
 
-TOOLS = """awk bash cat cut df dirname env flock grep head ls mkdir mv paste readlink rm sed setpriv
-setsid sh sha256sum sleep tail tar touch uname""".split()
+TOOLS = """awk bash cat cp cut df dirname env flock grep head id ls mkdir mktemp mv paste readlink
+rm sed sh sha256sum sleep tail tar touch true uname xargs""".split()
 
-# as root it makes the folder it is told; else it writes an archive
-MMDEBSTRAP = """
+#: What making a place takes: a call is counted, may take long, and may fail.
+MAKING = """
 echo call >>"$FAKES/calls"
 echo "I: stand-in"
 sleep "${FAKE_SECONDS:-0}"
 [[ -z ${FAKE_FAILURE-} ]] || { echo "E: the mirror is gone"; exit 25; }
-for target; do [[ $target != */*.part/root && $target != - ]] || break; done
+"""
+# as root it makes the folder it is told; else it writes an archive
+MMDEBSTRAP = (
+    MAKING
+    + """
+for target; do [[ $target != */*.part && $target != - ]] || break; done
 folder=$target
 [[ $target != - ]] || folder=$(mktemp -d)
 mkdir -p "$folder"/{usr,etc/ssl/certs,var} "$folder$FAKES" # for the marker
 [[ $target != - ]] || tar -c -C "$folder" .
 """
-# like the real one it waits for its child and hands on the status
-BWRAP = """
-while [[ $1 != env && $1 != true ]]; do shift; done
-echo "${FENICSX_SUITE:-trixie}" >"$FAKES/marker"
+)
+# enters the root, where the marker is seen, or is told to do so by --root
+UNSHARE = """
+while [[ $1 == -* ]]; do
+    [[ $1 != --root ]] || exec chroot "${@:2}"
+    [[ $1 != --propagation ]] || shift
+    shift
+done
+exec "$@"
+"""
+CHROOT = """
+name=${1##*/}
+echo "${name%%-*}" >"$FAKES/marker"
 status=0
-"$@" || status=$?
+"${@:2}" || status=$?
 rm -f "$FAKES/marker"
 exit $status
 """
+# answers the questions of the launcher, and makes a virtual environment with itself
+PYTHON = (
+    """
+case "$*" in
+-) cat >/dev/null ;;
+"- "*) echo "a requirement" ;;
+"-m venv "*) mkdir -p "$3/bin"; cp "$0" "$3/bin/python3"; echo "home = $3" >"$3/pyvenv.cfg" ;;
+"-m pip "*) """
+    + MAKING
+    + """ ;;
+esac
+"""
+)
 
 
 class Launcher:
@@ -54,7 +81,7 @@ class Launcher:
         self.fx = self.clone / "scripts/fx"
         self.fx.write_text(text)
         self.fx.chmod(0o755)
-        for tool in [*TOOLS, "mktemp"]:
+        for tool in TOOLS:
             found = shutil.which(tool)
             if found is None:
                 pytest.skip(f"{tool} is not installed")
@@ -75,10 +102,16 @@ class Launcher:
 
     def bootstrap_tools(self) -> None:
         """Put there what making and entering a root takes."""
-        self.fake("mmdebstrap", MMDEBSTRAP)
-        self.fake("bwrap", BWRAP)
-        self.fake("newuidmap")
-        self.fake("unshare", "exit 1")
+        for name, text in {
+            "mmdebstrap": MMDEBSTRAP, "unshare": UNSHARE, "chroot": CHROOT,
+            "newuidmap": "exit 0", "mount": "exit 0",
+        }.items():  # fmt: skip
+            self.fake(name, text)
+
+    def python_for_wheels(self) -> None:
+        """Put there what making a virtual environment takes."""
+        self.fake("cc")
+        self.fake("python3.13", PYTHON)
 
     def start(self, *command: str, **env: str) -> subprocess.Popen[str]:
         """Start the launcher, from another folder."""
@@ -100,10 +133,10 @@ class Launcher:
         return process.returncode, out, err
 
     def calls(self) -> int:
-        """How often mmdebstrap was started."""
+        """How often a place was begun."""
         calls = self.fakes / "calls"
         return len(calls.read_text().split()) if calls.exists() else 0
 
-    def roots(self) -> list[str]:
+    def places(self) -> list[str]:
         """List the folders in the cache, finished or not."""
         return sorted(path.name for path in self.cache.glob("*/*") if path.is_dir())

@@ -8,6 +8,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import Body, Fixed, Linear, Load
+from contact._compat import geometry_dofmap
 from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, from_mesh, revolved
 from contact.mesh.grid import box, rectangle
@@ -71,7 +72,7 @@ def layers(
 def of_layer(domain: Domain, number: int) -> np.ndarray:
     """Return which nodes of the geometry belong to a layer, of blocks that touch."""
     nodes = np.zeros(len(domain.mesh.geometry.x), dtype=bool)
-    cells = domain.mesh.geometry.dofmap
+    cells = geometry_dofmap(domain.mesh)
     nodes[cells[domain.mesh.geometry.x[cells][:, :, 0].mean(axis=1) > RADII[number]]] = True
     return nodes
 

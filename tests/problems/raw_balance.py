@@ -16,6 +16,7 @@ from dolfinx import mesh as dmesh
 from scipy.spatial import KDTree
 
 from contact import Solution
+from contact._compat import geometry_dofmap
 from contact.typing import Array
 from scripts.studies.robustness.check import Mesh, external_forces, gradients, internal_forces
 
@@ -61,7 +62,7 @@ def mesh_of(solution: Solution) -> Mesh:
     domain, cells = solution.problem.domain, solution.problem.body.space.dofmap.list
     geometry = domain.mesh.geometry
     number = np.empty(len(geometry.x), dtype=np.intp)
-    number[geometry.dofmap] = cells
+    number[geometry_dofmap(domain.mesh)] = cells
     points = np.empty((len(number), 2))
     points[number] = geometry.x[:, :2]
     domain.mesh.topology.create_connectivity(1, 2)

@@ -10,6 +10,7 @@ import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact._compat import geometry_dofmap
 from contact.body.description import Body
 from contact.mesh.domain import Domain, from_mesh, revolved
 from contact.mesh.grid import rectangle
@@ -118,7 +119,7 @@ class Layers:
             number = [round((outer - inner) * count), round(self.height * count)]
             corners = [[inner, 0.0], [outer, self.height]]
             tube = dmesh.create_rectangle(MPI.COMM_SELF, corners, number)
-            cells = np.concatenate([cells, tube.geometry.dofmap + len(points)])
+            cells = np.concatenate([cells, geometry_dofmap(tube) + len(points)])
             points = np.concatenate([points, tube.geometry.x[:, :2]])
         mesh = assembled(MPI.COMM_WORLD, points, cells)
         regions = {"in": lambda x: x[0] < c + 1e-9, "out": lambda x: x[0] > c - 1e-9}

@@ -1,17 +1,19 @@
 """scripts/fx: runs a command where FEniCSx is, or makes that place once.
 
 A copy of the launcher runs with a PATH of stand-ins, so nothing is downloaded or mounted and the
-tests are the same inside and outside a private root.
+tests are the same in all environments.
 """
 
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
-from tests.problems.launcher import CLONE, Launcher
+from tests.problems.launcher import CLONE, PYTHON, Launcher
 
 UNAVAILABLE = 69
 
@@ -26,7 +28,7 @@ def test_runs_directly_where_fenicsx_is(launcher):
     status, out, _ = launcher.run("sh", "-c", 'echo "$PYTHONPATH:$1:$PWD"; exit 7', "sh", "a  b")
     assert status == 7
     assert out == f"{launcher.clone}:a  b:{launcher.elsewhere}\n"
-    assert launcher.roots() == []
+    assert launcher.places() == []
 
 
 def test_contact_that_is_not_installed_is_the_package_of_the_clone(launcher):
@@ -78,25 +80,86 @@ def test_tells_which_fenicsx_is_supported(launcher, version, scalar, reason):
         assert reason in err
 
 
-def test_makes_the_root_once_and_passes_the_status(launcher):
+@pytest.fixture(params=["wheels", "trixie"])
+def place(request: pytest.FixtureRequest, launcher: Launcher) -> str:
+    """Return the kind of place that is made."""
     launcher.bootstrap_tools()
+    if request.param == "wheels":
+        launcher.python_for_wheels()
+        launcher.env["FENICSX"] = "wheels"
+    return request.param
+
+
+def test_makes_the_place_once_and_passes_the_status(launcher, place):
     status, out, err = launcher.run("sh", "-c", 'echo "$1"; exit 5', "sh", "a  b")
     assert (status, out) == (5, "a  b\n")
     assert "conda env create" in err
-    (root,) = launcher.roots()
-    assert root.startswith("trixie-") and not root.endswith(".part")
+    (made,) = launcher.places()
+    assert made.startswith(f"{place}-") and not made.endswith(".part")
     status, out, err = launcher.run("sh", "-c", "exit 6")
     assert (status, out, err) == (6, "", "")
     assert launcher.calls() == 1
 
 
-def test_the_suite_has_a_root_of_its_own(launcher):
-    launcher.bootstrap_tools()
-    launcher.fake("python3")  # FEniCSx is here, but another one is asked for
-    launcher.env["FENICSX_SUITE"] = "sid"
+def test_a_second_start_waits_for_the_first(launcher, place):
+    first = launcher.start("true", FAKE_SECONDS="2")
+    while launcher.calls() == 0:
+        time.sleep(0.05)
+    status, _, err = launcher.run("true")
+    assert (status, first.wait(), launcher.calls()) == (0, 0, 1)
+    assert "waiting for it" in err
+
+
+def test_nothing_is_left_of_a_failure(launcher, place):
+    status, _, err = launcher.run("true", FAKE_FAILURE="yes")
+    assert (status, launcher.places()) == (UNAVAILABLE, [])
+    assert "the mirror is gone" in err and "docker build" in err
     assert launcher.run("true")[0] == 0
-    assert [name.split("-")[0] for name in launcher.roots()] == ["sid"]
-    status, _, err = launcher.run("true", FENICSX_SUITE="buster")
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_nothing_is_left_of_an_interrupt(launcher, place, number, status):
+    process = launcher.start("true", FAKE_SECONDS="20")
+    while launcher.calls() == 0:
+        time.sleep(0.05)
+    process.send_signal(number)
+    assert process.wait(timeout=10) == status
+    assert launcher.places() == []
+    assert launcher.run("true")[0] == 0
+
+
+def test_wheels_come_first_in_the_path(launcher):
+    launcher.python_for_wheels()
+    launcher.env["FENICSX"] = "wheels"
+    status, out, _ = launcher.run("sh", "-c", 'echo "$VIRTUAL_ENV"; command -v python3')
+    (made,) = launcher.places()
+    venv = launcher.cache / "contact-fenicsx" / made
+    assert (status, out) == (0, f"{venv}\n{venv}/bin/python3\n")
+    assert (venv / "pyvenv.cfg").read_text() == f"home = {venv}\n"  # not that of the unfinished
+
+
+def test_a_python_that_only_prints_an_error_is_none(launcher):
+    launcher.python_for_wheels()
+    launcher.env["FENICSX"] = "wheels"
+    launcher.fake("python3.13", "echo 'command not found' >&2; exit 127")
+    status, _, err = launcher.run("true")
+    assert (status, launcher.places()) == (UNAVAILABLE, [])
+    assert "Python >= 3.12" in err
+    versions = launcher.cache.parent / ".pyenv/versions/3.12.1/bin"
+    versions.mkdir(parents=True)
+    launcher.fake("../.pyenv/versions/3.12.1/bin/python3", PYTHON)
+    assert launcher.run("true")[0] == 0
+    assert [name.split("-")[0] for name in launcher.places()] == ["wheels"]
+
+
+def test_each_choice_has_a_place_of_its_own(launcher):
+    launcher.bootstrap_tools()
+    launcher.python_for_wheels()
+    launcher.fake("python3")  # FEniCSx is here, but another one is asked for
+    for choice, kind in {"sid": "sid", "debian": "trixie", "wheels": "wheels"}.items():
+        assert launcher.run("true", FENICSX=choice)[0] == 0
+        assert kind in [name.split("-")[0] for name in launcher.places()]
+    status, _, err = launcher.run("true", FENICSX="buster")
     assert status == 2
     assert "'buster'" in err and "sid" in err
 
@@ -106,4 +169,4 @@ def test_usage():
     for arguments, status in (([], 2), (["--help"], 0)):
         done = subprocess.run([fx, *arguments], capture_output=True, text=True, env=os.environ)
         assert done.returncode == status
-        assert "FENICSX_SUITE" in done.stderr
+        assert "FENICSX " in done.stderr

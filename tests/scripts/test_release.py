@@ -29,11 +29,13 @@ NEEDED = (
     *("pyproject.toml", "MANIFEST.in"),
 )
 
+#: The wheel of FEniCSx, and what it has that conda and Debian have by themselves.
+WHEEL, APART = "dolfinx-solver-real", ("mpi4py", "petsc4py")
 #: Names that pip, conda and Debian do not share: of pip -> of the others.
-CONDA = {"matplotlib": "matplotlib-base", "gmsh": "python-gmsh"}
-DEBIAN = {"fenics-dolfinx": "dolfinx-real", "petsc4py": "petsc4py-real"}
+CONDA = {WHEEL: "fenics-dolfinx", "matplotlib": "matplotlib-base", "gmsh": "python-gmsh"}
+DEBIAN = {WHEEL: "dolfinx-real", "petsc4py": "petsc4py-real"}
 #: Debian counts these versions from 1 anew.
-EPOCHS = ("fenics-dolfinx", "numpy")
+EPOCHS = (WHEEL, "numpy")
 PACKAGING = ROOT / "scripts/packaging"
 
 
@@ -41,11 +43,19 @@ def _wanted() -> tuple[dict[str, str], dict[str, str]]:
     """Return what the program needs and what reads meshes, name -> bounds, as pip has them."""
     given = tomllib.loads((ROOT / "pyproject.toml").read_text())
     project = given["project"]
+    extras = project["optional-dependencies"]
+    (wheel,) = (line for line in extras["fenicsx"] if line.startswith(WHEEL))
     lists = (
-        [f"python{project['requires-python']}", *project["dependencies"]],
-        [*given["build-system"]["requires"], *project["optional-dependencies"]["meshes"]],
+        [
+            f"python{project['requires-python']}",
+            wheel,
+            *APART,
+            *project["dependencies"],
+            *extras["pictures"],
+        ],
+        [*given["build-system"]["requires"], *extras["meshes"]],
     )
-    needed, further = ([re.fullmatch(r"([\w-]+)(.*)", line) for line in each] for each in lists)
+    needed, further = ([re.fullmatch(r"([\w-]+)([^;]*).*", row) for row in rows] for rows in lists)
     return {m[1]: m[2] for m in needed if m}, {m[1]: m[2] for m in further if m}
 
 
@@ -143,20 +153,41 @@ def test_the_source_distribution_has_all_that_the_wheel_has(built: Path) -> None
 
 
 @pytest.mark.release
-def test_the_wheel_runs_without_a_clone(built: Path, tmp_path: Path) -> None:
-    venv = tmp_path / "venv"
-    run(sys.executable, "-m", "venv", "--system-site-packages", venv, cwd=tmp_path)
-    (wheel,) = built.glob("*.whl")
-    pip = [venv / "bin/python", "-m", "pip", "--disable-pip-version-check"]
-    run(*pip, "install", "--no-deps", "--no-index", wheel, cwd=tmp_path)
-    command = venv / "bin/contact"
+def test_an_index_takes_the_files(built: Path) -> None:
+    run(sys.executable, "-m", "twine", "check", "--strict", *built.iterdir(), cwd=built)
+
+
+@pytest.mark.release
+def test_the_lines_of_the_readme_install_and_run(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the unpacked source distribution, then without it."""
+    lines = re.search(r"^```bash\n(.*?)^```", (ROOT / "README.md").read_text(), re.M | re.S)
+    assert lines is not None and len(lines[1].splitlines()) == 3
+    (archive,) = built.glob("*.tar.gz")
+    with tarfile.open(archive) as files:
+        files.extractall(tmp_path, filter="data")
+    (sources,) = tmp_path.glob("contact_fenicsx-*")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))  # no form is compiled yet
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}:{os.environ['PATH']}")
+    said = run("bash", "-e", "-c", lines[1], cwd=sources)
+    assert "converged: " in said
+    assert json.loads((sources / "contact-demo/summary.json").read_text())["converged"]
+    assert (sources / "contact-demo/figure-contact.png").exists()
+
+    programs = sources / "venv/bin"
+    command = programs / "contact"
     assert run(command, "--version", cwd=tmp_path).split() == ["contact", contact.__version__]
-    said = run(command, "demo", "--set", "mesh.cells=[16,4]", cwd=tmp_path)
-    assert said.startswith("converged")
-    assert json.loads((tmp_path / "contact-demo/summary.json").read_text())["converged"]
-    assert (tmp_path / "contact-demo/figure-contact.png").exists()
     assert json.loads(run(command, "schema", cwd=tmp_path))["title"].startswith("Case file")
-    where = run(venv / "bin/python", "-c", "import contact; print(contact.__file__)", cwd=tmp_path)
-    assert str(venv) in where
+    where = run(programs / "python", "-c", "import contact; print(contact.__file__)", cwd=tmp_path)
+    assert str(programs.parent) in where
+    on_ranks = [programs / "mpirun", "-n", "2", command, "demo", "--set", "mesh.cells=[16,4]"]
+    assert "converged: " in run(*on_ranks, "--out", "on-ranks", cwd=tmp_path)
+
+    pip = [programs / "python", "-m", "pip", "--disable-pip-version-check"]
+    run(*pip, "install", "--quiet", "contact-fenicsx[notebooks]", cwd=tmp_path)
+    notebook = shutil.copy(ROOT / "scripts/notebooks/first_contact.py", tmp_path)
+    program = "import jupytext, nbclient, sys; nbclient.execute(jupytext.read(sys.argv[1]))"
+    run(programs / "python", "-c", program, notebook, cwd=tmp_path)
     run(*pip, "uninstall", "--yes", "contact-fenicsx", cwd=tmp_path)
     assert not command.exists()
