@@ -176,15 +176,26 @@ class FoundationLaw:
 
         Saturated is a tangent of less than half of the secant.
         """
+        return self._regimes(self._layer_penetration(jump))
+
+    def _regimes(self, s: Array) -> NDArray[np.int8]:
         assert self.layer is not None
-        secant, slope = self.secant(jump), self.layer.p_nu.derivative(self._layer_penetration(jump))
-        return np.where(secant > 0, np.where(slope < secant / 2, 2, 1), 0).astype(np.int8)
+        pressure, slope = self.layer.p_nu(s), self.layer.p_nu.derivative(s)
+        return np.where(pressure > 0, np.where(slope * s < pressure / 2, 2, 1), 0).astype(np.int8)
+
+    def saturates(self, size: float) -> NDArray[np.bool_]:
+        """Return where the layer saturates at penetrations up to the size of the body, (n,)."""
+        if self.layer is None or self.layer.lagged:
+            return np.zeros(self.nodes.weight.size, dtype=bool)
+        return np.max([self._regimes(s) == 2 for s in self._depths(size)], axis=0)
 
     def largest_secant(self, size: float) -> Array:
         """Return the largest p_nu(s)/s of penetrations up to the size of the body, shape (n,)."""
         assert self.layer is not None
-        depths = [np.full(self.nodes.weight.size, s) for s in size * np.logspace(-9, 0, 37)]
-        return np.max([self.layer.p_nu(s) / s for s in depths], axis=0)
+        return np.max([self.layer.p_nu(s) / s for s in self._depths(size)], axis=0)
+
+    def _depths(self, size: float) -> list[Array]:
+        return [np.full(self.nodes.weight.size, s) for s in size * np.logspace(-9, 0, 37)]
 
     def normal_graph(self, jump: Array) -> NormalGraph | None:
         """Return the layer and the constraint as one graph, h_nu frozen at the jumps.

@@ -351,9 +351,10 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     After a failure that is not the layer's, the first problems are not solved either.
     """
     problem, interface = newton.problem, newton.problem.interface
-    if interface.saturation == 0:
-        return None
     foundation, near = interface.foundation, NEARLY_BALANCED
+    saturates = foundation.saturates(interface.size).astype(float)
+    if interface.nodes.maximum(saturates) == 0:
+        return None
     state, largest = problem.start(), foundation.largest_secant(interface.size)
     secant = largest
     regimes: NDArray[np.int8] = np.full(largest.size, -1, dtype=np.int8)

@@ -241,6 +241,47 @@ class Falling:
         return np.where(s > 0, (1 - depth / self.a) * np.exp(1 - depth / self.a), 0.0)
 
 
+@pytest.mark.core
+@pytest.mark.parametrize("law", ["log", "linear"])
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize(("down", "limit"), [(0.01, 0.002), (0.02, 0.001), (0.1, 0.002)])
+def test_a_layer_that_saturates_before_a_rigid_part(down, limit, mu, law):
+    """Newton's method went from all open to all closed and back; pressed onto the rigid part too.
+
+    The rigid part is 0.05 behind a layer that is nearly touched; the body moves by more than the
+    limit.
+    """
+    young, stiffness, thickness, apart = 0.2, 2.45, 0.05, 1e-9
+    material = {"young": young, "poisson": 0.0}
+    if law == "log":
+        material |= {"law": "log", "yield_strain": 10.0}
+    solution = solve(
+        parse_case(
+            {
+                "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [9, 5]},
+                "material": material,
+                "fixed": [{"on": "top", "displacement": [0.0, -down]}],
+                "contact": {
+                    "on": "bottom",
+                    "gap": thickness + apart,
+                    "law": "compliance",
+                    "layer": thickness,
+                    "stiffness": stiffness,
+                    "limit": limit,
+                },
+                "friction": {"law": "coulomb", "mu": mu} if mu else {"law": "none"},
+            }
+        ),
+        comm=SELF,
+    )
+    assert solution.converged, solution.outcome.reason
+    # E (down - s) = k min(s, limit) without a rigid part, else s = 0.05 and the rest is on that.
+    below = young * down / (young + stiffness)
+    sinks = below if below < limit else down - stiffness * limit / young
+    pressed = young * (down - min(sinks, thickness))
+    assert solution.pressure == pytest.approx(pressed, rel=1e-6)
+
+
 def test_a_layer_that_falls_is_not_said_to_be_saturated():
     """It bears a load though its pressure far inside is 0, which was taken for its largest."""
     domain = build_problem(parse_case(block("plane", 0.5)), SELF).domain
