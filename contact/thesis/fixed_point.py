@@ -38,7 +38,7 @@ from contact.problem.residuals import (
     undeformed_equilibrium,
 )
 from contact.problem.state import State
-from contact.thesis.softest_mode import fitted_augmentation
+from contact.thesis.softest_mode import conditioning, fitted_augmentation
 from contact.thesis.uzawa import (
     FrozenProblem,
     augmentation,
@@ -220,6 +220,8 @@ class FixedPoint(OuterLoop):
         super().__post_init__()
         given = self.options.r
         self.r = self.problem.scales.augmentation if given == "auto" else given
+        # Like r, of later load steps too: from nearby they would stall with the r of a block.
+        self._slender = False
         self.operator = self._new_operator(symmetric=True)
 
     def _new_operator(self, symmetric: bool) -> Operator:
@@ -305,6 +307,7 @@ class FixedPoint(OuterLoop):
         start = problem.start()
         r = fitted_augmentation(problem, self._new_operator(symmetric=True), start)
         if r is not None:
+            self._slender = True
             self.r, self.state, self._secant_at = r, start, problem.body.zero_displacement()
             self.bound = self._first_bound
             self._z = self._initial_z(0.0, friction)
@@ -332,7 +335,8 @@ class FixedPoint(OuterLoop):
             self._tangent = choice == "tangent"
 
     def _limit(self) -> int:
-        return STALLED if self._stalled else self.stagnation[0]
+        # Of slender bodies each relaxation brings contact or friction nearer, in turn.
+        return STALLED if self._stalled and not self._slender else self.stagnation[0]
 
     def _thesis_criterion(self, change: float, previous: State) -> bool:
         """Tell whether (3.46) is met, or (6.40) without friction."""
@@ -342,5 +346,6 @@ class FixedPoint(OuterLoop):
 
     def _advice(self, residual: float | None = None) -> str:
         if self._stalled:
-            return f": the Uzawa block relaxation with r = {self.r:.3g} stalls"
+            words = f": the Uzawa block relaxation with r = {self.r:.3g} stalls"
+            return words + (conditioning(self.problem.scales, self.r) if self._slender else "")
         return FROZEN if residual is not None and residual > NEAR else ""

@@ -19,7 +19,7 @@ import numpy as np
 from contact.errors import SingularError
 from contact.linear.operator import Operator
 from contact.problem.problem import ContactProblem
-from contact.problem.state import State
+from contact.problem.state import Scales, State
 from contact.ranks import summed
 from contact.thesis.uzawa import augmentation
 from contact.typing import Array
@@ -51,8 +51,7 @@ def fitted_augmentation(problem: ContactProblem, operator: Operator, state: Stat
     -------
     The parameter; None if the body is not softer than a block.
     """
-    scales = problem.scales
-    block = BLOCK * scales.plane_modulus / scales.height
+    scales, block = problem.scales, block_stiffness(problem.scales)
     try:
         sigma = softest_mode(problem, operator, state, SHIFT * scales.augmentation)
     except SingularError:  # contact alone holds a rigid-body mode
@@ -60,6 +59,24 @@ def fitted_augmentation(problem: ContactProblem, operator: Operator, state: Stat
     if not sigma < block:
         return None
     return scales.augmentation * math.sqrt(sigma / block)
+
+
+def block_stiffness(scales: Scales) -> float:
+    """Return the least stiffness of a mode of a block (stress/length)."""
+    return BLOCK * scales.plane_modulus / scales.height
+
+
+def conditioning(scales: Scales, r: float) -> str:
+    """Say why the relaxation is slow with a fitted r: the ratio of stiffnesses, and its rate."""
+    stiffest = scales.augmentation**2 / block_stiffness(scales)
+    ratio = (stiffest / r) ** 2
+    # The softest mode contracts by 1/(1 + sqrt(sigma_min/sigma_max)).
+    steps = math.log(10) * math.sqrt(ratio)
+    return (
+        f": the body is slender, the modes of its contact surface differ by a factor of "
+        f"{ratio:.1e} in stiffness, and a digit takes {steps:.1e} solves without acceleration; "
+        "accepted: method newton"
+    )
 
 
 def softest_mode(problem: ContactProblem, operator: Operator, state: State, shift: float) -> float:

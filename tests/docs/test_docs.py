@@ -267,6 +267,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"after [{uzawa.STAGNATION_LIMIT}] iterations": True,
         "by [1 %]": uzawa.PROGRESS == 0.99,
         f"after [{fixed_point.FixedPoint.stagnation[0]}] iterations": True,
+        f"after [{fixed_point.STALLED}] where the relaxation": True,
         f"after [{penalty.Penalty.stagnation[0]}] iterations that do not reduce its": True,
         f"more than [{LARGEST_VIOLATION}] the run": penalty.Penalty.stagnation[1] == 0.99,
         "by [10 %]": fixed_point.FixedPoint.stagnation[1] == 0.9,

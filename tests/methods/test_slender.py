@@ -1,5 +1,6 @@
 """Bodies that bend over a gap: active sets cycle, a working set or an interior point solves."""
 
+import re
 from unittest.mock import patch
 
 import numpy as np
@@ -303,6 +304,46 @@ def test_the_block_relaxation_fits_r_to_a_beam(case, force):
     assert solution.converged, solution.outcome.reason
     assert np.allclose(solution.contact_force, force, rtol=0, atol=1e-7 * np.abs(force).max())
     assert solution.counters.factorizations <= 3
+
+
+def bridge(length: float) -> dict:
+    """Return a beam clamped at both ends, whose middle lies on the ground."""
+    load = {"on": "top", "traction": [0.0, -5 * 0.3 * 384 / 12 / length**4]}
+    case = beam(length, [100, 1], load, 0.3, 0.25, space={"degree": 2})
+    case["fixed"][0]["on"] = ["left", "right"]
+    return case
+
+
+def test_the_block_relaxation_goes_on_where_contact_and_friction_fall_in_turn():
+    """It ended at 2e-3 after three relaxations in which the larger one had not fallen."""
+    case = parse_case(bridge(200.0))
+    newton, solution = solve(case, comm=SELF), solve(case, FixedPointOptions(), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    size = np.abs(newton.contact_force).max()
+    assert np.allclose(solution.contact_force, newton.contact_force, rtol=0, atol=1e-7 * size)
+
+
+def test_a_slender_body_is_the_reason_of_a_stall():
+    """By Euler and Bernoulli sigma_min is (4.73/L)^4 E' h^3/12; sigma_max is that of a block."""
+    solution = solve(parse_case(bridge(120.0)), FixedPointOptions(max_outer=2), comm=SELF)
+    assert not solution.converged
+    found = re.search(r"by a factor of (\S+) in stiffness.*method newton", solution.outcome.reason)
+    scales = solution.problem.scales
+    block = 1.1 * scales.plane_modulus / scales.height
+    softest = (4.73 / 120.0) ** 4 * scales.plane_modulus / 12
+    assert found is not None
+    assert float(found[1]) == pytest.approx(scales.augmentation**2 / block / softest, rel=0.05)
+
+
+def test_load_steps_keep_the_r_of_a_slender_body():
+    """Near the solution they stall at 1e-6 with the r of a block, where no other is fitted."""
+    case = beam(100.0, [200, 2], TIP, 0.5, 0.3, evolution={"times": [0.0, 1.0], "steps": [3]})
+    case["load"] = [{"on": "right", "traction": ["0", "-1e-4*t"]}]
+    newton = solve(parse_case(case), comm=SELF)
+    solution = solve(parse_case(case), FixedPointOptions(), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    size = np.abs(newton.contact_force).max()
+    assert np.allclose(solution.contact_force, newton.contact_force, rtol=0, atol=1e-6 * size)
 
 
 def test_an_r_of_the_user_stays():
