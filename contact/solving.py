@@ -1,6 +1,6 @@
 """Solve a case or a problem: one step, or one load step after the other.
 
-A static solve is an evolution of one step: both are `solve_problem`.
+Both are `solve_problem`: it takes `solve_step` once, or `LoadStepping` for several steps.
 """
 
 from __future__ import annotations

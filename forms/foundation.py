@@ -61,7 +61,11 @@ def penalty_friction(u_frozen: Expr, u: Expr, v: Expr, nu: Expr, bound: Expr, ep
 def compliance(
     u: Expr, v: Expr, nu: Expr, p_nu: Law, h_nu: Law, gap: Expr, difference: Value
 ) -> Expr:
-    """Return h_nu(phi - phi_F) p_nu(u_nu - rho_0) v_nu, the form j_1 of section 6.2."""
+    """Return h_nu(phi - phi_F) p_nu(u_nu - rho_0) v_nu, with `gap` = rho_0.
+
+    The form j_1, (6.12), has the rho of the constraint. Here rho_0 is rho less the thickness of the
+    layer, which is thus pressed before the rigid part.
+    """
     return h_nu(difference) * p_nu(normal_part(u, nu) - gap) * normal_part(v, nu)
 
 

@@ -86,7 +86,10 @@ class Linear(Isotropic):
 
 @dataclass(frozen=True)
 class Log(Isotropic):
-    """The law (7.8): g(t) = mu1 up to xi_0, mu1 (xi_0/t) (ln(t/xi_0) + 1) beyond.
+    """The law (7.8): g(xi) = mu1 up to xi_0, mu1 (xi_0/xi) (ln(xi/xi_0) + 1) beyond.
+
+    xi is the norm t = |dev eps| by default. As printed, by (1.13), it is t^2: `argument="square"`.
+    Then d(g t)/dt < 0 beyond xi = e xi_0, against assumption (h1).
 
     Parameters
     ----------
@@ -95,8 +98,8 @@ class Log(Isotropic):
     yield_strain
         The limit xi_0 > 0 (no unit).
     argument
-        "norm": xi_0 limits t = |dev eps|, so that d(g t)/dt = mu1 xi_0/t > 0.
-        "square": xi_0 limits t^2, as (7.8) is printed; it softens beyond e xi_0.
+        "norm": xi = t = |dev eps|, so that d(g t)/dt = mu1 xi_0/t > 0 in the plastic range.
+        "square": xi = t^2.
     g_min
         A lower bound of g (stress), so that assumption (h1) is met uniformly; 0 for none.
 

@@ -1,14 +1,18 @@
-"""Piezoelectric bodies: material tensors, the saddle form A and its symmetrised twin.
+"""Piezoelectric bodies: material tensors, the forms A and A-check of the thesis.
 
 Sign convention, stated once, equations (1.23) and (8.2), with the potential phi:
 
     sigma = F eps(u) + e^T grad(phi),     (e^T grad phi)_jk = e_ijk phi_,i
     D     = e eps(u) - beta grad(phi),    D_i = e_ijk eps_jk - beta_ij phi_,j
 
+A of (5.16), with B of the fixed point, is positive definite and not symmetric: `saddle_form`, after
+the saddle-point problem of its two rows. A-check of (5.27), with B-check, is A with xi negated:
+symmetric and indefinite, the one whose quadratic form has a saddle: `symmetrised_form`.
+
 With the outward normal, D.nu = q_2 on a charged part, div D = q_0 in the body and
-D.nu = psi(u_nu - rho) phi_L(phi - phi_F) on a conductive foundation. On the left-hand side of the
-saddle form these are + q_2 xi, - q_0 xi and + psi phi_L xi, (5.10), (5.14); the symmetrised form,
-in which xi is negated, has the opposite signs, (5.28), (5.29).
+D.nu = psi(u_nu - rho) phi_L(phi - phi_F) on a conductive foundation. On the left-hand side of A
+these are + q_2 xi, - q_0 xi and + psi phi_L xi, (5.10), (5.14), on that of A-check the opposite,
+(5.28), (5.29).
 
 The stored energy is (1/2) eps : F eps + (1/2) E . beta E with E = -grad(phi): the coupling
 does no work on its own, so that it is positive if F and beta are, whatever e.
@@ -226,7 +230,7 @@ def saddle_form(
     xi: Expr,
     kinematics: Strained = CARTESIAN,
 ) -> Expr:
-    """Return the integrand of B(x_0; x, y): positive, not symmetric. At x_0 = x: A, (5.16).
+    """Return the integrand of B(x_0; x, y), at x_0 = x of A, (5.16): positive, not symmetric.
 
     x_0 = (u_0, .) is where the secant modulus is frozen, x = (u, phi) the unknown and
     y = (v, xi) the test function.
@@ -245,9 +249,9 @@ def symmetrised_form(
     xi: Expr,
     kinematics: Strained = CARTESIAN,
 ) -> Expr:
-    """Return the integrand of B-check(x_0; x, y) = B(x_0; x, (v, -xi)), (5.27), (5.31).
+    """Return the integrand of B-check(x_0; x, y) = B(x_0; x, (v, -xi)), (5.31): symmetric.
 
-    Symmetric and indefinite: convex in u, concave in phi.
+    At x_0 = x that of A-check, (5.27). Its quadratic form is convex in u and concave in phi.
     """
     of_stresses = mechanical_work(law, piezo, u_0, u, phi, v, kinematics)
     return of_stresses + electric_work(piezo, u, phi, xi, kinematics)

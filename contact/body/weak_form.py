@@ -3,14 +3,14 @@
 The unknowns x = (u, phi) of a body under given loads satisfy, for all test functions z = (v, xi)
 that vanish where displacements and potentials are prescribed,
 
-    r(x; z) = internal_forces + elastic_supports + body_forces + tractions + pressures + charges
-            = -int_Gamma_3 ((lambda_c + p_l) v_nu + lambda_f . v_tau - (D.nu) xi),
+    G_0(x; z) = internal_forces + elastic_supports + body_forces + tractions + pressures + charges
+              = -int_Gamma_3 ((lambda_c + p_l) v_nu + lambda_f . v_tau - (D.nu) xi),
 
 with the pressure p_l of a layer. The first line is of this module, the second of
 `contact.interface`. That is (10) of docs/theory.md; with (11) it is [T 5.26], without
 a potential [T 3.9]; [T n] is equation (n) of the thesis. The test function of the potential is
-negated, so that the derivative of r is symmetric.
-Loads are negative terms: r = <F(x), z> - <f, z>. Stresses are those of `forms`.
+negated, so that the derivative of G_0 is symmetric.
+Loads are negative terms: G_0 = <F(x), z> - <f, z>. Stresses are those of `forms`.
 
 Measures, fields and laws in UFL are made by `contact.body.materials` and `contact.body.loads`;
 `contact.body.assembly` compiles the terms.
@@ -76,7 +76,7 @@ class Term(NamedTuple):
 
 @dataclass(frozen=True)
 class WeakForm:
-    """The residual r(x; z) of one body, without contact.
+    """The residual G_0(x; z) of one body, without contact.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class WeakForm:
     def residual(
         self, x: Fields, z: Fields, secant_at: Expr | None = None, history_at: Expr | None = None
     ) -> list[Term]:
-        """Return the terms of r(x; z), of each material, support and load one.
+        """Return the terms of G_0(x; z), of each material, support and load one.
 
         Parameters
         ----------

@@ -126,7 +126,7 @@ class ComplementarityParameters:
     c
         Complementarity parameter of the functions and of the active set.
     nodal_stiffness
-        Stiffness kappa of the body at one contact node, 1.93 E'/h.
+        kappa = 1.93 E'/h, an upper estimate of the stiffness of the body at one contact node.
     gamma
         Penalty of the eliminated constraints, far above the others.
     """

@@ -2,12 +2,14 @@
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
-node by node. Newton's method takes `pressure_block` and `charge_block`, Picard's in part.
+node by node. Newton's method takes the whole of `pressure_block` and `charge_block`.
 
-The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer with the
-unilateral constraint, as the one monotone graph `NormalGraph` of Figure 1.6, and the charge
-through `charge_block` in the operator. A linearised layer would not do there: a column that
-is stiff enough cycles for ever between the slopes of an open and of a saturated layer.
+Algorithms 4 and 6 of the thesis freeze the charge l, Algorithms 6 and 8 the layer's force j_1: all
+of each is on the right-hand side; so it is here where they are `lagged`. The variants of the code
+freeze psi (4, 6) and h_nu (6, 8) alone. They treat the layer with the unilateral constraint, as the
+one monotone graph `NormalGraph` of Figure 1.6, and phi_L through `charge_block` in the operator. A
+linearised layer would not do there: a column that is stiff enough cycles for ever between the
+slopes of an open and of a saturated layer.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ class NormalGraph:
     stiffness
         h_nu, frozen, shape (n,).
     touch, gap
-        rho_0 and rho, gaps of the layer and of the rigid part, shape (n,).
+        rho_0 and rho, gaps at which layer and rigid part are touched, shape (n,).
     """
 
     p_nu: PenetrationLaw

@@ -1,6 +1,7 @@
 """Friction on Gamma_3: its bound at the contact nodes, (1.36)-(1.38), and the non-local operator R.
 
-R is the mollifier along Gamma_3 of section 1.4.3 of the thesis.
+R is a mollifier as in section 1.4.3 of the thesis, in a normalised variant: there the integral of
+the kernel over the line is 1, here the sum over the contact nodes in the radius of each node.
 """
 
 from __future__ import annotations

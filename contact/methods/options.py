@@ -126,8 +126,8 @@ class NewtonOptions(Options):
     method: Literal["newton"] = "newton"
     """Name of the method."""
     nested: Switch | None = None
-    """`true`: solve on coarser meshes first and start from there. Default: where that saves
-    time and there are coarser meshes: from 40000 unknowns on in 3-D with multigrid, and in 2-D
+    """`true`: solve on coarser meshes first and start from there; of a case alone, as a problem
+    that is built already has no coarser meshes. Default: where that saves time, of static cases: from 40000 unknowns on in 3-D with multigrid, and in 2-D
     where a body is not condensed onto its contact nodes, as slender ones; from 100000 on in 2-D
     where a nonlinear one is."""
     nested_levels: Annotated[
@@ -138,7 +138,8 @@ class NewtonOptions(Options):
     max_iterations: Internal[int] = 60
     """Number of steps allowed in each stage."""
     gamma: Internal[float] = 1e4
-    """Penalty gamma of the eliminated constraints over max(c, kappa), (20)."""
+    """gamma/max(c, kappa), the ratio of the penalty of the eliminated constraints to the
+    stiffness of the body, (20)."""
     stagnation_limit: Internal[int] = 12
     """Steps without progress after which the stage is given up."""
     softening: Internal[Annotated[float, AllowInfNan()]] = 0.25

@@ -52,7 +52,7 @@ class Layer:
     lagged: bool = False
 
     def check(self, size: float) -> None:
-        """Refuse laws that are none of a layer, (h6) and (h7).
+        """Refuse laws that are none of a layer, (h~6) and (h~7) of chapter 6.
 
         Parameters
         ----------

@@ -113,7 +113,7 @@ class CondensedBody:
         return x
 
     def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
-        """Return S (x - x_0) + r_0: internal forces minus loads. Collective."""
+        """Return S (x - x_0) + r_0: internal forces, the loads among them in r_0. Collective."""
         moved = np.concatenate(self.comm.allgather(state.x - self.at))
         return np.asarray(self.rows @ moved + self.residual[self.own])
 

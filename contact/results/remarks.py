@@ -291,7 +291,7 @@ def strong_friction(solution: Solution) -> Iterator[str]:
 
 
 def falling_layer(solution: Solution) -> Iterator[str]:
-    """Find a layer whose p_nu falls: (h6) asks for less."""
+    """Find a layer whose p_nu falls: (h~6) of chapter 6 asks for less."""
     problem = solution.problem
     layers = (contact.compliant_layer for contact in problem.contacts)
     if any(layer is not None and layer.falls(problem.domain.size) for layer in layers):

@@ -219,7 +219,7 @@ class FixedPoint(OuterLoop):
         """Choose r and set up the operator."""
         super().__post_init__()
         given = self.options.r
-        self.r = self.problem.scales.augmentation if given == "auto" else given
+        self.r = self.problem.scales.c if given == "auto" else given
         # Like r, of later load steps too: from nearby they would stall with the r of a block.
         self._slender = False
         self.operator = self._new_operator(symmetric=True)

@@ -2,7 +2,7 @@
 
 A mode of Gamma_3 with the stiffness sigma contracts by sigma/(sigma + r) in contact and by
 r/(sigma + r) without: r = sqrt(sigma_min sigma_max) is the best. A block has about the ends
-1.1 E'/H and 1.76 E'/h, whose r is r*; a body that bends has a smaller sigma_min.
+1.1 E'/H and 1.76 E'/h, whose r is c of (20); a body that bends has a smaller sigma_min.
 
 References
 ----------
@@ -27,7 +27,7 @@ from contact.typing import Array
 #: Steps of the Rayleigh-Ritz method: the softest mode of a body that bends stands apart.
 STEPS = 12
 
-#: Stiffness added to all modes, over r*. Modes below `FREE` times it are left out: they cannot be
+#: Stiffness added to all modes, over c. Modes below `FREE` times it are left out: they cannot be
 #: told from rigid motions (first modes of cantilevers more than 1600 times as long as thick).
 SHIFT, FREE = 1e-14, 10.0
 
@@ -53,12 +53,12 @@ def fitted_augmentation(problem: ContactProblem, operator: Operator, state: Stat
     """
     scales, block = problem.scales, block_stiffness(problem.scales)
     try:
-        sigma = softest_mode(problem, operator, state, SHIFT * scales.augmentation)
+        sigma = softest_mode(problem, operator, state, SHIFT * scales.c)
     except SingularError:  # contact alone holds a rigid-body mode
         return None
     if not sigma < block:
         return None
-    return scales.augmentation * math.sqrt(sigma / block)
+    return scales.c * math.sqrt(sigma / block)
 
 
 def block_stiffness(scales: Scales) -> float:
@@ -68,7 +68,7 @@ def block_stiffness(scales: Scales) -> float:
 
 def conditioning(scales: Scales, r: float) -> str:
     """Say why the relaxation is slow with a fitted r: the ratio of stiffnesses, and its rate."""
-    stiffest = scales.augmentation**2 / block_stiffness(scales)
+    stiffest = scales.c**2 / block_stiffness(scales)
     ratio = (stiffest / r) ** 2
     # The softest mode contracts by 1/(1 + sqrt(sigma_min/sigma_max)).
     steps = math.log(10) * math.sqrt(ratio)

@@ -1,15 +1,17 @@
 """Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
 
 The augmented Lagrangian of (3.32), (3.33) has the auxiliary variables phi = (phi_c, phi_f) for
-u_nu and the slip, and their multipliers lambda. An iteration is
+u_nu and the slip, and their multipliers lambda. Unknowns are du = u - u_0 with u_0 of the outer
+iterate, and z = lambda + r du: against rounding of a small lambda beside a large slip. An iteration
+is
 
-- Step 1, (3.34): u of K u + r u = f + r phi - lambda (`FrozenProblem.displacement_load`),
-- Step 2, (3.44): phi = (z - P z)/r with z = lambda + r u (`FrozenProblem.auxiliary`),
-- Step 3, (3.36): lambda + r (u - phi) = P z (`FrozenProblem.project`),
+- Step 1, (3.34): du of K du + r du = f - F(u_0) + r (phi - u_0) - lambda
+  (`FrozenProblem.displacement_load`),
+- Step 2, (3.44): phi = (z + r u_0 - P(z + r u_0))/r (`FrozenProblem.auxiliary`),
+- Step 3, (3.36): lambda + r (u - phi) = P(z + r u_0) (`FrozenProblem.project`),
 
-P the projections of (3.43) and onto the disc of radius s: a fixed-point map of z. Here u is u - u_0
-with u_0 of the outer iterate, against rounding of a small lambda beside a large slip. It is
-accelerated (`contact.thesis.acceleration`). Numbers of equations are those of the thesis.
+P the projections of (3.43) and onto the disc of radius s: a fixed-point map of z. It is accelerated
+(`contact.thesis.acceleration`). Numbers of equations are those of the thesis.
 
 References
 ----------
@@ -53,7 +55,7 @@ from contact.typing import Array
 logger = logging.getLogger("contact.inner")
 
 #: Stagnation limits of the accelerated and of the plain relaxation, which creeps with r far from
-#: r*; ratio of residuals that is progress.
+#: the best; ratio of residuals that is progress.
 STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
 
 #: Tolerance of an iterative solver over that of the relaxation, so that it moves off its initial

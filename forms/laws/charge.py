@@ -42,7 +42,7 @@ class Truncation:
 
 
 class Conductivity(Protocol):
-    """psi (capacitance/area), assumption (h5). A new law is a class with these."""
+    """psi (capacitance/area), assumption (h~5) of chapter 5. A new law is a class with these."""
 
     @property
     def k_e(self) -> float:

@@ -9,7 +9,7 @@ from forms.ops import Value, absolute, is_unlimited, less_equal, minimum, positi
 
 
 class PenetrationLaw(Protocol):
-    """p_nu: the pressure of a layer at its penetration s = u_nu - rho_0, assumption (h6).
+    """p_nu: the pressure of a layer at its penetration s = u_nu - rho_0, (h~6) of chapter 6.
 
     It vanishes for s <= 0 and should not fall: else several solutions may coexist.
     """
@@ -22,7 +22,7 @@ class PenetrationLaw(Protocol):
 
 
 class StiffnessLaw(Protocol):
-    """h_nu: the stiffness of a layer at s = phi - phi_F, assumption (h7)."""
+    """h_nu: the stiffness of a layer at s = phi - phi_F, (h~7) of chapter 6."""
 
     def __call__(self, s: Value) -> Value:
         """Return h_nu >= 0 at the potential difference."""

@@ -197,7 +197,7 @@ def linear_iterations(problem: ContactProblem) -> int:
     """Return the MINRES iterations of the first solve, all of Gamma_3 in contact. Collective."""
     interface, state = problem.interface, problem.start()
     nodal = problem.nodal(state)
-    blocks = augmentation(problem.nodes, problem.scales.augmentation, problem.frictional)
+    blocks = augmentation(problem.nodes, problem.scales.c, problem.frictional)
     blocks = blocks + interface.foundation.charge_block(nodal, np.ones(len(nodal)))
     operator = SparseOperator(problem.body, interface.coupled, kind="iterative")
     operator.update("secant", state, interface.weighted(blocks, state.x))

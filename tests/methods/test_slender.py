@@ -332,7 +332,7 @@ def test_a_slender_body_is_the_reason_of_a_stall():
     block = 1.1 * scales.plane_modulus / scales.height
     softest = (4.73 / 120.0) ** 4 * scales.plane_modulus / 12
     assert found is not None
-    assert float(found[1]) == pytest.approx(scales.augmentation**2 / block / softest, rel=0.05)
+    assert float(found[1]) == pytest.approx(scales.c**2 / block / softest, rel=0.05)
 
 
 def test_load_steps_keep_the_r_of_a_slender_body():
@@ -360,7 +360,7 @@ def test_the_softest_mode_of_a_cantilever_is_its_first_bending_mode():
     case = parse_case(beam(40.0, [160, 2], TIP, 0.5, space={"degree": 2}))
     problem = build_problem(case, comm=SELF)
     operator = FixedPoint(problem, FixedPointOptions()).operator
-    shift = 1e-12 * problem.scales.augmentation
+    shift = 1e-12 * problem.scales.c
     found = softest_mode(problem, operator, problem.start(), shift)
     assert found == pytest.approx(1.8751**4 / 40.0**4 * problem.scales.plane_modulus / 12, rel=5e-3)
 

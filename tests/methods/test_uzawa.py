@@ -136,10 +136,10 @@ def test_the_single_loop_needs_no_outer_one():
 def test_the_augmentation_parameter():
     problem = bar(MPI.COMM_SELF, 16)
     h = 4.0 / 64
-    found = problem.scales.augmentation
+    found = problem.scales.c
     assert found == pytest.approx(1.39 / (1 - 0.3**2) / np.sqrt(h * 1.0), rel=1e-12)
     fine = bar(MPI.COMM_SELF, 8, degree=2)
-    assert fine.scales.augmentation == pytest.approx(found, rel=1e-12)
+    assert fine.scales.c == pytest.approx(found, rel=1e-12)
 
 
 #: More than numbers can give.

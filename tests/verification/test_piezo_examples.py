@@ -131,7 +131,7 @@ def first_solve(problem, symmetric=True, compare=True):
     """Return the iterations of a first linear solve, and its difference to the direct one."""
     interface, state = problem.interface, problem.start()
     nodal = problem.nodal(state)
-    blocks = augmentation(problem.nodes, problem.scales.augmentation, problem.frictional)
+    blocks = augmentation(problem.nodes, problem.scales.c, problem.frictional)
     blocks = blocks + interface.foundation.charge_block(nodal, np.ones(nodal.shape[0]))
     blocks = interface.weighted(blocks, state.x)
     found = []
