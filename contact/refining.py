@@ -77,11 +77,11 @@ def pays(case: Case, problem: ContactProblem) -> bool:
     is condensed onto its contact nodes the steps are few where it is linear, and in 3-D; in the
     plane the tangent of a nonlinear one is then factorised near the solution, once.
     """
-    body, kind = problem.body, case.solver.linear
+    body, solver = problem.body, case.solver.linear
     if body.layout.dim == 3:
-        slow, many = multigrid.is_large(body.layout) and kind != "lu", MANY["whole"]
+        slow, many = multigrid.is_large(body.layout) and solver != "lu", MANY["whole"]
     else:
-        condensed = condensation_pays(problem, kind)
+        condensed = condensation_pays(problem, solver)
         slow, many = not (body.linear and condensed), MANY["condensed" if condensed else "whole"]
     enough = body.layout.unknowns >= many
     return slow and enough and case.evolution is None and has_coarser(case)

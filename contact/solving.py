@@ -23,7 +23,8 @@ from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, Replacements, build_problem, naming_case
 from contact.case.file import Case, load_case, to_toml
 from contact.errors import InputError
-from contact.methods.load_stepping import METHODS, LoadStepping, Method, solve_step
+from contact.methods.load_stepping import LoadStepping
+from contact.methods.method import METHODS, Method, solve_step
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, Outcome, Record, tell

@@ -27,7 +27,8 @@ from contact.errors import InputError, counted, nearest
 from contact.io.folder import write_whole
 from contact.io.tables import write_csv
 from contact.mesh.domain import Domain
-from contact.methods.load_stepping import METHODS, Method, predicted, solve_step
+from contact.methods.load_stepping import predicted
+from contact.methods.method import METHODS, Method, solve_step
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
 from contact.methods.signals import Interrupted, stop_on_signal

@@ -26,7 +26,7 @@ def penalty_pressure(u_n: Value, gap: Value, eps: Value) -> Value:
 
 
 def penalty_friction_modulus(bound: Value, slip: Value, eps: Value) -> Value:
-    """Return s / (|u_tau| + eps): the lagged friction modulus of (4.33)."""
+    """Return s / (|u_tau| + eps): the friction modulus of (4.33), frozen."""
     return bound / (slip + eps)
 
 

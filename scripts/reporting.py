@@ -23,7 +23,7 @@ from mpi4py import MPI
 from PIL import Image
 
 from contact import Case, NotConvergedError, Solution, solve
-from contact.methods.load_stepping import METHODS
+from contact.methods.method import METHODS
 from contact.methods.options import Options
 from contact.methods.report import Outcome, Record
 from contact.plot.run import Run

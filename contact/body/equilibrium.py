@@ -451,7 +451,7 @@ class BodyEquilibrium:
         *,
         symmetric: bool,
         counters: Counters,
-        kind: str,
+        solver: str,
     ) -> SparseOperator | ConstrainedOperator:
         """Return the operator of the body with blocks at nodes.
 
@@ -461,10 +461,10 @@ class BodyEquilibrium:
             Contact nodes, then others with blocks, local numbers.
         constraint
             The constraint after which blocks belong to single nodes; None if they do without.
-        symmetric, counters, kind
+        symmetric, counters, solver
             As of `SparseOperator`.
         """
-        options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "kind": kind}
+        options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "solver": solver}
         if constraint is None:
             return SparseOperator(self, nodes, subsystems=self.component_norms.apart, **options)
         bulk = ConstrainedBulk(self, constraint, BodyState(self.zero_displacement()))

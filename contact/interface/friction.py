@@ -284,7 +284,7 @@ class NodalFriction:
         """Return the derivative of the bound by the pressure at the node, shape (n,).
 
         0 where p < 0, for s is a function of max(p, 0); and 0 for a smoothed pressure: it would
-        couple all nodes within the radius, and is lagged.
+        couple all nodes within the radius, and is left out.
         """
         if self.law is None or not self.local:
             return np.zeros_like(slip)

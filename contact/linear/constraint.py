@@ -303,7 +303,7 @@ class ConstrainedOperator:
     ----------
     bulk
         The body.
-    nodes, symmetric, counters, kind
+    nodes, symmetric, counters, solver
         As of `SparseOperator`.
     """
 
@@ -314,10 +314,12 @@ class ConstrainedOperator:
         *,
         symmetric: bool,
         counters: Counters,
-        kind: str,
+        solver: str,
     ) -> None:
         self._bulk, self._constraint, self._nodes = bulk, bulk.constraint, nodes
-        self._inner = SparseOperator(bulk, nodes, symmetric=symmetric, counters=counters, kind=kind)
+        self._inner = SparseOperator(
+            bulk, nodes, symmetric=symmetric, counters=counters, solver=solver
+        )
         self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.constraint.free)
         #: Elimination of q by a direct solver; None for an earlier matrix.
         self._bordered: BorderedSolve | None = None
@@ -330,10 +332,10 @@ class ConstrainedOperator:
         return self._inner.symmetric
 
     def update(
-        self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, reuse: bool = False
     ) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
-        if not self._inner.update(kind, state, blocks, keep=keep):
+        if not self._inner.update(kind, state, blocks, reuse=reuse):
             return False
         self._bordered = None
         if self._inner.iterative and self._free.size > 0:

@@ -356,11 +356,11 @@ def is_large(layout: Layout) -> bool:
     return layout.unknowns >= LARGE[layout.dim, layout.coupled]
 
 
-def is_chosen(kind: str, layout: Layout) -> bool:
-    """Tell whether to solve by iterations; `kind` as of `operator.SparseOperator`."""
-    if kind == "many":
+def is_chosen(solver: str, layout: Layout) -> bool:
+    """Tell whether to solve by iterations; `solver` as of `operator.SparseOperator`."""
+    if solver == "many":
         return is_large(layout) and layout.unknowns > DIRECT
-    return kind == "iterative" or (kind == "auto" and is_large(layout))
+    return solver == "iterative" or (solver == "auto" and is_large(layout))
 
 
 def configure(ksp: PETSc.KSP, symmetric: bool) -> None:
@@ -458,11 +458,12 @@ class StiffNodes:
         scaled = blocks / root[:, :, None] / root[:, None, :]
         # The solver refuses numbers that overflow.
         left, size, right = np.linalg.svd(np.where(np.isfinite(scaled), scaled, 0.0))
-        yielding = np.einsum("nki,nk,nkj->nij", right, 1 / (1 + size), right)
+        # (K + |B|)^-1 K, with K scaled to the identity.
+        share_of_body = np.einsum("nki,nk,nkj->nij", right, 1 / (1 + size), right)
         self._inverse = np.einsum("nki,nk,njk->nij", right, size / (1 + size**2), left)
         self._inverse /= root[:, :, None] * root[:, None, :]
         if self._interpolation is not None:
-            values = self._mixed(yielding * root[:, None, :] / root[:, :, None])
+            values = self._mixed(share_of_body * root[:, None, :] / root[:, :, None])
             self._interpolation.setValuesIJV(self._starts, self._columns, values, rowmap=self._rows)
             self._interpolation.assemble()
 
@@ -478,11 +479,12 @@ class StiffNodes:
             values += factor[row // bs, row % bs, k] * self._values[same]
         return values
 
-    def jump(self, rhs: PETSc.Vec) -> PETSc.Vec:
-        """Return B^+ rhs at the contact nodes.
+    def local_correction(self, rhs: PETSc.Vec) -> PETSc.Vec:
+        """Return (I + B^T B)^-1 B^T b at the contact nodes, with K scaled to I: damped B^-1 b.
 
-        A frictional block exerts forces across the directions in which it is stiff: in the coarse
-        levels nothing resists them, and a residual relative to the first correction would be blind.
+        A block of friction, such as gamma mu e nu^T, is stiff along nu and exerts forces along e,
+        which nothing resists in the coarse levels. Without this correction such forces in b make
+        the first preconditioned residual so large that a tolerance relative to it says nothing.
         """
         vector = rhs.duplicate()
         values = vector.array.reshape(-1, self._inverse.shape[1])
@@ -623,11 +625,11 @@ class Hierarchy:
         self._solve(rhs, correction)
 
     def _solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
-        jump = self._stiff.jump(rhs)
-        rhs.axpy(-1.0, self._ksp.getOperators()[0] * jump)
-        solution.axpy(-1.0, jump)
+        local = self._stiff.local_correction(rhs)
+        rhs.axpy(-1.0, self._ksp.getOperators()[0] * local)
+        solution.axpy(-1.0, local)
         self._taken += self._iterate(rhs, solution, self._most - self._taken)
-        solution.axpy(1.0, jump)
+        solution.axpy(1.0, local)
 
     def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec, most: int) -> int:
         ksp, digits = self._ksp, -log10(self._ksp.getTolerances()[0])

@@ -1,4 +1,4 @@
-"""Linear operators: a bulk matrix plus small dense blocks at contact nodes, factorised once.
+"""Linear operators: a bulk matrix plus small dense blocks at contact nodes, and its solver.
 
 The blocks are the augmentation r I of Algorithm 2, a compliant layer, a charge, or Newton's
 linearised contact laws.
@@ -192,11 +192,11 @@ class Operator(Protocol):
         """Whether the blocks are symmetric too."""
 
     def update(
-        self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, reuse: bool = False
     ) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective.
 
-        The matrix of a condensed body is given: `kind`, `state` and `keep` do not change it.
+        The matrix of a condensed body is given: `kind`, `state` and `reuse` do not change it.
         """
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
@@ -216,7 +216,7 @@ class SparseOperator:
         Whether the blocks are symmetric too: LDL^T instead of LU.
     counters
         Counters of factorisations and solves.
-    kind
+    solver
         "lu", "iterative", or "auto": iterative for large problems. "many", for hundreds of solves
         with one matrix: iterative if LU has too little memory.
     subsystems
@@ -230,7 +230,7 @@ class SparseOperator:
         *,
         symmetric: bool = True,
         counters: Counters | None = None,
-        kind: str = "auto",
+        solver: str = "auto",
         subsystems: Subsystems | None = None,
     ) -> None:
         self.bulk, self.layout, self._nodes = bulk, bulk.layout, nodes
@@ -245,7 +245,7 @@ class SparseOperator:
         self._rhs, self._solution = self.matrix.createVecs()
         self.ksp = PETSc.KSP().create(self.layout.comm)
         self.ksp.setOptionsPrefix(PREFIX)
-        self.iterative = multigrid.is_chosen(kind, self.layout)
+        self.iterative = multigrid.is_chosen(solver, self.layout)
         self._split: BlockPreconditioner | None = None
         self._hierarchy: Hierarchy | None = None
         self._modes: PETSc.NullSpace | None = None
@@ -268,7 +268,7 @@ class SparseOperator:
         return times(self.matrix, values, transposed)
 
     def update(
-        self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, reuse: bool = False
     ) -> bool:
         """Assemble the operator at a state. Collective.
 
@@ -280,16 +280,16 @@ class SparseOperator:
             Where the body is linearised.
         blocks
             Weighted blocks at the nodes, shape (n, block size, block size).
-        keep
-            Whether to keep the bulk matrix of the last call if its kind is the same; that of a
-            linear body is always kept.
+        reuse
+            Whether to reuse the bulk matrix of the last call if its kind is the same; that of a
+            linear body always is.
 
         Returns
         -------
         Whether matrix or blocks have changed.
         """
         nodes, last = self._nodes, self._blocks
-        same = kind == self._kind and (keep or self.bulk.linear)
+        same = kind == self._kind and (reuse or self.bulk.linear)
         if same and last is not None and self._all(np.array_equal(blocks, last)):
             return False
         self._kind, self._blocks = kind, blocks.copy()

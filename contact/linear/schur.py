@@ -1,4 +1,4 @@
-"""Static condensation: the dense Schur complement at kept unknowns, and operators with it.
+"""Static condensation: the dense Schur complement at retained unknowns, and operators with it.
 
 MUMPS makes it on the first rank. In 2-D it has about as many entries as the mesh has nodes.
 """
@@ -23,7 +23,7 @@ from contact.linear.petsc import mat_solve, no_solution, out_of_memory, set_up_w
 from contact.ranks import on_each, on_root
 from contact.typing import Array
 
-#: MUMPS's ICNTL(26): solve with the kept unknowns 0; reduce a right-hand side, by the first
+#: MUMPS's ICNTL(26): solve with the retained unknowns 0; reduce a right-hand side, by the first
 #: substitution alone.
 INTERIOR_SOLVE, REDUCE = (26, 0), (26, 1)
 
@@ -77,41 +77,41 @@ def _mirror(matrix: Array) -> None:
 
 
 class SchurComplement:
-    """Schur complement of a symmetric matrix at kept unknowns.
+    """Schur complement of a symmetric matrix at retained unknowns.
 
     Parameters
     ----------
     matrix
         The assembled matrix, for its pattern.
-    kept
-        Owned kept unknowns, local numbers; the result has them in rank order.
+    retained
+        Owned retained unknowns, local numbers; the result has them in rank order.
     prefix
         Prefix of PETSc options of the factorisation.
 
     Attributes
     ----------
     size, offset
-        Number of kept unknowns, and offset of those of this rank.
+        Number of retained unknowns, and offset of those of this rank.
     """
 
-    def __init__(self, matrix: PETSc.Mat, kept: NDArray[np.int32], prefix: str) -> None:
-        self._kept, self.comm = kept, lasting(matrix.getComm().tompi4py())
+    def __init__(self, matrix: PETSc.Mat, retained: NDArray[np.int32], prefix: str) -> None:
+        self._retained, self.comm = retained, lasting(matrix.getComm().tompi4py())
         begin, end = matrix.getOwnershipRange()
-        own_kept = (begin + kept).astype(PETSc.IntType)
+        own_retained = (begin + retained).astype(PETSc.IntType)
         # MUMPS orders by minimum degree, with ties by the given order: backwards along the fronts
         # of dolfinx's numbering is cheapest.
         self._backwards = PETSc.IS().createStride(end - begin, end - 1, -1, comm=matrix.comm)
-        numbers = self.comm.allgather(begin + end - 1 - own_kept)
+        numbers = self.comm.allgather(begin + end - 1 - own_retained)
         self.size = sum(part.size for part in numbers)
         self.offset = sum(part.size for part in numbers[: self.comm.rank])
         # The Schur complement is on the first rank.
         own = np.concatenate(numbers)[: None if self.comm.rank == 0 else 0]
         self._numbers = PETSc.IS().createGeneral(own, matrix.comm)
         self._places = (
-            PETSc.IS().createGeneral(own_kept, matrix.comm),
+            PETSc.IS().createGeneral(own_retained, matrix.comm),
             PETSc.IS().createStride(end - begin, begin, 1, comm=matrix.comm),
         )
-        #: Rows at kept unknowns, and the matrix numbered backwards.
+        #: Rows at retained unknowns, and the matrix numbered backwards.
         self._rows: PETSc.Mat | None = None
         self._reordered: PETSc.Mat | None = None
         self._ksp = PETSc.KSP().create(matrix.comm)
@@ -155,7 +155,7 @@ class SchurComplement:
         return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
 
     def _prepare(self, pc: PETSc.PC) -> None:
-        """Tell MUMPS the kept unknowns before a factorisation."""
+        """Tell MUMPS the retained unknowns before a factorisation."""
         pc.setFactorSetUpSolverType()
         pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
         if self.size > 0:
@@ -165,47 +165,45 @@ class SchurComplement:
     def exceeds(self, rhs: Array, rounding: Array) -> bool:
         """Tell whether a right-hand side exceeds rounding at eliminated unknowns."""
         beyond = np.abs(rhs) > rounding
-        beyond[self._kept] = False
+        beyond[self._retained] = False
         return bool(beyond.any())
 
     def interior(self, rhs: Array) -> Array:
-        """Solve for an owned right-hand side with the kept unknowns 0. Collective."""
+        """Solve for an owned right-hand side with the retained unknowns 0. Collective."""
         inside = rhs.copy()
-        inside[self._kept] = 0.0
+        inside[self._retained] = 0.0
         factor = self._ksp.getPC().getFactorMatrix()
         # PETSc refuses solves with a Schur complement on several ranks.
         form = factor.getMumpsIcntl(SCHUR)
         factor.setMumpsIcntl(SCHUR, 0)
         solution = mat_solve(factor, inside[::-1, None])[::-1, 0]
         factor.setMumpsIcntl(SCHUR, form)
-        solution[self._kept] = 0.0
+        solution[self._retained] = 0.0
         return solution
 
-    def reduce(self, rhs: Array) -> Array:
-        """Return a right-hand side reduced to the kept unknowns of all ranks. Collective.
+    def condense(self, rhs: Array, interior: Array | None = None) -> Array:
+        """Return a right-hand side condensed onto the retained unknowns of all ranks. Collective.
 
-        On one rank by half a solve, which PETSc lacks on several.
+        With its `interior` solution, if that is known. Else on one rank by half a solve, which
+        PETSc lacks on several.
         """
-        if self.comm.size > 1:
-            return self.condense(rhs, self.interior(rhs))
-        factor = self._ksp.getPC().getFactorMatrix()
-        factor.setMumpsIcntl(*REDUCE)
-        reduced, given = factor.createVecs()
-        given.array[:] = rhs[::-1]
-        factor.solve(given, reduced)
-        factor.setMumpsIcntl(*INTERIOR_SOLVE)
-        return reduced.array[::-1][self._kept]
-
-    def condense(self, rhs: Array, interior: Array) -> Array:
-        """Reduce a right-hand side, given its `interior` solution. Collective."""
-        own = rhs[self._kept] - times(self._rows, interior)
+        if interior is None and self.comm.size == 1:
+            factor = self._ksp.getPC().getFactorMatrix()
+            factor.setMumpsIcntl(*REDUCE)
+            reduced, given = factor.createVecs()
+            given.array[:] = rhs[::-1]
+            factor.solve(given, reduced)
+            factor.setMumpsIcntl(*INTERIOR_SOLVE)
+            return reduced.array[::-1][self._retained]
+        interior = self.interior(rhs) if interior is None else interior
+        own = rhs[self._retained] - times(self._rows, interior)
         return np.concatenate(self.comm.allgather(own))
 
-    def expand(self, rhs: Array, kept: Array) -> Array:
-        """Return the owned solution from that at the kept unknowns of all ranks. Collective."""
-        own = kept[self.offset : self.offset + self._kept.size]
+    def expand(self, rhs: Array, retained: Array) -> Array:
+        """Return the owned solution from that at the retained unknowns of all ranks. Collective."""
+        own = retained[self.offset : self.offset + self._retained.size]
         solution = self.interior(rhs - times(self._rows, own, transposed=True))
-        solution[self._kept] = own
+        solution[self._retained] = own
         return solution
 
 
@@ -314,13 +312,13 @@ class DenseOperator:
     comm
         Communicator.
     free
-        Which of the owned kept unknowns are free, shape (nodes, block size).
+        Which of the owned retained unknowns are free, shape (nodes, block size).
     stiffness
         The matrix, on the first rank.
     counters
         Counters of factorisations and solves.
     inclined
-        Inclined directions of supports at kept nodes; None for none.
+        Inclined directions of supports at retained nodes; None for none.
     """
 
     symmetric, iterative = False, False
@@ -338,7 +336,7 @@ class DenseOperator:
         self.counters = counters
 
     def update(
-        self, kind: str, state: LinearisationPoint, blocks: Array, *, keep: bool = False
+        self, kind: str, state: LinearisationPoint, blocks: Array, *, reuse: bool = False
     ) -> bool:
         """Factorise with blocks, the matrix being that of all kinds and states. Collective."""
         gathered = self._comm.gather(masked_blocks(self._free, self._inclined, blocks))

@@ -3,8 +3,9 @@
 `newton` is the default: it condenses the body where that pays, and iterates over its material.
 `semismooth` is the semismooth Newton method (primal-dual active set) on the whole body or on the
 condensed one, `newton_step` one step of it. `fallbacks` has the methods after it, in order.
-`load_stepping` has the protocol `Method`, and the load steps around any method. The fixed points,
-Uzawa block relaxation and penalty are in `contact.thesis`; none is a fallback.
+`method` has the protocol `Method` and the methods by name, `load_stepping` the load steps around
+any of them. The fixed points, Uzawa block relaxation and penalty are in `contact.thesis`; none is
+a fallback.
 
 Parts of methods: `interior_point` with its cones, `unconstrained_modes` (rigid-body modes). For all
 methods: `options` has tolerances and limits, `report` records, stagnation and outcome; `signals`

@@ -1,4 +1,4 @@
-"""The methods by name, and quasi-static load stepping by any of them, with incremental friction.
+"""Quasi-static load stepping by any method, with incremental friction.
 
 A step is a static problem with the loads at its end and the history at its beginning. It starts
 from a prediction, and a linear body is factorised once for all steps. A step that fails is halved;
@@ -8,88 +8,22 @@ the steps before it stay. Where the loads grow from zero this is continuation in
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import Any, Protocol
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from contact.linear.operator import Counters
-from contact.methods.newton import Newton
-from contact.methods.report import Monitor, Outcome, Record
-from contact.methods.signals import Interrupted
-from contact.methods.unconstrained_modes import UnconstrainedModes, with_least_displacements
+from contact.methods.method import UNKNOWN, Method, evaluated, solve_step
+from contact.methods.report import Outcome
+from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.problem import ContactProblem
-from contact.problem.residuals import Residuals, evaluate
 from contact.problem.rigid_modes import released, unilateral_supports
 from contact.problem.state import State
-from contact.thesis.fixed_point import FixedPoint
-from contact.thesis.penalty import Penalty
 from contact.typing import Array
-
-
-class Method(Protocol):
-    """A solver of one problem, from an initial guess to a state and its `Outcome`.
-
-    A new one is a class made of a problem, its options and a monitor, with an entry in `METHODS`;
-    and its options, with an entry in `contact.methods.options.OPTIONS`. One that uses others makes
-    their options by `with_method`, and has their records in its history.
-    """
-
-    @property
-    def options(self) -> Any:
-        """Its options; `allowed` is the tolerance of each residual."""
-
-    @property
-    def history(self) -> list[Record]:
-        """Records of the outer iterations."""
-
-    @property
-    def counters(self) -> Counters:
-        """Factorisations and solves."""
-
-    @property
-    def state(self) -> State:
-        """The last iterate: the end of a solve after a signal."""
-
-    def set_load_step(self, problem: ContactProblem) -> None:
-        """Take another load step of the same problem; factorisations remain, records start anew."""
-
-    def solve(
-        self, start: State | None = None, secant_at: Array | None = None
-    ) -> tuple[State, Outcome]:
-        """Iterate until convergence or a limit. Collective.
-
-        Parameters
-        ----------
-        start
-            Initial guess; zero by default.
-        secant_at
-            Unknowns of the first secant of the material; those of the start by default. Prescribed
-            values that have changed strain the elements beside them alone.
-
-        Raises
-        ------
-        InputError
-            If the linear system is singular.
-        """
-
-
-#: Name of a method -> its class.
-METHODS: Mapping[str, Callable[[ContactProblem, Any, Monitor | None], Method]] = {
-    "uzawa": FixedPoint,
-    "penalty": Penalty,
-    "newton": Newton,
-}
-
 
 logger = logging.getLogger("contact.solve")
 
 #: Most halvings of a step that fails.
 HALVINGS = 4
-
-#: Placeholder of residuals that `evaluated` replaces.
-UNKNOWN = Residuals(np.inf, np.inf, np.inf)
 
 
 class LoadStepping:
@@ -169,40 +103,6 @@ class LoadStepping:
             start, secant_at = predicted(problem, ends)
         self._modes.problem = problem
         return solve_step(problem, self.method, start, secant_at, self._modes)
-
-
-def solve_step(
-    problem: ContactProblem,
-    method: Method,
-    start: State | None,
-    secant_at: Array | None = None,
-    modes: UnconstrainedModes | None = None,
-) -> tuple[State, Outcome]:
-    """Solve by a method, and evaluate the residuals from scratch. Collective.
-
-    Of solutions that differ by a free rigid motion, that of least norm is taken.
-    """
-    counted = replace(method.counters)
-    try:
-        state, outcome = method.solve(start, secant_at)
-    except Interrupted as interrupt:
-        state = method.state
-        outcome = Outcome(UNKNOWN, UNKNOWN, str(interrupt), interrupt.number)
-    outcome = replace(
-        outcome,
-        allowed=method.options.allowed,
-        records=tuple(method.history),
-        counters=method.counters - counted,
-    )
-    found = evaluated(problem, state, outcome)
-    return with_least_displacements(modes or UnconstrainedModes(problem), *found)
-
-
-def evaluated(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:
-    """Evaluate the residuals of a state at the time and history of a problem. Collective."""
-    x = problem.body.prescribe(state.x, problem.time)
-    state = replace(state, x=x, time=problem.time, history=problem.history)
-    return state, replace(outcome, residuals=evaluate(problem, state))
 
 
 #: Largest ratio of the predicted increment of the solution to that of the last step.

@@ -57,7 +57,7 @@ from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED
 from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Monitor, Outcome, Record, Recorder
-from contact.methods.semismooth import Iteration, SemismoothNewton
+from contact.methods.semismooth import ConvergenceMonitor, SemismoothNewton
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.condensed import (
     AnyProblem,
@@ -85,7 +85,7 @@ FALLBACKS = WORKING_SET, CONTINUATION, SECANT, RIGID_MOTION, INTERIOR_POINT, PRO
 #: Reason of an end without solution of a condensed contact problem.
 UNSOLVED_ON_CONTACT_NODES = "the condensed contact problem is not solved"
 
-#: Cost of a factorisation, in chord steps.
+#: Most chord steps to the goal for which a factorisation is reused: they cost as much as a new one.
 MOST_STEPS = 10.0
 
 #: Residual above which there are no chord steps.
@@ -110,7 +110,7 @@ class Chord:
 
     def drop(self) -> None:
         """Take a Newton step next."""
-        self._factorised = self._keeps = False
+        self._factorised = self._reused = False
 
     def begin(self) -> None:
         """Begin an iteration with other loads or another initial guess."""
@@ -132,17 +132,17 @@ class Chord:
         """
         before, last = self._before, self._reached
         if not self._factorised or self._most_steps <= 0:
-            keep = False
+            reuse = False
         elif before is None:
-            keep = state.active_set is not None and secant_at is None
-        elif reached >= last and self._keeps:
-            state, reached, keep = before, last, False
+            reuse = state.active_set is not None and secant_at is None
+        elif reached >= last and self._reused:
+            state, reached, reuse = before, last, False
         else:
             rate = reached / last
             left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
-            keep = bool(left <= self._most_steps and reached <= RADIUS)
-        self._before, self._reached, self._keeps = state, reached, keep
-        return state, keep
+            reuse = bool(left <= self._most_steps and reached <= RADIUS)
+        self._before, self._reached, self._reused = state, reached, reuse
+        return state, reuse
 
     def note_factorisation(self) -> None:
         """Note that there is a factorisation."""
@@ -231,50 +231,50 @@ class Newton:
         if self.condensation is None:
             self.condensation = Condensation(self.problem, self.counters)
         options, body = self.options, self.problem.body
-        loop, chord = Iteration(self.whole, state), self._chord
-        if loop.starts_converged:
-            return state, loop.outcome()
+        monitor, chord = ConvergenceMonitor(self.whole, state), self._chord
+        if monitor.starts_converged:
+            return state, monitor.outcome()
         chord.begin()
         tangent = state.active_set is not None and secant_at is None and not body.linear
         for _ in range(min(options.max_iterations, self.whole.steps_left)):
-            previous, last = state, loop.iterate
+            previous, last = state, monitor.iterate
             largest = last.residuals.significant
-            state, keep = chord.choose(state, largest, secant_at)
+            state, reuse = chord.choose(state, largest, secant_at)
             internal = last.internal if state is previous and secant_at is None else None
             kind = "tangent" if tangent else "secant"
-            condensed = self.condensation.linearise(kind, state, keep, secant_at, internal)
+            condensed = self.condensation.linearise(kind, state, reuse, secant_at, internal)
             if condensed is None:
-                return previous, loop.outcome(UNSOLVED_ON_CONTACT_NODES)
+                return previous, monitor.outcome(UNSOLVED_ON_CONTACT_NODES)
             # Inexact Newton: no more digits than the linearised material has.
             enough = 0.1 * options.tolerance
-            if not body.linear and not keep:
+            if not body.linear and not reuse:
                 enough = max(enough, CONTACT_PART * min(largest, 1.0))
             method = self._on_contact_nodes(condensed, enough)
-            end, outcome = solve_contact(method, replace(state, x=condensed.body.at))
+            end, outcome = solve_contact(method, replace(state, x=condensed.body.x_0))
             records = tuple(method.recorder.records)
             self.counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
             unsolved = outcome.residuals.significant > max(enough, UNSOLVED * largest)
             if unsolved and not overloaded:
-                return previous, loop.outcome(UNSOLVED_ON_CONTACT_NODES)
+                return previous, monitor.outcome(UNSOLVED_ON_CONTACT_NODES)
             increment = self.condensation.expand(condensed, end.x)
             state = replace(end, x=body.updated(state.x, increment), history=state.history)
             secant_at = None
             if not body.linear:
                 chord.note_factorisation()
-            loop.evaluate(state)
+            monitor.evaluate(state)
             taken = [word for word in FALLBACKS if any(word in r.note for r in records)]
-            note = ", ".join([*["chord step"] * keep, *taken])
-            loop.record(note, "tangent" * tangent, steps=records)
-            if overloaded and not loop.converged:
-                return state, replace(loop.outcome(OVERLOADED), overloaded=True)
-            if (found := loop.ended()) is not None:
+            note = ", ".join([*["chord step"] * reuse, *taken])
+            monitor.record(note, "tangent" * tangent, steps=records)
+            if overloaded and not monitor.converged:
+                return state, replace(monitor.outcome(OVERLOADED), overloaded=True)
+            if (found := monitor.ended()) is not None:
                 return found
             if not body.linear:
-                tangent = loop.next_is_tangent(tangent, last.residuals)
-            if (stalled := loop.stalled()) is not None:
+                tangent = monitor.next_is_tangent(tangent, last.residuals)
+            if (stalled := monitor.stalled()) is not None:
                 return state, stalled
-        return state, loop.out_of_steps()
+        return state, monitor.out_of_steps()
 
     def _on_contact_nodes(self, problem: CondensedProblem, tolerance: float) -> SemismoothNewton:
         """Return the method on a condensed problem, to a tolerance."""

@@ -46,7 +46,7 @@ FORCING = 1e-2
 STAGNANT, REDUCTION = 3, 1e-2
 
 #: Ratio of the equilibrium residual to the largest one below which the stiffness of the last step
-#: is kept: the error is in contact and friction.
+#: is reused: the error is in contact and friction.
 SMALL = 0.1
 
 
@@ -159,7 +159,7 @@ class NewtonStep:
                 interface.friction.acts or interface.foundation.active or not body.symmetric
             )
             self._operator = self._problem.operator(
-                symmetric=not asymmetric, counters=self._counters, kind=self.options.linear
+                symmetric=not asymmetric, counters=self._counters, solver=self.options.linear
             )
         return self._operator
 
@@ -272,11 +272,11 @@ class NewtonStep:
             blocks[:, : body.dim, : body.dim] += regularisation(
                 interface, residuals.significant, self.parameters.nodal_stiffness
             )
-        keep = self._assembled and residuals.equilibrium < SMALL * residuals.significant
+        reuse = self._assembled and residuals.equilibrium < SMALL * residuals.significant
         kind = "tangent" if material.tangent else "secant"
         at = state if material.secant_at is None else replace(state, x=material.secant_at)
         weighted = interface.weighted(blocks, state.x)
-        self.operator.update(kind, at, weighted, keep=keep)
+        self.operator.update(kind, at, weighted, reuse=reuse)
         self._assembled = True
 
 

@@ -126,10 +126,11 @@ class NewtonOptions(Options):
     method: Literal["newton"] = "newton"
     """Name of the method."""
     nested: Switch | None = None
-    """`true`: solve on coarser meshes first and start from there; of a case alone, as a problem
-    that is built already has no coarser meshes. Default: where that saves time, of static cases: from 40000 unknowns on in 3-D with multigrid, and in 2-D
-    where a body is not condensed onto its contact nodes, as slender ones; from 100000 on in 2-D
-    where a nonlinear one is."""
+    """`true`: solve on coarser meshes first and start from there; of a case alone, for a problem
+    that is built already has one mesh. Default: of static cases, where that saves time and there
+    are coarser meshes: from 40000 unknowns on in 3-D with multigrid, and in 2-D where a body is
+    not condensed onto its contact nodes, as slender ones; from 100000 on in 2-D where a nonlinear
+    one is."""
     nested_levels: Annotated[
         Annotated[int, Ge(2), Le(20), Accepted("a whole number from 2 to 20")] | None,
         ReadWith("nested", True),

@@ -5,7 +5,7 @@
 - `bound_by_slip`: the derivative of the friction bound by the slip, limited where the bound falls;
   `NewtonStep` takes it once the active set is unchanged.
 - `regularisation`: the Levenberg-Marquardt term of bodies that nothing constrains at first.
-- `ConductivityDerivative`: Newton's method or Picard's in psi of the charge.
+- `ConductivityDerivative`: psi of the charge linearised or frozen.
 
 References
 ----------
@@ -100,7 +100,7 @@ def regularisation(interface: Interface, residual: float, nodal_stiffness: float
 
 @dataclass
 class ConductivityDerivative:
-    """Choice between psi'(u_nu - rho) in the tangent (Newton) and psi frozen (Picard).
+    """Choice between psi'(u_nu - rho) in the tangent and psi frozen.
 
     With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and steep
     ramps psi converge fast. But a node that opens draws less charge, and may open further: the

@@ -128,38 +128,41 @@ class SemismoothNewton:
         """
         problem, options, step = self.problem, self.options, self.step
         linear = problem.body.linear
-        loop = Iteration(self, state, note, stagnation_limit)
-        if loop.starts_converged:
-            return state, loop.outcome()
+        monitor = ConvergenceMonitor(self, state, note, stagnation_limit)
+        if monitor.starts_converged:
+            return state, monitor.outcome()
         step.begin()
         # At zero strain the secant is the tangent; an initial guess with an active set is near.
         tangent = state.active_set is not None and secant_at is None and not linear
         for _ in range(min(options.max_iterations, self.steps_left if steps is None else steps)):
-            previous = loop.iterate
+            previous = monitor.iterate
             taken = step(problem, previous, MaterialLinearisation(tangent, secant_at), exact)
             if taken is None:
-                return state, loop.outcome(step.fault)
+                return state, monitor.outcome(step.fault)
             state, secant_at = taken, None
-            loop.evaluate(state)
-            worse = step.conductivity_derivative.worsened(loop.residuals.significant)
-            loop.record("tangent" * tangent, "rejected" * worse)
+            monitor.evaluate(state)
+            worse = step.conductivity_derivative.worsened(monitor.residuals.significant)
+            monitor.record("tangent" * tangent, "rejected" * worse)
             if worse:
                 state = previous.state
-                loop.evaluate(state)
-            if (found := loop.ended()) is not None:
+                monitor.evaluate(state)
+            if (found := monitor.ended()) is not None:
                 return found
             if give_up and previous.state.active_set is None:
                 if _overestimates_stiffness(problem, step.parameters.c, state):
-                    return state, loop.outcome(OVERESTIMATED)
+                    return state, monitor.outcome(OVERESTIMATED)
             if not linear:
-                tangent = loop.next_is_tangent(tangent, previous.residuals)
-            if (stalled := loop.stalled()) is not None:
+                tangent = monitor.next_is_tangent(tangent, previous.residuals)
+            if (stalled := monitor.stalled()) is not None:
                 return state, stalled
-        return state, loop.out_of_steps()
+        return state, monitor.out_of_steps()
 
 
-class Iteration:
-    """The last iterate with its residuals, and the ends by these residuals."""
+class ConvergenceMonitor:
+    """Monitor of convergence: residuals of each iterate, their record, and the ends by them.
+
+    An iteration ends by convergence, divergence, loss of contact, stagnation or its limit of steps.
+    """
 
     def __init__(
         self,

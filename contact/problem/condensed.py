@@ -31,7 +31,7 @@ from contact.ranks import summed
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
-#: Most kept unknowns: the dense matrix then takes 130 MB.
+#: Most retained unknowns: the dense matrix then takes 130 MB.
 LARGEST = 4200
 
 #: Largest residual that is accepted as rounding at the contact nodes. Larger than for the whole
@@ -47,28 +47,28 @@ DENSE_IS_FASTER = 50.0
 
 @dataclass(frozen=True)
 class CondensedBody:
-    """Equilibrium of a linear body at its kept nodes: S (x - x_0) + r_0.
+    """Equilibrium of a linear body at its retained nodes: S (x - x_0) + r_0.
 
     Attributes
     ----------
     comm, dim
         Those of the body.
     free
-        Which unknowns of the owned kept nodes are free, shape (nodes, block size).
+        Which unknowns of the owned retained nodes are free, shape (nodes, block size).
     rows
         Owned rows of the Schur complement S.
     stiffness
         All of S, on the first rank.
     residual
         r_0: condensed internal forces minus loads at the linearisation, of all ranks.
-    at, own
-        x_0: the owned kept unknowns there, and their slice among those of all ranks.
+    x_0, own
+        The owned retained unknowns there, and their slice among those of all ranks.
     acting
         `norms` of loads, reactions and coupling forces of the whole body.
     component_norms
         Norms of forces and charges of each connected component.
     inclined
-        Inclined directions of supports at kept nodes; None for none.
+        Inclined directions of supports at retained nodes; None for none.
     """
 
     comm: MPI.Intracomm
@@ -77,7 +77,7 @@ class CondensedBody:
     rows: Array
     stiffness: DenseStiffness
     residual: Array
-    at: Array
+    x_0: Array
     own: slice
     acting: Array
     component_norms: ComponentNorms
@@ -101,7 +101,7 @@ class CondensedBody:
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
         """Return unknowns with the fixed ones of the linearisation."""
-        fixed = self.at - masked(self.free, self.inclined, self.at)
+        fixed = self.x_0 - masked(self.free, self.inclined, self.x_0)
         return masked(self.free, self.inclined, x) + fixed
 
     def updated(self, x: Array, increment: Array) -> Array:
@@ -114,7 +114,7 @@ class CondensedBody:
 
     def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
         """Return S (x - x_0) + r_0: internal forces, the loads among them in r_0. Collective."""
-        moved = np.concatenate(self.comm.allgather(state.x - self.at))
+        moved = np.concatenate(self.comm.allgather(state.x - self.x_0))
         return np.asarray(self.rows @ moved + self.residual[self.own])
 
     def external(self, time: float = 1.0) -> Array:
@@ -164,7 +164,7 @@ class CondensedProblem:
         """Return the problem with another interface on the same contact nodes."""
         return replace(self, interface=interface)
 
-    def operator(self, *, symmetric: bool, counters: Counters, kind: str) -> DenseOperator:
+    def operator(self, *, symmetric: bool, counters: Counters, solver: str) -> DenseOperator:
         """Return the dense operator, with blocks at all nodes."""
         body = self.body
         return DenseOperator(body.comm, body.free, body.stiffness, counters, body.inclined)
@@ -174,18 +174,18 @@ class CondensedProblem:
 AnyProblem: TypeAlias = ContactProblem | CondensedProblem
 
 
-def at_kept_nodes(interface: Interface) -> Interface:
-    """Return an interface numbered by kept nodes."""
+def at_retained_nodes(interface: Interface) -> Interface:
+    """Return an interface numbered by retained nodes."""
     count = interface.nodes.nodes.size
     first, others = np.split(np.arange(interface.coupled.size, dtype=np.int32), [count])
 
-    def kept(nodes: ContactNodes, positions: NDArray[np.int32]) -> ContactNodes:
+    def retained(nodes: ContactNodes, positions: NDArray[np.int32]) -> ContactNodes:
         """Return nodes of other numbers, whose unknowns are the jumps."""
         return replace(nodes, nodes=positions, motion=None, coupling=None)
 
-    nodes, fixed_conducting = kept(interface.nodes, first), interface.fixed_conducting
+    nodes, fixed_conducting = retained(interface.nodes, first), interface.fixed_conducting
     if fixed_conducting is not None:
-        fixed_conducting = replace(fixed_conducting, nodes=kept(fixed_conducting.nodes, others))
+        fixed_conducting = replace(fixed_conducting, nodes=retained(fixed_conducting.nodes, others))
     law = replace(interface.foundation, nodes=nodes)
     return replace(interface, nodes=nodes, foundation=law, fixed_conducting=fixed_conducting)
 
@@ -198,41 +198,41 @@ class Condensation:
 
     Parameters
     ----------
-    full
+    whole
         The whole problem.
     counters
         Counters of sparse factorisations and solves.
     """
 
-    def __init__(self, full: ContactProblem, counters: Counters) -> None:
+    def __init__(self, whole: ContactProblem, counters: Counters) -> None:
         self.counters = counters
-        self.nodes = full.interface.coupled
-        self.set_load_step(full)
-        body = full.body
+        self.nodes = whole.interface.coupled
+        self.set_load_step(whole)
+        body = whole.body
         none = Constraint(body.layout, None, body.global_unknowns.ties, body.global_unknowns.free)
-        self._constraint = full.constraint or none
+        self._constraint = whole.constraint or none
         self._bulk = ConstrainedBulk(body, self._constraint, BodyState(body.zero_displacement()))
         self._free = np.flatnonzero(self._constraint.free)
         self._matrix = self._bulk.create_matrix()
         size = body.block_size
-        kept = (self.nodes[:, None] * size + np.arange(size)).astype(np.int32).ravel()
-        self._schur = SchurComplement(self._matrix, kept, PREFIX)
+        retained = (self.nodes[:, None] * size + np.arange(size)).astype(np.int32).ravel()
+        self._schur = SchurComplement(self._matrix, retained, PREFIX)
         begin = self._schur.offset
-        self._own = slice(begin, begin + kept.size)
+        self._own = slice(begin, begin + retained.size)
         self._kind = ""
         self._rows: Array = np.zeros((0, 0))
         self._stiffness = DenseStiffness(self._rows)
 
-    def set_load_step(self, full: ContactProblem) -> None:
+    def set_load_step(self, whole: ContactProblem) -> None:
         """Take another load step of the same problem; factorisations remain."""
-        self.full = full
-        self._interface = at_kept_nodes(full.interface)
+        self.whole = whole
+        self._interface = at_retained_nodes(whole.interface)
 
     def linearise(
         self,
         kind: str,
         state: State,
-        keep: bool = False,
+        reuse: bool = False,
         secant_at: Array | None = None,
         internal_forces: Array | None = None,
     ) -> CondensedProblem | None:
@@ -242,8 +242,8 @@ class Condensation:
         ----------
         kind, state
             "secant" or "tangent", and the state.
-        keep
-            Whether to keep the last factorisation (chord step).
+        reuse
+            Whether to reuse the last factorisation (chord step).
         secant_at
             Unknowns at which the secant modulus is taken; those of the state by default.
         internal_forces
@@ -251,7 +251,7 @@ class Condensation:
 
         Returns
         -------
-        The condensed problem; None with too many kept unknowns, or if the eliminated block is
+        The condensed problem; None with too many retained unknowns, or if the eliminated block is
         singular.
 
         Raises
@@ -259,10 +259,10 @@ class Condensation:
         InputError
             If numbers overflow.
         """
-        body = self.full.body
+        body = self.whole.body
         if not 0 < self._schur.size <= min(LARGEST, body.layout.unknowns - 1):
             return None
-        if not self._kind or not (keep or (body.linear and kind == self._kind)):
+        if not self._kind or not (reuse or (body.linear and kind == self._kind)):
             self._factorise(kind, state if secant_at is None else replace(state, x=secant_at))
         if internal_forces is None:
             internal_forces = body.internal_forces(state, secant_at)
@@ -277,16 +277,16 @@ class Condensation:
         # With loads along those before, the extrapolated state is in equilibrium inside.
         nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
         if body.comm.allreduce(bool(self._schur.exceeds(self._rhs, nothing)), op=MPI.LOR):
-            kept = self._schur.reduce(self._rhs)
+            retained = self._schur.condense(self._rhs)
         else:
-            kept = self._schur.condense(self._rhs, np.zeros(body.owned))
+            retained = self._schur.condense(self._rhs, np.zeros(body.owned))
         inside = summed(body.comm, self._bordered.responses.T @ self._rhs)
         self._on_q = restricted[body.owned :][self._free] - inside
-        forces = self._border.T @ (self._bordered.inverse @ self._on_q) - kept
+        forces = self._border.T @ (self._bordered.inverse @ self._on_q) - retained
         if not np.isfinite(forces).all():
             return None
         free, inclined = body.layout.at(self.nodes)
-        nodes = self.full.interface.nodes
+        nodes = self.whole.interface.nodes
         others = body.nodal(state.x)[self.nodes[nodes.nodes.size :]]
         condensed = CondensedBody(
             body.comm,
@@ -301,14 +301,14 @@ class Condensation:
             body.component_norms.at(self.nodes),
             inclined,
         )
-        return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
+        return CondensedProblem(condensed, self._interface, self.whole.scales, state.time)
 
     def stiffness(self, state: State) -> Array | None:
         """Return the Schur complement, on the first rank; None with too many rows, or if singular.
 
         Of the last linearisation, or else the tangent at a state. Collective.
         """
-        if not 0 < self._schur.size <= min(LARGEST, self.full.body.layout.unknowns - 1):
+        if not 0 < self._schur.size <= min(LARGEST, self.whole.body.layout.unknowns - 1):
             return None
         if not self._kind:
             self._factorise("tangent", state)
@@ -316,7 +316,7 @@ class Condensation:
 
     def _factorise(self, kind: str, state: State) -> None:
         """Factorise at a state, and eliminate q from the Schur complement. Collective."""
-        body, schur = self.full.body, self._schur
+        body, schur = self.whole.body, self._schur
         self._rows = np.zeros((0, 0))
         self._stiffness = DenseStiffness(self._rows)  # room for a new one
         # The symmetric part of a tangent converges linearly, as chord steps.
@@ -330,7 +330,7 @@ class Condensation:
         self._regular = body.comm.bcast(bool(np.isfinite(stiffness).all()))
         if not self._regular:
             return
-        # q with the kept unknowns at 0.
+        # q with the retained unknowns at 0.
         columns = self._bulk.columns[:, self._free].T
         responses = [schur.interior(np.asarray(column)) for column in columns]
         border = [schur.condense(*pair) for pair in zip([*columns], responses, strict=True)]
@@ -339,7 +339,7 @@ class Condensation:
             body.comm, columns.T, corner, np.reshape(responses, columns.shape).T
         )
         self._regular = self._bordered.regular
-        #: Derivative of the forces on q by kept unknowns, shape (free, kept).
+        #: Derivative of the forces on q by retained unknowns, shape (free, retained).
         self._border = np.reshape(border, (self._free.size, schur.size))
         if body.comm.rank == 0 and self._free.size:
             stiffness -= self._border.T @ (self._bordered.inverse @ self._border)
@@ -347,7 +347,7 @@ class Condensation:
 
     def _scattered(self, stiffness: Array) -> Array:
         """Scatter the rows of a matrix on the first rank. Collective."""
-        comm, own = self.full.comm, self._own
+        comm, own = self.whole.comm, self._own
         every = comm.gather(own)
         if comm.rank > 0:
             rows = np.empty((own.stop - own.start, self._schur.size))
@@ -364,34 +364,34 @@ class Condensation:
         """
         self.counters.linear_solves += 1
         self.counters.linear_iterations += 1
-        kept = np.concatenate(self.full.comm.allgather(x - condensed.body.at))
+        retained = np.concatenate(self.whole.comm.allgather(x - condensed.body.x_0))
         q = np.zeros(self._constraint.free.size)
-        q[self._free] = self._bordered.inverse @ (self._on_q - self._border @ kept)
+        q[self._free] = self._bordered.inverse @ (self._on_q - self._border @ retained)
         rhs = self._rhs - self._bulk.columns @ q
-        return self._constraint.expand(np.concatenate([self._schur.expand(rhs, kept), q]))
+        return self._constraint.expand(np.concatenate([self._schur.expand(rhs, retained), q]))
 
 
-def condensation_pays(problem: ContactProblem, kind: str) -> bool:
+def condensation_pays(problem: ContactProblem, solver: str) -> bool:
     """Tell whether dense Newton steps on the condensed problem cost less than sparse ones.
 
-    A dense factorisation costs k^3 operations with k kept unknowns, a sparse one n b^2 with n
+    A dense factorisation costs k^3 operations with k retained unknowns, a sparse one n b^2 with n
     unknowns and fronts of b: in 2-D the body's depth, n/k nodes, in 3-D some n^(1/2). Large bodies
-    in 3-D are left to multigrid, unless `kind` is a direct solver.
+    in 3-D are left to multigrid, unless `solver` is a direct one.
     """
     layout = problem.body.layout
-    if not condensable(problem, kind) or (kind == "auto" and multigrid.is_large(layout)):
+    if not condensable(problem, solver) or (solver == "auto" and multigrid.is_large(layout)):
         return False
-    kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
-    front = unknowns / kept * layout.block_size if layout.dim == 2 else unknowns**0.5
-    return kept <= ALWAYS or kept**3 <= DENSE_IS_FASTER * unknowns * front**2
+    retained, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
+    front = unknowns / retained * layout.block_size if layout.dim == 2 else unknowns**0.5
+    return retained <= ALWAYS or retained**3 <= DENSE_IS_FASTER * unknowns * front**2
 
 
-def condensable(problem: ContactProblem, kind: str) -> bool:
-    """Tell whether kept unknowns are few, and a direct solver has the memory and is not refused."""
+def condensable(problem: ContactProblem, solver: str) -> bool:
+    """Tell whether retained unknowns are few, and a direct solver has the memory and is allowed."""
     options = PETSc.Options(PREFIX)
     names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
     chosen = any(options.hasName(name) for name in names)
     layout = problem.body.layout
-    large = kind == "auto" and layout.dim == 3 and layout.unknowns > multigrid.DIRECT
+    large = solver == "auto" and layout.dim == 3 and layout.unknowns > multigrid.DIRECT
     many = problem.nodes.size * layout.block_size > LARGEST
-    return not (chosen or kind == "iterative" or large or many)
+    return not (chosen or solver == "iterative" or large or many)

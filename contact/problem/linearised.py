@@ -160,8 +160,8 @@ class Linearised:
         self._regular = np.linalg.inv(regular)
         d = nodes.dim
         law[:, :d] -= self._regular @ self._by_jump
-        kind = "auto" if multigrid.is_large(problem.body.layout) else "lu"
-        self._operator = problem.operator(symmetric=False, counters=counters, kind=kind)
+        solver = "auto" if multigrid.is_large(problem.body.layout) else "lu"
+        self._operator = problem.operator(symmetric=False, counters=counters, solver=solver)
         self._operator.update("tangent", state, interface.weighted(law, state.x))
 
     def _conditions(self, jump: Array) -> None:

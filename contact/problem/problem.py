@@ -358,7 +358,7 @@ class ContactProblem:
         return Constraint(body.layout, change, motions, unknowns.free)
 
     def operator(
-        self, *, symmetric: bool, counters: Counters, kind: str
+        self, *, symmetric: bool, counters: Counters, solver: str
     ) -> SparseOperator | ConstrainedOperator:
         """Return the operator of its linear systems; see `BodyEquilibrium.operator`. Collective."""
         return self.body.operator(
@@ -366,7 +366,7 @@ class ContactProblem:
             self.constraint,
             symmetric=symmetric,
             counters=counters,
-            kind=kind,
+            solver=solver,
         )
 
     @property

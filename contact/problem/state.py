@@ -78,11 +78,11 @@ class Scales:
 
     @property
     def c(self) -> float:
-        """c = 1.39 E'/sqrt(h H), (20), the default of the augmentation r too (stress/length).
+        """Complementarity parameter c = 1.39 E'/sqrt(h H), (20); the default of r (stress/length).
 
-        The geometric mean of the least and the largest stiffness of a mode of Gamma_3, 1.1 E'/H and
-        1.76 E'/h. On rectangles with the far side fixed, 16 and 32 cells of P1 over H and Poisson's
-        ratios of 0.3 and 0.45, these are 1.0 to 1.2 E'/H and 1.3 to 1.8 E'/h.
+        It is the geometric mean of the least and the largest stiffness of a mode of Gamma_3, about
+        1.1 E'/H and 1.76 E'/h. On rectangles with the far side fixed, 16 and 32 cells of P1 over H,
+        these are 1.0 to 1.2 E'/H and 1.3 to 1.8 E'/h (Poisson's ratios 0.3 and 0.45).
         """
         return 1.39 * self.plane_modulus / math.sqrt(self.spacing * self.height)
 

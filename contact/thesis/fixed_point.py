@@ -225,8 +225,8 @@ class FixedPoint(OuterLoop):
         self.operator = self._new_operator(symmetric=True)
 
     def _new_operator(self, symmetric: bool) -> Operator:
-        kind = "many" if self.options.linear == "auto" else self.options.linear
-        return self.problem.operator(symmetric=symmetric, counters=self.counters, kind=kind)
+        solver = "many" if self.options.linear == "auto" else self.options.linear
+        return self.problem.operator(symmetric=symmetric, counters=self.counters, solver=solver)
 
     def solve(
         self, start: State | None = None, secant_at: Array | None = None

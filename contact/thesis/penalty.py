@@ -6,7 +6,7 @@ and s u_tau/(|u_tau| + eps_slip), (4.1)-(4.3), functions of the displacement. Th
 secant modulus of the material and the friction modulus of (4.33); (4.32), with [u_nu - rho]^+ of
 the *new* iterate and a compliant layer, is solved by SNES as a semismooth equation. Outer
 iterations are those of Algorithm 3, inner ones those of SNES. SNES takes full steps while friction
-is lagged, and has a backtracking line search with implicit friction or a layer that is not lagged.
+is frozen, and has a backtracking line search with implicit friction or a layer that is not lagged.
 
 Convergence is that of equilibrium with the forces of the penalised laws. The residuals `contact`
 and `friction` are those of Signorini's and Coulomb's laws: the error of the penalised solution, of
@@ -72,9 +72,9 @@ class PenalisedLaw:
     interface, eps
         The contact nodes with their laws, and the parameters of these.
     iterate
-        Nodal unknowns of the lagged friction modulus s/(|u_tau| + eps), (4.32)-(4.33), shape
-        (n, block size). None: the modulus is implicit, (4.3), but for a smoothed pressure in its
-        derivative.
+        Nodal unknowns at which the friction modulus s/(|u_tau| + eps), (4.32)-(4.33), is frozen,
+        shape (n, block size). None: the modulus is implicit, (4.3), but for a smoothed pressure in
+        its derivative.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class PenalisedLaw:
         self._modulus = None if iterate is None else self._modulus_at(iterate)
 
     def acts(self) -> bool:
-        """Return whether friction acts: a lagged modulus above 0 anywhere. Collective."""
+        """Return whether friction acts: a frozen modulus above 0 anywhere. Collective."""
         return self._modulus is None or self._interface.nodes.maximum(self._modulus) > 0
 
     def stick(self) -> None:
@@ -153,7 +153,7 @@ class PenalisedProblem:
         self._problem = problem
         self._body, self._interface = problem.body, problem.interface
         self.operator = problem.operator(
-            symmetric=symmetric, counters=counters, kind=options.linear
+            symmetric=symmetric, counters=counters, solver=options.linear
         )
         # Global unknowns are on the first rank, behind its own ones.
         self._here = self._body.global_unknowns.size if problem.comm.rank == 0 else 0
@@ -225,7 +225,7 @@ class PenalisedProblem:
         """Solve from a state; return unknowns, number of iterations, and fault or "". Collective.
 
         `poll` is called before each linear solve. Raises SingularError, and InputError for overflow
-        with lagged laws.
+        with frozen laws.
         """
         body, interface = self._body, self._interface
         jump = interface.nodes.jump(state.x)
@@ -320,8 +320,8 @@ class PenalisedProblem:
         kind, linearised_at = ("tangent", x) if self._implicit else ("secant", self._state.x)
         blocks = self._interface.weighted(blocks, x)
         at = replace(self._state, x=linearised_at)
-        keep = self._assembled and not self._implicit  # SNES asks again at each iterate
-        self.operator.update(kind, at, blocks, keep=keep)
+        reuse = self._assembled and not self._implicit  # SNES asks again at each iterate
+        self.operator.update(kind, at, blocks, reuse=reuse)
         self._assembled = True
 
 
@@ -360,7 +360,7 @@ class Penalty(OuterLoop):
     """Algorithm 3; see `OuterLoop`."""
 
     options: PenaltyOptions
-    #: The lagged friction modulus may creep.
+    #: With a frozen modulus of friction it may creep.
     stagnation: ClassVar[tuple[int, float]] = (100, 0.99)
 
     def __post_init__(self) -> None:
@@ -396,7 +396,7 @@ class Penalty(OuterLoop):
         interface, implicit = self.problem.interface, self._implicit
         x, inner, fault = self._solve(implicit)
         self._failed = implicit and bool(fault)
-        if self._failed:  # go on with lagged terms
+        if self._failed:  # go on with frozen terms
             x, fault = self.state.x, f"implicit: {fault}"
         forces = PenalisedLaw(interface, self._eps).forces(interface.nodes.jump(x))
         self.state = replace(self.state, x=x, forces=forces)

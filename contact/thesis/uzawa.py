@@ -138,7 +138,7 @@ def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
 
 @dataclass(frozen=True)
 class FrozenProblem:
-    """The problem of one outer iteration, with Kacanov's frozen terms, and the steps on it.
+    """The problem of one outer iteration, with its frozen terms, and the steps on it.
 
     Contact forces and jumps are arrays of normal and tangential parts, shape (n, 1 + d). Steps take
     the friction bound s_n, shape (n,): with `single_loop` it is not frozen.

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from contact import Case, Solution
 from contact.interface.multipliers import Multipliers
-from contact.methods.load_stepping import METHODS, Method
+from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome, Record

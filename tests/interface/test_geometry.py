@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.body.description import Body
-from contact.methods.load_stepping import METHODS
+from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
 from contact.model.body import Fixed
 from contact.model.contact import Contact

@@ -190,7 +190,7 @@ def test_multigrid_knows_rigid_motions_with_inclined_supports() -> None:
     problem = ContactProblem(domain, body, Contact("bottom", plane))
     found, blocks = {}, np.tile(np.eye(3), (problem.nodes.nodes.size, 1, 1))
     for kind in ("iterative", "lu"):
-        operator = SparseOperator(problem.body, problem.nodes.nodes, kind=kind)
+        operator = SparseOperator(problem.body, problem.nodes.nodes, solver=kind)
         operator.update("secant", problem.start(), blocks)
         found[kind] = operator.solve(problem.body.external())
     norm = problem.body.norm

@@ -26,7 +26,7 @@ GAMMA, MU = 1e4, 0.4
 def operator_of(problem: ContactProblem, kind: str, *, symmetric: bool = True) -> SparseOperator:
     """Return the operator with blocks at the contact nodes."""
     body, nodes = problem.body, problem.nodes.nodes
-    return SparseOperator(body, nodes, symmetric=symmetric, kind=kind)
+    return SparseOperator(body, nodes, symmetric=symmetric, solver=kind)
 
 
 def sticking(problem: ContactProblem) -> Array:
@@ -156,7 +156,7 @@ def test_fixed_unknowns_stay_exactly_where_they_are():
     problem = mechanics.leaning_block(MPI.COMM_SELF, 4)
     body = problem.body
     operator = body.operator(
-        problem.nodes.nodes, symmetric=True, counters=Counters(), kind="iterative"
+        problem.nodes.nodes, symmetric=True, counters=Counters(), solver="iterative"
     )
     blocks = np.zeros((problem.nodes.nodes.size, 3, 3))
     operator.update("secant", BodyState(body.zero_displacement()), blocks)

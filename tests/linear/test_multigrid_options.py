@@ -25,7 +25,7 @@ def solved(given: dict[str, str]) -> tuple[SparseOperator, PETSc.PC, int]:
     for name, value in given.items():
         known[name] = value
     try:
-        operator = SparseOperator(problem.body, problem.nodes.nodes, kind="iterative")
+        operator = SparseOperator(problem.body, problem.nodes.nodes, solver="iterative")
         operator.update("secant", problem.start(), blocks)
         found = operator.solve(rhs)
     finally:

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from contact import evolve
-from contact.methods.load_stepping import METHODS, LoadStepping
+from contact.methods.load_stepping import LoadStepping
+from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.problem.residuals import Residuals

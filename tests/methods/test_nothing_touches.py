@@ -9,7 +9,8 @@ from mpi4py import MPI
 
 from contact import build_problem, solve
 from contact.case.file import parse_case
-from contact.methods.load_stepping import METHODS, LoadStepping
+from contact.methods.load_stepping import LoadStepping
+from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.problem.problem import ContactProblem

@@ -49,7 +49,7 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     assert np.allclose(stiffness, stiffness.T, rtol=0, atol=1e-13)
     rhs = body.layout.mask(body.external())
     forces = schur.condense(rhs, schur.interior(rhs))
-    assert np.allclose(schur.reduce(rhs), forces, rtol=0, atol=1e-13 * np.abs(forces).max())
+    assert np.allclose(schur.condense(rhs), forces, rtol=0, atol=1e-13 * np.abs(forces).max())
     found = schur.expand(rhs, on_root(WORLD, lambda: np.linalg.solve(stiffness, forces)))
     largest = WORLD.allreduce(np.abs(whole).max(initial=0.0), op=MPI.MAX)
     assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
@@ -83,9 +83,9 @@ def test_the_first_rank_alone_holds_the_dense_matrix_and_factors():
     left = condensed.Condensation(problem, Counters()).linearise("secant", problem.start())
     assert left is not None
     body = left.body
-    operator = left.operator(symmetric=False, counters=Counters(), kind="auto")
+    operator = left.operator(symmetric=False, counters=Counters(), solver="auto")
     blocks = np.tile(np.eye(body.block_size), (len(body.free), 1, 1))
-    operator.update("secant", BodyState(body.at), blocks)
+    operator.update("secant", BodyState(body.x_0), blocks)
     assert (body.stiffness._solve is not None) == (WORLD.rank == 0)
     rhs = np.where(body.free.ravel(), 1.0, 0.0)
     found = np.concatenate(WORLD.allgather(operator.solve(rhs)))
@@ -128,8 +128,8 @@ def test_what_is_left_of_a_problem_has_the_same_residuals():
     left = condensation.linearise("secant", state)
     assert left is not None
     body = left.body
-    assert evaluate(left, State(body.at, state.forces)).largest < 1e-10
-    x = body.updated(body.at, 1e-3 * np.where(body.free.ravel(), body.at, 0.0))
+    assert evaluate(left, State(body.x_0, state.forces)).largest < 1e-10
+    x = body.updated(body.x_0, 1e-3 * np.where(body.free.ravel(), body.x_0, 0.0))
     moved = evaluate(left, State(x, state.forces))
     whole = problem.body.updated(state.x, condensation.expand(left, x))
     found = evaluate(problem, State(whole, state.forces))

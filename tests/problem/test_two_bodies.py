@@ -8,7 +8,7 @@ from contact import parse_case, solve
 from contact.body.description import Body
 from contact.errors import InputError, SingularError
 from contact.linear.operator import SparseOperator
-from contact.methods.load_stepping import METHODS
+from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
 from contact.model.body import Fixed, Load
 from contact.model.contact import Contact

@@ -5,7 +5,8 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.mesh.grid import rectangle
-from contact.methods.load_stepping import METHODS, LoadStepping
+from contact.methods.load_stepping import LoadStepping
+from contact.methods.method import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.model.body import Fixed
 from contact.model.contact import Contact
