@@ -251,7 +251,9 @@ def acting(problem: ContactProblem) -> list[str]:
     layers = any(contact.compliant_layer is not None for contact in problem.contacts)
     if not rows and least >= 0 and not layers:
         return ["# warning: nothing is loaded or moved: all results will be 0"]
-    over = " (below 0: an overlap, which is pressed apart)" if least < 0 else ""
+    over = "" if least >= 0 else " (below 0: by the given gap, or the mean over facets that touch)"
+    if least < 0 and any(contact.press for contact in problem.contacts):
+        over = " (below 0: an overlap, which is pressed apart)"
     lines = ["# acting:", *aligned([*rows, ["gap", f"{least:.4g} to {largest:.4g}{over}"]])]
     if moved > LARGE:
         lines.append(

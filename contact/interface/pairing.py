@@ -159,14 +159,24 @@ def find_pair(
     if body.comm.allreduce(no_multiplier.size, op=MPI.SUM) > 0:
         found = couple(slave, master, reach, no_multiplier)
     if body.comm.allreduce(found.nodes.size, op=MPI.SUM) == 0:
+        depth = couple(slave, master, np.inf).depth
+        if depth > reach:
+            raise InputError(
+                f"{label}: the second lies {depth:.3g} behind the first, farther than {reach:.3g}: "
+                "the undeformed bodies overlap as deep, or these sides look away from each other; "
+                "accepted: meshes that are apart or touch, an interference that is less deep",
+                "overlap",
+            )
         raise InputError(
             f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
             "held there; accepted: sides of two bodies that look at each other",
             "pair",
         )
     _check_apart(body, found, slave.owners, label)
-    if not press:
-        _refuse_overlap(body, found, slave.owners, label)
+    if found.depth > TOUCHING * body.domain.size and not (press and found.resolved):
+        # Nodes of the master may be between the directions of two slave facets.
+        depth = max(found.depth, couple(master, slave, reach).depth)
+        _refuse_overlap(body, found, depth, slave.owners, label)
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     _, local = owned_among(body.layout.index_map, found.nodes)
     points = body.space.tabulate_dof_coordinates()[local, : body.dim]
@@ -266,20 +276,22 @@ def _check_rim(
         )
 
 
-def _refuse_overlap(body: BodyEquilibrium, coupling: Coupling, owners: Owners, label: str) -> None:
+def _refuse_overlap(
+    body: BodyEquilibrium, coupling: Coupling, depth: float, owners: Owners, label: str
+) -> None:
     """Refuse bodies that overlap in the reference configuration. Collective."""
-    if coupling.depth <= TOUCHING * body.domain.size:
-        return
     if _connected(body, coupling, owners):
         raise InputError(
             f"{label} are sides of one body that look away from each other; accepted: parts of two "
             "bodies whose meshes are apart",
             "pair",
         )
+    way = 'overlap = "press" (in Python press=True) for an interference'
+    if not coupling.resolved:
+        way += ", with on and against exchanged or with shorter facets of on there"
     raise InputError(
-        f"{label}: the undeformed bodies overlap, by up to {coupling.depth:.3g} more than straight "
-        "facets deviate from a curve; accepted: meshes that are apart or touch, or "
-        'overlap = "press" (in Python press=True) for an interference',
+        f"{label}: the undeformed bodies overlap, by up to {depth:.3g} more than straight "
+        f"facets deviate from a curve; accepted: meshes that are apart or touch, or {way}",
         "overlap",
     )
 

@@ -54,6 +54,12 @@ ACTING = {
 }
 
 
+def test_what_is_pressed_apart_is_said():
+    """Gaps below 0 may be given, or means over facets of bodies that touch."""
+    assert "pressed apart" in said(ACTING["a press fit"])
+    assert "by the given gap" in said(bar(contact={"on": "bottom", "gap": -1e-3}))
+
+
 @pytest.mark.parametrize("name", ACTING)
 def test_what_acts_is_seen(name):
     assert NOTHING not in said(ACTING[name])

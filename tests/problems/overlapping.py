@@ -5,7 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from numpy.typing import ArrayLike
 
 from contact import Body, Fixed, Linear, Load
 from contact._compat import geometry_dofmap
@@ -20,8 +22,26 @@ YOUNG, POISSON = 10.0, 0.3
 #: Modulus of a layer that cannot widen.
 UNIAXIAL = YOUNG * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
 
+#: Place of a corner along the side that it is in, of the length 1.
+OFFSET = 0.45
+
 #: Ends of the layers, along x or the radius.
 RADII = (1.0, 1.5, 2.0)
+
+
+def boxes(comm: MPI.Intracomm, cell: str, order: int, numbers: Sequence[Sequence[int]]) -> Mesh:
+    """Return unit cubes of these numbers of cells, which begin at x = 0, 2, 4, ..."""
+    d, places, rows, count = Shape(cell).dim, [], [], 0
+    for k, given in enumerate(numbers):
+        make = rectangle if d == 2 else box
+        grid = make(MPI.COMM_SELF, (0.0,) * d, (1.0,) * d, given, cell=cell).mesh
+        space = fem.functionspace(grid, ("Lagrange", order))
+        x = space.tabulate_dof_coordinates()[:, :d].copy()
+        x[:, 0] += 2 * k
+        places.append(x)
+        rows.append(space.dofmap.list + count)
+        count += len(x)
+    return assembled(comm, np.concatenate(places), np.concatenate(rows), cell, order)
 
 
 def layers(
@@ -34,19 +54,9 @@ def layers(
     counts: Sequence[int] = (4, 5),
 ) -> Domain:
     """Return blocks ("flat"), revolved tubes ("tube") or rings ("ring"), `depth` in each other."""
-    shape = Shape(cell)
-    d, places, rows, count = shape.dim, [], [], 0
-    for k, n in enumerate(counts):
-        make = rectangle if d == 2 else box
-        numbers = [max(n // 2, 1), n, max(n // 2, 1)][:d]
-        grid = make(MPI.COMM_SELF, (0.0,) * d, (1.0,) * d, numbers, cell=cell).mesh
-        space = fem.functionspace(grid, ("Lagrange", order))
-        x = space.tabulate_dof_coordinates()[:, :d].copy()
-        x[:, 0] += 2 * k  # apart, until parts have their names
-        places.append(x)
-        rows.append(space.dofmap.list + count)
-        count += len(x)
-    mesh = assembled(comm, np.concatenate(places), np.concatenate(rows), cell, order)
+    d = Shape(cell).dim
+    numbers = [[max(n // 2, 1), n, max(n // 2, 1)][:d] for n in counts]
+    mesh = boxes(comm, cell, order, numbers)
     facets, middle, *_ = midpoints(mesh)
     sides = {
         f"{name}{k}": np.abs(middle[:, 0] - 2 * k - end) < 1e-9
@@ -67,6 +77,42 @@ def layers(
         x[:, 1] = radius * np.sin(angle)
     domain = from_mesh(mesh, {name: facets[there] for name, there in sides.items()}, radii[-1])
     return revolved(domain) if form == "tube" else domain
+
+
+def corner(
+    comm: MPI.Intracomm,
+    cell: str,
+    order: int,
+    edges: ArrayLike,
+    depth: float,
+    numbers: Sequence[Sequence[int]],
+    axis: bool = False,
+) -> Domain:
+    """Return a block with the side "top" at y = 0, and a parallelepiped whose corner is in it.
+
+    Its "sides" meet at the corner, from where its edges (rows) go; "base" and "end" are the sides
+    of both bodies far from each other. With `axis` the corner is on the axis of revolution, and the
+    first edge along it.
+    """
+    mesh, edges = boxes(comm, cell, order, numbers), np.asarray(edges)
+    facets, middle, *_ = midpoints(mesh)
+    d, second = edges.shape[0], middle[:, 0] > 1.5
+    middle[:, 0] -= 2 * second
+    low, high = (np.abs(middle[:, :d] - end) < 1e-9 for end in (0, 1))
+    sides = {
+        "base": ~second & low[:, 1],
+        "top": ~second & high[:, 1],
+        "sides": second & low[:, : d - axis].any(axis=1),
+        "end": second & high.any(axis=1),
+    }
+    x = mesh.geometry.x
+    above = x[:, 0] > 1.5
+    x[above, 0] -= 2
+    x[above, :d] = x[above, :d] @ edges
+    x[above, 1] -= depth
+    x[~above, :d] = 4 * (x[~above, :d] - [0.0 if axis else OFFSET, 1.0, OFFSET][:d])
+    domain = from_mesh(mesh, {name: facets[there] for name, there in sides.items()}, 4.0)
+    return revolved(domain) if axis else domain
 
 
 def of_layer(domain: Domain, number: int) -> np.ndarray:

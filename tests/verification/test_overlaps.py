@@ -4,13 +4,18 @@ import re
 
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem
 from mpi4py import MPI
+from scipy.sparse.linalg import spsolve
 
 from contact import Body, Contact, Fixed, Linear, Plane, Problem, parse_case, solve
 from contact.cli.new import facing_parts
 from contact.errors import InputError
+from contact.interface.mortar.coupling import couple
+from contact.interface.mortar.surface import Surface
 from tests.problems import overlapping
-from tests.problems.overlapping import POISSON, UNIAXIAL, YOUNG, body, layers, pressure
+from tests.problems.overlapping import POISSON, UNIAXIAL, YOUNG, body, corner, layers, pressure
 
 COMM = MPI.COMM_WORLD
 
@@ -203,6 +208,143 @@ def test_several_pairs():
     solution = solve(Problem(domain, given, contacts(False, True)))
     exact = UNIAXIAL * (sum(depths) + push) / 1.5
     np.testing.assert_allclose(solution.pressure, exact, rtol=1e-8)
+
+
+def between(*angles):
+    """Return edges of the length 1 at angles from the normal of a side, in degrees."""
+    return [[np.sin(angle), np.cos(angle)] for angle in np.deg2rad(angles)]
+
+
+#: Edges of parallelepipeds whose corner is in a side: square, blade, almost flat, aslant; a point,
+#: and an edge that is in the side as a whole, or at one end alone.
+CORNERS = {
+    2: [between(-45, 45), between(-12, 12), between(-85, 85), between(-70, 20)],
+    3: [
+        [[1.0, 1.0, 0.0], [-0.5, 1.0, 0.8], [-0.5, 1.0, -0.8]],
+        [[-0.3, 0.8, 0.0], [0.3, 0.8, 0.0], [0.0, 0.0, 1.0]],
+        [[-0.8, 0.3, 0.0], [0.8, 0.3, 0.0], [0.0, 0.4, 1.0]],
+    ],
+}
+
+#: Those of cones: along the axis, and from the tip.
+CONES = [[[0.0, 1.0], *between(angle)] for angle in (20, 45, 85)]
+
+
+def corners(cell, order):
+    """Yield a function from the depth to a mesh, and the supports of its bodies."""
+    d = 2 if cell in PLANE else 3
+    numbers = [[4, 2], [2, 2]] if d == 2 else [[3, 1, 3], [2, 2, 2]]
+    for edges in CORNERS[d] + (CONES if d == 2 else []):
+        axis = edges in CONES
+        held = [Fixed(part, [None if axis else 0.0, *[0.0] * (d - 1)]) for part in ("base", "end")]
+
+        def mesh(depth, edges=edges, axis=axis):
+            return corner(COMM, cell, order, edges, depth, numbers, axis)
+
+        yield mesh, Body(Linear(YOUNG, POISSON), held), axis
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("cell", [*PLANE, *SPACE])
+def test_corners_are_refused(cell, element):
+    """Of any angle, within a facet, by shares of that; a corner that touches is none."""
+    order, degree = element
+    for mesh, given, axis in corners(cell, order):
+        for share in (0.0, *SHARES):
+            domain = mesh(share)
+            for on, against in (("top", "sides"), ("sides", "top")):
+                contact = Contact(on, against=against)
+                if share == 0:
+                    nodes = Problem(domain, given, contact, degree=degree).nodes
+                    assert nodes.cut == 0 and nodes.maximum(-nodes.gap) < 1e-12
+                    continue
+                with pytest.raises(InputError, match=r"\[overlap\]") as raised:
+                    Problem(domain, given, contact, degree=degree)
+                told = float(re.search(r"by up to (\S+) more", str(raised.value))[1])
+                # That of a cone is measured along its normal.
+                assert (0.3 if axis else 0.99) * share < told < 1.01 * share
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_corner_is_pressed_out_from_its_side(degree):
+    """Its force is that of plain elasticity, the corner on the side that it was in."""
+    depth = 0.01
+    domain = corner(COMM, "quadrilateral", 1, between(-45, 45), depth, [[1, 1], [2, 2]])
+    given = Body(Linear(YOUNG, POISSON), [Fixed(part, [0.0, 0.0]) for part in ("base", "end")])
+    with pytest.raises(InputError, match=r"on and against exchanged.*\[overlap\]"):
+        Problem(domain, given, Contact("top", against="sides", press=True), degree=degree)
+    contact = Contact("sides", against="top", press=True)
+    solution = solve(Problem(domain, given, contact, degree=degree))
+    space = fem.functionspace(domain.mesh, ("Lagrange", degree, (2,)))
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    strain = ufl.sym(ufl.grad(u))
+    mu, bulk = YOUNG / 2 / (1 + POISSON), YOUNG * POISSON / (1 + POISSON) / (1 - 2 * POISSON)
+    stress = 2 * mu * strain + bulk * ufl.tr(strain) * ufl.Identity(2)
+    stiffness = (
+        fem.assemble_matrix(fem.form(ufl.inner(stress, ufl.grad(v)) * ufl.dx)).to_scipy().tocsc()
+    )
+    x = space.tabulate_dof_coordinates()
+    side, way = np.flatnonzero(np.abs(x[:, 1]) < 1e-9), np.zeros(2 * len(x))
+    way[2 * np.argmin(np.abs(x[:, 0]) + np.abs(x[:, 1] + depth)) + 1] = 1.0
+    assert side.size == degree + 1
+    for node in side:  # Lagrange's functions at x = 0
+        others = x[np.setdiff1d(side, node), 0]
+        way[2 * node + 1] = -np.prod(-others / (x[node, 0] - others))
+    free = np.ones(way.size, dtype=bool)
+    for part in ("base", "end"):
+        nodes = fem.locate_dofs_topological(space, 1, domain.facets(part))
+        free[2 * nodes] = free[2 * nodes + 1] = False
+    compliance = way[free] @ spsolve(stiffness[free][:, free], way[free])
+    assert solution.converged
+    force = solution.problem.nodes.sum(solution.pressure)
+    assert force == pytest.approx(depth / compliance, rel=1e-9 if degree == 1 else 1e-5)
+
+
+def side_of(points, first):
+    """Return a chain of straight facets along points from left to right, its left side outside."""
+    corners = np.stack([points[:-1], points[1:]], axis=1)
+    normal = np.diff(points, axis=0)[:, ::-1] * [-1.0, 1.0]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    nodes = first + np.column_stack([np.arange(len(normal)), np.arange(1, len(points))])
+    none = np.zeros((len(normal), 0))
+    return Surface(nodes, corners, normal, none, none, 1).with_deviations()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_polygons_in_a_flat_side(seed):
+    """The depth is that of the lowest corner, whichever facets of the side it lies in."""
+    rng = np.random.default_rng(seed)
+    slopes = np.sort(rng.uniform(-8, 8, rng.integers(2, 7)))
+    corners = np.cumsum(
+        np.vstack([[0.0, 0.0], rng.uniform(0.2, 1.0, (slopes.size, 1)) * [[1, s] for s in slopes]]),
+        axis=0,
+    )
+    ends = np.linspace(-2, corners[-1, 0] + 2, rng.integers(2, 12))
+    turn, move = rng.uniform(0, 2 * np.pi), rng.uniform(-10, 10, 2)
+    axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    side = side_of(np.column_stack([ends, 0 * ends]) @ axes + move, 0)
+    for depth in (-0.1, 0.0, 1e-4, 1e-3, 0.01, 0.1):
+        places = corners - [0.0, corners[:, 1].min() + depth]
+        polygon = side_of(places[::-1] @ axes + move, 1000)
+        found = [couple(*both, 100.0).depth for both in ((side, polygon), (polygon, side))]
+        if depth <= 0:
+            assert max(found) < 1e-12
+        else:
+            assert min(found) > 0.1 * depth
+            assert max(found) == pytest.approx(depth, rel=1e-6)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("press", [False, True])
+def test_overlaps_deeper_than_the_reach(press):
+    """They are told from sides that are too far apart."""
+    deep, far = (layers(COMM, "triangle", 1, "flat", depth) for depth in (0.6, -0.6))
+    contact = Contact("outer0", against="inner1", press=press)
+    with pytest.raises(InputError, match=r"lies 0.6 behind .*\[overlap\]"):
+        Problem(deep, body("flat", 2, 2), contact)
+    with pytest.raises(InputError, match=r"\[pair\]"):
+        Problem(far, body("flat", 2, 2), contact)
 
 
 @pytest.mark.parallel

@@ -113,8 +113,8 @@ class Parts:
         shape (f, k, 2, d).
     rows, columns, values
         int Phi_i (N_l o Pi): numbers of the node of Phi' and of the master's node, shape (e,).
-    depth
-        Of the deepest overlap (length), as of `Coupling`, on this rank.
+    depths
+        Of the deepest overlap on each facet, as of `Coupling`, shape (f,) (length).
     """
 
     nodes: NDArray[np.int64]
@@ -127,7 +127,7 @@ class Parts:
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
     values: Array
-    depth: float
+    depths: Array
 
 
 def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> Parts:
@@ -168,7 +168,7 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
         rows,
         columns,
         values,
-        depth=max((float(-points.clear.min(initial=0.0)) for points in found), default=0.0),
+        depths=np.max([np.zeros(slave.count), *(points.depth for points in found)], axis=0),
     )
 
 
@@ -255,6 +255,9 @@ def _master_entries(
 #: Nodes less than this share of whose function faces the master carry no multiplier.
 LEAST_COVERED = 1e-3
 
+#: Share of an overlap that gaps at nodes have at least, if facets are short enough for it.
+RESOLVED = 0.1
+
 
 @dataclass(frozen=True)
 class Coupling(JumpRows):
@@ -275,8 +278,10 @@ class Coupling(JumpRows):
     covered
         Share of int N~_j that faces the master, shape (n,).
     depth
-        Of the deepest overlap at a point, of facets and of the surfaces that they approximate
-        (length), on all ranks.
+        Of the deepest overlap, of facets and of the surfaces that they approximate (length), on
+        all ranks.
+    resolved
+        Whether slave nodes have gaps below 0 wherever the overlap is half as deep.
     """
 
     weight: Array
@@ -285,6 +290,7 @@ class Coupling(JumpRows):
     gap_positive_part: Array
     covered: Array
     depth: float
+    resolved: bool
 
 
 def couple(
@@ -367,5 +373,9 @@ def _assembled(
     masters, M = sparse_rows(nodes, entries)
     divide = sparse.diags_array(1 / weight)
     jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
-    depth = owners.comm.allreduce(parts.depth, op=MPI.MAX)
-    return Coupling(*jumps, weight, normal, gap, positive_part, covered[kept], depth)
+    depth = owners.comm.allreduce(float(parts.depths.max(initial=0.0)), op=MPI.MAX)
+    # A corner within a long facet leaves the mean gaps at the nodes of that above 0.
+    pressed = owners.among(nodes[gap < -RESOLVED * depth], parts.dual_nodes.ravel())
+    missed = (parts.depths > depth / 2) & ~np.isin(parts.dual_nodes, pressed).any(axis=1)
+    resolved = not owners.comm.allreduce(bool(missed.any()), op=MPI.LOR)
+    return Coupling(*jumps, weight, normal, gap, positive_part, covered[kept], depth, resolved)

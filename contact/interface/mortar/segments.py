@@ -100,9 +100,9 @@ class Points:
         Quadrature weights, lengths or areas on the slave facet, or of its rings, shape (p,).
     gap
         Distance from the slave to the master facet along the slave's direction, shape (p,).
-    clear
-        Upper bound of it, of the facets or of the surfaces that they approximate, shape (p,):
-        below 0 the bodies overlap.
+    depth
+        Of the deepest overlap on each slave facet, of facets and of the surfaces that they
+        approximate, shape (f,) (length).
     """
 
     slave: NDArray[np.intp]
@@ -111,7 +111,7 @@ class Points:
     on_master: Array
     weight: Array
     gap: Array
-    clear: Array
+    depth: Array
 
 
 def common_points(
@@ -162,14 +162,19 @@ def common_points(
     for sign, side, facets, at, _ in sides:
         bounds = side.distance_bounds(facets[there], at[cut], direction[i[there]])
         most += np.maximum(*(sign * bound for bound in bounds))
-    clear[cut] += np.maximum(most, 0.0)
+    across = np.einsum("pd,pd->p", slave.normal[i[there]], direction[i[there]])
+    depth = np.zeros(slave.count)
+    np.maximum.at(depth, i[there], -(clear[cut] + np.maximum(most, 0.0)) * across)
+    bears = weight != 0
+    pair, on_slave, on_master = pair[bears], on_slave[bears], on_master[bears]
+    weight, gap = weight[bears], gap[bears]
     gradients, d = slave.shape.gradients(slave.order, on_slave), slave.shape.dim
     slopes, turned = slave.slopes(i[pair], on_slave), _slopes(gradients, own[pair, :, :d])
     size = np.linalg.norm(area_vectors(slopes), axis=1) / np.abs(determinant(turned))
     if slave.revolved:
         functions = slave.shape.lagrange(slave.order, on_slave)
         size *= 2 * np.pi * np.einsum("pk,pk->p", functions, slave.points[i[pair], :, 0])
-    return Points(i[pair], j[pair], on_slave, on_master, weight * size, gap, clear)
+    return Points(i[pair], j[pair], on_slave, on_master, weight * size, gap, depth)
 
 
 def _on_planes(
@@ -210,7 +215,7 @@ def _pieces(side: Surface, nodes: Array) -> Array:
 
 
 def _common(own: Array, other: Array, degree: int) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return the pair, point and weight of each point of a rule on the common parts of facets."""
+    """Return pair, point and weight of the points of a rule, and of corners, on common parts."""
     first, second = own[:, :, None], other[:, None]
     low = np.maximum(first.min(axis=3), second.min(axis=3))
     high = np.minimum(first.max(axis=3), second.max(axis=3))
@@ -226,7 +231,10 @@ def _common(own: Array, other: Array, degree: int) -> tuple[NDArray[np.intp], Ar
         pair, part = pair[row], polygon[row[:, None], np.stack([0 * k, k + 1, k + 2], axis=1)]
     size = np.abs(determinant(jacobians(shape, part, shape.middle)[:, 0]))
     large = size > ROUNDING
+    # Corners have no weight: the gap of straight facets is least there.
     at, weights = rule(shape, degree)
+    at = np.concatenate([at, shape.nodes(1)])
+    weights = np.append(weights, np.zeros(shape.corners))
     y = shape.lagrange(1, at) @ part[large]
     weight = size[large][:, None] * weights
     return np.repeat(pair[large], weights.size), y.reshape(-1, shape.dim), weight.ravel()
