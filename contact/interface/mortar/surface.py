@@ -330,6 +330,10 @@ class Surface:
         if self.refined:
             return np.minimum(least, most), np.maximum(least, most)
         known, slack = self.distance(facets, at, direction), np.abs(most - least) / 2
+        if self.order == 1:
+            # An error of third order is largest beside the middle, up to four times the bubble.
+            most = DOUBT * self.unknown[facets].sum(axis=1) / np.abs(rise)
+            slack = np.maximum(slack, np.minimum(4 * slack, most))
         return known - slack, known + slack
 
     @property
