@@ -331,9 +331,10 @@ class Surface:
             return np.minimum(least, most), np.maximum(least, most)
         known, slack = self.distance(facets, at, direction), np.abs(most - least) / 2
         if self.order == 1:
-            # An error of third order is largest beside the middle, up to four times the bubble.
+            # An error of third order is largest beside the middle, up to four times the bubble;
+            # spheres have one.
             most = DOUBT * self.unknown[facets].sum(axis=1) / np.abs(rise)
-            slack = np.maximum(slack, np.minimum(4 * slack, most))
+            slack = np.maximum(self.shape.dim * slack, np.minimum(4 * slack, most))
         return known - slack, known + slack
 
     @property
