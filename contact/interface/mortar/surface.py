@@ -27,7 +27,7 @@ from contact.mesh.geometry import (
 )
 from contact.mesh.owners import ALONE, Owners
 from contact.ranks import exchanged
-from contact.tolerances import NEGLIGIBLE
+from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 
 #: Share of each mid-edge function that goes to the two vertices of a quadratic triangle.
@@ -261,7 +261,7 @@ class Surface:
         if not self.shape.simplex:
             # Between opposite edges the arcs of both, in proportion.
             along = functions[:, first] + functions[:, second]
-            products /= np.where(along != 0, along, 1.0) ** 2
+            products /= np.where(np.abs(along) > ROUNDING, along, 1.0) ** 2
         return along, products
 
     def reconstructed(self, values: Array) -> tuple[NDArray[np.int64], Array]:
