@@ -335,7 +335,7 @@ class _Runner:
     def _settings(self, case: Case) -> Options:
         """Return the method's options: the factorisation of a case may serve the next one."""
         if self._warm and isinstance(case.solver, NewtonOptions):
-            return case.solver.model_copy(update={"keep": "across"})
+            return case.solver.model_copy(update={"reuse": "across"})
         return case.solver
 
     def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:

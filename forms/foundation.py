@@ -59,14 +59,14 @@ def penalty_friction(u_frozen: Expr, u: Expr, v: Expr, nu: Expr, bound: Expr, ep
 
 
 def compliance(
-    u: Expr, v: Expr, nu: Expr, p_nu: Law, h_nu: Law, gap: Expr, difference: Value
+    u: Expr, v: Expr, nu: Expr, p_nu: Law, h_nu: Law, rho_0: Expr, difference: Value
 ) -> Expr:
-    """Return h_nu(phi - phi_F) p_nu(u_nu - rho_0) v_nu, with `gap` = rho_0.
+    """Return h_nu(phi - phi_F) p_nu(u_nu - rho_0) v_nu.
 
     The form j_1, (6.12), has the rho of the constraint. Here rho_0 is rho less the thickness of the
     layer, which is thus pressed before the rigid part.
     """
-    return h_nu(difference) * p_nu(normal_part(u, nu) - gap) * normal_part(v, nu)
+    return h_nu(difference) * p_nu(normal_part(u, nu) - rho_0) * normal_part(v, nu)
 
 
 def electric_contact(

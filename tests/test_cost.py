@@ -256,11 +256,11 @@ SEEN: dict[str, tuple[Counted, tuple[int, int, int]]] = {
     "fine bar that yields": (of_case(bar_case(32)), (6, 2, 11)),
     "fine bar that yields, nested": (of_case(bar_case(32, "solver.nested=true")), (8, 1, 10)),
     **{
-        f"bar that yields at {strain}, a tangent is kept {keep}": (
-            by_newton(lambda strain=strain: yielding(yield_strain=strain), keep=keep),
+        f"bar that yields at {strain}, a tangent is reused {reuse}": (
+            by_newton(lambda strain=strain: yielding(yield_strain=strain), reuse=reuse),
             seen,
         )
-        for strain, keep, seen in [
+        for strain, reuse, seen in [
             (0.02, "never", (4, 4, 8)),
             (0.02, "within", (8, 2, 14)),
             (0.004, "never", (8, 8, 21)),

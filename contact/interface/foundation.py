@@ -41,22 +41,22 @@ class NormalGraph:
         Penetration law.
     stiffness
         h_nu, frozen, shape (n,).
-    touch, gap
+    rho_0, gap
         rho_0 and rho, gaps at which layer and rigid part are touched, shape (n,).
     """
 
     p_nu: PenetrationLaw
     stiffness: Array
-    touch: Array
+    rho_0: Array
     gap: Array
 
     def layer(self, u_n: Array) -> Array:
         """Return the pressure of the layer, by its law also where an iterate exceeds rho."""
-        return self.stiffness * self.p_nu(u_n - self.touch)
+        return self.stiffness * self.p_nu(u_n - self.rho_0)
 
     def layer_slope(self, u_n: Array) -> Array:
         """Return the derivative of `layer`; at the first touch that of the pressed layer."""
-        s = u_n - self.touch
+        s = u_n - self.rho_0
         return self.stiffness * self.p_nu.derivative(np.where(s == 0, TINY, s))
 
     def pressure(self, z: Array, r: float) -> Array:
@@ -64,7 +64,7 @@ class NormalGraph:
 
         It is (3.43) with a layer, and unique for any r > 0 above the slope of a falling p_nu.
         """
-        low, high = self.touch, np.minimum(self.gap, z / r)
+        low, high = self.rho_0, np.minimum(self.gap, z / r)
         u_n, layer, steep = high, self.layer(high), self.layer_slope(high)
         free, rigid = z <= r * low, z - r * self.gap >= layer
         done = free | rigid
@@ -72,7 +72,7 @@ class NormalGraph:
         for sweep in range(90):
             excess, slope = r * u_n + layer - z, r + steep
             # Below this the excess is rounding in u_n.
-            rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(u_n) + np.abs(self.touch)))
+            rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(u_n) + np.abs(self.rho_0)))
             done |= np.abs(excess) <= rounding
             if np.all(done):
                 break
@@ -92,7 +92,7 @@ class NormalGraph:
     def pressure_slope(self, z: Array, r: float) -> Array:
         """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
         high = np.minimum(self.gap, z / r)
-        free, rigid = z <= r * self.touch, z - r * self.gap >= self.layer(high)
+        free, rigid = z <= r * self.rho_0, z - r * self.gap >= self.layer(high)
         slope = self.layer_slope(self.displacement(z, r))
         return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))
 
@@ -145,8 +145,8 @@ class FoundationLaw:
         return np.where(rigid, self.nodes.gap, np.inf)
 
     @property
-    def touch(self) -> Array:
-        """The gap rho_0 of the layer's first touch, shape (n,)."""
+    def rho_0(self) -> Array:
+        """Gap at which the layer is touched first, rho less its thickness, shape (n,)."""
         assert self.layer is not None
         depth = self.layer.thickness
         return self.nodes.gap - np.where(np.isfinite(depth), depth, 0.0)
@@ -208,7 +208,7 @@ class FoundationLaw:
             return None
         stiffness = np.broadcast_to(self.layer.h_nu(self._difference(jump)), jump.shape[:1])
         gap = self.signorini_gap
-        return NormalGraph(self.layer.p_nu, stiffness, self.touch, gap)
+        return NormalGraph(self.layer.p_nu, stiffness, self.rho_0, gap)
 
     def _difference(self, jump: Array) -> Array:
         """Return phi - phi_F at the nodes; 0 for a body without potential."""
@@ -250,7 +250,7 @@ class FoundationLaw:
     def _layer_penetration(self, jump: Array) -> Array:
         """Return the penetration of the layer, min(u_nu, gap) - rho_0, shape (n,)."""
         # An iterate may go beyond the rigid part; the excess pressure belongs to the multiplier.
-        return np.minimum(self.nodes.normal_component(jump), self.signorini_gap) - self.touch
+        return np.minimum(self.nodes.normal_component(jump), self.signorini_gap) - self.rho_0
 
     def charge(self, jump: Array, pressure: Array) -> Array:
         """Return D.nu = psi phi_L(phi - phi_F) at the nodes; nodes with `pressure` are closed."""

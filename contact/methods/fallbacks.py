@@ -181,7 +181,7 @@ def all_open(newton: SemismoothNewton) -> State | None:
 
 
 def working_set(newton: SemismoothNewton, without_contact: State | None) -> End | None:
-    """Return a solution with all nodes open, or by a working set, if any. Collective.
+    """Return the solution with all nodes open, or that of `dual_active_set`, if any. Collective.
 
     Active sets may cycle on contact forces that are rounding.
 

@@ -176,7 +176,7 @@ class Newton:
         self._step = self._newton_step(problem, options, self.counters)
         self._condenses = options.condense and condensable(problem, options.linear)
         self._pays = self._condenses and condensation_pays(problem, options.linear)
-        self._chord = Chord(options.tolerance, MOST_STEPS if options.keep != "never" else 0.0)
+        self._chord = Chord(options.tolerance, MOST_STEPS if options.reuse != "never" else 0.0)
         #: The condensed body; None before the first condensed step.
         self.condensation: Condensation | None = None
         self.set_load_step(problem)
@@ -211,7 +211,7 @@ class Newton:
         """Iterate until convergence or the limit; the best iterate on failure; see `Method`."""
         whole, problem, body = self.whole, self.problem, self.problem.body
         self.recorder.begin = time.perf_counter()
-        if self.options.keep != "across":
+        if self.options.reuse != "across":
             self._chord.drop()
         begin = problem.start() if start is None else whole.started(start)
         if body.linear:

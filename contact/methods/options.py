@@ -150,8 +150,8 @@ class NewtonOptions(Options):
     condense: Internal[bool] = True
     """Whether to condense the linearised body onto the contact nodes where that pays: one step
     then solves the whole contact problem for a linear body."""
-    keep: Internal[Literal["never", "within", "across"]] = "within"
-    """Whether to keep the factorisation of a condensed body while that costs less than new
+    reuse: Internal[Literal["never", "within", "across"]] = "within"
+    """Whether to reuse the factorisation of a condensed body while that costs less than new
     ones: within a solve, which then does not depend on those before, or across solves too."""
 
 

@@ -333,7 +333,7 @@ def hencky(hardening: float) -> UserLaw:
 def newton(report: Report) -> None:
     """Make the table of Newton's residuals with friction, each iteration with a tangent."""
     case = block("j2", evolution={"times": [0.0, 1.0, 2.0, 2.5], "steps": [2, 2, 1]})
-    solution = solve(case, NewtonOptions(tolerance=1e-12, keep="never", condense=False))
+    solution = solve(case, NewtonOptions(tolerance=1e-12, reuse="never", condense=False))
     assert solution.converged, solution.outcome.reason
     found: dict[str, list[float]] = {}
     for record in solution.history:
@@ -371,8 +371,8 @@ def cost(report: Report, coarse: bool) -> None:
     )  # fmt: skip
     for degree, cells in ((2, 8),) if coarse else ((2, 24), (1, 64)):
         mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [2 * cells, cells]}
-        for words, keep in (("few (chord steps)", "within"), ("each iteration", "never")):
-            settings, hencky_takes = NewtonOptions(keep=keep), np.nan
+        for words, reuse in (("few (chord steps)", "within"), ("each iteration", "never")):
+            settings, hencky_takes = NewtonOptions(reuse=reuse), np.nan
             for name, parameters in HARDENINGS.items():
                 given, law = ("j2", None) if parameters else ("linear", hencky(4e3))
                 more = {"material": {**STEEL, **parameters}} if parameters else {}

@@ -1,4 +1,4 @@
-"""A factorisation that is kept while the material moves on."""
+"""A factorisation that is reused while the material moves on."""
 
 from dataclasses import replace
 
@@ -30,8 +30,8 @@ def yielding(load: float = -0.03, yield_strain: float = 0.02) -> ContactProblem:
 @pytest.mark.parametrize("yield_strain", [0.02, 0.004])
 def test_it_changes_nothing(yield_strain):
     problem = yielding(yield_strain=yield_strain)
-    always, kept = (newton(problem, keep=k) for k in ("never", "within"))
-    one, other = always.state, kept.state
+    always, chord = (newton(problem, reuse=k) for k in ("never", "within"))
+    one, other = always.state, chord.state
     assert np.allclose(one.x, other.x, rtol=0, atol=1e-8 * np.abs(one.x).max())
     assert np.allclose(one.forces.pressure, other.forces.pressure, rtol=0, atol=1e-8)
 
@@ -39,7 +39,7 @@ def test_it_changes_nothing(yield_strain):
 def followed() -> tuple[Newton, list[Counters]]:
     """Return the method after loads that follow each other, and the counts of each of them."""
     method, start, counts = (
-        Newton(yielding(), NewtonOptions(tolerance=1e-10, keep="across")),
+        Newton(yielding(), NewtonOptions(tolerance=1e-10, reuse="across")),
         None,
         [],
     )
@@ -76,25 +76,25 @@ def test_a_body_that_flies_away_is_not_said_to_be_free():
 def begun(reached: float) -> tuple[Chord, State]:
     """Return the rule after one step with a new factorisation, which led to a residual."""
     state = yielding().start()
-    kept = Chord(1e-8, 10.0)
-    iterate, keep = kept.choose(state, 1.0)
-    assert not keep
-    kept.note_factorisation()
-    iterate, keep = kept.choose(state, reached)
-    assert keep
-    return kept, iterate
+    chord = Chord(1e-8, 10.0)
+    iterate, reuse = chord.choose(state, 1.0)
+    assert not reuse
+    chord.note_factorisation()
+    iterate, reuse = chord.choose(state, reached)
+    assert reuse
+    return chord, iterate
 
 
 @pytest.mark.parametrize(("rate", "keeps"), [(0.1, True), (0.5, False)])
 def test_it_is_kept_as_long_as_that_is_fast(rate, keeps):
-    kept, iterate = begun(1e-3)
-    assert kept.choose(replace(iterate), 1e-3 * rate)[1] is keeps
+    chord, iterate = begun(1e-3)
+    assert chord.choose(replace(iterate), 1e-3 * rate)[1] is keeps
 
 
 def test_a_step_that_makes_things_worse_is_taken_back():
-    kept, iterate = begun(1e-3)
-    again, keep = kept.choose(replace(iterate), 2e-3)
-    assert again is iterate and not keep
+    chord, iterate = begun(1e-3)
+    again, reuse = chord.choose(replace(iterate), 2e-3)
+    assert again is iterate and not reuse
 
 
 @pytest.mark.parametrize("name", ["yielding-0", "yielding-1"])

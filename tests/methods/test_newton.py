@@ -98,7 +98,7 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
 def test_the_last_steps_square_the_residual():
     law = Log(1.0, 0.3, yield_strain=0.01)
     problem = mechanics.bar(SELF, 16, -0.02, law=law, friction=Friction(ConstantCoefficient(0.4)))
-    records = newton(problem, tolerance=1e-12, keep="never").history
+    records = newton(problem, tolerance=1e-12, reuse="never").history
     before, after = records[-2].residuals.largest, records[-1].residuals.largest
     # gamma leaves 1e-4 of the interface residual, the material's part is squared
     assert after < max(2e-4 * before, 1e-13)

@@ -103,7 +103,7 @@ def test_methods_agree(hardening, degree):
     given, found = block(hardening, cells=4, degree=degree), {}
     for name, options in {
         "condensed": NewtonOptions(),
-        "no chord steps": NewtonOptions(keep="never"),
+        "no chord steps": NewtonOptions(reuse="never"),
         "whole": NewtonOptions(condense=False),
         "uzawa": FixedPointOptions(max_outer=500),
     }.items():

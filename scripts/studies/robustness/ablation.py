@@ -349,7 +349,7 @@ LINEAR = (
            (("nested", False),), _own("pulled-strip")),
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
            _block),
-    Device("chord steps", (Chord,), "Kelley 1995", (), (("keep", "never"),), _plane),
+    Device("chord steps", (Chord,), "Kelley 1995", (), (("reuse", "never"),), _plane),
     Device("static condensation", (Newton._condensed_steps,), "Guyan 1965", (),
            (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
