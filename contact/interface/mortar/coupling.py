@@ -375,7 +375,9 @@ def _assembled(
     jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
     depth = owners.comm.allreduce(float(parts.depths.max(initial=0.0)), op=MPI.MAX)
     # A corner within a long facet leaves the mean gaps at the nodes of that above 0.
-    pressed = owners.among(nodes[gap < -RESOLVED * depth], parts.dual_nodes.ravel())
+    # That of a node beyond the corner, on a facet covered in part, is extrapolated.
+    within = (gap < -RESOLVED * depth) & (gap > -2 * depth)
+    pressed = owners.among(nodes[within], parts.dual_nodes.ravel())
     missed = (parts.depths > depth / 2) & ~np.isin(parts.dual_nodes, pressed).any(axis=1)
     resolved = not owners.comm.allreduce(bool(missed.any()), op=MPI.LOR)
     return Coupling(*jumps, weight, normal, gap, positive_part, covered[kept], depth, resolved)
