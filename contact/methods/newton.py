@@ -203,7 +203,7 @@ class Newton:
     @property
     def state(self) -> State:
         """The state after the last step."""
-        return self.whole.at
+        return self.whole.last
 
     def solve(
         self, start: State | None = None, secant_at: Array | None = None
@@ -221,7 +221,7 @@ class Newton:
         whole.begin(begin)
         condensed = self._condensed_steps if self._condenses else None
         state, outcome = solve_contact(whole, begin, secant_at, condensed, self._pays)
-        whole.at = state
+        whole.last = state
         return state, outcome
 
     def _condensed_steps(

@@ -50,7 +50,7 @@ class SemismoothNewton:
 
     Attributes
     ----------
-    at, best
+    last, best
         Last iterate, and iterate of least residual.
     """
 
@@ -68,7 +68,7 @@ class SemismoothNewton:
 
     def begin(self, state: State) -> None:
         """Begin a solve from an initial guess."""
-        self.at = state
+        self.last = state
         self.best: Best[State] = Best()
 
     @property
@@ -78,7 +78,7 @@ class SemismoothNewton:
 
     def see(self, state: State, residuals: Residuals) -> None:
         """Keep an iterate as the last one, and as the best one if it is."""
-        self.at = state
+        self.last = state
         self.best.see(state, residuals.significant)
 
     def on(self, problem: AnyProblem) -> SemismoothNewton:

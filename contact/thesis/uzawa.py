@@ -172,19 +172,19 @@ class FrozenProblem:
         return self.interface.nodes
 
     @cached_property
-    def at(self) -> Array:
+    def jump_0(self) -> Array:
         """u_0 at the contact nodes, shape (n, block size)."""
         return self.nodes.jump(self.state.x)
 
     @cached_property
     def layer(self) -> NormalGraph | None:
         """The layer, within the constraint; None without one."""
-        return self.interface.foundation.normal_graph(self.at)
+        return self.interface.foundation.normal_graph(self.jump_0)
 
     @cached_property
     def origin(self) -> Array:
         """Augmentation r u_0, tangentially that of the slip, shape (n, 1 + d)."""
-        return self.r * displacement_and_slip(self.interface, self.at, self.friction)
+        return self.r * displacement_and_slip(self.interface, self.jump_0, self.friction)
 
     @cached_property
     def _load(self) -> Array:
@@ -192,7 +192,7 @@ class FrozenProblem:
         residual = residual_forces(self.problem, self.state, self.secant_at)
         contact = self.state.forces.vectors(self.nodes)
         if self.layer is not None:
-            contact += self.interface.foundation.pressure(self.at)[:, None] * self.nodes.normal
+            contact += self.interface.foundation.pressure(self.jump_0)[:, None] * self.nodes.normal
         self._add(-contact, residual)
         return -residual
 
@@ -340,7 +340,7 @@ def uzawa_block_relaxation(
         load = frozen.displacement_load(multipliers, z)
         increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.jump(increment)
-        jump, r_u = frozen.at + moved, frozen.augmented(moved)
+        jump, r_u = frozen.jump_0 + moved, frozen.augmented(moved)
         # The contact stress of this solve, in equilibrium with u.
         stress = 2 * multipliers - z + r_u
         if iteration == 1:

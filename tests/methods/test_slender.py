@@ -221,8 +221,8 @@ def test_a_beam_with_many_contact_nodes_takes_the_sparse_interior_point(mu):
     case = parse_case(beam(100.0, [600, 2], UNIFORM, 0.5, mu))
 
     def none(newton, *_):
-        residuals = evaluate(newton.problem, newton.at)
-        return newton.at, Outcome(residuals, newton.options.allowed, "no interior point")
+        residuals = evaluate(newton.problem, newton.last)
+        return newton.last, Outcome(residuals, newton.options.allowed, "no interior point")
 
     sparse = solve(case, comm=SELF)
     whole = fallbacks.interior_point

@@ -91,8 +91,8 @@ def _nothing(*_: Any, **__: Any) -> None:
 
 
 def _no_fallback(method: Any, *_: Any) -> tuple[Any, Outcome]:
-    residuals = evaluate(method.problem, method.at)
-    return method.at, Outcome(residuals, method.options.allowed, "no interior point")
+    residuals = evaluate(method.problem, method.last)
+    return method.last, Outcome(residuals, method.options.allowed, "no interior point")
 
 
 def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
