@@ -50,6 +50,15 @@ def test_threads_under_mpi_only_where_the_user_set_none(launcher):
     assert launcher.run("sh", "-c", "echo ${OMP_NUM_THREADS-unset}")[1] == "unset\n"
 
 
+def test_ranks_of_mpich_that_wait_give_way(launcher):
+    launcher.fake("python3")
+    launcher.fake("mpirun", "echo 'HYDRA build details:'")
+    count = "MPIR_CVAR_CH4_PROGRESS_THROTTLE_NO_PROGRESS_COUNT"
+    words = ["sh", "-c", f"echo $MPIR_CVAR_CH4_PROGRESS_THROTTLE ${count}"]
+    assert launcher.run(*words)[1] == "1 1\n"
+    assert launcher.run(*words, **{count: "9"})[1] == "1 9\n"
+
+
 @pytest.mark.parametrize(
     ("version", "scalar", "reason"),
     [
@@ -102,11 +111,11 @@ def test_makes_the_place_once_and_passes_the_status(launcher, place):
 
 
 def test_a_second_start_waits_for_the_first(launcher, place):
-    first = launcher.start("true", FAKE_SECONDS="2")
-    while launcher.calls() == 0:
-        time.sleep(0.05)
-    status, _, err = launcher.run("true")
-    assert (status, first.wait(), launcher.calls()) == (0, 0, 1)
+    with launcher.start("true", FAKE_SECONDS="2") as first:
+        while launcher.calls() == 0:
+            time.sleep(0.05)
+        status, _, err = launcher.run("true")
+    assert (status, first.returncode, launcher.calls()) == (0, 0, 1)
     assert "waiting for it" in err
 
 
@@ -119,11 +128,11 @@ def test_nothing_is_left_of_a_failure(launcher, place):
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_nothing_is_left_of_an_interrupt(launcher, place, number, status):
-    process = launcher.start("true", FAKE_SECONDS="20")
-    while launcher.calls() == 0:
-        time.sleep(0.05)
-    process.send_signal(number)
-    assert process.wait(timeout=10) == status
+    with launcher.start("true", FAKE_SECONDS="20") as process:
+        while launcher.calls() == 0:
+            time.sleep(0.05)
+        process.send_signal(number)
+        assert process.wait(timeout=10) == status
     assert launcher.places() == []
     assert launcher.run("true")[0] == 0
 
