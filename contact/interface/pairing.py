@@ -154,9 +154,14 @@ def find_pair(
     master = surface_of(body.domain, body.space, against)
     _refuse_shared(slave, master, label)
     reach = REACH * body.domain.size
-    found = couple(slave, master, reach)
-    no_multiplier = _without_multiplier(body, slave, found, label, part if friction else None)
-    if body.comm.allreduce(no_multiplier.size, op=MPI.SUM) > 0:
+    found, no_multiplier = couple(slave, master, reach), np.empty(0, dtype=np.int64)
+    while True:
+        lost = _without_multiplier(body, slave, found, label, part if friction else None)
+        new = np.setdiff1d(lost, no_multiplier)
+        if body.comm.allreduce(new.size, op=MPI.SUM) == 0:
+            break
+        # With the functions of these given to their neighbours, others may face the master.
+        no_multiplier = np.union1d(no_multiplier, new)
         found = couple(slave, master, reach, no_multiplier)
     if body.comm.allreduce(found.nodes.size, op=MPI.SUM) == 0:
         depth = couple(slave, master, np.inf).depth
