@@ -154,7 +154,8 @@ def find_pair(
     master = surface_of(body.domain, body.space, against)
     _refuse_shared(slave, master, label)
     reach = REACH * body.domain.size
-    found, no_multiplier = couple(slave, master, reach), np.empty(0, dtype=np.int64)
+    found = couple(slave, master, reach)
+    no_multiplier: NDArray[np.int64] = np.empty(0, dtype=np.int64)
     while True:
         lost = _without_multiplier(body, slave, found, label, part if friction else None)
         new = np.setdiff1d(lost, no_multiplier)
