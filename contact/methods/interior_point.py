@@ -359,7 +359,9 @@ def interior_point(
             jump
         ):
             break
-        if modes.overloaded(bound):
+        # Pressures out of balance with the loads may be larger by that share, and so friction.
+        missing = modes.missing_pressure(interface.pressure(jump, state.forces))
+        if np.isfinite(missing) and modes.overloaded((1 + missing) * bound):
             outcome = replace(outcome, residuals=evaluate(problem, state))
             last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
             break

@@ -32,6 +32,7 @@ from contact.problem.rigid_modes import (
     Group,
     constrained_by_supports,
     groups,
+    missing_pressure,
     null_space,
     sliding_mode,
 )
@@ -108,6 +109,12 @@ class UnconstrainedModes:
         friction, time = self.problem.nodes.weight * bound, self.problem.time
         found = [sliding_mode(group, time, friction) for group in self._unsupported]
         return any(mode is not None for mode in found)
+
+    def missing_pressure(self, pressure: Array) -> float:
+        """Return the share by which pressures (n,) miss the loads. Collective."""
+        forces, time = self.problem.nodes.weight * pressure, self.problem.time
+        found = [missing_pressure(group, time, forces) for group in self._unsupported]
+        return max(found, default=0.0)
 
     @cached_property
     def _unsupported(self) -> list[Group]:

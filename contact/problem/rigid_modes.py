@@ -502,6 +502,31 @@ def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
     return on_root(problem.comm, found)
 
 
+def missing_pressure(group: Group, time: float, pressing: Array) -> float:
+    """Return the share by which contact forces miss the loads of a time without slip. Collective.
+
+    On rigid motions that no friction resists.
+
+    Parameters
+    ----------
+    group, time
+        The bodies, and the time.
+    pressing
+        Contact forces at the nodes of this rank, shape (n,) (force).
+    """
+    problem, free = group.problem, null_space(group.supports)
+    work, scale = _work(group, free, time)
+    slipless = free @ null_space(
+        _gram(problem, group.tangential[np.isfinite(problem.nodes.gap)] @ free)
+    )
+    normal = group.normal @ slipless
+    resisted, most = problem.comm.allreduce(
+        np.stack([pressing @ normal, pressing @ np.abs(normal)]), op=MPI.SUM
+    )
+    missing = np.abs(slipless.T @ free @ work - resisted)
+    return float(np.max(missing / np.maximum(most, BALANCED * scale), initial=0.0))
+
+
 def _most_power(
     work: Array, normal: Array, tangential: Array, bound: Array, along: list[Array]
 ) -> Array | None:

@@ -205,8 +205,9 @@ def not_held(solution: Solution) -> Iterator[Remark]:
     if solution.converged:
         return
     for group in groups(problem):
-        motion = None
+        motion, by = None, "contact and friction"
         if solution.outcome.overloaded:
+            by = "the friction of the pressures that were found"
             bound = problem.nodes.weight * solution.friction_bound
             motion = sliding_mode(group, time, bound)
         elif (support := UnilateralSupport.of(group)) is not None:
@@ -217,7 +218,7 @@ def not_held(solution: Solution) -> Iterator[Remark]:
         large = np.abs(motion) > 0.1 * np.abs(motion).max()
         words = ", ".join(dict.fromkeys(np.array(group.names)[large].tolist()))
         yield (
-            f"contact and friction cannot hold {_named(group, motion[:, None])} ({words}), by "
+            f"{by} cannot hold {_named(group, motion[:, None])} ({words}), by "
             "limit analysis; accepted: supports, more friction, or a load that presses it"
         )
 

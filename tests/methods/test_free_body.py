@@ -187,7 +187,7 @@ def test_a_block_that_jaws_touch_aslant_is_said_to_fall(weight, tmp_path):
     solution = solve(between_jaws(tmp_path, weight), comm=MPI.COMM_SELF)
     assert not solution.converged
     (said,) = [text for text in solution.warnings if "[not-held]" in text]
-    assert "contact and friction cannot hold m (" in said
+    assert "cannot hold m (" in said
     assert "translation along y" in said
 
 

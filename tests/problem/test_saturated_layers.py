@@ -10,6 +10,7 @@ from mpi4py import MPI
 from contact import Body, Contact, Fixed, Layer, Linear, Load, Problem
 from contact.case.file import parse_case
 from contact.errors import InputError
+from contact.methods import fallbacks
 from contact.problem.checks import check_rigid_modes
 from contact.solving import build_problem, solve
 from forms.laws import PotentialFactor
@@ -176,6 +177,27 @@ def test_a_load_aside_tilts_a_block_until_the_layer_is_saturated_there():
     assert solution.converged, solution.outcome.reason
     assert solution.contact_force[1] == pytest.approx(-2 * LARGEST * 0.6, rel=1e-6)
     assert solution.pressure.max() == pytest.approx(LARGEST, rel=1e-9)
+
+
+def pulled(kind: str, height: float, share: float, part: float, **more) -> dict:
+    """Return a block on the layer that a part of the largest friction, 0.3 F, pulls along it."""
+    case = block(kind, 0.0, mu=0.3, fixed=[], **more)
+    size = [4.0, height] if kind == "plane" else [4.0, 2.0, height]
+    cells = [16, 4 if height == 1.0 else 2] if kind == "plane" else [8, 4, 2]
+    across = [0.0] * (len(size) - 2)
+    case["mesh"] |= {"size": size, "cells": cells}
+    case["material"]["poisson"] = 0.3
+    down = share * LARGEST
+    case["load"] = [{"on": "top", "traction": [part * 0.3 * down, *across, -down]}]
+    return case
+
+
+def test_pressures_out_of_balance_prove_no_sliding(monkeypatch):
+    """Pressures of half the load bound friction to half: "cannot hold the body" was false."""
+    monkeypatch.setattr(fallbacks, "layer_secants", lambda _: None)
+    lost = solve(parse_case(pulled("plane", 1.0, 0.53, 0.9)), comm=SELF)
+    assert not lost.converged and not lost.outcome.overloaded
+    assert not any("[not-held]" in text for text in lost.warnings)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.95])
