@@ -348,7 +348,8 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     p_nu(s)/s of the last iterate (it is positive). Newton's method takes the last steps, where the
     forces nearly balance, and once from each set of regimes (open, below saturation, saturated)
     that a secant leaves unchanged: supports that bear little bring the load to balance slowly.
-    After a failure that is not the layer's, the first problems are not solved either.
+    Proximal points solve the bed's problem where friction alone holds the body along it. After a
+    failure that is not the layer's, the first problems are not solved either.
     """
     problem, interface = newton.problem, newton.problem.interface
     foundation, near = interface.foundation, NEARLY_BALANCED
@@ -364,7 +365,10 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
         method = newton.on(problem.with_interface(replace(interface, foundation=bed)))
         state, outcome = method.iterate(state, note=SECANT)
         if not outcome.converged:
-            return None
+            held = proximal_points(method)
+            if held is None:
+                return None
+            state = held[0]
         jump = interface.nodes.jump(state.x)
         before, regimes = regimes, foundation.regimes(jump)
         changed, untried = (

@@ -192,6 +192,26 @@ def pulled(kind: str, height: float, share: float, part: float, **more) -> dict:
     return case
 
 
+@pytest.mark.core
+@pytest.mark.parametrize(
+    ("height", "share", "part"),
+    [(1.0, 0.53, 0.9), (1.0, 0.8, 0.97), (0.2, 0.53, 0.9), (0.2, 0.93, 0.97)],
+)
+@pytest.mark.parametrize("kind", ["plane", "solid"])
+def test_friction_alone_holds_a_block_along_the_layer(kind, height, share, part):
+    """The elastic bed of the first secant was not solved: the block slid by 1e12."""
+    solutions = [
+        solve(parse_case(pulled(kind, height, share, part, solver={"method": method})), comm=SELF)
+        for method in ("newton", "uzawa")
+    ]
+    for solution in solutions:
+        assert solution.converged, solution.outcome.reason
+    newton, uzawa = solutions
+    down = share * LARGEST * (4.0 if kind == "plane" else 8.0)
+    assert newton.contact_force[[0, -1]] == pytest.approx([part * 0.3 * down, -down], rel=1e-6)
+    assert newton.max_displacement == pytest.approx(uzawa.max_displacement, rel=1e-4)
+
+
 def test_pressures_out_of_balance_prove_no_sliding(monkeypatch):
     """Pressures of half the load bound friction to half: "cannot hold the body" was false."""
     monkeypatch.setattr(fallbacks, "layer_secants", lambda _: None)
