@@ -179,15 +179,20 @@ def find_pair(
             "pair",
         )
     _check_apart(body, found, slave.owners, label)
-    if found.depth > TOUCHING * body.domain.size and not (press and found.resolved):
-        # Nodes of the master may be between the directions of two slave facets.
-        depth = max(found.depth, couple(master, slave, reach).depth)
-        _refuse_overlap(body, found, depth, slave.owners, label)
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     _, local = owned_among(body.layout.index_map, found.nodes)
     points = body.space.tabulate_dof_coordinates()[local, : body.dim]
     _, added = measured(distance, points, found.normal, body.comm, key)
     check_gap(body.domain, added, key)
+    rounding = TOUCHING * body.domain.size
+    depth, resolved = found.interference(slave.owners, added)
+    resolved |= depth <= rounding
+    if found.depth > rounding and not press:
+        # Nodes of the master may be between the directions of two slave facets.
+        depth = max(found.depth, couple(master, slave, reach).depth)
+        _refuse_overlap(body, found, (depth, resolved), slave.owners, label)
+    elif not resolved:
+        _refuse_overlap(body, found, (depth, resolved), slave.owners, label)
     placement = PairPlacement(body, slave, master, reach, no_multiplier, found.nodes, added, press)
     return placement, placement.geometry(slave, master, found)
 
@@ -283,20 +288,27 @@ def _check_rim(
 
 
 def _refuse_overlap(
-    body: BodyEquilibrium, coupling: Coupling, depth: float, owners: Owners, label: str
+    body: BodyEquilibrium,
+    coupling: Coupling,
+    overlap: tuple[float, bool],
+    owners: Owners,
+    label: str,
 ) -> None:
-    """Refuse bodies that overlap in the reference configuration. Collective."""
-    if _connected(body, coupling, owners):
+    """Refuse an overlap, given its depth and whether nodes resolve it. Collective."""
+    drawn, (depth, resolved) = coupling.depth > TOUCHING * body.domain.size, overlap
+    if drawn and _connected(body, coupling, owners):
         raise InputError(
             f"{label} are sides of one body that look away from each other; accepted: parts of two "
             "bodies whose meshes are apart",
             "pair",
         )
-    way = 'overlap = "press" (in Python press=True) for an interference'
-    if not coupling.resolved:
+    drawn_way = 'overlap = "press" (in Python press=True)'
+    bodies, way = ("bodies", drawn_way) if drawn else ("bodies and the gap", "a gap below 0")
+    way += " for an interference"
+    if not resolved:
         way += ", with on and against exchanged or with shorter facets of on there"
     raise InputError(
-        f"{label}: the undeformed bodies overlap, by up to {depth:.3g} more than straight "
+        f"{label}: the undeformed {bodies} overlap, by up to {depth:.3g} more than straight "
         f"facets deviate from a curve; accepted: meshes that are apart or touch, or {way}",
         "overlap",
     )

@@ -268,6 +268,34 @@ def test_corners_are_refused(cell, element):
                 assert (0.3 if axis else 0.99) * share < told < 1.01 * share
 
 
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    "cell", [*PLANE, *(pytest.param(cell, marks=pytest.mark.slow) for cell in SPACE)]
+)
+def test_a_gap_below_0_is_refused_as_the_drawn_overlap(cell):
+    """Of corners within a facet, that touch, or are less far away; what is apart is accepted."""
+    told = []
+    for mesh, given, _ in corners(cell, 1):
+        for on, against in (("top", "sides"), ("sides", "top")):
+            drawn = Contact(on, against=against, press=True)
+            pairs = [(mesh(0.01), drawn)]
+            for share, gap in ((0.0, -0.01), (0.0, lambda x: -0.01 - 1e-5 * x[1]), (-0.02, -0.01)):
+                pairs.append((mesh(share), Contact(on, gap, against=against)))
+            reasons = []
+            for domain, contact in pairs:
+                try:
+                    Problem(domain, given, contact)
+                    reasons.append("")
+                except InputError as error:
+                    reasons.append(str(error))
+            refused = ["on and against exchanged" in reason for reason in reasons]
+            assert refused == [refused[0]] * 3 + [False] and reasons[3] == ""
+            if refused[0]:
+                told.append(float(re.search(r"by up to (\S+) more", reasons[1])[1]))
+    assert len(told) > 1
+    assert told == pytest.approx([0.01] * len(told))
+
+
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_corner_is_pressed_out_from_its_side(degree):
     """Its force is that of plain elasticity, the corner on the side that it was in."""

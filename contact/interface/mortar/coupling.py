@@ -114,7 +114,7 @@ class Parts:
     rows, columns, values
         int Phi_i (N_l o Pi): numbers of the node of Phi' and of the master's node, shape (e,).
     depths
-        Of the deepest overlap on each facet, as of `Coupling`, shape (f,) (length).
+        As of `Coupling`.
     """
 
     nodes: NDArray[np.int64]
@@ -168,7 +168,7 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
         rows,
         columns,
         values,
-        depths=np.max([np.zeros(slave.count), *(points.depth for points in found)], axis=0),
+        depths=np.max([np.full(slave.count, -np.inf), *(p.depth for p in found)], axis=0),
     )
 
 
@@ -280,8 +280,10 @@ class Coupling(JumpRows):
     depth
         Of the deepest overlap, of facets and of the surfaces that they approximate (length), on
         all ranks.
-    resolved
-        Whether slave nodes have gaps below 0 wherever the overlap is half as deep.
+    dual_nodes
+        Global numbers of the nodes of the functions Phi' on the facets of this rank, shape (f, k).
+    depths
+        Of the deepest overlap on each of these; below 0 the least distance, shape (f,) (length).
     """
 
     weight: Array
@@ -290,7 +292,43 @@ class Coupling(JumpRows):
     gap_positive_part: Array
     covered: Array
     depth: float
-    resolved: bool
+    dual_nodes: NDArray[np.int64]
+    depths: Array
+
+    def interference(self, owners: Owners, added: Array) -> tuple[float, bool]:
+        """Return the largest depth of the overlap less an added gap. Collective.
+
+        Parameters
+        ----------
+        owners
+            The owners of the nodes.
+        added
+            Gap that is added at the nodes, shape (n,) (length).
+
+        Returns
+        -------
+        The depth, and whether nodes have gaps below 0 wherever the overlap is half as deep.
+        """
+        comm = owners.comm
+        least = comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
+
+        def at(numbers: NDArray[np.int64]) -> Array:
+            """Return the gaps added at nodes of this rank, the least where there are none."""
+            found = np.full(numbers.size, least)
+            there = np.isin(numbers, self.nodes)
+            found[there] = added[np.searchsorted(self.nodes, numbers[there])]
+            return found
+
+        on_facets = owners.values(self.dual_nodes.ravel(), at).reshape(self.dual_nodes.shape)
+        depths = self.depths - on_facets.max(axis=1)
+        depth = comm.allreduce(float(depths.max(initial=0.0)), op=MPI.MAX)
+        # A corner within a long facet leaves the mean gaps at the nodes of that above 0.
+        # That of a node beyond the corner, on a facet covered in part, is extrapolated.
+        gap = self.gap + added
+        within = (gap < -RESOLVED * depth) & (gap > -2 * depth)
+        pressed = owners.among(self.nodes[within], self.dual_nodes.ravel())
+        missed = (depths > depth / 2) & ~np.isin(self.dual_nodes, pressed).any(axis=1)
+        return depth, not comm.allreduce(bool(missed.any()), op=MPI.LOR)
 
 
 def couple(
@@ -374,10 +412,5 @@ def _assembled(
     divide = sparse.diags_array(1 / weight)
     jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
     depth = owners.comm.allreduce(float(parts.depths.max(initial=0.0)), op=MPI.MAX)
-    # A corner within a long facet leaves the mean gaps at the nodes of that above 0.
-    # That of a node beyond the corner, on a facet covered in part, is extrapolated.
-    within = (gap < -RESOLVED * depth) & (gap > -2 * depth)
-    pressed = owners.among(nodes[within], parts.dual_nodes.ravel())
-    missed = (parts.depths > depth / 2) & ~np.isin(parts.dual_nodes, pressed).any(axis=1)
-    resolved = not owners.comm.allreduce(bool(missed.any()), op=MPI.LOR)
-    return Coupling(*jumps, weight, normal, gap, positive_part, covered[kept], depth, resolved)
+    state = weight, normal, gap, positive_part, covered[kept]
+    return Coupling(*jumps, *state, depth, parts.dual_nodes, parts.depths)

@@ -102,7 +102,7 @@ class Points:
         Distance from the slave to the master facet along the slave's direction, shape (p,).
     depth
         Of the deepest overlap on each slave facet, of facets and of the surfaces that they
-        approximate, shape (f,) (length).
+        approximate; below 0 the least distance, shape (f,) (length).
     """
 
     slave: NDArray[np.intp]
@@ -158,13 +158,13 @@ def common_points(
         if side.follows:
             change += sign * side.distance(facets[pair], at, direction[i[pair]])
     gap, cut = clear + change, np.flatnonzero(clear < 0)
-    most, there = np.zeros(cut.size), pair[cut]
+    apart, most, there = np.maximum(clear, gap), np.zeros(cut.size), pair[cut]
     for sign, side, facets, at, _ in sides:
         bounds = side.distance_bounds(facets[there], at[cut], direction[i[there]])
         most += np.maximum(*(sign * bound for bound in bounds))
-    across = np.einsum("pd,pd->p", slave.normal[i[there]], direction[i[there]])
-    depth = np.zeros(slave.count)
-    np.maximum.at(depth, i[there], -(clear[cut] + np.maximum(most, 0.0)) * across)
+    apart[cut] = np.minimum(clear[cut] + np.maximum(most, 0.0), 0.0)
+    depth, across = np.full(slave.count, -np.inf), np.einsum("fd,fd->f", slave.normal, direction)
+    np.maximum.at(depth, i[pair], -apart * across[i[pair]])
     bears = weight != 0
     pair, on_slave, on_master = pair[bears], on_slave[bears], on_master[bears]
     weight, gap = weight[bears], gap[bears]
