@@ -16,9 +16,11 @@ from contact.arguments import naming
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.supports import APART
 from contact.errors import InputError, counted
+from contact.interface.mortar.coupling import RESOLVED
 from contact.interface.mortar.lumping import JumpRows, Lumping
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, Geometry, contact_directions
+from contact.mesh.cells import rule
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
@@ -30,6 +32,9 @@ from contact.typing import Array
 #: Depth in a shape, over the size of the mesh, that is taken for rounding: its numbers are written
 #: by hand, with fewer digits than positions in files.
 ROUNDED = 1e-5
+
+#: Degree of the rule at whose points facets are compared with a shape.
+WITHIN = 20
 
 
 @dataclass(frozen=True)
@@ -287,6 +292,7 @@ def find_nodes(
             _refuse_within(body.domain, obstacle, found)
             if not press:
                 _refuse_overlap(body, found)
+            _refuse_unresolved(body.domain, obstacle, facets)
         except InputError as error:
             raise error.within(f"{key}.") from None
     else:
@@ -392,6 +398,34 @@ def _refuse_overlap(body: BodyEquilibrium, found: Candidates) -> None:
             f"foundation: the undeformed body cuts it, by up to {cut:.3g}; accepted: gaps "
             f">= 0 but for {ROUNDED * body.domain.size:.1g} (rounding), and the deviation of "
             'straight facets from a curve, or overlap = "press"',
+            "overlap",
+        )
+
+
+def _refuse_unresolved(domain: Domain, obstacle: Obstacle, facets: Surface) -> None:
+    """Refuse shapes that cut facets between their nodes, deeper than at these. Collective."""
+    if not isinstance(obstacle, Shape):
+        return
+    comm, shape = domain.comm, facets.shape
+    at = np.concatenate([shape.nodes(2), shape.middle, rule(shape, WITHIN)[0]])
+    with on_all_ranks(comm), naming("foundation"):
+        near = np.flatnonzero(obstacle.distance(facets.centres)[0] < 2 * facets.radii)
+        x = (shape.lagrange(facets.order, at) @ facets.points[near]).reshape(-1, domain.dim)
+        distance, outward = obstacle.distance(x)
+    every, there = np.repeat(near, len(at)), np.tile(at, (near.size, 1))
+    normal = facets.normal[every]
+    # No overlap where the facets, or the surfaces that they approximate, have none.
+    behind = np.minimum(facets.distance_bounds(every, there, normal)[0], 0.0)
+    faces = np.einsum("pd,pd->p", normal, outward) < 0
+    depths = np.where(faces, -distance + 1.1 * behind, 0.0).reshape(near.size, len(at))
+    nodes = depths[:, : len(shape.nodes(facets.degree))].max(axis=1)
+    deepest = depths.max(axis=1)
+    depth = comm.allreduce(float(deepest.max(initial=0.0)), op=MPI.MAX)
+    missed = (deepest > depth / 2) & (nodes < RESOLVED * depth)
+    if comm.allreduce(bool(missed.any()), op=MPI.LOR) and depth > ROUNDED * domain.size:
+        raise InputError(
+            f"foundation: it cuts facets of the undeformed body between their nodes, by up to "
+            f"{depth:.3g}; accepted: shorter facets there, a shape that is apart or touches",
             "overlap",
         )
 

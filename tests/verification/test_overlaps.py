@@ -9,11 +9,23 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.sparse.linalg import spsolve
 
-from contact import Body, Contact, Fixed, Linear, Plane, Problem, parse_case, solve
+from contact import (
+    Body,
+    Contact,
+    Fixed,
+    Linear,
+    Paraboloid,
+    Plane,
+    Problem,
+    Sphere,
+    parse_case,
+    solve,
+)
 from contact.cli.new import facing_parts
 from contact.errors import InputError
 from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.surface import Surface
+from contact.mesh.grid import box, rectangle
 from tests.problems import overlapping
 from tests.problems.overlapping import POISSON, UNIAXIAL, YOUNG, body, corner, layers, pressure
 
@@ -163,6 +175,29 @@ def test_rigid_foundations(degree):
         for contact in (Contact("inner0", plane, press=True), Contact("inner0", -depth)):
             solution = solve(Problem(domain, ring, contact, degree=degree))
             np.testing.assert_allclose(solution.pressure, UNIAXIAL * depth / width, rtol=1e-7)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("cell", [*PLANE, *SPACE])
+def test_rigid_shapes_within_a_facet(cell, degree):
+    """What cuts a flat facet between its nodes is refused; what touches or reaches nodes is not."""
+    d = 2 if cell in PLANE else 3
+    make = rectangle if d == 2 else box
+    domain = make(COMM, (0.0,) * d, (4.0,) * d, (4,) * d, cell=cell)
+    down, given = -np.eye(d)[d - 1], Body(Linear(YOUNG, POISSON), [Fixed("top", [0.0] * d)])
+    share = 1 / 4 if degree == 2 else 1 / 3 if d == 3 else 1 / 2
+    radius = 0.3 if degree == 2 else 1.0
+    for depth in (-0.1, 0.0, 0.01, 0.1):
+        tip = np.array([1 + share] * (d - 1) + [depth])
+        for shape in (Sphere(tip + radius * down, radius), Paraboloid(tip, down, 0.3)):
+            for press in (False, True):
+                contact = Contact("bottom", shape, press=press)
+                if depth <= 0:
+                    assert Problem(domain, given, contact, degree=degree).nodes.size > 0
+                    continue
+                with pytest.raises(InputError, match=r"shorter facets.*\[overlap\]"):
+                    Problem(domain, given, contact, degree=degree)
 
 
 @pytest.mark.parallel
