@@ -290,9 +290,9 @@ def find_nodes(
         try:
             _refuse_behind(body, found)
             _refuse_within(body.domain, obstacle, found)
-            if not press:
+            if not press:  # what adaptive meshes are to find may be within facets of the first
                 _refuse_overlap(body, found)
-            _refuse_unresolved(body.domain, obstacle, facets)
+                _refuse_unresolved(body.domain, obstacle, facets)
         except InputError as error:
             raise error.within(f"{key}.") from None
     else:
