@@ -187,12 +187,12 @@ def find_pair(
     rounding = TOUCHING * body.domain.size
     depth, resolved = found.interference(slave.owners, added)
     resolved |= depth <= rounding
-    if found.depth > rounding and not press:
+    drawn = found.depth > rounding and not press
+    if drawn:
         # Nodes of the master may be between the directions of two slave facets.
         depth = max(found.depth, couple(master, slave, reach).depth)
-        _refuse_overlap(body, found, (depth, resolved), slave.owners, label)
-    elif not resolved:
-        _refuse_overlap(body, found, (depth, resolved), slave.owners, label)
+    if drawn or not resolved:
+        _refuse_overlap(body, found, depth, resolved, slave.owners, label)
     placement = PairPlacement(body, slave, master, reach, no_multiplier, found.nodes, added, press)
     return placement, placement.geometry(slave, master, found)
 
@@ -290,12 +290,13 @@ def _check_rim(
 def _refuse_overlap(
     body: BodyEquilibrium,
     coupling: Coupling,
-    overlap: tuple[float, bool],
+    depth: float,
+    resolved: bool,
     owners: Owners,
     label: str,
 ) -> None:
     """Refuse an overlap, given its depth and whether nodes resolve it. Collective."""
-    drawn, (depth, resolved) = coupling.depth > TOUCHING * body.domain.size, overlap
+    drawn = coupling.depth > TOUCHING * body.domain.size
     if drawn and _connected(body, coupling, owners):
         raise InputError(
             f"{label} are sides of one body that look away from each other; accepted: parts of two "
