@@ -290,7 +290,7 @@ def find_nodes(
         try:
             _refuse_behind(body, found)
             _refuse_within(body.domain, obstacle, found)
-            if not press:  # what adaptive meshes are to find may be within facets of the first
+            if not press:  # an adaptive run starts on facets that hide the shape
                 _refuse_overlap(body, found)
                 _refuse_unresolved(body.domain, obstacle, facets)
         except InputError as error:
