@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from contact.errors import InputError
 from contact.history import LinearisationPoint
 from contact.linear import multigrid
 from contact.linear.layout import (
@@ -237,27 +238,32 @@ class SparseOperator:
         self.counters = counters or Counters()
         self.symmetric = symmetric
         self.matrix = bulk.create_matrix()
+        self._subsystems = subsystems
+        self._rhs, self._solution = self.matrix.createVecs()
+        self.iterative = multigrid.is_chosen(solver, self.layout)
+        self._modes: PETSc.NullSpace | None = None
+        if self.iterative and not self.layout.coupled:
+            self._modes = masked_motions(self.layout)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Make a new solver, without a factorisation. Collective."""
         #: The matrix, or with global unknowns eliminated from it.
         self.system = self.matrix
         self._kind = ""
         self._blocks: Array | None = None
-        self._subsystems = subsystems
-        self._rhs, self._solution = self.matrix.createVecs()
-        self.ksp = PETSc.KSP().create(self.layout.comm)
-        self.ksp.setOptionsPrefix(PREFIX)
-        self.iterative = multigrid.is_chosen(solver, self.layout)
         self._split: BlockPreconditioner | None = None
         self._hierarchy: Hierarchy | None = None
-        self._modes: PETSc.NullSpace | None = None
+        self.ksp = PETSc.KSP().create(self.layout.comm)
+        self.ksp.setOptionsPrefix(PREFIX)
         if self.iterative and self.layout.coupled:
-            self._split = BlockPreconditioner(self.ksp, self.layout, symmetric)
+            self._split = BlockPreconditioner(self.ksp, self.layout, self.symmetric)
         elif self.iterative:
-            self._modes = masked_motions(self.layout)
-            multigrid.configure(self.ksp, symmetric)
+            multigrid.configure(self.ksp, self.symmetric)
         else:
             self.ksp.setType("preonly")
             pc = self.ksp.getPC()
-            pc.setType("cholesky" if symmetric else "lu")
+            pc.setType("cholesky" if self.symmetric else "lu")
             pc.setFactorSolverType("mumps")
         with petsc_options(PREFIX):
             self.ksp.setFromOptions()
@@ -403,8 +409,7 @@ class SparseOperator:
         given = np.column_stack([self.layout.mask(side) for side in sides.T])
         norm = float(np.sqrt(summed(self.layout.comm, np.sum(given**2))))
         if self.ksp.getPC().getFailedReason():
-            check_overflow(self.layout, self.matrix.norm(), norm)
-            raise no_solution(self.ksp.getPC(), PREFIX)
+            raise self._fault(norm)
         found = mat_solve(self.ksp, given)
         self._solved(1, norm, float(np.sqrt(summed(self.layout.comm, np.sum(found**2)))))
         return np.column_stack([self.layout.mask(x) for x in found.T])
@@ -415,5 +420,11 @@ class SparseOperator:
         self.counters.linear_iterations += iterations
         failed = self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
         if failed or not np.isfinite(solution):
-            check_overflow(self.layout, self.matrix.norm(), rhs)
-            raise no_solution(self.ksp.getPC(), PREFIX)
+            raise self._fault(rhs)
+
+    def _fault(self, rhs: float) -> InputError:
+        """Return the error of a failure, from which MUMPS does not recover. Collective."""
+        pc = self.ksp.getPC()
+        self._begin()
+        check_overflow(self.layout, self.matrix.norm(), rhs)
+        return no_solution(pc, PREFIX)

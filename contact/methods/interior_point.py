@@ -499,7 +499,7 @@ class InteriorPoint:
             at_nodes[frictional] += friction - np.einsum("kij,kj->ki", across, slip)
             rhs = residual.copy()
             nodes.add_jump_transposed(at_nodes, rhs)
-            dx = self._step.solve(rhs, FORCING)
+            dx = self._step.operator.solve(rhs, FORCING)
             moved = nodes.jump(dx)
             closed = slack - nodes.normal_component(moved)[rigid]
             return dx, cones.complete(

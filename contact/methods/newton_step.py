@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contact.errors import InputError, SingularError
+from contact.errors import SingularError
 from contact.interface.complementarity import (
     ComplementarityParameters,
     LinearisedBound,
@@ -133,14 +133,6 @@ class NewtonStep:
         self._assembled = False
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
-    def solve(self, rhs: Array, rtol: float | None = None) -> Array:
-        """Solve with the operator; drop it on failure, as MUMPS does not recover. Collective."""
-        try:
-            return self.operator.solve(rhs, rtol)
-        except InputError:
-            self._operator = None
-            raise
-
     def _forcing_term(self, residual: float) -> float:
         """Return the forcing term of a step from the residual before it."""
         self._stagnant = 0 if residual < self._nearest else self._stagnant + 1
@@ -180,7 +172,7 @@ class NewtonStep:
         free = State(state.x, Multipliers.zero(nodes), state.time, state.history)
         size = nodes.block_size
         self.assemble(problem, free, np.zeros((nodes.nodes.size, size, size)))
-        step = self.solve(-residual_forces(problem, free))
+        step = self.operator.solve(-residual_forces(problem, free))
         return replace(free, x=body.prescribe(body.updated(free.x, step), free.time))
 
     def __call__(
@@ -213,7 +205,7 @@ class NewtonStep:
         residual = _residual(problem, iterate, laws, material)
         forcing = None if exact else self._forcing_term(largest)
         try:
-            increment = self.solve(-residual, forcing)
+            increment = self.operator.solve(-residual, forcing)
         except SingularError:
             if body.linear or (self._underconstrained and state.active_set is None):
                 raise

@@ -139,7 +139,7 @@ class UnconstrainedModes:
         step.operator.update("secant", start, problem.interface.weighted(blocks, start.x))
         state = start
         for _ in range(2):  # each leaves an error of sqrt(EPS)
-            increment = step.solve(-residual_forces(problem, state))
+            increment = step.operator.solve(-residual_forces(problem, state))
             state = replace(state, x=problem.body.updated(state.x, increment))
         found = self.free_motion(problem, state)
         if found is None:

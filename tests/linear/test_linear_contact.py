@@ -183,14 +183,24 @@ def test_a_factorisation_takes_the_workspace_it_needs(degree: int) -> None:
     assert pc.getFactorMatrix().getMumpsIcntl(14) > 0
 
 
-def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Several right-hand sides are refused with the words of one."""
+@pytest.mark.parametrize("several", [True, False])
+def test_a_failed_factorisation_solves_for_nothing(
+    several: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Several right-hand sides are refused with the words of one; a new factorisation has room."""
     monkeypatch.setattr("contact.linear.petsc.MOST_WORKSPACE", 0)
     problem = mechanics.bar(SELF, 16)
-    operator = operator_of(problem, "lu")
+    operator, kept = operator_of(problem, "lu"), operator_of(problem, "lu")
     operator.ksp.setOperators(operator.matrix)
     operator.ksp.getPC().setFactorSetUpSolverType()
     operator.ksp.getPC().getFactorMatrix().setMumpsIcntl(14, -90)
-    operator.update("secant", BodyState(problem.body.zero_displacement()), sticking(problem))
+    state, side = BodyState(problem.body.zero_displacement()), problem.body.external()
+    operator.update("secant", state, sticking(problem))
     with pytest.raises(InputError, match=r"\[memory\]"):
-        operator.solve_all(np.ones((problem.body.owned, 2)))
+        if several:
+            operator.solve_all(np.column_stack([side, side]))
+        else:
+            operator.solve(side)
+    for made in (operator, kept):
+        made.update("secant", state, sticking(problem))
+    np.testing.assert_allclose(operator.solve(side), kept.solve(side), rtol=1e-9, atol=1e-12)
