@@ -118,6 +118,7 @@ def find_pair(
     key: str = "contact",
     press: bool = False,
     friction: bool = False,
+    inside: float = 0.0,
 ) -> tuple[PairPlacement, Geometry]:
     """Choose the nodes of a part that may touch another one, in the reference place. Collective.
 
@@ -138,6 +139,8 @@ def find_pair(
         Whether the bodies may overlap in the reference configuration, and press each other out.
     friction
         Whether there is friction between them.
+    inside
+        Depth of the boundary of either body in the other (`overlap_depths`) (length).
 
     Returns
     -------
@@ -165,14 +168,8 @@ def find_pair(
         no_multiplier = np.union1d(no_multiplier, new)
         found = couple(slave, master, reach, no_multiplier)
     if body.comm.allreduce(found.nodes.size, op=MPI.SUM) == 0:
-        depth = couple(slave, master, np.inf).depth
-        if depth > reach:
-            raise InputError(
-                f"{label}: the second lies {depth:.3g} behind the first, farther than {reach:.3g}: "
-                "the undeformed bodies overlap as deep, or these sides look away from each other; "
-                "accepted: meshes that are apart or touch, an interference that is less deep",
-                "overlap",
-            )
+        if inside > 0:
+            raise _overlap(inside, True, False, label)
         raise InputError(
             f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
             "held there; accepted: sides of two bodies that look at each other",
@@ -186,13 +183,19 @@ def find_pair(
     check_gap(body.domain, added, key)
     rounding = TOUCHING * body.domain.size
     depth, resolved = found.interference(slave.owners, added)
-    resolved |= depth <= rounding
-    drawn = found.depth > rounding and not press
-    if drawn:
-        # Nodes of the master may be between the directions of two slave facets.
-        depth = max(found.depth, couple(master, slave, reach).depth)
-    if drawn or not resolved:
-        _refuse_overlap(body, found, depth, resolved, slave.owners, label)
+    least = body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
+    depth = max(depth, inside - max(least, 0.0))
+    # Sides that do not face each other see nothing of an overlap.
+    resolved &= inside <= 2 * found.depth
+    drawn = max(found.depth, inside) > rounding
+    if depth > rounding and ((drawn and not press) or not resolved):
+        if drawn and _connected(body, found, slave.owners):
+            raise InputError(
+                f"{label} are sides of one body that look away from each other; accepted: parts of "
+                "two bodies whose meshes are apart",
+                "pair",
+            )
+        raise _overlap(depth, drawn, resolved, label)
     placement = PairPlacement(body, slave, master, reach, no_multiplier, found.nodes, added, press)
     return placement, placement.geometry(slave, master, found)
 
@@ -287,28 +290,17 @@ def _check_rim(
         )
 
 
-def _refuse_overlap(
-    body: BodyEquilibrium,
-    coupling: Coupling,
-    depth: float,
-    resolved: bool,
-    owners: Owners,
-    label: str,
-) -> None:
-    """Refuse an overlap, given its depth and whether nodes resolve it. Collective."""
-    drawn = coupling.depth > TOUCHING * body.domain.size
-    if drawn and _connected(body, coupling, owners):
-        raise InputError(
-            f"{label} are sides of one body that look away from each other; accepted: parts of two "
-            "bodies whose meshes are apart",
-            "pair",
-        )
+def _overlap(depth: float, drawn: bool, resolved: bool, label: str) -> InputError:
+    """Return the error of an overlap, drawn or by the gap, given whether nodes resolve it."""
     drawn_way = 'overlap = "press" (in Python press=True)'
     bodies, way = ("bodies", drawn_way) if drawn else ("bodies and the gap", "a gap below 0")
     way += " for an interference"
     if not resolved:
-        way += ", with on and against exchanged or with shorter facets of on there"
-    raise InputError(
+        way += (
+            " of sides that face each other there, with on and against exchanged or with shorter "
+            "facets of on"
+        )
+    return InputError(
         f"{label}: the undeformed {bodies} overlap, by up to {depth:.3g} more than straight "
         f"facets deviate from a curve; accepted: meshes that are apart or touch, or {way}",
         "overlap",

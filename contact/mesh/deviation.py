@@ -295,7 +295,9 @@ def _between(
         )
         other = value.max(axis=1) - value.min(axis=1)
         jump = np.where(total > 0, changed / np.where(total > 0, total, 1.0), other) / largest
-        weights[:, k], jumps[:, k] = known[corner] / (jump**2 + ALIKE**2) ** 4, jump * largest
+        with np.errstate(over="ignore"):  # beside flat facets, of rounding
+            weights[:, k] = known[corner] / (jump**2 + ALIKE**2) ** 4
+        jumps[:, k] = jump * largest
         totals[:, k] = total
         changes[:, k] = further / np.where(total > 0, total, 1.0)
     weight = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)

@@ -9,9 +9,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
-from contact.mesh.cells import Shape, rule, shape_of
+from contact.mesh.cells import Shape, barycentric, rule, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import cells_at
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 #: Degree of the rule for integrands that are no polynomials.
@@ -111,6 +112,45 @@ def inverse(matrix: Array) -> Array:
     one, two, three = columns
     rows = [np.cross(two, three), np.cross(three, one), np.cross(one, two)]
     return np.asarray(np.stack(rows, axis=-2) / det)
+
+
+def pulled_back(shape: Shape, of: Array, points: Array) -> Array:
+    """Return points, (n, dim), in reference coordinates: Newton's method.
+
+    Of cells, or of projected facets, by their nodes, shape (n, nodes, dim).
+    """
+    degree, at = shape.degree_of(of.shape[1]), np.repeat(shape.middle, len(points), axis=0)
+    for _ in range(20):
+        slope = np.einsum("pkr,pkd->pdr", shape.gradients(degree, at), of)
+        left = points - np.einsum("pk,pkd->pd", shape.lagrange(degree, at), of)
+        step = np.einsum("pij,pj->pi", inverse(slope), left)
+        # Nothing that is asked for lies farther from a cell.
+        at = np.clip(at + step, -1.0, 2.0)
+        if np.abs(step).max(initial=0.0) <= ROUNDING:
+            break
+    return at
+
+
+def nearest_on_simplices(corners: Array, points: Array) -> Array:
+    """Return barycentric coordinates, (n, k), of the points nearest to given ones, (n, d).
+
+    Of segments or triangles by their corners, shape (n, k, d).
+    """
+    edges = corners[:, 1:] - corners[:, :1]
+    along = np.einsum("nkd,nd->nk", edges, points - corners[:, 0])
+    own = barycentric(np.einsum("nkl,nl->nk", inverse(edges @ edges.swapaxes(1, 2)), along))
+    if own.shape[1] == 2:
+        return np.clip(own, 0.0, 1.0)
+    beyond = np.flatnonzero((own < 0).any(axis=1))
+    least = np.full(beyond.size, np.inf)
+    for side in ([0, 1], [1, 2], [2, 0]):
+        ends = corners[beyond][:, side]
+        share = nearest_on_simplices(ends, points[beyond])
+        far = np.linalg.norm(points[beyond] - np.einsum("nk,nkd->nd", share, ends), axis=1)
+        nearer = np.flatnonzero(far < least)
+        least[nearer], own[beyond[nearer]] = far[nearer], 0.0
+        own[np.ix_(beyond[nearer], side)] = share[nearer]
+    return own
 
 
 def integration_weights(

@@ -52,8 +52,12 @@ def layers(
     depth: float | Sequence[float],
     radii: Sequence[float] = RADII,
     counts: Sequence[int] = (4, 5),
+    rib: float = 0.0,
 ) -> Domain:
-    """Return blocks ("flat"), revolved tubes ("tube") or rings ("ring"), `depth` in each other."""
+    """Return blocks ("flat"), revolved tubes ("tube") or rings ("ring"), `depth` in each other.
+
+    The last one has a rib of this height in the middle of its inner side, two facets wide.
+    """
     d = Shape(cell).dim
     numbers = [[max(n // 2, 1), n, max(n // 2, 1)][:d] for n in counts]
     mesh = boxes(comm, cell, order, numbers)
@@ -71,6 +75,8 @@ def layers(
     low, high = np.array(list(pairwise(radii))).T
     shift = np.concatenate([[0.0], np.cumsum(np.broadcast_to(depth, len(counts) - 1))])
     radius = low[k] + (high - low)[k] * (x[:, 0] - 2 * k) - shift[k]
+    tent = np.maximum(1 - counts[-1] * np.abs(x[:, 1] - 0.5), 0.0) * (1 - (x[:, 0] - 2 * k))
+    radius -= np.where(k == len(counts) - 1, rib * tent, 0.0)
     angle = np.pi / 2 * x[:, 1] if form == "ring" else np.zeros(len(x))
     x[:, 0] = radius * np.cos(angle)
     if form == "ring":

@@ -1,11 +1,13 @@
 """Overlaps of undeformed bodies: refused, or pressed out; none is dropped but that of chords."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
 from scipy.sparse.linalg import spsolve
 
@@ -403,13 +405,75 @@ def test_random_polygons_in_a_flat_side(seed):
 @pytest.mark.parallel
 @pytest.mark.parametrize("press", [False, True])
 def test_overlaps_deeper_than_the_reach(press):
-    """They are told from sides that are too far apart."""
+    """They are told from sides that are too far apart: other sides are in the bodies."""
     deep, far = (layers(COMM, "triangle", 1, "flat", depth) for depth in (0.6, -0.6))
     contact = Contact("outer0", against="inner1", press=press)
-    with pytest.raises(InputError, match=r"lies 0.6 behind .*\[overlap\]"):
+    with pytest.raises(InputError, match=r"overlap, by up to 0.1 more .*\[overlap\]"):
         Problem(deep, body("flat", 2, 2), contact)
     with pytest.raises(InputError, match=r"\[pair\]"):
         Problem(far, body("flat", 2, 2), contact)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("cell", [*PLANE, *SPACE])
+def test_ribs_and_needles_are_refused(cell, element):
+    """Whether their flanks face the other side or not, and if nearer facets are apart."""
+    order, degree = element
+    apart, radii, count = 0.05, (1.0, 2.0, 2.5), 24 if cell in PLANE else 8
+    for form in forms(cell):
+        for depth in (-0.01, 0.1, 0.45):
+            rib = apart + depth
+            domain = layers(COMM, cell, order, form, -apart, radii, (4, count), rib)
+            for on, against in (("outer0", "inner1"), ("inner1", "outer0")):
+                given = body(form, domain.dim, 2)
+                if depth < 0:
+                    pair = Contact(on, against=against)
+                    nodes = Problem(domain, given, pair, degree=degree).nodes
+                    assert nodes.maximum(-nodes.gap, -1.0) < 0 and nodes.cut == 0
+                    continue
+                with pytest.raises(InputError, match=r"\[overlap\]") as raised:
+                    Problem(domain, given, Contact(on, against=against), degree=degree)
+                told = float(re.search(r"by up to (\S+) more", str(raised.value))[1])
+                assert told == pytest.approx(depth, rel=0.1)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("cell", PLANE)
+def test_an_overlap_beside_the_sides_of_a_pair(cell):
+    """A pair of its own presses it apart, not one that is beside it."""
+    domain = layers(COMM, cell, 1, "flat", 0.0, counts=(8, 8))
+    x, second = domain.mesh.geometry.x, overlapping.of_layer(domain, 1)
+    parts = dict(domain.parts)
+    for name in ("outer0", "inner1"):
+        facets = domain.facets(name)
+        y = compute_midpoints(domain.mesh, 1, facets)[:, 1] if facets.size else np.zeros(0)
+        parts |= {f"{name}_low": facets[y < 0.4], f"{name}_high": facets[y > 0.6]}
+    x[second, 0] -= 0.01 * np.clip(8 * x[second, 1] - 5, 0.0, 1.0)
+    domain, given = replace(domain, parts=parts), body("flat", 2, 2)
+
+    def contacts(*press):
+        names = zip(("low", "high"), press, strict=False)
+        return [Contact(f"outer0_{n}", against=f"inner1_{n}", press=p) for n, p in names]
+
+    for press in ((False,), (True,)):
+        with pytest.raises(InputError, match=r"contact\.against.* up to 0.01 more.*\[overlap\]"):
+            Problem(domain, given, contacts(*press))
+    with pytest.raises(InputError, match=r"contact\.1\.against.* up to 0.01 more.*\[overlap\]"):
+        Problem(domain, given, contacts(False, False))
+    nodes = Problem(domain, given, contacts(False, True)).nodes
+    assert nodes.maximum(-nodes.gap) == pytest.approx(0.01, rel=1e-6)
+
+
+@pytest.mark.parallel
+def test_a_gap_makes_up_for_a_drawn_overlap():
+    domain = layers(COMM, "quadrilateral", 1, "flat", 0.01)
+    given = body("flat", 2, 2)
+    for on, against in (("outer0", "inner1"), ("inner1", "outer0")):
+        nodes = Problem(domain, given, Contact(on, 0.03, against=against)).nodes
+        np.testing.assert_allclose(nodes.gap, 0.02, rtol=1e-9)
+        with pytest.raises(InputError, match=r"by up to 0.004 more .*\[overlap\]"):
+            Problem(domain, given, Contact(on, 0.006, against=against))
 
 
 @pytest.mark.parallel

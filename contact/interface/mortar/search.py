@@ -57,9 +57,9 @@ class Opposite:
         near = np.flatnonzero(distance <= reach + widest + slave.radii)
         radius = (slave.radii + widest + DETOUR * distance)[near]
         centres = slave.centres[near]
-        ball, rank = _meeting(bounding_boxes(comm, master.centres), centres, radius)
+        ball, rank = meeting(bounding_boxes(comm, master.centres), centres, radius)
         asked = exchanged(comm, rank, centres[ball], radius[ball])
-        facets, ranks = _within(master.centres, *asked)
+        facets, ranks = within(master.centres, *asked)
         return Opposite(master.sent(facets, ranks), near, radius, reach)
 
     def pairs(self, slave: Surface) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
@@ -67,15 +67,11 @@ class Opposite:
         master, near, radius = self.master, self.near, self.radius
         if near.size == 0 or master.count == 0:
             return
-        tree, radii = cKDTree(master.centres), master.radii
-        centres, own = slave.centres, slave.radii
-        counts = tree.query_ball_point(centres[near], radius, return_length=True)
+        radii, centres, own = master.radii, slave.centres, slave.radii
         # Masses of the functions of a facet are found at its points.
-        ends = np.cumsum(counts) // max(CHUNK // slave.nodes.shape[1] ** 2, 1)
-        for chosen in np.split(np.arange(near.size), np.flatnonzero(np.diff(ends)) + 1):
-            found = tree.query_ball_point(centres[near[chosen]], radius[chosen], return_sorted=True)
-            i = np.repeat(near[chosen], [len(f) for f in found])
-            j = np.array([m for f in found for m in f], dtype=np.intp)
+        most = CHUNK // slave.nodes.shape[1] ** 2
+        for row, j in in_balls(master.centres, centres[near], radius, most):
+            i = near[row]
             offset = master.centres[j] - centres[i]
             height = np.einsum("pd,pd->p", offset, slave.normal[i])
             aside = np.sqrt(np.maximum(np.einsum("pd,pd->p", offset, offset) - height**2, 0.0))
@@ -83,6 +79,19 @@ class Opposite:
             keep = (aside <= own[i] + radii[j]) & (opposite > FACING)
             keep &= np.abs(height) <= self.reach
             yield i[keep], j[keep]
+
+
+def in_balls(
+    places: Array, centres: Array, radius: Array, most: int
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Yield pairs of a ball and a place in it, about `most` at a time."""
+    tree = cKDTree(places)
+    counts = tree.query_ball_point(centres, radius, return_length=True)
+    ends = np.cumsum(counts) // max(most, 1)
+    for chosen in np.split(np.arange(len(centres)), np.flatnonzero(np.diff(ends)) + 1):
+        found = tree.query_ball_point(centres[chosen], radius[chosen], return_sorted=True)
+        row = np.repeat(chosen, [len(near) for near in found])
+        yield row, np.array([k for near in found for k in near], dtype=np.intp)
 
 
 def nearest(comm: MPI.Intracomm, points: Array, places: Array) -> Array:
@@ -106,7 +115,7 @@ def nearest_named(
     least = nearest(comm, points, places)
     among = np.flatnonzero(np.isfinite(least))
     radius = least[among] * (1 + 100 * ROUNDING)
-    ball, rank = _meeting(bounding_boxes(comm, places), points[among], radius)
+    ball, rank = meeting(bounding_boxes(comm, places), points[among], radius)
     source, number, centre, size = exchanged(
         comm, rank, among[ball], points[among][ball], radius[ball]
     )
@@ -129,7 +138,7 @@ def _distances(box: Array, points: Array) -> tuple[Array, Array]:
     return least, most
 
 
-def _meeting(
+def meeting(
     every: Array, centres: Array, radius: Array
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return pairs of a ball and a rank whose box it meets."""
@@ -164,7 +173,7 @@ def _holders(every: Array, points: Array) -> tuple[NDArray[np.intp], NDArray[np.
     return np.concatenate(chosen), ranks
 
 
-def _within(
+def within(
     places: Array, source: NDArray[np.intp], centres: Array, radius: Array
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the places in balls or beside them, and the ranks of these balls."""

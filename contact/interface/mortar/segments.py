@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from contact.interface.mortar.surface import Surface
 from contact.mesh.cells import INTERVAL, LARGEST, QUADRILATERAL, TRIANGLE, rule
-from contact.mesh.geometry import area_vectors, determinant, inverse, jacobians
+from contact.mesh.geometry import area_vectors, determinant, inverse, jacobians, pulled_back
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
@@ -148,7 +148,8 @@ def common_points(
     order = np.argsort(pair, kind="stable")
     pair, y, weight = pair[order], y[order], weight[order]
     on_slave, on_master = (
-        _carried_back(side, nodes[pair], y) for side, nodes in ((slave, own), (master, other))
+        pulled_back(side.shape, nodes[pair][..., : slave.shape.dim], y)
+        for side, nodes in ((slave, own), (master, other))
     )
     sides = (1.0, master, j, on_master, other), (-1.0, slave, i, on_slave, own)
     clear, change = np.zeros((2, pair.size))
@@ -288,18 +289,3 @@ def _within(begin: Array, along: Array, polygons: Array) -> tuple[Array, Array, 
 
 def _slopes(gradients: Array, nodes: Array) -> Array:
     return np.asarray(np.einsum("pkr,pkd->pdr", gradients, nodes))
-
-
-def _carried_back(side: Surface, nodes: Array, y: Array) -> Array:
-    """Return points of the reference facet, given their projections, (p, dim): Newton's method."""
-    shape = side.shape
-    at = np.repeat(shape.middle, len(y), axis=0)
-    for _ in range(20):
-        slope = inverse(_slopes(shape.gradients(side.order, at), nodes[..., : shape.dim]))
-        left = y - np.einsum("pk,pkd->pd", shape.lagrange(side.order, at), nodes[..., : shape.dim])
-        step = np.einsum("pij,pj->pi", slope, left)
-        # Nothing common lies farther from a facet.
-        at = np.clip(at + step, -1.0, 2.0)
-        if np.abs(step).max(initial=0.0) <= ROUNDING:
-            break
-    return at

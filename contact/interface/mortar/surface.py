@@ -17,7 +17,7 @@ from contact import _compat
 from contact.mesh.cells import Shape, facet_with, rule, shape_of
 from contact.mesh.deviation import deviations
 from contact.mesh.domain import Domain
-from contact.mesh.entities import cells_at
+from contact.mesh.entities import Indices, cells_at
 from contact.mesh.geometry import (
     area_vectors,
     integration_weights,
@@ -377,8 +377,12 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     InputError
         If there is no such part.
     """
+    return straight_surface(domain, space, domain.facets(part)).with_deviations()
+
+
+def straight_surface(domain: Domain, space: fem.FunctionSpace, facets: Indices) -> Surface:
+    """Return owned facets of the boundary, without deviations. Collective."""
     mesh, d = domain.mesh, domain.dim
-    facets = domain.facets(part)
     cells, place = cells_at(mesh, facets)
     degree, shape = space.ufl_element().embedded_superdegree, shape_of(mesh)
     local = shape.facet_nodes(degree)[place]
@@ -390,10 +394,9 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
     normal = unit_normals(shape.facet, points, x.mean(axis=1))
     owners, none = Owners.of(space.dofmap.index_map, domain.comm), np.zeros((len(facets), 0))
-    straight = Surface(
+    return Surface(
         names, points, normal, none, none, degree, domain.revolved, domain.levels, owners
     )
-    return straight.with_deviations()
 
 
 def _of_arcs(shape: Shape, points: Array, normal: Array) -> Array:

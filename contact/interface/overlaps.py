@@ -1,0 +1,251 @@
+"""Overlaps of undeformed bodies, whichever way their sides look: boundaries in cells of others.
+
+A point of the boundary of a body in a cell of another one is as deep in that as it is far from its
+boundary, less the heights of both curved surfaces above their facets: chords of curves that touch
+cut each other. Corners and middles of facets show ribs, needles and sides that no facet faces;
+`contact.interface.mortar` has the depth between facets that face each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import geometry
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.body.elements import CHUNK
+from contact.body.equilibrium import BodyEquilibrium
+from contact.interface.mortar.search import in_balls, meeting, nearest, within
+from contact.interface.mortar.surface import Surface, straight_surface, surface_of
+from contact.mesh.cells import shape_of
+from contact.mesh.entities import exterior_facets
+from contact.mesh.geometry import geometry_nodes, nearest_on_simplices, pulled_back
+from contact.mesh.owners import Owners
+from contact.ranks import bounding_boxes, exchanged
+from contact.tolerances import NEGLIGIBLE, TOUCHING
+from contact.typing import Array
+
+#: Distance along a further axis, over the size of the mesh, by which searches keep bodies apart.
+ASIDE = 10.0
+
+#: Indices of points, bodies or facets.
+Numbers = NDArray[np.intp]
+
+
+def overlap_depths(body: BodyEquilibrium, pairs: Sequence[tuple[str, str, bool]]) -> list[float]:
+    """Return how deep the bodies of pairs of sides lie in each other. Collective.
+
+    Parameters
+    ----------
+    body
+        The bodies.
+    pairs
+        Both parts of each, and whether it presses overlaps apart.
+
+    Returns
+    -------
+    The largest depth of each pair that curvature does not explain (length): at its sides, but where
+    another pair presses, and where there is no side of any pair; 0 for rounding.
+    """
+    if not pairs or body.components[1] == 1:
+        return [0.0] * len(pairs)
+    bodies = _Boundaries.of(body, [pair[:2] for pair in pairs])
+    facet, at, other = bodies.inside()
+    depth, on_sides = bodies.depths(facet, at, other)
+    between = bodies.between(bodies.component[facet], other)
+    press = np.array([press for *_, press in pairs])
+    elsewhere = (on_sides & press).any(axis=1)[:, None] & ~press
+    mine = between & ((on_sides & ~elsewhere) | ~on_sides.any(axis=1)[:, None])
+    deepest = np.where(mine, depth[:, None], 0.0).max(axis=0, initial=0.0)
+    body.comm.Allreduce(MPI.IN_PLACE, deepest, op=MPI.MAX)
+    return [d if d > TOUCHING * body.domain.size else 0.0 for d in deepest.tolist()]
+
+
+@dataclass(frozen=True)
+class _Boundaries:
+    """The boundaries of all bodies, which are the connected components of the mesh.
+
+    Attributes
+    ----------
+    body
+        The bodies.
+    facets, surface
+        Facets of the boundary that this rank owns, but on the axis of revolution, shape (f,).
+    component
+        Of each facet, shape (f,).
+    parts, sides
+        Both parts of each pair, and which facets are on either, shape (f, pairs, 2).
+    bodies
+        Which components each side is of, shape (pairs, 2, components).
+    """
+
+    body: BodyEquilibrium
+    facets: NDArray[np.int32]
+    surface: Surface
+    component: Numbers
+    parts: Sequence[tuple[str, str]]
+    sides: NDArray[np.bool_]
+    bodies: NDArray[np.bool_]
+
+    @staticmethod
+    def of(body: BodyEquilibrium, parts: Sequence[tuple[str, str]]) -> _Boundaries:
+        """Find them. Collective."""
+        domain, (_, count) = body.domain, body.components
+        facets = exterior_facets(domain.mesh)
+        surface = straight_surface(domain, body.space, facets)
+        if domain.revolved:
+            radius = surface.corners[:, :, 0].max(axis=1, initial=0.0)
+            facets = facets[radius > NEGLIGIBLE * domain.size]
+            surface = straight_surface(domain, body.space, facets)
+        component = _components(body, surface.owners, surface.nodes[:, 0])
+        sides = np.zeros((facets.size, len(parts), 2), dtype=bool)
+        bodies = np.zeros((len(parts), 2, count), dtype=bool)
+        for pair, both in enumerate(parts):
+            for side, part in enumerate(both):
+                sides[:, pair, side] = np.isin(facets, domain.facets(part))
+                bodies[pair, side, component[sides[:, pair, side]]] = True
+        body.comm.Allreduce(MPI.IN_PLACE, bodies, op=MPI.LOR)
+        return _Boundaries(body, facets, surface, component, parts, sides, bodies)
+
+    def between(self, one: Numbers, other: Numbers) -> NDArray[np.bool_]:
+        """Return whether components are of both sides of each pair, shape (n, pairs)."""
+        first, second = np.moveaxis(self.bodies, 1, 0)
+        both = (first[:, one] & second[:, other]) | (first[:, other] & second[:, one])
+        return np.asarray(both.T)
+
+    def inside(self) -> tuple[Numbers, Array, Numbers]:
+        """Return facet, reference point and other body of points within that. Collective."""
+        domain, surface, comm, d = self.body.domain, self.surface, self.body.comm, self.body.dim
+        shape, mesh = surface.shape, domain.mesh
+        places = np.concatenate([shape.nodes(surface.order), shape.middle])
+        x = (shape.lagrange(surface.order, places) @ surface.points).reshape(-1, d)
+        of = np.repeat(self.component, len(places))
+        cells = geometry_nodes(domain)
+        # Points beyond the boxes of the other bodies of their pairs are in none of these.
+        near = np.flatnonzero(self._near(x, of))
+        within_box, rank = meeting(
+            bounding_boxes(comm, cells.reshape(-1, d)), x[near], np.zeros(near.size)
+        )
+        asked = near[within_box]
+        source, number, x, of = exchanged(comm, rank, asked, x[asked], of[asked])
+        point = cell = np.zeros(0, dtype=np.intp)
+        if len(x) and len(cells):
+            owned = np.arange(len(cells), dtype=np.int32)
+            padded = np.pad(x, ((0, 0), (0, 3 - d)))
+            tree = geometry.bb_tree(mesh, d, entities=owned, padding=NEGLIGIBLE * domain.size)
+            found = geometry.compute_collisions_points(tree, padded)
+            point = np.repeat(np.arange(len(x)), np.diff(found.offsets))
+            cell = found.array.astype(np.intp)
+        dofmap = self.body.space.dofmap
+        first = dofmap.index_map.local_to_global(dofmap.list[: len(cells), 0].copy())
+        component = _components(self.body, surface.owners, first.astype(np.int64))
+        joined = component[cell] != of[point]
+        joined[joined] = self.between(of[point[joined]], component[cell[joined]]).any(axis=1)
+        point, cell = point[joined], cell[joined]
+        of_cells = shape_of(mesh)
+        at = pulled_back(of_cells, cells[cell], x[point])
+        inward = -of_cells.facet_normals
+        begin = of_cells.nodes(1)[of_cells.facet_corners[:, 0]]
+        height = np.einsum("pfd,fd->pf", at[:, None] - begin, inward)
+        held = height.min(axis=1, initial=np.inf) >= -NEGLIGIBLE
+        point, other = point[held], component[cell[held]]
+        _, number, other = exchanged(comm, source[point], number[point], other)
+        number, other = np.unique(np.column_stack([number, other]), axis=0).T
+        return number // len(places), places[number % len(places)], other
+
+    def _near(self, x: Array, of: Numbers) -> NDArray[np.bool_]:
+        """Return which points are in boxes of other bodies of the pairs of theirs. Collective."""
+        count, rounding = self.bodies.shape[2], TOUCHING * self.body.domain.size
+        low = np.full((count, x.shape[1]), np.inf)
+        high = -low
+        np.minimum.at(low, of, x)
+        np.maximum.at(high, of, x)
+        self.body.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+        self.body.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+        near = np.zeros(len(x), dtype=bool)
+        for first, second in self.bodies[self.bodies.any(axis=1).sum(axis=1) > 1]:
+            for own, other in ((first, second), (second, first)):
+                lower, upper = low[other].min(axis=0), high[other].max(axis=0)
+                held = np.all((x > lower + rounding) & (x < upper - rounding), axis=1)
+                near |= own[of] & held
+        return near
+
+    def depths(self, facet: Numbers, at: Array, other: Numbers) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the depths of points in other bodies, (n,), and their `on_sides`. Collective."""
+        surface, comm, far = self.surface, self.body.comm, ASIDE * self.body.domain.size
+        functions = surface.shape.lagrange(surface.order, at)
+        x = np.einsum("nk,nkd->nd", functions, surface.points[facet])
+        points = np.column_stack([x, far * other])
+        beside = np.repeat(far * self.component, surface.points.shape[1])
+        nodes = np.column_stack([surface.points.reshape(-1, x.shape[1]), beside])
+        centres = np.column_stack([surface.centres, far * self.component])
+        least = nearest(comm, points, nodes)
+        if comm.allreduce(len(x)) == 0:
+            return least, np.zeros((0, len(self.parts)), dtype=bool)
+        widest = comm.allreduce(float(surface.radii.max(initial=0.0)), op=MPI.MAX)
+        radius = least + widest
+        ball, rank = meeting(bounding_boxes(comm, centres), points, radius)
+        near, ranks = within(centres, *exchanged(comm, rank, points[ball], radius[ball]))
+        surface = self._curved()
+        opposite = surface.sent(near, ranks)
+        # A foot aside, where facets turn, has a height in another direction: none adds to depths.
+        sides, own = self.sides.any(axis=2), np.minimum(surface.height_bounds(facet, at)[0], 0.0)
+        _, theirs, centres = exchanged(comm, ranks, sides[near], centres[near])
+        depth, on_sides = np.full(len(x), np.inf), sides[facet]
+        rounding = NEGLIGIBLE * self.body.domain.size
+        for i, j in in_balls(centres, points, radius, CHUNK):
+            distance, there = _from_facets(opposite, j, x[i])
+            behind = np.minimum(opposite.height_bounds(j, there)[0], 0.0) - _bow(opposite)[j]
+            np.minimum.at(depth, i, distance + own[i] + behind)
+            np.minimum.at(least, i, distance)
+            nearest_ones = distance <= least[i] + rounding
+            np.logical_or.at(on_sides, i[nearest_ones], theirs[j[nearest_ones]])
+        return depth, on_sides
+
+    def _curved(self) -> Surface:
+        """Return the boundary with deviations, on the sides of pairs by these alone. Collective."""
+        curved = self.surface.with_deviations()
+        for k, both in enumerate(self.parts):
+            for side, part in enumerate(both):
+                alone = surface_of(self.body.domain, self.body.space, part)
+                there = self.sides[:, k, side]
+                row = np.searchsorted(self.body.domain.facets(part), self.facets[there])
+                curved.deviation[there] = alone.deviation[row]
+                curved.unknown[there] = alone.unknown[row]
+        return curved
+
+
+def _components(body: BodyEquilibrium, owners: Owners, nodes: NDArray[np.int64]) -> Numbers:
+    """Return the connected components of nodes by global numbers. Collective."""
+    piece, _ = body.components
+    return owners.values(nodes, lambda given: piece[given - owners.begin].astype(np.intp))
+
+
+def _from_facets(facets: Surface, of: Numbers, x: Array) -> tuple[Array, Array]:
+    """Return distances of points from facets, (n,), and reference points of the nearest points."""
+    shape, order = facets.shape, facets.order
+    pieces = shape.pieces(order)
+    if not shape.simplex:
+        pieces = np.concatenate([pieces[:, [0, 1, 2]], pieces[:, [1, 3, 2]]])
+    count, corners = pieces.shape
+    ends = facets.points[of][:, pieces].reshape(-1, corners, x.shape[1])
+    share = nearest_on_simplices(ends, np.repeat(x, count, axis=0))
+    foot = np.einsum("nk,nkd->nd", share, ends).reshape(-1, count, x.shape[1])
+    distance = np.linalg.norm(foot - x[:, None], axis=2)
+    best = np.arange(of.size), distance.argmin(axis=1)
+    share = share.reshape(-1, count, corners)[best]
+    return distance[best], np.einsum("nk,nkr->nr", share, shape.nodes(order)[pieces[best[1]]])
+
+
+def _bow(facets: Surface) -> Array:
+    """Return the largest distance of curved facets from their straight pieces, shape (f,)."""
+    if facets.order == 1:
+        return np.zeros(facets.count)
+    shape = facets.shape
+    first, second = np.array(shape.edges).T
+    middle = facets.points[:, shape.corners : shape.corners + first.size]
+    bow = middle - (facets.points[:, first] + facets.points[:, second]) / 2
+    return np.asarray(shape.dim * np.linalg.norm(bow, axis=2).max(axis=1, initial=0.0) / 4)
