@@ -146,7 +146,8 @@ class _Boundaries:
         joined[joined] = self.between(of[point[joined]], component[cell[joined]]).any(axis=1)
         point, cell = point[joined], cell[joined]
         of_cells = shape_of(mesh)
-        at = pulled_back(of_cells, cells[cell], x[point])
+        with np.errstate(divide="ignore", invalid="ignore"):  # far from a curved cell
+            at = pulled_back(of_cells, cells[cell], x[point])
         inward = -of_cells.facet_normals
         begin = of_cells.nodes(1)[of_cells.facet_corners[:, 0]]
         height = np.einsum("pfd,fd->pf", at[:, None] - begin, inward)
