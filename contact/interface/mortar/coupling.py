@@ -109,8 +109,8 @@ class Parts:
         int N~_i times the direction where the facets face the master, and int Phi_i times the
         slave's normal over all of them, shape (f, k, d).
     gap
-        int Phi_i times the vector across, everywhere and where the sides do not cut each other,
-        shape (f, k, 2, d).
+        int Phi_i times the vector across, everywhere, where the sides do not cut each other, and
+        between curved surfaces, shape (f, k, 3, d).
     rows, columns, values
         int Phi_i (N_l o Pi): numbers of the node of Phi' and of the master's node, shape (e,).
     depths
@@ -146,12 +146,12 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
     dual, weight = _dual(slave, found, change)
     dual, d_matrix = basis.functions @ dual, basis.functions * weight[:, None, :]
     whole = np.einsum("fij,fj->fi", basis.functions, integrals(slave))
-    gap, normal = np.zeros((*weight.shape, 2)), np.zeros((*weight.shape, direction.shape[1]))
+    gap, normal = np.zeros((*weight.shape, 3)), np.zeros((*weight.shape, direction.shape[1]))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
     for points in found:
         own_share = points.weight[:, None] * _functions(points, slave, change)
         phi = np.einsum("pij,pj->pi", dual[points.slave], own_share)
-        across = np.column_stack([points.gap, np.maximum(points.gap, 0.0)])
+        across = np.column_stack([points.gap, np.maximum(points.gap, 0.0), points.curved_gap])
         _add(gap, points.slave, phi[:, :, None] * across[:, None, :])
         normals = _normals(points, slave, master, direction)
         _add(normal, points.slave, own_share[:, :, None] * normals[:, None, :])
@@ -256,7 +256,7 @@ def _master_entries(
 LEAST_COVERED = 1e-3
 
 #: Share of an overlap that gaps at nodes have at least, if facets are short enough for it.
-RESOLVED = 0.1
+RESOLVED = 0.5
 
 
 @dataclass(frozen=True)
@@ -275,6 +275,9 @@ class Coupling(JumpRows):
     gap_positive_part
         int Phi_j max(g, 0) / int N~_j of the distance g at a point, whose mean is `gap`, shape
         (n,); below 0 by negative functions Phi_j alone.
+    curved_gap
+        Mean distance of the curved surfaces that facets approximate, shape (n,) (length); `gap` at
+        degree 2.
     covered
         Share of int N~_j that faces the master, shape (n,).
     depth
@@ -290,6 +293,7 @@ class Coupling(JumpRows):
     normal: Array
     gap: Array
     gap_positive_part: Array
+    curved_gap: Array
     covered: Array
     depth: float
     dual_nodes: NDArray[np.int64]
@@ -324,7 +328,7 @@ class Coupling(JumpRows):
         depth = comm.allreduce(float(depths.max(initial=0.0)), op=MPI.MAX)
         # A corner within a long facet leaves the mean gaps at the nodes of that above 0.
         # That of a node beyond the corner, on a facet covered in part, is extrapolated.
-        gap = self.gap + added
+        gap = self.curved_gap + added
         within = (gap < -RESOLVED * depth) & (gap > -2 * depth)
         pressed = owners.among(self.nodes[within], self.dual_nodes.ravel())
         missed = (depths > depth / 2) & ~np.isin(self.dual_nodes, pressed).any(axis=1)
@@ -380,7 +384,7 @@ def _assembled(
         parts.dual_nodes.ravel(),
         np.hstack([part.reshape(f * k, int(np.prod(part.shape[2:]))) for part in shares]),
     )
-    areas, *vectors = np.split(total, 3 + d * np.arange(4), axis=1)
+    areas, *vectors = np.split(total, 3 + d * np.arange(5), axis=1)
     weight, whole, around = areas.T
     some = whole > NEGLIGIBLE * around
     covered = np.where(some, weight / np.where(some, whole, 1.0), 0.0)
@@ -392,7 +396,7 @@ def _assembled(
     normal, outward, *gaps = (vector[kept] for vector in vectors)
     normal = np.where(faces[:, None], normal, outward)
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    gap, positive_part = (
+    gap, positive_part, curved_gap = (
         np.where(faces, np.einsum("nd,nd->n", vector, normal) / weight, np.inf) for vector in gaps
     )
     # Each facet with a node has all of the node's row of D. The jump of an open node is its u.
@@ -412,5 +416,5 @@ def _assembled(
     divide = sparse.diags_array(1 / weight)
     jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
     depth = owners.comm.allreduce(float(parts.depths.max(initial=0.0)), op=MPI.MAX)
-    state = weight, normal, gap, positive_part, covered[kept]
+    state = weight, normal, gap, positive_part, curved_gap, covered[kept]
     return Coupling(*jumps, *state, depth, parts.dual_nodes, parts.depths)

@@ -98,8 +98,9 @@ class Points:
         Points of their reference facets, shape (p, dim).
     weight
         Quadrature weights, lengths or areas on the slave facet, or of its rings, shape (p,).
-    gap
-        Distance from the slave to the master facet along the slave's direction, shape (p,).
+    gap, curved_gap
+        Distance from the slave to the master facet along the slave's direction, and that of the
+        curved surfaces also where displacements do not follow these, shape (p,).
     depth
         Of the deepest overlap on each slave facet, of facets and of the surfaces that they
         approximate; below 0 the least distance, shape (f,) (length).
@@ -111,6 +112,7 @@ class Points:
     on_master: Array
     weight: Array
     gap: Array
+    curved_gap: Array
     depth: Array
 
 
@@ -152,13 +154,15 @@ def common_points(
         for side, nodes in ((slave, own), (master, other))
     )
     sides = (1.0, master, j, on_master, other), (-1.0, slave, i, on_slave, own)
-    clear, change = np.zeros((2, pair.size))
+    clear, change, curved = np.zeros((3, pair.size))
     for sign, side, facets, at, nodes in sides:
         functions = side.shape.lagrange(side.order, at)
         clear += sign * np.einsum("pk,pk->p", functions, nodes[pair, :, -1])
-        if side.follows:
-            change += sign * side.distance(facets[pair], at, direction[i[pair]])
-    gap, cut = clear + change, np.flatnonzero(clear < 0)
+        if side.order == 1 and not side.refined:
+            height = sign * side.distance(facets[pair], at, direction[i[pair]])
+            curved += height
+            change += height if side.follows else 0.0
+    gap, curved, cut = clear + change, clear + curved, np.flatnonzero(clear < 0)
     apart, most, there = np.maximum(clear, gap), np.zeros(cut.size), pair[cut]
     for sign, side, facets, at, _ in sides:
         bounds = side.distance_bounds(facets[there], at[cut], direction[i[there]])
@@ -168,14 +172,14 @@ def common_points(
     np.maximum.at(depth, i[pair], -apart * across[i[pair]])
     bears = weight != 0
     pair, on_slave, on_master = pair[bears], on_slave[bears], on_master[bears]
-    weight, gap = weight[bears], gap[bears]
+    weight, gap, curved = weight[bears], gap[bears], curved[bears]
     gradients, d = slave.shape.gradients(slave.order, on_slave), slave.shape.dim
     slopes, turned = slave.slopes(i[pair], on_slave), _slopes(gradients, own[pair, :, :d])
     size = np.linalg.norm(area_vectors(slopes), axis=1) / np.abs(determinant(turned))
     if slave.revolved:
         functions = slave.shape.lagrange(slave.order, on_slave)
         size *= 2 * np.pi * np.einsum("pk,pk->p", functions, slave.points[i[pair], :, 0])
-    return Points(i[pair], j[pair], on_slave, on_master, weight * size, gap, depth)
+    return Points(i[pair], j[pair], on_slave, on_master, weight * size, gap, curved, depth)
 
 
 def _on_planes(
