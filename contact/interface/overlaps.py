@@ -57,8 +57,8 @@ def overlap_depths(body: BodyEquilibrium, pairs: Sequence[tuple[str, str, bool]]
     depth, on_sides = bodies.depths(facet, at, other)
     between = bodies.between(bodies.component[facet], other)
     press = np.array([press for *_, press in pairs])
-    elsewhere = (on_sides & press).any(axis=1)[:, None] & ~press
-    mine = between & ((on_sides & ~elsewhere) | ~on_sides.any(axis=1)[:, None])
+    elsewhere = (on_sides & press).any(axis=1, keepdims=True) & ~press
+    mine = between & ((on_sides & ~elsewhere) | ~on_sides.any(axis=1, keepdims=True))
     deepest = np.where(mine, depth[:, None], 0.0).max(axis=0, initial=0.0)
     body.comm.Allreduce(MPI.IN_PLACE, deepest, op=MPI.MAX)
     return [d if d > TOUCHING * body.domain.size else 0.0 for d in deepest.tolist()]
@@ -130,14 +130,14 @@ class _Boundaries:
             bounding_boxes(comm, cells.reshape(-1, d)), x[near], np.zeros(near.size)
         )
         asked = near[within_box]
-        source, number, x, of = exchanged(comm, rank, asked, x[asked], of[asked])
+        source, number, there, of = exchanged(comm, rank, asked, x[asked], of[asked])
         point = cell = np.zeros(0, dtype=np.intp)
-        if len(x) and len(cells):
+        if len(there) and len(cells):
             owned = np.arange(len(cells), dtype=np.int32)
-            padded = np.pad(x, ((0, 0), (0, 3 - d)))
+            padded = np.pad(there, ((0, 0), (0, 3 - d)))
             tree = geometry.bb_tree(mesh, d, entities=owned, padding=NEGLIGIBLE * domain.size)
             found = geometry.compute_collisions_points(tree, padded)
-            point = np.repeat(np.arange(len(x)), np.diff(found.offsets))
+            point = np.repeat(np.arange(len(there)), np.diff(found.offsets))
             cell = found.array.astype(np.intp)
         dofmap = self.body.space.dofmap
         first = dofmap.index_map.local_to_global(dofmap.list[: len(cells), 0].copy())
@@ -147,7 +147,7 @@ class _Boundaries:
         point, cell = point[joined], cell[joined]
         of_cells = shape_of(mesh)
         with np.errstate(divide="ignore", invalid="ignore"):  # far from a curved cell
-            at = pulled_back(of_cells, cells[cell], x[point])
+            at = pulled_back(of_cells, cells[cell], there[point])
         inward = -of_cells.facet_normals
         begin = of_cells.nodes(1)[of_cells.facet_corners[:, 0]]
         height = np.einsum("pfd,fd->pf", at[:, None] - begin, inward)
@@ -193,7 +193,8 @@ class _Boundaries:
         surface = self._curved()
         opposite = surface.sent(near, ranks)
         # A foot aside, where facets turn, has a height in another direction: none adds to depths.
-        sides, own = self.sides.any(axis=2), np.minimum(surface.height_bounds(facet, at)[0], 0.0)
+        own = np.minimum(surface.height_bounds(facet, at)[0], 0.0)
+        sides = np.asarray(self.sides.any(axis=2))
         _, theirs, centres = exchanged(comm, ranks, sides[near], centres[near])
         depth, on_sides = np.full(len(x), np.inf), sides[facet]
         rounding = NEGLIGIBLE * self.body.domain.size

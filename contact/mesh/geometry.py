@@ -149,7 +149,7 @@ def nearest_on_simplices(corners: Array, points: Array) -> Array:
         far = np.linalg.norm(points[beyond] - np.einsum("nk,nkd->nd", share, ends), axis=1)
         nearer = np.flatnonzero(far < least)
         least[nearer], own[beyond[nearer]] = far[nearer], 0.0
-        own[np.ix_(beyond[nearer], side)] = share[nearer]
+        own[beyond[nearer, None], side] = share[nearer]
     return own
 
 
