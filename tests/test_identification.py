@@ -11,7 +11,7 @@ from contact.case.file import number_at, to_toml, with_number
 from contact.cli.identify import report
 from contact.cli.main import main
 from contact.derivatives.identification import _least
-from scripts.studies.derivatives import FAMILIES, problem
+from scripts.studies.derivatives import problem
 from scripts.studies.identification import coverage
 
 SELF = MPI.COMM_SELF
@@ -19,7 +19,7 @@ COLUMNS = ("contact_force_x", "contact_force_y")
 
 
 def case():
-    return parse_case(problem(FAMILIES.index("evolution"))[1])
+    return parse_case(problem("evolution"))
 
 
 @cache
@@ -113,7 +113,7 @@ def with_columns(given, columns):
 
 def loaded(mu=0.3):
     """Return the block with a load on its held top, and two equal ones on its left side."""
-    data = problem(FAMILIES.index("evolution"))[1]
+    data = problem("evolution")
     data["fixed"][1]["displacement"] = [data["fixed"][1]["displacement"][0], "free"]
     load = {"traction": [0.002, 0.0], "amplitude": "constant"}
     data["load"] = [{"on": on, **load} for on in ("top", "left", "left")]

@@ -1,8 +1,11 @@
-"""Derivatives by every parameter of random problems, against central differences of solutions.
+"""Derivatives by parameters: Taylor's series, closed forms and published values, and their cost.
 
-`python3 -m scripts.studies.derivatives [--out DIR] [--coarse]`.
+`python3 -m scripts.studies.derivatives [--out DIR] [--coarse]`; the page is docs/derivatives.md.
 """
 
+from __future__ import annotations
+
+import time
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,8 +15,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact import solve
-from contact.case.file import Case, number_at, parse_case, to_toml, with_number
+from contact import field_gradient, gap_gradient, load_case, parse_case, solve
+from contact.case.file import Case, number_at, to_toml, with_number
 from contact.derivatives.by_parameters import (
     ADJOINT,
     TANGENT,
@@ -23,14 +26,29 @@ from contact.derivatives.by_parameters import (
     sensitivity,
 )
 from contact.errors import InputError
-from contact.problem.linearised import active_set
 from contact.results.quantities import named_functionals
 from contact.results.solution import Solution
 from contact.typing import Array
-from scripts.reporting import Report, append, empty, options
+from forms.elasticity import hexagonal
+from forms.piezo import hexagonal_voigt
+from scripts.cases import CASES
+from scripts.reporting import Report, append, empty, options, solved
+from scripts.studies.half_space import HalfSpace
+from scripts.studies.indentation import Setting
 
-#: Relative changes of a parameter in the central differences: the first without a kink between.
-STEPS = (2e-5, 5e-6, 1e-6)
+#: Largest step in Taylor's series, in sizes of the parameters; the other one is half of it.
+STEP = 2e-5
+
+#: Constants of PZT-4 (GPa, C/m2, nF/m).
+STIFFNESS = {"c11": 139.0, "c12": 77.8, "c13": 74.3, "c33": 113.0, "c44": 25.6}
+PIEZO = {"e31": -6.98, "e33": 13.84, "e15": 13.44, "beta11": 6.0, "beta33": 5.47}
+
+#: Those by which the exponents of the force are tabulated.
+BY = ("c11", "c33", "c44", "c13", "e31", "e33", "e15", "beta11", "beta33")
+
+#: Extents of the boxes that stand for a half space, in contact radii.
+BOXES = (15.0, 30.0)
+
 
 #: Sections with parameters.
 SECTIONS = ("material", "fixed", "load", "contact", "friction", "electric", "electrode")
@@ -38,11 +56,7 @@ SECTIONS = ("material", "fixed", "load", "contact", "friction", "electric", "ele
 #: Numbers that are no parameters: they choose, or leave the problem as it is.
 CHOICES = ("radius", "layer", "yield_strain")
 
-#: Derivatives are compared relative to themselves, but not to less than this share of quantity
-#: over parameter: a solve knows no more of them.
-LEAST = 1e-2
-
-PIEZO = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
+SHARP = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
 
 
 def block(rng: np.random.Generator, cells: int = 12) -> dict[str, Any]:
@@ -81,10 +95,10 @@ def _slip(rng: np.random.Generator) -> dict[str, Any]:
     return {"law": "slip", "a": rng.uniform(0.2, 0.5), "b": rng.uniform(0, 0.2), "rho": 20.0}
 
 
-def problem(seed: int) -> tuple[str, dict[str, Any]]:
-    """Return a random problem: its family, and the data of its case."""
-    rng = np.random.default_rng(seed)
-    data, family = block(rng), family_of(seed)
+def problem(family: str) -> dict[str, Any]:
+    """Return the case of a random problem."""
+    rng = np.random.default_rng(FAMILIES.index(family))
+    data = block(rng)
     if family == "slip":
         data["friction"]["mu"] = _slip(rng)
     elif family == "log":
@@ -102,7 +116,7 @@ def problem(seed: int) -> tuple[str, dict[str, Any]]:
         data["material"] |= {"law": "log", "yield_strain": 0.01}
         data = evolving(data)
     elif family == "piezo":
-        data["material"] = {"young": 100.0, "poisson": 0.3, "piezo": PIEZO}
+        data["material"] = {"young": 100.0, "poisson": 0.3, "piezo": SHARP}
         data["fixed"][0]["potential"] = 0.0
         data["electric"] = {"k_e": rng.uniform(0.5, 2), "phi_f": rng.uniform(0.02, 0.1)}
         data["electric"]["law"] = "perfect"
@@ -136,7 +150,7 @@ def problem(seed: int) -> tuple[str, dict[str, Any]]:
         data["material"] |= {"law": "j2", **hardening}
         data = evolving(data)
     elif family == "evolution, electrode":
-        data["material"] = {"young": 100.0, "poisson": 0.3, "piezo": PIEZO}
+        data["material"] = {"young": 100.0, "poisson": 0.3, "piezo": SHARP}
         data["electric"] = {"law": "perfect", "k_e": rng.uniform(0.5, 2), "phi_f": 0.05}
         data["electrode"] = [
             {"on": "top", "charge": rng.uniform(-0.1, 0.1), "amplitude": "constant"}
@@ -174,26 +188,16 @@ def problem(seed: int) -> tuple[str, dict[str, Any]]:
         data["contact"] = {"on": "top", "foundation": ball, "rigid": motion}
         law = {"law": "slip", "a": rng.uniform(0.2, 0.6), "b": 0.0, "rho": 0.0}
         data["friction"] = {"law": "coulomb", "mu": law}
-    return family, data | {"solver": {"tolerance": 1e-13}}
-
-
-def family_of(seed: int) -> str:
-    """Return the family of a problem: those of `FURTHER` come after the others."""
-    if seed < COUNT:
-        return FAMILIES[seed % len(FAMILIES)]
-    return FURTHER[(seed - COUNT) % len(FURTHER)]
+    return data | {"solver": {"tolerance": 1e-13}}
 
 
 #: Families of which all numbers are parameters, those of the mesh and 0 among them.
-FURTHER = ("turning plate", "slant, in SI", "numbers at 0")
-
-#: Problems of the others, and of all.
-COUNT, ALL = 60, 72
+FURTHER = "turning plate", "slant, in SI", "numbers at 0"
 
 FAMILIES = (
     "number", "slip", "log", "layer", "evolution", "evolution, slip", "evolution, log", "piezo",
     "two bodies", "ball under a force", "3-D", "revolution", "smoothed", "evolution, j2",
-    "evolution, electrode",
+    "evolution, electrode", *FURTHER,
 )  # fmt: skip
 
 
@@ -256,72 +260,6 @@ def values(solution: Solution, names: list[str]) -> Array:
     return np.array([known[name](problem, state) for name in names])
 
 
-def moved(case: Case, way: Mapping[str, float], by: float) -> Case:
-    """Return a case with each of some numbers changed by so many times its way and size."""
-    made = case
-    for key, change in way.items():
-        if change:
-            made = with_number(made, key, number_at(case, key) + by * change * size_of(case, key))
-    return made
-
-
-def active_sets(solution: Solution) -> Array:
-    """Return states of the contact nodes of all steps, in an order of their places. Collective.
-
-    Of all ranks: two runs need not divide a mesh alike, and their meshes may differ a little.
-    """
-    base, found = solution.problem, []
-    along = np.sqrt([1.0, 2.0, 3.0])[: base.dim]
-    for state in [step.state for step in solution.steps] or [solution.state]:
-        active = active_set(base.at(state.time, state.history), state)
-        own = np.column_stack([base.nodes.points @ along, active.closed, active.slips])
-        rows = base.nodes.gather(own)
-        found.append(rows[np.argsort(rows[:, 0]), 1:])
-    return np.array(found)
-
-
-def differences(
-    solution: Solution, names: list[str], way: Mapping[str, float]
-) -> tuple[Array, float]:
-    """Return the derivatives along a way of parameters by differences of solutions.
-
-    Where the active sets of the ends differ in a step, the difference goes across a kink of
-    the results: it is taken over a smaller part of the way then. It is central, or
-    of second order on one side where no number is accepted on the other.
-    """
-    comm, case = solution.problem.comm, solution.source
-    for step in STEPS:
-        try:
-            ends, factors = [moved(case, way, by) for by in (step, -step)], (0.5, -0.5)
-        except InputError:  # a border
-            ends, factors = [moved(case, way, by) for by in (step, 2 * step, 0.0)], (2, -0.5, -1.5)
-        runs = [solve(end, comm=comm) for end in ends]
-        one, *others = (active_sets(run) for run in runs)
-        same = all(np.array_equal(one, other) for other in others)
-        if same:
-            break
-    found = sum(f * values(run, names) for f, run in zip(factors, runs, strict=True)) / step
-    return found, step if same else 0.0
-
-
-@dataclass(frozen=True)
-class Compared:
-    """Relative differences of the tangent, the largest over results and ways."""
-
-    family: str
-    #: To central differences of solutions, and to the adjoint.
-    apart: float
-    adjoint: float
-    #: Number of weakly active nodes; names of the parameters whose differences were shortened, for
-    #: at their ends another node touches, sticks or slips, each with the step.
-    weak: int
-    kinks: str
-    #: How many there are; ways of parameters along which solutions were compared.
-    parameters: int
-    results: int
-    ways: int
-
-
 def by_both(
     solution: Solution, names: Sequence[str], parameters: Sequence[str] | Mapping[str, Parameter]
 ) -> tuple[Sensitivities, Sensitivities]:
@@ -337,83 +275,288 @@ def by_both(
     return tangent, adjoint
 
 
-def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
-    """Compare the derivatives of a random problem by all of its parameters. Collective."""
-    family, data = problem(seed)
-    solution = solve(parse_case(data), comm=comm)
-    given = keys(solution.source, every=family in FURTHER)
-    names = ["contact_force_x", "contact_force_y", "max_pressure", "max_displacement"]
-    names = names[1:] if family == "revolution" else names
-    if family == "ball under a force":
-        names += ["rigid_x", "rigid_y"]
-    if family == "piezo":
-        names += ["charge_foundation", "charge_top"]
-    if family == "evolution, electrode":
-        names += ["charge_foundation", "potential_top", "reaction_x_top"]
-    if family == "turning plate":
-        names += ["rigid_x", "rigid_y", "rigid_rotation"]
-    size = np.array([size_of(solution.source, key) for key in given])
-    found, other = by_both(solution, names, given)
+@dataclass(frozen=True)
+class Taylor:
+    """Taylor's series of results along a way of parameters, by the tangent; all is relative."""
+
+    #: Largest difference of the adjoint, over derivative and result.
+    adjoint: float
+    #: Largest difference of one-sided differences of second order, over derivative and a hundredth
+    #: of the result.
+    apart: float
+    #: Largest remainder of first order, over the result, and its order.
+    remainder: float
+    order: float
+    #: Number of weakly active nodes.
+    weak: int
+
+
+def taylor(
+    solution: Solution, names: Sequence[str], sizes: Mapping[str, float], way: Array
+) -> Taylor:
+    """Compare tangent, adjoint and two more solutions along a way. Collective."""
+    case, comm = solution.source, solution.problem.comm
+    both = by_both(solution, names, [*sizes])
     # By relative changes of the parameters: in the units of the results.
+    scale = np.array([*sizes.values()])
     tangent, adjoint = (
-        np.array([[of[name][key] for key in given] for name in names]) * size
-        for of in (found, other)
+        np.array([[of[name][key] for key in sizes] for name in names]) * scale for of in both
     )
-    natural = np.maximum(np.abs(values(solution, names)), 1e-300)[:, None]
-    both = float((np.abs(tangent - adjoint) / np.maximum(np.abs(tangent), natural)).max())
-    ways = np.eye(len(given))
-    if not each:
-        ways = np.random.default_rng(seed).uniform(-1, 1, (len(given), 1))
-        at = np.array([number_at(solution.source, key) for key in given])
-        ways[at == 0] = np.abs(ways[at == 0])  # 0 may be the least that is accepted
-    ends = [differences(solution, names, dict(zip(given, way, strict=True))) for way in ways.T]
-    apart, along = np.column_stack([end for end, _ in ends]), tangent @ ways
-    known = given if each else ["all of them"]
-    kinks = [f"{k} ({step:g})" for k, (_, step) in zip(known, ends, strict=True) if step < STEPS[0]]
-    return Compared(
-        family,
-        float((np.abs(along - apart) / np.maximum(np.abs(apart), LEAST * natural)).max()),
-        both,
-        len(found.weakly_active),
-        "; ".join(kinks),
-        len(given),
-        len(names),
-        ways.shape[1],
+    here = values(solution, names)
+    natural = np.maximum(np.abs(here), 1e-300)
+    least = np.maximum(np.abs(tangent), natural[:, None])
+
+    def moved(by: float) -> Array:
+        """Return the change of the results."""
+        end = case
+        for key, change in zip(sizes, by * way * scale, strict=True):
+            end = with_number(end, key, number_at(case, key) + change)
+        return values(solve(end, comm=comm), names) - here
+
+    far, near = moved(STEP), moved(STEP / 2)
+    along, apart = tangent @ way, (4 * near - far) / STEP
+    first, second = (
+        float((np.abs(end - by * along) / natural).max())
+        for end, by in ((far, STEP), (near, STEP / 2))
+    )
+    return Taylor(
+        float((np.abs(tangent - adjoint) / least).max()),
+        float((np.abs(along - apart) / np.maximum(np.abs(apart), 1e-2 * natural)).max()),
+        first,
+        float(np.log2(first / second)) if second else np.nan,
+        len(both[0].weakly_active),
+    )
+
+
+#: Results of a family beside forces, pressure and displacement.
+MORE = {
+    "ball under a force": ("rigid_x", "rigid_y"),
+    "piezo": ("charge_foundation", "charge_top"),
+    "evolution, electrode": ("charge_foundation", "potential_top", "reaction_x_top"),
+    "turning plate": ("rigid_x", "rigid_y", "rigid_rotation"),
+}
+
+
+def series(family: str, comm: MPI.Intracomm) -> tuple[Taylor, int]:
+    """Return Taylor's series of a problem along a random way of all of its parameters.
+
+    With it the number of derivatives. Collective.
+    """
+    solution = solve(parse_case(problem(family)), comm=comm)
+    case, names = solution.source, ["contact_force_y", "max_pressure", "max_displacement"]
+    names += ([] if family == "revolution" else ["contact_force_x"]) + [*MORE.get(family, ())]
+    sizes = {key: size_of(case, key) for key in keys(case, every=family in FURTHER)}
+    way = np.random.default_rng(FAMILIES.index(family)).uniform(-1, 1, len(sizes))
+    at_zero = np.array([number_at(case, key) == 0 for key in sizes])
+    way[at_zero] = np.abs(way[at_zero])  # 0 may be the least that is accepted
+    return taylor(solution, names, sizes, way), len(sizes) * len(names)
+
+
+def tabulate(report: Report) -> None:
+    """Tabulate Taylor's series of all families."""
+    columns = empty("problem", "derivatives", "adjoint", "apart", "remainder", "order")
+    for family in FAMILIES:
+        found, count = series(family, MPI.COMM_WORLD)
+        append(columns, family, count, found.adjoint, found.apart, found.remainder, found.order)
+    report.table(
+        "taylor",
+        "Taylor's series of results along a random way of all parameters",
+        columns,
+        "Adjoint: largest relative difference to the tangent. Apart: that of the tangent along the "
+        "way to a difference of three solutions, of second order. Derivatives are compared "
+        "relative to themselves, but to not less than the result (adjoint), or a hundredth of the "
+        f"result (apart). Remainder: that of first order for a step of {STEP:g} times the "
+        "parameters, over the result, with its order from half the step.",
+    )
+
+
+def relative(solution: Solution, name: str, keys: Sequence[str]) -> Array:
+    """Return d ln Q/d ln m of a result by parameters."""
+    found = sensitivity(solution, [name], keys)[name]
+    value = named_functionals(solution.problem)[name](solution.problem, solution.state)
+    return np.array([found[key] * number_at(solution.source, key) / value for key in keys])
+
+
+def closed_exponents(potential: float | None) -> Array:
+    """Return the exponents of the force of a ball on a half space of PZT-4 by its constants."""
+
+    def stiffness(constants: dict[str, float]) -> float:
+        coupling = hexagonal_voigt(**{key: constants[key] for key in PIEZO})
+        elastic = hexagonal(*(constants[key] for key in ("c11", "c12", "c13", "c33", "c44")))
+        body = HalfSpace(elastic, *coupling)
+        return body.insulating if potential is None else body.conducting
+
+    constants, step = STIFFNESS | PIEZO, 1e-5
+    return np.array(
+        [
+            np.log(
+                stiffness(constants | {key: constants[key] * (1 + step)})
+                / stiffness(constants | {key: constants[key] * (1 - step)})
+            )
+            / (2 * step)
+            for key in BY
+        ]
+    )
+
+
+def ball(potential: float | None, fineness: float, material: dict[str, Any]) -> list[Solution]:
+    """Return a ball on a half space of a material in two boxes."""
+    found = []
+    for extent in BOXES:
+        data = tomllib.loads(to_toml(Setting("PZT-4", "ball", potential, fineness).case(extent)))
+        data["material"], data["solver"] = material, {"tolerance": 1e-11}
+        if "piezo" not in material:
+            del data["fixed"][0]["potential"], data["fixed"][1]["potential"]
+        found.append(solved(parse_case(data)))
+    return found
+
+
+def exponents(report: Report, fineness: float) -> None:
+    """Tabulate the exponents of the force on a ball, of PZT-4 and of Hertz."""
+    crystal = {"law": "anisotropic", "poling": -90.0, **STIFFNESS, "piezo": PIEZO}
+    shape = ["contact.foundation.radius", "contact.rigid.displacement.1"]
+    columns = empty("ball", "parameter", *(f"box {box:g} a" for box in BOXES))
+    columns |= {"extrapolated": [], "closed form": []}
+    for kind, potential, material, own in (
+        ("insulating", None, crystal, BY),
+        ("conducting", 0.0, crystal, BY),
+        ("Hertz", None, {"young": 100.0, "poisson": 0.3}, ("young",)),
+    ):
+        keys = [f"material.{'' if key in STIFFNESS or kind == 'Hertz' else 'piezo.'}{key}"
+                for key in own]  # fmt: skip
+        first, second = (
+            relative(solution, "contact_force_y", [*keys, *shape])
+            for solution in ball(potential, fineness, material)
+        )
+        exact = [1.0] if kind == "Hertz" else closed_exponents(potential)
+        rows = zip(
+            [*own, "R", "delta"], first, second, 2 * second - first, [*exact, 0.5, 1.5], strict=True
+        )
+        for row in rows:
+            append(columns, kind, *row)
+    report.table(
+        "exponents",
+        "Exponents of the force on a ball: d ln P/d ln m at a given depth",
+        columns,
+        "Quadratic elements in a body of revolution, 12 of them on the contact radius a = 0.1 R. "
+        "The error caused by the finite box is of first order in a over its size, and is "
+        "extrapolated.",
+    )
+
+
+def known(report: Report) -> None:
+    """Tabulate derivatives that are known."""
+    columns = empty("problem", "derivative", "found", "known")
+    changes = ["mesh.cells=[64,16]", "material.law=linear", "friction.mu=0.3"]
+    bar = solved(load_case(CASES / "bar.toml", [*changes, "solver.tolerance=1e-12"]))
+    names = ["contact_force_x", "contact_force_y", "max_pressure"]
+    found = sensitivity(bar, names, ["friction.mu", "material.young"])
+    for name, value in zip(names, (-6.2189744e-4, 1.4790623e-4, 1.25772757e-2), strict=True):
+        append(columns, "bar 64 x 16", f"d {name}/d mu", found[name]["friction.mu"], value)
+    append(columns, "bar 64 x 16", "d contact_force_x/d E", found[names[0]]["material.young"], 0.0)
+    height, k, b, top = 0.5, 2.0, PIEZO["beta33"], 3.0
+    column = solved(parse_case(charged_column(height, k, top)))
+    slope = sensitivity(column, ["charge_foundation"], ["electric.k_e"])["charge_foundation"]
+    sign = np.sign(slope["electric.k_e"])
+    exact = top / (k * height / b + 1) ** 2
+    append(columns, "column", "d charge/d k", sign * slope["electric.k_e"], exact)
+    shown = {name: [f"{x:.9g}" if isinstance(x, float) else x for x in column]
+             for name, column in columns.items()}  # fmt: skip
+    report.table(
+        "known",
+        "Derivatives beside known ones",
+        shown,
+    )
+
+
+def charged_column(height: float, k: float, top: float) -> dict[str, Any]:
+    """Return a column without coupling on a foundation that conducts with a constant k."""
+    return {
+        "mesh": {"generator": "rectangle", "size": [1.0, height], "cells": [2, 4]},
+        "material": {
+            "young": 1.0,
+            "poisson": 0.3,
+            "piezo": PIEZO | {"e31": 0.0, "e33": 0.0, "e15": 0.0},
+        },
+        "fixed": [{"on": "top", "displacement": [0.0, -0.01], "potential": top}],
+        "contact": {"on": "bottom"},
+        "electric": {"law": "perfect", "k_e": k, "phi_f": 0.0},
+        "solver": {"tolerance": 1e-12},
+    }
+
+
+def cost(report: Report, coarse: bool) -> None:
+    """Tabulate factorisations, back-substitutions and time beside those of the solution."""
+    n = 8 if coarse else 125
+    pressed = {
+        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [4 * n - 1, n // 4]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": [0.002, -0.01]}],
+        "contact": {"on": "bottom", "gap": "0.001*(x - 2)**2"},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    space = {
+        "mesh": {
+            "generator": "box",
+            "size": [2.0, 1.0, 1.0],
+            "cells": [4, 2, 2] if coarse else [24, 12, 12],
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": [0.002, 0.0, -0.01]}],
+        "contact": {"on": "bottom", "gap": "0.01*((x - 1)**2 + (y - 0.5)**2)"},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    loop = evolving(pressed | {"mesh": pressed["mesh"] | {"cells": [64, 16]}}, 1 if coarse else 4)
+    plastic = loop | {"material": {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 0.01}}
+    columns = empty("problem", "unknowns", "parameters", "by", "factorisations", "solves", "s")
+    many = ["friction.mu", "material.young", "material.poisson", "fixed.0.displacement.1"]
+    for title, data in (
+        ("plane", pressed),
+        ("3-D", space),
+        ("loop", loop),
+        ("loop, J2", plastic),
+    ):
+        begin = time.process_time()
+        solution = solved(parse_case(data))
+        seconds, summary = time.process_time() - begin, solution.counters
+        size = solution.problem.body.layout.unknowns
+        append(columns, title, size, 0, "solution", summary.factorizations,
+               summary.linear_solves, seconds)  # fmt: skip
+        name, nodes = "contact_force_x", solution.problem.nodes.size
+        for parameters, method in ((many[:1], "tangent"), (many, "tangent"), (many[:1], "adjoint"),
+                                   (many, "adjoint")):  # fmt: skip
+            begin = time.process_time()
+            found = sensitivity(solution, [name], parameters, method)
+            seconds, taken = time.process_time() - begin, found.counters
+            append(columns, title, size, len(parameters), method, taken.factorizations,
+                   taken.linear_solves, seconds)  # fmt: skip
+        for count, label, made in (
+            (nodes, "gap_gradient", gap_gradient),
+            (solution.problem.domain.mesh.topology.index_map(solution.problem.dim).size_local,
+             "field_gradient", field_gradient),
+        ):  # fmt: skip
+            begin = time.process_time()
+            made(solution, name)
+            append(columns, title, size, count, label, len(solution.steps) or 1, "—",
+                   time.process_time() - begin)  # fmt: skip
+    report.table(
+        "cost",
+        "Cost of derivatives of one result beside that of the solution",
+        columns,
+        "Factorisations, back-substitutions and seconds of the processor on one thread. The time "
+        "includes two residuals per parameter and step, and the problems of the two changed "
+        "values.",
     )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Compare the problems, and tabulate them by family."""
+    """Make the tables."""
     given = options(__doc__, "derivatives", arguments)
     report = Report(given.out)
-    rows = empty(*Compared.__annotations__)
-    for seed in range(len(FAMILIES) if given.coarse else ALL):  # one of each
-        append(rows, *vars(compared(seed, MPI.COMM_WORLD, each=not given.coarse)).values())
-        print(seed, *(column[-1] for column in rows.values()), flush=True)
-    report.numbers("problems-all", rows)
-    tabulate(report, rows)
-
-
-def tabulate(report: Report, rows: Mapping[str, Sequence[Any]]) -> None:
-    """Tabulate the problems by family."""
-    columns = empty("family", "problems", "derivatives", "adjoint", "differences", "apart", "kinks")
-    every = [dict(zip(rows, row, strict=True)) for row in zip(*rows.values(), strict=True)]
-    for family in dict.fromkeys(rows["family"]):
-        own = [row for row in every if row["family"] == family]
-        apart, adjoint = (max(row[name] for row in own) for name in ("apart", "adjoint"))
-        by, along = (sum(r[name] * r["results"] for r in own) for name in ("parameters", "ways"))
-        kinks = sum(len(row["kinks"].split(";")) for row in own if row["kinks"])
-        append(columns, family, len(own), by, adjoint, along, apart, kinks)
-    report.table(
-        "problems",
-        "Derivatives of random problems by all their parameters",
-        columns,
-        "Largest relative difference of the tangent to the adjoint, and to central differences of "
-        "solutions by each parameter (apart). Derivatives are compared relative to themselves, but "
-        "to not less than the result (adjoint), or a hundredth of the result (apart), over the "
-        "parameter. Kinks: differences between whose ends a node begins to touch, stick or slip; "
-        "they were taken over a smaller part of the way. problems-all.csv names their parameters.",
-    )
+    tabulate(report)
+    known(report)
+    exponents(report, 4.0 if given.coarse else 12.0)
+    cost(report, given.coarse)
 
 
 if __name__ == "__main__":

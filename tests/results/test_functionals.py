@@ -11,7 +11,7 @@ from contact import load_case, parse_case, sensitivity, solve
 from contact.case.file import number_at, with_number
 from contact.results.functionals import Differentiable, Integral
 from contact.results.quantities import named_functionals
-from scripts.studies.derivatives import FAMILIES, problem
+from scripts.studies.derivatives import problem
 
 SELF = MPI.COMM_SELF
 
@@ -34,7 +34,7 @@ def plate():
 
 
 def family(name):
-    return parse_case(problem(FAMILIES.index(name))[1])
+    return parse_case(problem(name))
 
 
 def energy(run):
