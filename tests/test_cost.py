@@ -35,8 +35,6 @@ from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from scripts.benchmarks.bench_one import block
 from scripts.cases import bar
-from scripts.studies.cantilevers import UNIFORM as PUSHED
-from scripts.studies.cantilevers import cantilever
 from scripts.studies.indentation_in_space import punch
 from scripts.studies.robustness.problems import problems
 from tests.interface.test_compliance import COLUMNS
@@ -445,8 +443,8 @@ def test_else_it_starts_from_rest(monkeypatch: pytest.MonkeyPatch, change: str) 
 def test_a_slender_body_starts_from_a_coarser_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without it a linear beam that lies down takes more than twice as many factorisations."""
     monkeypatch.setitem(refining.MANY, "whole", 1000)
-    beam = cantilever(PUSHED, [640, 8], 2, 0.3, 0.5)
-    found, cold = solve(parse_case(beam)), solve(parse_case({**beam, "solver": {"nested": False}}))
+    case = beam(100.0, [640, 8], UNIFORM, 0.5, 0.3, **LONG)
+    found, cold = solve(parse_case(case)), solve(parse_case({**case, "solver": {"nested": False}}))
     assert (found.start, cold.start) == ("the solution on a coarser mesh", "the zero initial guess")
     assert found.converged and cold.converged
     assert 2 * found.counters.factorizations < cold.counters.factorizations
@@ -458,13 +456,12 @@ def test_a_coarser_mesh_that_does_not_fit_the_case_is_left_out(
 ) -> None:
     """With an odd number of cells it has other nodes, at one of which this mu is negative."""
     monkeypatch.setitem(refining.MANY, "whole", 1000)
-    beam = cantilever(PUSHED, [803, 9], 1, 0.0, 0.5)
-    beam["mesh"]["size"] = [402.0, 1.0]
-    beam["friction"] = {"law": "coulomb", "mu": "0.05 * sqrt(abs(x - 200)) - 0.0005"}
-    found = solve(parse_case(beam))
+    case = beam(402.0, [803, 9], UNIFORM, 0.5)
+    case["friction"] = {"law": "coulomb", "mu": "0.05 * sqrt(abs(x - 200)) - 0.0005"}
+    found = solve(parse_case(case))
     assert (found.start, found.converged) == ("the zero initial guess", True)
     with pytest.raises(InputError, match=r"\[negative\]"):
-        solve(parse_case({**beam, "solver": {"nested": True}}))
+        solve(parse_case({**case, "solver": {"nested": True}}))
 
 
 @pytest.fixture

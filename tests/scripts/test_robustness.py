@@ -9,6 +9,7 @@ from contact.mesh.cells import SHAPES
 from contact.methods.options import NewtonOptions
 from forms.laws import SlipCoefficient
 from scripts.studies.robustness.__main__ import SMALL, judge, main
+from scripts.studies.robustness.ablation import DEVICES, LINEAR
 from scripts.studies.robustness.check import Mesh, internal_forces, recheck
 from scripts.studies.robustness.problems import problems
 
@@ -148,3 +149,10 @@ def test_the_table_of_the_study(tmp_path, capsys):
         .splitlines()[1]
         .startswith("clouds-0,newton,right")
     )
+
+
+def test_devices_are_there_to_be_switched_off():
+    for device in (*DEVICES, *LINEAR):
+        assert all(hasattr(owner, name) for owner, name, _ in device.changes), device.name
+        with device.off() as options:
+            assert isinstance(options, NewtonOptions)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice, product
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -27,13 +27,7 @@ from contact import Solution, load_case, refining, solve
 from contact.case.file import Case, parse_case
 from contact.linear import multigrid, schur
 from contact.linear.operator import BlockPreconditioner
-from contact.methods import (
-    fallbacks,
-    interior_point,
-    newton_step,
-    safeguards,
-    semismooth,
-)
+from contact.methods import fallbacks, interior_point, newton_step, safeguards, semismooth
 from contact.methods.newton import Chord, Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
@@ -42,11 +36,14 @@ from contact.problem.residuals import evaluate, undeformed_equilibrium
 from scripts.benchmarks import bench_one
 from scripts.cases import CASES
 from scripts.reporting import Report, append, empty, parser
-from scripts.studies import cantilevers
 from scripts.studies.robustness.bodies import Bodies
 from scripts.studies.robustness.check import write_msh
 from scripts.studies.robustness.problems import problems
 from scripts.thesis.tables_compliance import case_of
+from tests.methods.test_free_body import pads
+from tests.methods.test_nothing_touches import unloaded
+from tests.methods.test_overload import wall
+from tests.methods.test_slender import TIP, UNIFORM, beam
 
 #: Times as long as with the device, and seconds more, from which on a problem counts as slow.
 SLOW, NOTICED = 1.5, 0.1
@@ -108,8 +105,8 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
 
 ELASTIC, COULOMB = {"young": 1.0, "poisson": 0.3}, {"law": "coulomb", "mu": 0.3}
 
-_STOP = cantilevers.cantilever(cantilevers.TIP, [1600, 16], 1, 0.3, 0.5)
-_STRIP = cantilevers.cantilever({}, [1600, 16], 1, 0.3, 0.0)
+_STOP = beam(100.0, [1600, 16], TIP, 0.5, 0.3)
+_STRIP = beam(100.0, [1600, 16], {}, 0.0, 0.3)
 _PIEZO = {"e31": -0.3, "e33": 0.8, "e15": 0.6, "beta11": 1.0, "beta33": 0.9}
 
 #: Tables of problems that a device alone solves, or solves in time.
@@ -117,7 +114,7 @@ OWN: dict[str, dict[str, Any]] = {
     # A cantilever whose tip touches a stop, on one mesh alone, as of a file.
     "stop": {**_STOP, "solver": {"nested": False}},
     # A cantilever most of which lies on the ground, and that is condensed.
-    "lying": cantilevers.cantilever(cantilevers.UNIFORM, [500, 20], 2, 0.0, 0.5),
+    "lying": beam(100.0, [500, 20], UNIFORM, 0.5, space={"degree": 2}),
     # A pressed strip, clamped at one end and pulled at the other: half of it slides.
     "pulled-strip": {
         **_STRIP,
@@ -145,15 +142,6 @@ OWN: dict[str, dict[str, Any]] = {
         "friction": COULOMB,
         "solver": {"linear": "iterative"},
     },
-    # A block pressed to a wall, and along it by 1 % more than friction can bear.
-    "wall": {
-        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
-        "material": ELASTIC | {"poisson": 0.0},
-        "fixed": [{"on": "right", "displacement": [-1e-3, "free"]}],
-        "load": [{"everywhere": True, "body_force": [0.0, -1.01 * 0.3e-3]}],
-        "contact": {"on": "left"},
-        "friction": COULOMB,
-    },
     # Two piezoelectric bodies below a plate, with a current across both contacts.
     "piezoelectric-pair": {
         "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.22},
@@ -168,16 +156,6 @@ OWN: dict[str, dict[str, Any]] = {
              "electric": {"k_e": 1.0, "delta": 5.0}},
         ],
         "solver": {"linear": "iterative", "tolerance": 1e-9},
-    },
-    # Two blocks that are pressed, pushed aside, and moved back by supports.
-    "two-blocks-unloaded": {
-        "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.3},
-        "material": ELASTIC,
-        "fixed": [{"on": "lower_bottom", "displacement": [0.0, 0.0]},
-                  {"on": "upper_top", "displacement": ["0.0003*t*(1 - t)", "-0.001*t*(1 - t)"]}],
-        "contact": {"on": "upper_bottom", "against": "lower_top"},
-        "friction": COULOMB,
-        "evolution": {"times": [0.0, 1.0], "steps": [10]},
     },
 }  # fmt: skip
 
@@ -233,34 +211,6 @@ def _wedge() -> Case:
     return problem.case
 
 
-def _pads() -> Case:
-    """Return two pads between a base and a lid that presses them and is lifted off."""
-    bodies = Bodies(np.random.default_rng(1))
-    places = {"base": (-2.0, 2.0, -1.0, 0.0), "p0": (-1.4, -0.8, 0.0, 0.4),
-              "p1": (0.8, 1.4, 0.0, 0.4), "lid": (-2.0, 2.0, 0.4, 1.0)}  # fmt: skip
-    for name, (left, right, low, high) in places.items():
-        bodies.block(name, [[left, low], [right, low], [right, high], [left, high]], 0.2)
-    folder = Path(tempfile.mkdtemp())
-    write_msh(bodies.mesh(), folder / "pads.msh")
-    sides = ("bottom", "base_top"), ("top", "lid_bottom")
-    lid = {"on": "lid_top", "displacement": [0.0021, -0.003], "amplitude": "d"}
-    tables = {
-        "mesh": {"file": str(folder / "pads.msh")},
-        "material": ELASTIC,
-        "fixed": [{"on": "base_bottom", "displacement": [0.0, 0.0]}, lid],
-        "contact": [
-            {"on": f"{pad}_{side}", "against": other, "friction": COULOMB | {"mu": 0.2}}
-            for pad, (side, other) in product(("p0", "p1"), sides)
-        ],
-        "evolution": {
-            "times": [0.0, 1.0, 2.0],
-            "steps": [1, 3],
-            "amplitudes": {"d": {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, -0.3]}},
-        },
-    }
-    return parse_case(tables, source="pads")
-
-
 def _steep(cells: tuple[int, int], k_e: str, delta: str) -> Case:
     """Return Example 8.4 with a steep ramp of the conductivity."""
     changes = "solver.method=newton", f"electric.k_e={k_e}", f"electric.delta={delta}"
@@ -291,6 +241,9 @@ def _renamed(name: str, make: Callable[..., Case], *arguments: Any) -> Callable[
 
 _block = _renamed("block-16", bench_one.block, 16)
 _plane = _renamed("plane-256", bench_one.problem_case, 2, 256, "solver.nested=false")
+_wall = _renamed("wall", wall, 2, 1.01)
+_lifted = _renamed("pads", lambda: pads(Path(tempfile.mkdtemp()), 1))
+_unloaded = _renamed("two-blocks-unloaded", lambda: parse_case(unloaded("supports")))
 _conducting = _renamed("compliance-8-4 with k_e = 6", _steep, (48, 8), "6.0", "8.3333")
 
 DEVICES = (
@@ -301,9 +254,9 @@ DEVICES = (
     Device("friction bound of Newton's last steps", (), "-",
            ((interior_point, "PROGRESS", 0.0),), (), _wedge),
     Device("limit analysis of the friction bound", (UnconstrainedModes.overloaded,), "Drucker 1954",
-           ((UnconstrainedModes, "overloaded", lambda *_: False),), (), _own("wall")),
+           ((UnconstrainedModes, "overloaded", lambda *_: False),), (), _wall),
     Device("rigid motion to a state without contact", (UnconstrainedModes.separated,),
-           "Lawson and Hanson 1974", ((fallbacks, "rigid_motion", _nothing),), (), _pads),
+           "Lawson and Hanson 1974", ((fallbacks, "rigid_motion", _nothing),), (), _lifted),
     Device("steps on the condensed body at last", (fallbacks.condensed_body,), "Guyan 1965",
            ((fallbacks, "condensed_body", _nothing),)),
     Device("secants of a layer", (fallbacks.layer_secants,), "Kacanov 1959",
@@ -332,7 +285,7 @@ DEVICES = (
     Device("stagnation limit of the continuation", (), "-",
            ((fallbacks, "CONTINUATION_LIMIT", None),), (), _conducting),
     Device("zero displacement where nothing acts", (undeformed_equilibrium,), "-",
-           ((semismooth.Iteration, "_loss_of_contact", _nothing),), (),
+           ((semismooth.ConvergenceMonitor, "_loss_of_contact", _nothing),), (),
            _own("two-blocks-unloaded")),
     Device("working set of contact nodes, from all open",
            (fallbacks.all_open, fallbacks.working_set, fallbacks.dual_active_set),
@@ -361,7 +314,8 @@ LINEAR = (
            "Karlin, Manasse, Rudolph and Sleator 1988", ((multigrid, "PRICE", 0),), (), _block),
     Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",
            ((multigrid.StiffNodes, "follow", _nothing),
-            (multigrid.StiffNodes, "jump", lambda _, rhs: rhs.duplicate())), (), _block),
+            (multigrid.StiffNodes, "local_correction", lambda _, rhs: rhs.duplicate())),
+           (), _block),
     Device("piezoelectric block preconditioner", (BlockPreconditioner,),
            "Silvester and Wathen 1994",
            ((multigrid, "LARGE", {**multigrid.LARGE, (3, True): 10**9}),), (),

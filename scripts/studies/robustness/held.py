@@ -23,16 +23,30 @@ from scripts.studies.robustness.one_body import Families, Rng, Tables, grid, pla
 #: Tables, and the mesh in place of theirs.
 Drawn = tuple[Tables, Domain | None]
 
+PLANE_STRESS = {"degree": 2, "kinematics": "plane_stress"}
+
 
 def _on(*parts: str) -> Tables:
     """Return the mesh of a case on a domain of its own, which has these parts beside the sides."""
-    named = {name: {"side": "top"} for name in parts}
-    return grid([1.0, 1.0], [1, 1], parts=named)
+    return grid([1.0, 1.0], [1, 1], parts={name: {"side": "top"} for name in parts})
 
 
-def bent(size: Array, cells: tuple[int, int], place: Any) -> Domain:
+def _held(mu: float, contact: Any, *loads: Tables, **more: Any) -> Tables:
+    """Return a case without supports, of unit modulus unless another material is given."""
+    friction = {"law": "coulomb", "mu": mu}
+    rest = {"load": [*loads], "contact": contact, "friction": friction}
+    return {"material": {"young": 1.0, "poisson": 0.3}} | more | rest
+
+
+def _round(radius: float) -> Tables:
+    """Return the contact of the lower side with a cylinder about the origin."""
+    cylinder = {"shape": "sphere", "centre": [0.0, 0.0], "radius": radius}
+    return {"on": "bottom", "overlap": "press", "foundation": cylinder}
+
+
+def bent(length: float, thick: float, cells: tuple[int, int], place: Any) -> Domain:
     """Return a rectangle whose points are moved by a function of both coordinates."""
-    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], size, cells)
+    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [length, thick], cells)
     x = domain.mesh.geometry.x
     x[:, 0], x[:, 1] = place(x[:, 0].copy(), x[:, 1].copy())
     return domain
@@ -45,52 +59,43 @@ def belt(rng: Rng) -> Drawn:
     degree, share = int(rng.choice([1, 1, 2])), float(rng.choice([0.5, 0.8, 0.9, 0.95]))
     ratio = 1 + share * (np.exp(mu * angle) * (1 - thick) - 1)
     layers, tension = int(rng.integers(1, 3)), thick * float(10 ** rng.uniform(-6, -4))
+    pull = ratio * tension * np.array([np.sin(angle), np.cos(angle)])
+    loads = {"on": "left", "force": [0.0, -tension]}, {"on": "right", "force": pull.tolist()}
+    space, material = PLANE_STRESS | {"degree": degree}, {"young": 1.0, "poisson": 0.0}
     domain = bent(
-        np.array([angle, thick]),
-        (cells, layers),
-        lambda a, r: (-(1 + r) * np.cos(a), (1 + r) * np.sin(a)),
+        angle, thick, (cells, layers), lambda a, r: (-(1 + r) * np.cos(a), (1 + r) * np.sin(a))
     )
-    pull = [float(c) for c in ratio * tension * np.array([np.sin(angle), np.cos(angle)])]
-    drum = {"shape": "sphere", "centre": [0.0, 0.0], "radius": 1.0}
-    return {
-        "mesh": _on(),
-        "space": {"degree": degree, "kinematics": "plane_stress"},
-        "material": {"young": 1.0, "poisson": 0.0},
-        "load": [{"on": "left", "force": [0.0, -tension]}, {"on": "right", "force": pull}],
-        "contact": {"on": "bottom", "overlap": "press", "foundation": drum},
-        "friction": {"law": "coulomb", "mu": mu},
-    }, domain
+    return _held(mu, _round(1.0), *loads, mesh=_on(), space=space, material=material), domain
+
+
+def _arch(long: float, rise: float) -> tuple[float, Any]:
+    """Return the radius of an arc, and half its angle."""
+    radius = (long**2 / 4 + rise**2) / (2 * rise)
+    return radius, np.arcsin(long / 2 / radius)
 
 
 def _between_plates(mu: float, poisson: float, low: float, high: float, force: float) -> Tables:
     """Return an arched leaf, or two, between a plane and a rigid lid that a force presses down."""
     lid = {"displacement": [0.0, "free"], "force": [0.0, -force]}
-    return {
-        "mesh": _on("inner", "outer"),
-        "space": {"degree": 2, "kinematics": "plane_stress"},
-        "material": {"young": 200e3, "poisson": poisson},
-        "friction": {"law": "coulomb", "mu": mu},
-        "contact": [
-            {"on": "bottom", "foundation": plane([0.0, low], [0.0, 1.0])},
-            {"on": "top", "foundation": plane([0.0, high], [0.0, -1.0]), "rigid": lid},
-        ],
-    }
+    contacts = [
+        {"on": "bottom", "foundation": plane([0.0, low], [0.0, 1.0])},
+        {"on": "top", "foundation": plane([0.0, high], [0.0, -1.0]), "rigid": lid},
+    ]
+    material = {"young": 200e3, "poisson": poisson}
+    return _held(mu, contacts, mesh=_on("inner", "outer"), space=PLANE_STRESS, material=material)
 
 
 def leaf(rng: Rng) -> Drawn:
     """Draw an arched leaf between two plates, the upper of which is pressed down."""
     long, rise, thick = 100.0, float(rng.uniform(2, 10)), float(rng.uniform(0.5, 2))
     cells, mu = int(rng.integers(16, 60)), float(rng.choice([0.05, 0.1, 0.3, 0.6]))
-    radius = (long**2 / 4 + rise**2) / (2 * rise)
-    half = np.arcsin(long / 2 / radius)
-    domain = bent(
-        np.array([2 * half, thick]),
-        (cells, 2),
-        lambda a, r: (
-            (radius + r) * np.sin(a - half),
-            rise - radius + (radius + r) * np.cos(a - half),
-        ),
-    )
+    radius, half = _arch(long, rise)
+
+    def place(a: Array, r: Array) -> tuple[Array, Array]:
+        a = a - half
+        return (radius + r) * np.sin(a), rise - radius + (radius + r) * np.cos(a)
+
+    domain = bent(2 * half, thick, (cells, 2), place)
     low = float(domain.mesh.geometry.x[:, 1].min())
     # Share of the force that would press a beam of the same length flat.
     force = 48 * 200e3 * thick**3 / 12 / long**3 * rise * float(rng.choice([0.1, 0.3, 0.6, 0.9]))
@@ -104,17 +109,10 @@ def strip(rng: Rng) -> Drawn:
     press, solid = float(10 ** rng.uniform(-7, -4)), rng.random() < 1 / 3
     long = float(cells // 5) if solid else cells / 2
     aside, side = ([0.0], [1.0]) if solid else ([], [])
-    counts = [cells // 5, 1, 1] if solid else [cells, 2]
-    return {
-        "mesh": grid([long, *side, 1.0], counts),
-        "material": {"young": 1.0, "poisson": 0.3},
-        "load": [
-            {"on": "top", "traction": [0.0, *aside, -press]},
-            {"on": "right", "traction": [share * mu * long * press, *aside, 0.0]},
-        ],
-        "contact": {"on": "bottom"},
-        "friction": {"law": "coulomb", "mu": mu},
-    }, None
+    mesh = grid([long, *side, 1.0], [cells // 5, 1, 1] if solid else [cells, 2])
+    pressed = {"on": "top", "traction": [0.0, *aside, -press]}
+    pulled = {"on": "right", "traction": [share * mu * long * press, *aside, 0.0]}
+    return _held(mu, {"on": "bottom"}, pressed, pulled, mesh=mesh), None
 
 
 def stack(rng: Rng) -> Drawn:
@@ -122,8 +120,7 @@ def stack(rng: Rng) -> Drawn:
     long, rise = 100.0, float(rng.uniform(3, 8))
     thick = rng.uniform(0.5, 1.5, 2)
     cells, mu = int(rng.integers(16, 40)), float(rng.choice([0.1, 0.3, 0.6]))
-    radius = (long**2 / 4 + rise**2) / (2 * rise)
-    half = np.arcsin(long / 2 / radius)
+    radius, half = _arch(long, rise)
     apart = 10.0  # of the leaves before they are bent, so that markers tell them apart
     rows = [np.array([0.0, 0.5, 1.0]) * t + k * apart for k, t in enumerate(thick)]
     across = np.linspace(-half, half, cells + 1)
@@ -133,11 +130,9 @@ def stack(rng: Rng) -> Drawn:
     element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
     mesh = dmesh.create_mesh(MPI.COMM_SELF, corner[:, None] + corners, points, element)
     places = {"bottom": 0.0, "inner": thick[0], "outer": apart, "top": apart + thick[1]}
-    domain = from_mesh(
-        mesh,
-        {name: lambda x, r=r: np.isclose(x[1], r) for name, r in places.items()},
-        regions={"lower": lambda x: x[1] < apart / 2, "upper": lambda x: x[1] > apart / 2},
-    )
+    parts = {name: lambda x, r=r: np.isclose(x[1], r) for name, r in places.items()}
+    regions = {"lower": lambda x: x[1] < apart / 2, "upper": lambda x: x[1] > apart / 2}
+    domain = from_mesh(mesh, parts, regions=regions)
     x = mesh.geometry.x
     r = x[:, 1] - np.where(x[:, 1] > apart / 2, apart - thick[0], 0.0)
     angle = x[:, 0].copy()
@@ -155,24 +150,16 @@ def clip(rng: Rng) -> Drawn:
     angle, thick = np.deg2rad(rng.uniform(200, 330)), float(rng.uniform(0.05, 0.3))
     mu, spread = float(rng.uniform(0.1, 0.6)), float(10 ** rng.uniform(-5, -3))
     cells, degree = int(rng.integers(20, 60)), int(rng.choice([1, 2]))
+    layers = int(rng.integers(1, 4))
     domain = bent(
-        np.array([angle, thick]),
-        (cells, int(rng.integers(1, 4))),
-        lambda a, r: ((1 + r) * np.cos(a), (1 + r) * np.sin(a)),
+        angle, thick, (cells, layers), lambda a, r: ((1 + r) * np.cos(a), (1 + r) * np.sin(a))
     )
     # The clip bends open: forces of the bar are of the order 3 E I spread.
     pull = float(rng.choice([0.0, 0.1, 0.3])) * mu * thick**3 / 4 * spread
-    along = pull * np.array([-np.sin(angle), np.cos(angle)])
-    bar = {"shape": "sphere", "centre": [0.0, 0.0], "radius": 1.0 + spread}
-    pulled = {"on": "right", "force": [float(c) for c in along]}
-    return {
-        "mesh": _on(),
-        "space": {"degree": degree},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "load": [pulled] if pull else [],
-        "contact": {"on": "bottom", "overlap": "press", "foundation": bar},
-        "friction": {"law": "coulomb", "mu": mu},
-    }, domain
+    force = (pull * np.array([-np.sin(angle), np.cos(angle)])).tolist()
+    loads = [{"on": "right", "force": force}] if pull else []
+    space = {"degree": degree}
+    return _held(mu, _round(1.0 + spread), *loads, mesh=_on(), space=space), domain
 
 
 def ring(rng: Rng) -> Drawn:
@@ -184,18 +171,12 @@ def ring(rng: Rng) -> Drawn:
     outer = inner + wide
     pressure = fit / inner * (outer**2 - inner**2) / (outer**2 + inner**2)  # Lame, nu = 0
     pull = share * mu * pressure * 2 * inner * tall / (outer**2 - inner**2)
-    return {
-        "mesh": grid([wide, tall], cells, origin=[inner, 0.0]),
-        "space": {"degree": int(rng.choice([1, 2])), "kinematics": "axisymmetric"},
-        "material": {"young": 1.0, "poisson": 0.0},
-        "load": [{"on": str(rng.choice(["top", "bottom"])), "traction": [0.0, pull]}],
-        "contact": {
-            "on": "left",
-            "overlap": "press",
-            "foundation": plane([inner + fit, 0.0], [1.0, 0.0]),
-        },
-        "friction": {"law": "coulomb", "mu": mu},
-    }, None
+    space = {"degree": int(rng.choice([1, 2])), "kinematics": "axisymmetric"}
+    load = {"on": str(rng.choice(["top", "bottom"])), "traction": [0.0, pull]}
+    shaft = plane([inner + fit, 0.0], [1.0, 0.0])
+    contact = {"on": "left", "overlap": "press", "foundation": shaft}
+    mesh, material = grid([wide, tall], cells, origin=[inner, 0.0]), {"young": 1.0, "poisson": 0.0}
+    return _held(mu, contact, load, mesh=mesh, space=space, material=material), None
 
 
 def jaws(rng: Rng) -> Drawn:
@@ -203,20 +184,21 @@ def jaws(rng: Rng) -> Drawn:
     mu, share = float(rng.uniform(0.1, 0.6)), float(rng.choice([0.3, 0.6, 0.8, 0.9]))
     size = rng.uniform(0.5, 1.5, 3)
     cells, force = [int(n) for n in rng.integers(2, 6, 3)], float(10 ** rng.uniform(-5, -3))
-    weight = share * 2 * mu * force / float(np.prod(size))
-    left = plane([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
-    right = plane([float(size[0]), 0.0, 0.0], [-1.0, 0.0, 0.0])
+    weight = {
+        "everywhere": True,
+        "body_force": [0.0, 0.0, -share * 2 * mu * force / float(np.prod(size))],
+    }
     jaw = {"displacement": ["free", 0.0, 0.0], "force": [-force, 0.0, 0.0]}
-    return {
-        "mesh": grid(size.tolist(), cells),
-        "material": {"young": 1.0, "poisson": float(rng.choice([0.0, 0.3]))},
-        "load": [{"everywhere": True, "body_force": [0.0, 0.0, -weight]}],
-        "contact": [
-            {"on": "left", "foundation": left},
-            {"on": "right", "foundation": right, "rigid": jaw},
-        ],
-        "friction": {"law": "coulomb", "mu": mu},
-    }, None
+    contacts = [
+        {"on": "left", "foundation": plane([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])},
+        {
+            "on": "right",
+            "foundation": plane([float(size[0]), 0.0, 0.0], [-1.0, 0.0, 0.0]),
+            "rigid": jaw,
+        },
+    ]
+    material = {"young": 1.0, "poisson": float(rng.choice([0.0, 0.3]))}
+    return _held(mu, contacts, weight, mesh=grid(size.tolist(), cells), material=material), None
 
 
 FAMILIES = belt, belt, leaf, strip, stack, clip, ring, jaws
