@@ -5,7 +5,6 @@ import pytest
 from mpi4py import MPI
 
 from scripts.examples import (
-    fretting,
     own_contact,
     own_material,
     own_return_mapping,
@@ -51,12 +50,3 @@ def test_refinement(shared_tmp_path):
     assert np.all(np.log2(coarse / fine) > 0.6)
     MPI.COMM_WORLD.barrier()
     assert (shared_tmp_path / "errors.png").is_file()
-
-
-def test_fretting():
-    """Around the loop the force changes its sign and comes back to the same size."""
-    rows = fretting.main((24, 12), 4)
-    force = dict(zip(rows[:, 0], rows[:, 1], strict=True))
-    assert force[4.0] == pytest.approx(-force[2.0], rel=0.02)
-    assert force[6.0] == pytest.approx(force[2.0], rel=1e-6)
-    assert abs(force[3.0]) > 0.1 * force[2.0]  # friction remembers

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact import evolve
+from contact import evolve, load_case
 from contact.errors import InputError
 from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.problem.problem import SLIP
@@ -13,6 +13,7 @@ from contact.problem.residuals import Balance, balance, evaluate
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
+from scripts.cases import CASES
 from tests.problems import mechanics
 from tests.problems.mechanics import SlidingBlock, close
 from tests.problems.shaken import SELF, TIGHT, shaken, steps_of, times
@@ -162,3 +163,13 @@ def test_a_state_can_be_gone_on_from():
 def test_times_have_to_increase(ends):
     with pytest.raises(InputError, match=r"\[value\]"):
         list(evolve(shaken(), ends))
+
+
+@pytest.mark.parallel(2)
+def test_a_cycle_of_fretting_comes_back():
+    """Around the loop the force changes its sign and comes back to the same size."""
+    case = load_case(CASES / "fretting.toml", ["mesh.cells=[24,12]", "evolution.steps=[4,4,8,8]"])
+    force = {step.row["t"]: step.row["contact_force_x"] for step in solve(case).steps}
+    assert force[4.0] == pytest.approx(-force[2.0], rel=0.02)
+    assert force[6.0] == pytest.approx(force[2.0], rel=1e-6)
+    assert abs(force[3.0]) > 0.1 * abs(force[2.0])  # friction remembers
