@@ -27,7 +27,7 @@ import numpy as np
 from meshes import write
 from scripts.benchmarks.pages import write_memory, write_page
 from scripts.benchmarks.processes import Run, columns, command, measured, run, started
-from scripts.reporting import Report, parser, subplots
+from scripts.reporting import Report, parser
 
 #: Seconds after which a run of the peer is ended: it is then shown as one of infinite length.
 TIMEOUT = 150.0
@@ -86,28 +86,6 @@ def against_one_solve(bench: Bench) -> None:
         "estimate and the remarks, `review`, are part of a solve, but not of the ratio *without "
         "review*. The memory is the peak of the process, with "
         "the loaded libraries and the linear solve.",
-    )
-    draw_ratios(bench.report, rows)
-
-
-def draw_ratios(report: Report, rows: Sequence[Run]) -> None:
-    """Draw the ratios over the number of unknowns."""
-    figure, axes = subplots(1, 2, (6.6, 2.8), sharey=True)
-    for axis, dimension in zip(axes, (2, 3), strict=True):
-        for name, marker in (("cold", "o"), ("as it chooses", "s")):
-            chosen = [r for r in rows if r["dimension"] == dimension and r["start"] == name]
-            ratio = [r["ratio"] for r in chosen]
-            axis.semilogx([r["unknowns"] for r in chosen], ratio, marker + "-", label=name)
-        axis.set_xlabel("unknowns")
-        axis.set_title("plane" if dimension == 2 else "space")
-    axes[0].set_ylim(0, 1.1 * max(row["ratio"] for row in rows))
-    axes[0].set_ylabel("solve / one linear solve")
-    axes[0].legend()
-    report.figure(
-        "bench-ratio-plot",
-        "Cost in units of one linear elasticity solve",
-        figure,
-        columns(rows),
     )
 
 
@@ -255,7 +233,7 @@ def load_steps(bench: Bench) -> None:
 #: Part -> its function, and the tables and figures that it writes.
 PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
     "a": (by_method, ("bench-tables",)),
-    "b": (against_one_solve, ("bench-ratio", "bench-ratio-plot")),
+    "b": (against_one_solve, ("bench-ratio",)),
     "c": (ranks, ("bench-ranks",)),
     "d": (against_getfem, ("bench-getfem", "peer-pair")),
     "e": (against_plain_dolfinx, ("peer-plain",)),

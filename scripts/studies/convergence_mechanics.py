@@ -48,6 +48,7 @@ def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
         "which the load presses down and where the pressure peaks, and at the clamped corners. P1 "
         "therefore does not reach order 1 in H1, and P2 gains accuracy but no order.",
         variants,
+        drawn=True,
     )
 
 

@@ -21,7 +21,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated
 from contact.results.remarks import LOCKED
-from scripts.reporting import Report, append, empty, options, subplots
+from scripts.reporting import Report, append, empty, options
 from tests.problems.bar import changed
 from tests.problems.membrane import cook
 
@@ -208,38 +208,20 @@ def per_second(report: Report, coarse: bool) -> None:
 
 
 def adaptive(report: Report, coarse: bool) -> None:
-    """Draw the error on adapted and uniform meshes, with a table of costs. Collective."""
-    figure, axes = subplots(1, 2)
-    data: dict[str, Sequence[Any]] = {}
+    """Make the table of adapted meshes beside uniform ones. Collective."""
     columns = empty(
         "problem", "element", "error", "unknowns, adapted", "unknowns, uniform", "rate, adapted",
         "rate, uniform", "meshes", "unknowns, last", "seconds", "seconds, last alone", "ratio",
     )  # fmt: skip
-    for name, place, degree, error, case, uniform in _adapted(coarse):
+    for name, degree, error, case, uniform in _adapted(coarse):
         rows, seconds, last = _timed(case)
         found = {"adapted": [(row["unknowns"], row["error"]) for row in rows], "uniform": []}
         for problem in uniform:
             estimate = estimated(problem, state_of(problem)).relative
             found["uniform"].append((problem.body.layout.unknowns, estimate))
-        for kind, line in (("adapted", "o-"), ("uniform", "s--")):
-            unknowns, errors = np.array(found[kind]).T
-            label = f"P{degree}, {kind}"
-            axes[place].loglog(unknowns, errors, line, color=f"C{degree - 1}", ms=3, label=label)
-            data[f"unknowns, {name}, {label}"], data[f"error, {name}, {label}"] = unknowns, errors
         needed, rates = zip(*(_fall(found[kind], error) for kind in found), strict=True)
         append(columns, name, f"P{degree}", error, *needed, *rates, len(rows),
                found["adapted"][-1][0], seconds, last, seconds / last)  # fmt: skip
-        axes[place].set(xlabel="unknowns", title=name)
-    axes[0].set_ylabel("estimated relative error")
-    for panel in axes:
-        panel.legend()
-    report.figure(
-        "adaptive",
-        "Error over unknowns on adapted and uniform meshes",
-        figure,
-        data,
-        "The bar of Example 7.2, linear, with mu = 0.6, and a rigid ball on a block.",
-    )
     report.table(
         "adapted",
         "Adapted beside uniform meshes",
@@ -254,21 +236,21 @@ def adaptive(report: Report, coarse: bool) -> None:
 
 def _adapted(
     coarse: bool,
-) -> Iterator[tuple[str, int, int, float, Case, Iterator[ContactProblem]]]:
-    """Give name, panel, degree, error, case with `[mesh.adapt]`, and uniform meshes. Collective."""
+) -> Iterator[tuple[str, int, float, Case, Iterator[ContactProblem]]]:
+    """Give name, degree, error, case with `[mesh.adapt]`, and uniform meshes. Collective."""
     changes = {**LINEAR, "friction__mu": 0.6}
     for degree, asked in ((1, 0.05 if coarse else 0.004), (2, 0.02 if coarse else 5e-4)):
         tables = changed(mesh__cells=[16, 4], space__degree=degree, **changes)
         tables["mesh"]["adapt"] = {"error": asked, "max_unknowns": 400_000}
         cells = (4, 8) if coarse else (4, 8, 16, 32, 64)
         uniform = (bar(n, degree, **changes) for n in cells)
-        yield "bar with friction", 0, degree, 0.01, parse_case(tables), uniform
+        yield "bar with friction", degree, 0.01, parse_case(tables), uniform
     for degree, asked, error in ((1, 0.08, 0.1), (2, 0.02, 0.03)):
         adapt = {"error": 3 * asked if coarse else asked, "max_unknowns": 150_000}
         sizes = (4,) if coarse else (4, 8, 16) if degree == 2 else (4, 8, 16, 32)
         uniform = (build_problem(parse_case(ball_on_block(n, degree))) for n in sizes)
         case = parse_case(ball_on_block(4, degree, adapt=adapt))
-        yield "rigid ball, 3-D", 1, degree, error, case, uniform
+        yield "rigid ball, 3-D", degree, error, case, uniform
 
 
 def ball_on_block(n: int, degree: int, **mesh: Any) -> dict[str, Any]:

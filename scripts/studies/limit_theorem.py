@@ -10,9 +10,11 @@ Section 1.3.3: with the rigid part far enough away, (1.29) is (1.27).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from contact import Case, NotConvergedError, build_problem, load_case
 from contact.model.contact import Contact
@@ -22,8 +24,15 @@ from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
 from scripts.cases import CASES, TABLE_8_4
-from scripts.reporting import Report, iterates, observed_orders, options, solved
-from scripts.studies.limits import Errors, draw_errors, draw_iterations
+from scripts.reporting import (
+    TWO_COLUMNS,
+    Report,
+    iterates,
+    observed_orders,
+    options,
+    solved,
+    subplots,
+)
 from scripts.studies.product_norm import ProductNorm
 
 #: mu = k_e of the limit: those of the table and some between them.
@@ -44,6 +53,29 @@ OF_6_3 = (
 TOUCH = 0.5
 STIFFNESS = tuple(10.0 ** np.arange(2, 8))
 THICKNESS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Distances to a limit over a parameter."""
+
+    #: The varied parameter.
+    name: str
+    #: Its values, shape (k,).
+    parameter: Array
+    #: Distances in V (and W), shape (k, 1 or 2).
+    norms: Array
+
+    @property
+    def total(self) -> Array:
+        """Distances in X, shape (k,)."""
+        return np.linalg.norm(self.norms, axis=1)
+
+    def order(self, low: float, high: float) -> float:
+        """Return the least-squares order over a range of the parameter."""
+        inside = (self.parameter >= low) & (self.parameter <= high)
+        x, y = np.log(self.parameter[inside]), np.log(self.total[inside])
+        return float(np.polyfit(x, y, 1)[0])
 
 
 def case_of(name: str, cells: Sequence[int], changes: Sequence[str] = ()) -> Case:
@@ -155,6 +187,22 @@ FIXED_POINTS = {
 }
 
 
+def draw_iterations(curves: Mapping[str, Array]) -> Figure:
+    """Draw errors over the iterations of the fixed point."""
+    figure, axes = subplots(size=(TWO_COLUMNS, 3.8))
+    for label, errors in curves.items():
+        axes.semilogy(
+            np.arange(1, errors.size + 1),
+            errors,
+            "o-",
+            label=label.replace("mu = k_e = 0.02", r"$\mu = k_e = 0.02$"),
+            ms=4,
+        )
+    axes.set(xlabel=r"iteration $n$", ylabel=r"$|x_n - x|$ in $X$")
+    axes.legend()
+    return figure
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Compute, print and draw all. Collective."""
     chosen = options(__doc__, "limit_theorem", arguments)
@@ -176,8 +224,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
             errors,
             f"{NORMS} Order below 0.01: {order:.4f}. {OF_6_3}",
         )
-    caption = "Theorem 6.3: x(mu, k_e) tends to x(0, 0) like mu + k_e"
-    report.figure("figure-theorem-6-3", caption, *draw_errors(limits))
 
     iterations = {
         label: fixed_point_errors(name, cells, changes)
@@ -189,7 +235,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     stiff = stiffness_limit(cells, stiffness)
     caption = "The normal compliance law (1.28) tends to Signorini's as c grows"
     table(report, "compliance-stiffness", caption, stiff, NORMS)
-    report.figure("figure-compliance-stiffness", caption, *draw_errors({"p = c [r]^+": stiff}))
 
     far, depth = distance_limit(cells, thickness)
     caption = "Law (1.29) tends to (1.27), c = 10, as the rigid part moves away"

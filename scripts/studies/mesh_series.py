@@ -82,9 +82,14 @@ def _residual(outcome: Outcome, variant: Variant) -> float:
 
 
 def mesh_series(
-    report: Report, name: str, caption: str, note: str, variants: Sequence[Variant]
+    report: Report,
+    name: str,
+    caption: str,
+    note: str,
+    variants: Sequence[Variant],
+    drawn: bool = False,
 ) -> dict[str, Array]:
-    """Tabulate and draw errors over h; return them by label. Collective."""
+    """Tabulate errors over h, and draw them if asked to; return them by label. Collective."""
     columns = empty("problem", "1/h", "reference 1/h")
     for norm in NORMS:
         columns |= {norm: [], f"order ({norm})": []}
@@ -102,7 +107,8 @@ def mesh_series(
             columns[norm] += found[:, k].tolist()
             columns[f"order ({norm})"] += observed_orders(h, found[:, k])
     report.table(f"{name}-table", caption, columns, note)
-    report.figure(name, caption, draw_series(columns), columns)
+    if drawn:
+        report.figure(name, caption, draw_series(columns), columns)
     return results
 
 

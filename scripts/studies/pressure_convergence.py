@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import NullLocator
 
 from contact import NotConvergedError, Problem, solve
 from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import TWO_COLUMNS, Report, empty, observed_orders, options, subplots
+from scripts.reporting import Report, empty, observed_orders, options
 from scripts.studies.curved_foundations import ring
 from scripts.studies.dual_norm import DualNorm
 from scripts.studies.exact_solutions import Singular
@@ -111,16 +110,14 @@ def measured(series: Series, n: int, degree: int) -> tuple[Array, float]:
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int], Array]:
-    """Make table and figure; return the errors by problem and degree, (meshes, 2). Collective."""
+    """Make the table; return the errors by problem and degree, (meshes, 2). Collective."""
     chosen = options(__doc__, "pressure_convergence", arguments)
-    report = Report(chosen.out)
     columns = empty(
         "problem", "degree", "cells", "p in L2", "order", "fitted", "p in H^-1/2", "its order",
         "its fit", "residual",
     )  # fmt: skip
-    figure, axes = subplots(1, len(SERIES), size=(TWO_COLUMNS, 2.6), sharey=True)
     found = {}
-    for ax, (name, series) in zip(axes, SERIES.items(), strict=True):
+    for name, series in SERIES.items():
         for degree, cells in series.cells.items():
             cells = cells[:2] if chosen.coarse else cells
             rows = [measured(series, n, degree) for n in cells]
@@ -136,27 +133,10 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int], Array]
                 columns[value] += errors[:, k].tolist()
                 columns[order] += observed_orders(h, errors[:, k].tolist())
                 columns[fit] += [*[np.nan] * (len(cells) - 1), slope]
-                label = f"{('$L^2$', '$H^{-1/2}$')[k]}, P{degree}"
-                ax.loglog(h, errors[:, k], f"{'os'[degree - 1]}-", ms=3, color=f"C{k}", label=label)
             print(name, degree, errors.tolist(), flush=True)
-        _finish(ax, name, sorted({n for cells in series.cells.values() for n in cells}))
-    axes[0].set_ylabel("relative error of $p$")
-    axes[0].legend(fontsize=6)
     caption = "Convergence of the contact pressure"
-    report.table("pressure-convergence-table", caption, columns, NOTE)
-    report.figure("pressure-convergence", caption, figure, columns)
+    Report(chosen.out).table("pressure-convergence-table", caption, columns, NOTE)
     return found
-
-
-def _finish(ax: Any, title: str, cells: Sequence[int]) -> None:
-    h = 1 / np.array([cells[-1], cells[0]])
-    for power in (1.0, 1.5):
-        ax.loglog(h, 0.3 * h**power, "k:", lw=0.8)
-        ax.annotate(f"{power:g}", (h[0], 0.3 * h[0] ** power), fontsize=6, va="top")
-    ax.set(xlabel="$h$")
-    ax.set_title(title.replace("root-like", r"$p \sim \sqrt{x - x_0}$"), fontsize=8)
-    ax.set_xticks(1 / np.array(cells), [f"1/{n}" for n in cells], fontsize=6)
-    ax.xaxis.set_minor_locator(NullLocator())
 
 
 if __name__ == "__main__":

@@ -9,19 +9,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from contact import Solution, build_problem, load_case, solve
 from scripts.cases import CASES
-from scripts.reporting import ONE_COLUMN, Report, append, empty, options, subplots
+from scripts.reporting import Report, append, empty, options
 
 
 @dataclass(frozen=True)
 class Sweep:
     """One parameter of one case."""
 
-    #: Its name, for the axis.
-    words: str
     #: Of the thesis.
     example: str
     #: Case file, and the key that is changed.
@@ -29,11 +26,8 @@ class Sweep:
     key: str
     #: Of the parameter.
     values: Sequence[float]
-    #: The mesh, along and across, and further changes of the case.
+    #: The mesh, along and across.
     cells: tuple[int, int]
-    changes: tuple[str, ...] = ()
-    #: Whether the axis is logarithmic.
-    log: bool = True
     #: The observation.
     note: str = ""
 
@@ -42,7 +36,7 @@ LAYERED, LAYER = "8.4 with a layer of thickness 0.1", "compliance-8-4-layer"
 
 SWEEPS: Mapping[str, Sweep] = {
     "rho-7": Sweep(
-        r"$\rho$ of (7.16)", "7.2, f2 = -0.005", "bar", "friction.mu.rho",
+        "7.2, f2 = -0.005", "bar", "friction.mu.rho",
         (1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 6e7), (128, 32),
         note="The thesis prints rho for its tables and for Figures 7.7 and 7.8. The choice of rho "
              "changes the force by 0.1 % and the largest pressure by 0.2 %. With a large rho "
@@ -51,33 +45,33 @@ SWEEPS: Mapping[str, Sweep] = {
              "compared](thesis-studies.md#agreement-of-the-methods)).",
     ),
     "rho": Sweep(
-        r"$\rho$ of (7.16)", "8.2", "piezo-8-2", "friction.mu.rho",
+        "8.2", "piezo-8-2", "friction.mu.rho",
         (1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5), (64, 32),
         note="The thesis prints no rho here; the case takes 1.",
     ),
     "delta": Sweep(
-        r"$\delta$ of $\psi$", "8.4", "compliance-8-4", "electric.delta",
+        "8.4", "compliance-8-4", "electric.delta",
         (0.5, 1.0, 2.0, 10 / 3, 5.0, 8.0, 12.0), (192, 32),
         note="By default delta = 10/3. The thesis says that delta is small. Beyond 8 the ramp is "
              "narrower than two spacings of the nodes: patches appear and vanish with the mesh, "
              "and the parameter has no meaning.",
     ),
     "c_nu": Sweep(
-        r"$c_\nu$", LAYERED, LAYER, "contact.stiffness", (0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0),
+        LAYERED, LAYER, "contact.stiffness", (0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0),
         (96, 16), note="The case takes 10.",
     ),
     "alpha_nu": Sweep(
-        r"$\alpha_\nu$", LAYERED, LAYER, "contact.potential_factor",
-        (1.0, 1.5, 2.0, 3.0, 5.0, 10.0), (96, 16), log=False, note="The case takes 2.",
+        LAYERED, LAYER, "contact.potential_factor",
+        (1.0, 1.5, 2.0, 3.0, 5.0, 10.0), (96, 16), note="The case takes 2.",
     ),
     "n_nu": Sweep(
-        r"$n_\nu$", LAYERED, LAYER, "contact.limit", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (96, 16),
+        LAYERED, LAYER, "contact.limit", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (96, 16),
         note="The case takes 0.1, the thickness of the layer. A larger limit has no effect, for "
              "the rigid part is reached first.",
     ),
     "radius": Sweep(
-        r"radius of $R$", "8.4", "compliance-8-4", "friction.radius",
-        (0.0, 0.1, 0.2, 0.4, 0.8, 1.6), (96, 16), log=False,
+        "8.4", "compliance-8-4", "friction.radius",
+        (0.0, 0.1, 0.2, 0.4, 0.8, 1.6), (96, 16),
         note="The case takes 0, R = identity, as the thesis computes.",
     ),
 }  # fmt: skip
@@ -85,15 +79,14 @@ SWEEPS: Mapping[str, Sweep] = {
 
 def run(sweep: Sweep, value: float, cells: tuple[int, int], domain: object) -> Solution:
     """Solve with one value. Collective."""
-    changes = (f"mesh.cells=[{cells[0]}, {cells[1]}]", f"{sweep.key}={value}", *sweep.changes)
+    changes = (f"mesh.cells=[{cells[0]}, {cells[1]}]", f"{sweep.key}={value}")
     case = load_case(CASES / f"{sweep.case}.toml", ["solver.method=newton", *changes])
     solution = solve(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
-    solution.units = case.case.units
     return solution
 
 
 def study(report: Report, name: str, coarse: bool) -> None:
-    """Draw contact force and largest pressure over one parameter. Collective."""
+    """Tabulate contact force and pressure over one parameter. Collective."""
     sweep = SWEEPS[name]
     cells = (24, 24 // (sweep.cells[0] // sweep.cells[1])) if coarse else sweep.cells
     parameter = name.partition("-")[0]
@@ -116,25 +109,10 @@ def study(report: Report, name: str, coarse: bool) -> None:
         )
     caption = f"Sensitivity to {parameter}: Example {sweep.example}, {cells[0]} x {cells[1]} cells"
     report.table(f"sensitivity-{name}-table", caption, columns, sweep.note)
-    if MPI.COMM_WORLD.rank > 0:
-        return
-    figure, (above, below) = subplots(2, 1, size=(ONE_COLUMN, 3.6), sharex=True)
-    good = np.array(columns["converged"], dtype=bool)
-    x, units = np.array(sweep.values), solution.units
-    for ax, key, label in (
-        (above, "contact force", f"force ({units.stress} {units.length})"),
-        (below, "max p", units.label("largest pressure", "stress")),
-    ):
-        ax.plot(x[good], np.array(columns[key], dtype=float)[good], "o-", ms=3)
-        ax.set_ylabel(label)
-        if sweep.log:
-            ax.set_xscale("log")
-    below.set_xlabel(sweep.words)
-    report.figure(f"sensitivity-{name}", caption, figure, columns)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Make tables and figures. Collective."""
+    """Make the tables. Collective."""
     chosen = options(__doc__, "sensitivity", arguments)
     for name in SWEEPS:
         study(Report(chosen.out), name, chosen.coarse)

@@ -64,6 +64,7 @@ PARTS = (
     Part(
         "table_7_2",
         "Example 7.2: Table 7.2, the penalty method, Theorem 4.2",
+        figures=False,
         page="thesis-mechanics",
     ),
     Part(
@@ -79,7 +80,12 @@ PARTS = (
         package="studies",
         page="thesis-mechanics",
     ),
-    Part("pressure_convergence", "Convergence of the contact pressure", package="studies"),
+    Part(
+        "pressure_convergence",
+        "Convergence of the contact pressure",
+        figures=False,
+        package="studies",
+    ),
     Part("curved_foundations", "Curved foundations", figures=False, package="studies"),
     Part("pressure_on_axis", "Pressure on the axis", figures=False, package="studies"),
     Part("nonlocal_friction", "Non-local friction at work", package="studies"),
@@ -120,7 +126,12 @@ PARTS = (
         page="thesis-compliance",
     ),
     Part("refinement_8", "Chapter 8 on finer meshes", figures=False, package="studies"),
-    Part("sensitivity", "Parameters that the thesis does not print", package="studies"),
+    Part(
+        "sensitivity",
+        "Parameters that the thesis does not print",
+        figures=False,
+        package="studies",
+    ),
     Part("agreement", "Agreement of the methods", figures=False, package="studies"),
 )
 

@@ -101,7 +101,7 @@ ROWS = (
         "penalty error against ε: order in the energy",
         "table_7_2",
         "order 1 without friction, and for small ε with friction",
-        "theorem-4-2.csv",
+        "theorem-4-2-table.csv",
         "",
         "order",
     ),

@@ -8,14 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from contact import Case, NotConvergedError, build_problem, solve
 from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.results.solution import Solution
 from scripts.cases import bar
-from scripts.reporting import Report, append, empty, observed_orders, options, solved, subplots
+from scripts.reporting import Report, append, empty, observed_orders, options, solved
 from scripts.studies.dual_norm import DualNorm
 from scripts.studies.error_norms import errors
 
@@ -145,8 +143,7 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
         "its order", "over |u - u_eps|_V",
     )  # fmt: skip
     found: dict[str, list[float]] = {}
-    figure, axes = subplots(1, 2, sharex=True)
-    for (label, changes), marker in zip(variants.items(), "os^", strict=True):
+    for label, changes in variants.items():
         case = _with(n, changes, "solver.tolerance=1e-11")
         problem = build_problem(case)
         reference = solved(case, problem)
@@ -173,13 +170,6 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
         columns["its order"] += observed_orders(values, dual)
         columns["over |u - u_eps|_V"] += ratios
         found[label] = energy
-        axes[0].loglog(values, energy, f"{marker}-", ms=3, label=label)
-        axes[1].loglog(values, pressure, f"{marker}-", ms=3, label=label)
-    slope = np.array([values[-1], 1e3 * values[-1]])
-    for ax, quantity in zip(axes, ("$u$ in energy", r"$-\sigma_\nu$ in $L^2$"), strict=True):
-        ax.loglog(slope, 30 * slope, "k:", label="slope 1")
-        ax.set(xlabel=r"$\epsilon$ (mm³/daN, mm)", title=f"relative error of {quantity}")
-        ax.legend()
     note = (
         "Theorem 4.2 states convergence. The observed order is 1: without friction for all eps, "
         "with friction once eps is below the slip of the slowest sliding node. The solutions with "
@@ -193,7 +183,6 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
     )
     caption = "Penalty error against eps on Example 7.2, f2 = -0.005 (Theorems 4.2 and 4.4)"
     report.table("theorem-4-2-table", caption, columns, note)
-    report.figure("theorem-4-2", caption, figure, columns)
     return found
 
 

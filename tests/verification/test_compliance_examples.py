@@ -201,7 +201,7 @@ def test_other_friction_laws_on_a_layer(law):
     [
         (tables_compliance, ["table-8-4.csv", "table-8-4-layer.csv", "examples-8-3-8-4.csv"]),
         (figures_compliance, ["figure-1-3.png", "figure-8-9a.png", "figure-8-12.png"]),
-        (limit_theorem, ["figure-theorem-6-3.png", "theorem-6-3-layer.csv"]),
+        (limit_theorem, ["figure-theorems-6-4-6-5.png", "theorem-6-3-layer.csv"]),
     ],
 )
 def test_scripts_on_coarse_meshes(script, made, tmp_path):
