@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, parse_case, solve
+from contact import Case, build_problem, parse_case, solve
 from contact.mesh.cells import SHAPES
 from contact.methods.options import NewtonOptions
 from forms.laws import SlipCoefficient
@@ -154,5 +154,6 @@ def test_the_table_of_the_study(tmp_path, capsys):
 def test_devices_are_there_to_be_switched_off():
     for device in (*DEVICES, *LINEAR):
         assert all(hasattr(owner, name) for owner, name, _ in device.changes), device.name
+        assert device.problem is None or isinstance(device.problem(), Case)
         with device.off() as options:
             assert isinstance(options, NewtonOptions)

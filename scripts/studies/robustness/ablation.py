@@ -286,7 +286,7 @@ DEVICES = (
            ((fallbacks, "CONTINUATION_LIMIT", None),), (), _conducting),
     Device("zero displacement where nothing acts", (undeformed_equilibrium,), "-",
            ((semismooth.ConvergenceMonitor, "_loss_of_contact", _nothing),), (),
-           _own("two-blocks-unloaded")),
+           _unloaded),
     Device("working set of contact nodes, from all open",
            (fallbacks.all_open, fallbacks.working_set, fallbacks.dual_active_set),
            "Goldfarb and Idnani 1983",
