@@ -233,9 +233,9 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
         )
     words, along = described(found.motion[:, None], group.names), group.translation(found.motion)
     if along is None:
-        sums = f"{found.power / found.resisted:.6g} times its largest resistance"
+        sums = f"{found.power / found.resisted:.6g} times its resistance"
     else:
-        sums = f"{found.power / along:.6g}, it bears {found.resisted / along:.6g} at most"
+        sums = f"{found.power / along:.6g}, it bears less than {found.resisted / along:.6g}"
     raise InputError(
         f"the loads {PUSHED_THROUGH} ({words}): they are {sums}, with its largest "
         f"pressure of {problem.interface.saturation:.4g} (stiffness x limit); accepted: smaller "

@@ -327,7 +327,7 @@ class Release:
     power, resisted
         f . m of the loads, and the largest resistance of layers and friction, which is less.
     saturated
-        Whether layers resist it.
+        Whether they would balance rigid parts in place of the layers.
     """
 
     motion: Array
@@ -419,19 +419,34 @@ class UnilateralSupport:
         from scipy.optimize import linprog  # takes a while to load
         from scipy.sparse import block_array, eye_array
 
-        finite = np.isfinite(self.bound)
-        rigid, yielding = self.cone[:, ~finite].reshape(-1, work.size), self.cone[:, finite]
-        cost = np.concatenate([-work, self.bound[finite]]) / scale
-        bounds = [(-1, 1)] * work.size + [(0, None)] * yielding.shape[1]
-        rows = [[rigid, None], *([each, -eye_array(each.shape[0])] for each in yielding)]
-        cone = block_array(rows, format="csr")
-        found = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
-        if found.status != 0 or -found.fun <= BALANCED:
+        def released(bound: Array, margin: float) -> tuple[Array, Array] | None:
+            """Return mode and resistance of each node; None where all is balanced."""
+            finite = np.isfinite(bound)
+            rigid, yielding = self.cone[:, ~finite].reshape(-1, work.size), self.cone[:, finite]
+            cost = np.concatenate([-(1 + margin) * work, bound[finite]]) / scale
+            bounds = [(-1, 1)] * work.size + [(0, None)] * yielding.shape[1]
+            rows = [[rigid, None], *([each, -eye_array(each.shape[0])] for each in yielding)]
+            cone = block_array(rows, format="csr")
+            found = linprog(cost, cone, np.zeros(cone.shape[0]), bounds=bounds)
+            if found.status != 0 or -found.fun <= BALANCED:
+                return None
+            resisted = np.zeros(bound.size)
+            resisted[finite] = bound[finite] * found.x[work.size :]
+            return found.x[: work.size], resisted
+
+        # On rigid parts in place of the layers first: no larger limit helps there.
+        found = released(np.where(self.normal, np.inf, self.bound), 0.0)
+        saturated = found is None
+        if found is None:
+            # With the whole layer at its limit the position of a body is undetermined.
+            found = released(self.bound, 2 * BALANCED)
+        if found is None:
             return None
-        motion = found.x[: work.size]
-        power, resisted = float(work @ motion), self.bound[finite] * found.x[work.size :]
-        saturated = resisted[self.normal[finite]].sum() > BALANCED * power
-        return Release(self.free @ motion, power, float(resisted.sum()), bool(saturated))
+        motion, resisted = found
+        power = float(work @ motion)
+        if saturated and resisted[self.normal].sum() <= BALANCED * power:
+            return None
+        return Release(self.free @ motion, power, float(resisted.sum()), saturated)
 
 
 def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:

@@ -1,4 +1,4 @@
-"""Bodies that a layer without a rigid part alone holds: it bears stiffness x limit at most."""
+"""Bodies that a layer without a rigid part alone holds: it bears less than stiffness x limit."""
 
 import re
 from dataclasses import dataclass
@@ -70,9 +70,18 @@ def test_loads_beyond_the_limit_are_refused_with_both(kind):
     with pytest.raises(InputError, match=r"\[saturated\]") as refused:
         solve(parse_case(block(kind, 1.02)), comm=SELF)
     message = str(refused.value)
-    forces = f"they are {1.02 * LARGEST * area:.6g}, it bears {LARGEST * area:.6g} at most"
+    forces = f"they are {1.02 * LARGEST * area:.6g}, it bears less than {LARGEST * area:.6g}"
     assert forces in message
     assert f"largest pressure of {LARGEST:.4g} (stiffness x limit)" in message
+
+
+@pytest.mark.core
+@pytest.mark.parametrize("kind", BLOCKS)
+def test_a_load_of_exactly_the_limit_is_refused(kind):
+    """Its position is undetermined, as without a support; a hundred-thousandth less is borne."""
+    with pytest.raises(InputError, match=r"\[saturated\]"):
+        build_problem(parse_case(block(kind, 1.0)), SELF)
+    build_problem(parse_case(block(kind, 1.0 - 1e-5)), SELF)
 
 
 #: Friction whose bound is no multiple of the pressure at its node.
@@ -119,7 +128,7 @@ def test_forces_are_told_of_a_translation_of_several_parts(kind):
     case |= {"load": [], "fixed": [], "rigid": [plate]}
     with pytest.raises(InputError, match=r"\[saturated\]") as refused:
         build_problem(parse_case(case), SELF)
-    assert f"they are {force:.6g}, it bears {force / 1.02:.6g} at most" in str(refused.value)
+    assert f"they are {force:.6g}, it bears less than {force / 1.02:.6g}" in str(refused.value)
 
 
 def tilted(kind: str, stiffness: float) -> tuple[dict, float]:
@@ -210,6 +219,17 @@ def test_friction_alone_holds_a_block_along_the_layer(kind, height, share, part)
     down = share * LARGEST * (4.0 if kind == "plane" else 8.0)
     assert newton.contact_force[[0, -1]] == pytest.approx([part * 0.3 * down, -down], rel=1e-6)
     assert newton.max_displacement == pytest.approx(uzawa.max_displacement, rel=1e-4)
+
+
+@pytest.mark.parametrize(("share", "limit"), [(0.8, LIMIT), (0.99, LIMIT), (0.8, 100 * LIMIT)])
+@pytest.mark.parametrize("height", [0.2, 2.0])
+@pytest.mark.parametrize("kind", ["plane", "solid"])
+def test_a_body_that_slides_is_not_said_to_be_pushed_through(kind, height, share, limit):
+    """It tilts too, so that a part of the layer resisted; no larger limit would hold it."""
+    case = pulled(kind, height, share, 1.4)
+    case["contact"]["limit"] = limit
+    with pytest.raises(InputError, match=r"along it by more than friction holds.*\[pulled-off\]"):
+        build_problem(parse_case(case), SELF)
 
 
 def test_pressures_out_of_balance_prove_no_sliding(monkeypatch):
