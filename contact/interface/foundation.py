@@ -185,19 +185,20 @@ class FoundationLaw:
         pressure, slope = self.layer.p_nu(s), self.layer.p_nu.derivative(s)
         return np.where(pressure > 0, np.where(slope * s < pressure / 2, 2, 1), 0).astype(np.int8)
 
+    def _depths(self, size: float) -> list[Array]:
+        """Return penetrations up to a thousand times the size of the bodies, shape (n,) each."""
+        return [np.full(self.nodes.weight.size, s) for s in size * np.logspace(-9, 3, 49)]
+
     def saturates(self, size: float) -> NDArray[np.bool_]:
-        """Return where the layer saturates at penetrations up to the size of the body, (n,)."""
+        """Return where the layer saturates at any penetration, shape (n,)."""
         if self.layer is None or self.layer.lagged:
             return np.zeros(self.nodes.weight.size, dtype=bool)
         return np.max([self._regimes(s) == 2 for s in self._depths(size)], axis=0)
 
     def largest_secant(self, size: float) -> Array:
-        """Return the largest p_nu(s)/s of penetrations up to the size of the body, shape (n,)."""
+        """Return the largest p_nu(s)/s of all penetrations, shape (n,)."""
         assert self.layer is not None
         return np.max([self.layer.p_nu(s) / s for s in self._depths(size)], axis=0)
-
-    def _depths(self, size: float) -> list[Array]:
-        return [np.full(self.nodes.weight.size, s) for s in size * np.logspace(-9, 0, 37)]
 
     def normal_graph(self, jump: Array) -> NormalGraph | None:
         """Return the layer and the constraint as one graph, h_nu frozen at the jumps.
@@ -237,8 +238,7 @@ class FoundationLaw:
         unbounded = np.full(self.nodes.weight.size, np.inf)
         if self.layer is None:
             return unbounded
-        depths = size * np.logspace(-9, 3, 49)
-        p_nu = np.array([self.layer.p_nu(np.full(unbounded.size, depth)) for depth in depths])
+        p_nu = np.array([self.layer.p_nu(s) for s in self._depths(size)])
         steps = np.diff(p_nu, axis=0)
         saturates = np.isinf(self.layer.thickness) & (steps >= 0).all(axis=0) & (steps[-1] == 0)
         differences = np.array([0.0])

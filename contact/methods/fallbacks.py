@@ -1,22 +1,11 @@
 """The strategy: stages of the semismooth Newton method, and its fallbacks (`solve_contact`).
 
-1. Steps on the condensed body where that pays, then on the whole one; else on the whole one alone.
-2. Fallbacks, where these end without convergence, in turn (`fall_back`):
-
-   - all nodes open, by one linear solve from the best iterate, then a working set from there;
-   - continuation in psi of the charge, of a condensed problem alone, from the initial guess
-     `problem.start()`;
-   - secants of a layer that saturates, from that guess;
-   - a rigid motion that separates the bodies, of a condensed problem alone;
-   - proximal points, from that guess;
-   - the interior point from that guess, its first slacks from the gaps of the linear solve;
-   - steps on the condensed body, of a whole problem alone, from that guess.
-
-3. The iterate of least residual.
-
-A condensed problem has fallbacks of its own, all but the last. The notes of the history name them.
-They are also tried where Newton's method has converged to a solution at which a rigid-body
-mode has become unconstrained, although friction could constrain it.
+Steps on the condensed body where that pays, then on the whole one, else on the whole one alone;
+where these end without convergence, the fallbacks in turn (`fall_back`), from the initial guess
+`problem.start()`; then the iterate of least residual. A condensed problem has fallbacks of its own,
+all but the last. The notes of the history name them. They are also tried where Newton's method has
+converged to a solution at which a rigid-body mode has become unconstrained, although friction could
+constrain it.
 
 References
 ----------
@@ -184,13 +173,6 @@ def working_set(newton: SemismoothNewton, without_contact: State | None) -> End 
     """Return the solution with all nodes open, or that of `dual_active_set`, if any. Collective.
 
     Active sets may cycle on contact forces that are rounding.
-
-    Parameters
-    ----------
-    newton
-        The method on the problem.
-    without_contact
-        State with all nodes open; None for none.
     """
     if without_contact is None:
         return None
@@ -256,13 +238,6 @@ def dual_active_set(newton: SemismoothNewton, state: State) -> State | None:
     nodes penetrate, and active sets of all these cycle. The node of largest penetration enters the
     working set, then one more in turn. None where a node more does not halve the number of those
     that penetrate: an interior point then takes fewer steps.
-
-    Parameters
-    ----------
-    newton
-        The method on the problem.
-    state
-        State after a linear solve without contact.
     """
     problem, interface = newton.problem, newton.problem.interface
     nodes = interface.nodes
@@ -298,13 +273,7 @@ def continuation(solve: Callable[[float, State], End], start: State) -> End | No
     """Solve by continuation in a parameter from `FIRST_PART` to 1; None on failure. Collective.
 
     After a failure the square root of the factor is taken; after a failure of the first part none.
-
-    Parameters
-    ----------
-    solve
-        Solver of the problem with a part of the parameter, from an initial guess.
-    start
-        Initial guess of the first problem.
+    `solve` takes a part of the parameter, and an initial guess.
     """
     state, reached, part, factor = start, 0.0, FIRST_PART, FACTOR
     while factor > LEAST_FACTOR:
@@ -346,41 +315,36 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     The tangent of the layer is zero where it is saturated, and before its first touch: Newton's
     matrix may be singular, or as weak as elastic supports. Kacanov's method takes the secant
     p_nu(s)/s of the last iterate (it is positive). Newton's method takes the last steps, where the
-    forces nearly balance, and once from each set of regimes (open, below saturation, saturated)
-    that a secant leaves unchanged: supports that bear little bring the load to balance slowly.
-    Proximal points solve the bed's problem where friction alone holds the body along it. After a
-    failure that is not the layer's, the first problems are not solved either.
+    forces nearly balance, and where a secant leaves the regimes (open, below saturation, saturated)
+    unchanged: supports that bear little bring the load to balance slowly. Proximal points solve the
+    bed's problem where friction alone holds the body along it. After a failure that is not the
+    layer's, the first problems are not solved either.
     """
     problem, interface = newton.problem, newton.problem.interface
     foundation, near = interface.foundation, NEARLY_BALANCED
-    saturates = foundation.saturates(interface.size).astype(float)
-    if interface.nodes.maximum(saturates) == 0:
+    if interface.nodes.maximum(foundation.saturates(interface.size).astype(float)) == 0:
         return None
     state, largest = problem.start(), foundation.largest_secant(interface.size)
-    secant = largest
+    secant, unchanged = largest, 0
     regimes: NDArray[np.int8] = np.full(largest.size, -1, dtype=np.int8)
-    tried = regimes
     for _ in range(SECANTS):
         bed = foundation.elastic_bed(np.maximum(secant, SOFTEST * largest))
         method = newton.on(problem.with_interface(replace(interface, foundation=bed)))
-        state, outcome = method.iterate(state, note=SECANT)
-        if not outcome.converged:
-            held = proximal_points(method)
-            if held is None:
-                return None
-            state = held[0]
-        jump = interface.nodes.jump(state.x)
+        found = method.iterate(state, note=SECANT)
+        if not found[1].converged:
+            found = proximal_points(method)
+        if found is None:
+            return None
+        state, jump = found[0], interface.nodes.jump(found[0].x)
         before, regimes = regimes, foundation.regimes(jump)
-        changed, untried = (
-            float(summed(interface.comm, not np.array_equal(regimes, others))) > 0
-            for others in (before, tried)
-        )
+        changed = float(summed(interface.comm, not np.array_equal(regimes, before))) > 0
+        unchanged = 0 if changed else unchanged + 1
         balanced = evaluate(problem, state).significant <= near
-        if balanced or (untried and not changed):
+        if balanced or unchanged == 1:
             found = newton.iterate(newton.started(state), note=SECANT)
             if found[1].converged:
                 return found
-            near, tried = near * NEARER_BY if balanced else near, regimes
+        near = NEARER_BY * near if balanced else near
         secant = foundation.secant(jump)
     return None
 
