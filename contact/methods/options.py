@@ -66,8 +66,8 @@ class FixedPointOptions(LoopOptions):
         Discriminator(lambda given: ":text" if isinstance(given, str) else ":number"),
         Accepted('"auto" or a number > 0'),
     ] = "auto"
-    """Augmentation parameter of the Uzawa block relaxation (stress/length). `auto` fits a block,
-    and a slender body where the relaxation stalls with that."""
+    """Augmentation parameter of the Uzawa block relaxation (stress/length). `auto` fits a block;
+    where the relaxation stalls with that, a slender body or the soft layer of a stiff one."""
     acceleration: Literal["anderson", "none"] = "anderson"
     """Acceleration of the Uzawa block relaxation."""
     depth: Annotated[

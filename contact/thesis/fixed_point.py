@@ -56,21 +56,9 @@ LOST = "the linear system is singular: a rigid-body mode is unconstrained at thi
 
 @dataclass
 class OuterLoop(ABC):
-    """Outer loop of the algorithms of the thesis.
+    """Outer loop of the algorithms of the thesis; see `Method`.
 
-    Parameters
-    ----------
-    problem
-        The contact problem.
-    options
-        Options of the loop, a `LoopOptions`.
-    monitor
-        Called after each outer iteration.
-
-    Attributes
-    ----------
-    state, bound
-        Last iterate, and its friction bound, shape (n,) (stress).
+    `state` is the last iterate, `bound` its friction bound, shape (n,) (stress).
     """
 
     problem: ContactProblem
@@ -220,8 +208,8 @@ class FixedPoint(OuterLoop):
         super().__post_init__()
         given = self.options.r
         self.r = self.problem.scales.c if given == "auto" else given
-        # Like r, of later load steps too: from nearby they would stall with the r of a block.
-        self._slender = False
+        # Whether r is fitted, once for all load steps: from nearby they would stall with another.
+        self._fitted: bool | None = None
         self.operator = self._new_operator(symmetric=True)
 
     def _new_operator(self, symmetric: bool) -> Operator:
@@ -232,7 +220,7 @@ class FixedPoint(OuterLoop):
         self, start: State | None = None, secant_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit; see `Method`. Collective."""
-        self._stalled, self._residual, self._fitted = False, np.inf, False
+        self._stalled, self._residual = False, np.inf
         self._gap_derivative = ConductivityDerivative(NEAR)
         if not self.operator.symmetric:  # of an earlier solve
             self.operator = self._new_operator(symmetric=True)
@@ -271,7 +259,7 @@ class FixedPoint(OuterLoop):
         if friction and self._first == 0 and iteration == 1:
             # Slip and contact without friction are a bad initial guess.
             self._z = self._initial_z(0.0, friction)
-        if self._stalled and self._residual > NEAR:
+        if self._stalled and self._fitted is None:
             self._fit_to_softest_mode(friction)
         state, jump = self.state, interface.nodes.jump(self.state.x)
         blocks = augmentation(interface.nodes, self.r, friction)
@@ -299,15 +287,13 @@ class FixedPoint(OuterLoop):
         return result.iterations, "tangent" if kind == "tangent" else ""
 
     def _fit_to_softest_mode(self, friction: bool) -> None:
-        """Begin anew with the r of a slender body, once, if the body is one."""
-        options, problem = self.options, self.problem
-        if self._fitted or options.r != "auto" or options.stopping == "thesis":
+        """Begin anew with the r of a mode softer than those of a block, if there is one."""
+        options, problem, start = self.options, self.problem, self.problem.start()
+        if options.r != "auto" or options.stopping == "thesis":
             return
-        self._fitted = True
-        start = problem.start()
         r = fitted_augmentation(problem, self._new_operator(symmetric=True), start)
+        self._fitted = r is not None
         if r is not None:
-            self._slender = True
             self.r, self.state, self._secant_at = r, start, problem.body.zero_displacement()
             self.bound = self._first_bound
             self._z = self._initial_z(0.0, friction)
@@ -336,7 +322,7 @@ class FixedPoint(OuterLoop):
 
     def _limit(self) -> int:
         # Of slender bodies each relaxation brings contact or friction nearer, in turn.
-        return STALLED if self._stalled and not self._slender else self.stagnation[0]
+        return STALLED if self._stalled and not self._fitted else self.stagnation[0]
 
     def _thesis_criterion(self, change: float, previous: State) -> bool:
         """Tell whether (3.46) is met, or (6.40) without friction."""
@@ -347,5 +333,5 @@ class FixedPoint(OuterLoop):
     def _advice(self, residual: float | None = None) -> str:
         if self._stalled:
             words = f": the Uzawa block relaxation with r = {self.r:.3g} stalls"
-            return words + (conditioning(self.problem.scales, self.r) if self._slender else "")
+            return words + (conditioning(self.problem.scales, self.r) if self._fitted else "")
         return FROZEN if residual is not None and residual > NEAR else ""

@@ -1,8 +1,9 @@
-"""The augmentation parameter of a slender body, from the stiffness of its softest mode.
+"""The augmentation parameter of a body whose softest mode is softer than a block.
 
 A mode of Gamma_3 with the stiffness sigma contracts by sigma/(sigma + r) in contact and by
 r/(sigma + r) without: r = sqrt(sigma_min sigma_max) is the best. A block has about the ends
-1.1 E'/H and 1.76 E'/h, whose r is c of (20); a body that bends has a smaller sigma_min.
+1.1 E'/H and 1.76 E'/h, whose r is c of (20). A body that bends has a smaller sigma_min; so has one
+that a soft layer alone holds, as a rigid motion has the stiffness of the layer.
 
 References
 ----------
@@ -36,20 +37,9 @@ BLOCK = 1.1
 
 
 def fitted_augmentation(problem: ContactProblem, operator: Operator, state: State) -> float | None:
-    """Return r = sqrt(sigma_min sigma_max) (stress/length). Collective.
+    """Return r = sqrt(sigma_min sigma_max) (stress/length); None if no softer than a block.
 
-    Parameters
-    ----------
-    problem
-        The problem.
-    operator
-        An operator of it, for this alone: it is left singular where the body is.
-    state
-        Where the body is linearised.
-
-    Returns
-    -------
-    The parameter; None if the body is not softer than a block.
+    The operator is for this alone: it is left singular where the body is. Collective.
     """
     scales, block = problem.scales, block_stiffness(problem.scales)
     try:
@@ -73,8 +63,8 @@ def conditioning(scales: Scales, r: float) -> str:
     # The softest mode contracts by 1/(1 + sqrt(sigma_min/sigma_max)).
     steps = math.log(10) * math.sqrt(ratio)
     return (
-        f": the body is slender, the modes of its contact surface differ by a factor of "
-        f"{ratio:.1e} in stiffness, and a digit takes {steps:.1e} solves without acceleration; "
+        f": the modes of its contact surface differ by a factor of {ratio:.1e} in stiffness, as of "
+        f"slender bodies and soft layers: a digit takes {steps:.1e} solves without acceleration; "
         "accepted: method newton"
     )
 
@@ -82,14 +72,17 @@ def conditioning(scales: Scales, r: float) -> str:
 def softest_mode(problem: ContactProblem, operator: Operator, state: State, shift: float) -> float:
     """Return the least stiffness of normal displacements, but for rigid motions. Collective.
 
-    1/(largest Ritz value of the compliance in L2(Gamma_3)) - shift, without rigid motions; `shift`
-    is added to all stiffnesses (stress/length).
+    With that of a layer: 1/(largest Ritz value of the compliance in L2(Gamma_3)) - shift, without
+    rigid motions that nothing holds; `shift` is added to all stiffnesses (stress/length).
     """
     interface, nodes = problem.interface, problem.interface.nodes
-    blocks = augmentation(nodes, shift, False)
-    if interface.foundation.active:
+    blocks, law = augmentation(nodes, shift, False), interface.foundation
+    if law.active:
         jump = nodes.jump(state.x)
-        blocks += interface.foundation.charge_block(jump, interface.pressure(jump, state.forces))
+        blocks += law.charge_block(jump, interface.pressure(jump, state.forces))
+    if (graph := law.normal_graph(nodes.jump(state.x))) is not None:
+        layer = graph.stiffness * law.largest_secant(interface.size)
+        blocks += layer[:, None, None] * augmentation(nodes, 1.0, False)
     weighted = interface.weighted(blocks, state.x)
     operator.update("secant", state, weighted)
 

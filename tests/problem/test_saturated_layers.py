@@ -221,6 +221,20 @@ def test_friction_alone_holds_a_block_along_the_layer(kind, height, share, part)
     assert newton.max_displacement == pytest.approx(uzawa.max_displacement, rel=1e-4)
 
 
+@pytest.mark.parametrize("height", [1.0, 2.0])
+def test_the_block_relaxation_fits_r_to_the_layer_below_a_stiff_body(height):
+    """With the r of a block it stalled at .03 and .3: the layer is 1e6 times softer."""
+    case = pulled("plane", height, 0.05, 0.7)
+    case["mesh"]["cells"] = [10, 2 + round(height)]
+    case["material"]["young"] = 1e9
+    newton, uzawa = (
+        solve(parse_case({**case, "solver": {"method": method}}), comm=SELF)
+        for method in ("newton", "uzawa")
+    )
+    assert newton.converged and uzawa.converged, uzawa.outcome.reason
+    assert uzawa.max_displacement == pytest.approx(newton.max_displacement, rel=1e-6)
+
+
 @pytest.mark.parametrize(("share", "limit"), [(0.8, LIMIT), (0.99, LIMIT), (0.8, 100 * LIMIT)])
 @pytest.mark.parametrize("height", [0.2, 2.0])
 @pytest.mark.parametrize("kind", ["plane", "solid"])
