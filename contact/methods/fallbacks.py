@@ -330,12 +330,13 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     for _ in range(SECANTS):
         bed = foundation.elastic_bed(np.maximum(secant, SOFTEST * largest))
         method = newton.on(problem.with_interface(replace(interface, foundation=bed)))
-        found = method.iterate(state, note=SECANT)
-        if not found[1].converged:
-            found = proximal_points(method)
-        if found is None:
-            return None
-        state, jump = found[0], interface.nodes.jump(found[0].x)
+        state, outcome = method.iterate(state, note=SECANT)
+        if not outcome.converged:
+            held = proximal_points(method)
+            if held is None:
+                return None
+            state = held[0]
+        jump = interface.nodes.jump(state.x)
         before, regimes = regimes, foundation.regimes(jump)
         changed = float(summed(interface.comm, not np.array_equal(regimes, before))) > 0
         unchanged = 0 if changed else unchanged + 1

@@ -2,19 +2,10 @@
 
 Frictionless contact and Tresca's friction are convex. The linear systems of an interior point are
 those of a Newton step with other nodal blocks: along the normal, force over slack in place of
-gamma. So it runs on whole bodies and condensed ones alike, on any number of ranks.
-
-1. The first friction bound is zero.
-2. A step of the interior point is Mehrotra's predictor and corrector with the scaling of Nesterov
-   and Todd (`Cones`), both with one matrix. Every step linearises layer and charge, and the
-   material by its secant.
-3. With a closed duality gap the active set is known. From there, or where rounding ends the steps
-   before, Newton's method takes the last steps.
-4. Without convergence, or where a rigid-body mode has become unconstrained at the solution, the
-   friction bound becomes that of the pressures found (Haslinger's fixed point), and the next
-   problem begins at 2. It has a solution if this friction balances the loads on rigid motions
-   (`problem.rigid_modes.sliding_mode`). The method ends where it does not, where a body with an
-   unconstrained mode is not in contact, or after a number of bounds.
+gamma. So it runs on whole bodies and condensed ones alike, on any number of ranks. Its steps are
+Mehrotra's predictor and corrector with the scaling of Nesterov and Todd (`Cones`), both with one
+matrix; docs/algorithms.md has all of the method, with Newton's last steps and the updates of the
+friction bound.
 
 Pressures and gaps are in half lines, friction and slip in second-order (Lorentz) cones: with the
 slip a, its length t >= |a|, the friction force q and its bound h >= |q|, the pairs (t, a) and
@@ -77,16 +68,9 @@ def _mixed(x: Array, y: Array) -> Array:
 
 @dataclass
 class ConeStep:
-    """A search direction.
+    """A search direction: changes of slacks and forces, (n,), of (t, a) and (h, -q) in the frame.
 
-    Attributes
-    ----------
-    slack, force
-        Changes in the half lines, shape (n,).
-    slip, friction
-        Changes of (t, a) and (h, -q) in the frame, shape (k, 2 + t).
-    tails
-        Changes of a and -q, shapes (k, t).
+    The latter of shape (k, 2 + t); `tails` are those of a and -q, (k, t).
     """
 
     slack: Array
@@ -99,16 +83,8 @@ class ConeStep:
 class Cones:
     """Slacks and multipliers strictly inside their cones, those of this rank.
 
-    Parameters
-    ----------
-    slack, force
-        Open gaps and contact forces, shape (n,), positive.
-    length, slip
-        t and a, shapes (k,) and (k, t), t > |a|.
-    bound, friction
-        h and -q, shapes (k,) and (k, t), h > |q|.
-    comm
-        Communicator of the cones.
+    Open gaps and contact forces, (n,), are positive; length t and slip a, (k,) and (k, t), t > |a|;
+    bound h and friction -q, h > |q|.
     """
 
     def __init__(
@@ -315,13 +291,11 @@ def interior_point(
 
     Parameters
     ----------
-    newton
-        Newton's method on the problem.
+    newton, steps
+        Newton's method on the problem, and most steps; those left of the limit by default.
     begin
         State without contact, whose gaps are the first slacks; None where contact has to constrain
         a rigid-body mode or the potential.
-    steps
-        Most steps; those left of the limit by default.
     """
     problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
     last_step = len(newton.recorder.records) + (newton.steps_left if steps is None else steps)
@@ -359,9 +333,10 @@ def interior_point(
             jump
         ):
             break
-        # Pressures out of balance with the loads may be larger by that share, and so friction.
+        # Pressures that miss a share of the loads may be larger by it, and so friction; those that
+        # bear less than half of the loads prove nothing.
         missing = modes.missing_pressure(interface.pressure(jump, state.forces))
-        if np.isfinite(missing) and modes.overloaded((1 + missing) * bound):
+        if missing <= 1 and modes.overloaded((1 + missing) * bound):
             outcome = replace(outcome, residuals=evaluate(problem, state))
             last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
             break
@@ -369,16 +344,9 @@ def interior_point(
 
 
 class InteriorPoint:
-    """The interior-point method for a given friction bound (Tresca), on the operator of Newton's.
+    """The interior-point method for a friction bound (n,) (Tresca), on the operator of Newton's.
 
-    Parameters
-    ----------
-    newton
-        Newton's method on the problem.
-    bound
-        Friction bound, shape (n,) (stress).
-    begin
-        State whose gaps are the first slacks; None for none.
+    `begin` is a state whose gaps are the first slacks; None for none.
     """
 
     def __init__(self, newton: SemismoothNewton, bound: Array, begin: State | None) -> None:

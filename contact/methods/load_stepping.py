@@ -27,18 +27,10 @@ HALVINGS = 4
 
 
 class LoadStepping:
-    """Load steps of a problem by one method.
+    """Load steps of a problem, from its history, by one method.
 
-    Parameters
-    ----------
-    problem
-        The problem; friction begins with its history.
-    method
-        Solver of the steps.
-    start
-        State at the end of an earlier step; the reference configuration by default.
-    before
-        State at the end of the step before `start`, for the extrapolation.
+    `start` is the state at the end of an earlier step, the reference configuration by default;
+    `before` that of the step before it, for the extrapolation.
     """
 
     def __init__(

@@ -1,28 +1,16 @@
 """Semismooth Newton method, a primal-dual active set strategy: the default solver.
 
-1. Complementarity functions p - max(0, p + c (u_nu - rho)) and lambda - proj_s(lambda + c u_tau),
-   (17) of docs/algorithms.md, state contact and friction at each node; rho is the gap of the
-   constraint (`Interface.gap`). Their arguments define the active set: which nodes are open, stick
-   or slip (`contact.interface.multipliers`). On it each has a generalised derivative
-   (`contact.interface.complementarity`).
-2. A step linearises material, contact, friction, layer and charge together (`newton_step`). The
-   multipliers are eliminated node by node, so that one linear system in the unknowns of the body
-   is left. The complementarity function of a closed node, -c (u_nu - rho), has no derivative in p.
-   It is perturbed to (c/gamma) dp = c (u_nu+ - rho): one augmented-Lagrangian update, an inexact
-   semismooth Newton step; gamma -> infinity is the primal-dual active set strategy.
-   The material is linearised by its tangent while the residual of equilibrium falls, else by its
-   secant (Kacanov). Steps are taken whole, without a line search: the residuals may rise while the
-   active set changes, and the stagnation limit bounds how long.
-3. Where the contact nodes are few, the body is condensed onto them (static condensation): a loop
+1. A step linearises material, contact, friction, layer and charge together (`newton_step`), and
+   eliminates the multipliers node by node (`contact.interface.complementarity`). The function of a
+   closed node, -c (u_nu - rho), has no derivative in p: it is perturbed to (c/gamma) dp =
+   c (u_nu+ - rho), one augmented-Lagrangian update; gamma -> infinity is the primal-dual active set
+   strategy. Steps are taken whole, without a line search: the residuals may rise while the active
+   set changes, and the stagnation limit bounds how long.
+2. Where the contact nodes are few, the body is condensed onto them (static condensation): a loop
    linearises the material (`Newton._condensed_steps`), and the same method solves contact on the
    Schur complement, in small dense steps (`semismooth`).
-4. The iteration ends by the residuals of the problem, computed from scratch, or by their
-   stagnation: the active sets cycle. From zero it also ends after a first step whose penetration
-   shows that c is far above the stiffness of the body, as of slender ones; not so on the whole body
-   after steps on the condensed one. Loads that friction is found not to balance end the solve,
-   without further fallbacks.
-5. `contact.methods.fallbacks.solve_contact` has the order of all stages: steps on the condensed
-   body and on the whole one, then the fallbacks.
+3. `fallbacks.solve_contact` has the order of all stages: steps on the condensed body and on the
+   whole one, then the fallbacks.
 
 References
 ----------
@@ -93,14 +81,9 @@ RADIUS = 0.05
 
 
 class Chord:
-    """Choice between a Newton step and a chord step, by the rate of convergence.
+    """Choice between a Newton step and a chord step, by the rate of convergence to a tolerance.
 
-    Parameters
-    ----------
-    goal
-        Tolerance on the residual.
-    most_steps
-        Most chord steps to the goal; 0 for none at all.
+    `most_steps`: most chord steps to it; 0 for none at all.
     """
 
     def __init__(self, goal: float, most_steps: float) -> None:
@@ -122,13 +105,7 @@ class Chord:
     ) -> tuple[State, bool]:
         """Return the iterate to step from, and whether the step is a chord step.
 
-        Parameters
-        ----------
-        state, reached
-            Last iterate and its residual. Where a chord step has raised it, the one before is
-            taken.
-        secant_at
-            Unknowns of the secant; None for those of the state.
+        Of the last iterate and its residual; where a chord step has raised it, the one before.
         """
         before, last = self._before, self._reached
         if not self._factorised or self._most_steps <= 0:
@@ -142,26 +119,13 @@ class Chord:
             left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
             reuse = bool(left <= self._most_steps and reached <= RADIUS)
         self._before, self._reached, self._reused = state, reached, reuse
-        return state, reuse
-
-    def note_factorisation(self) -> None:
-        """Note that there is a factorisation."""
         self._factorised = True
+        return state, reuse
 
 
 @dataclass
 class Newton:
-    """The semismooth Newton method with its fallbacks, on a whole problem.
-
-    Parameters
-    ----------
-    problem
-        The contact problem.
-    options
-        Options of the method.
-    monitor
-        Called after each step.
-    """
+    """The semismooth Newton method with its fallbacks, on a whole problem; see `Method`."""
 
     problem: ContactProblem
     options: NewtonOptions = field(default_factory=NewtonOptions)
@@ -176,7 +140,9 @@ class Newton:
         self._step = self._newton_step(problem, options, self.counters)
         self._condenses = options.condense and condensable(problem, options.linear)
         self._pays = self._condenses and condensation_pays(problem, options.linear)
-        self._chord = Chord(options.tolerance, MOST_STEPS if options.reuse != "never" else 0.0)
+        # The factorisation of a linear body serves all steps.
+        reuses = options.reuse != "never" and not problem.body.linear
+        self._chord = Chord(options.tolerance, MOST_STEPS if reuses else 0.0)
         #: The condensed body; None before the first condensed step.
         self.condensation: Condensation | None = None
         self.set_load_step(problem)
@@ -244,6 +210,7 @@ class Newton:
             kind = "tangent" if tangent else "secant"
             condensed = self.condensation.linearise(kind, state, reuse, secant_at, internal)
             if condensed is None:
+                chord.drop()
                 return previous, monitor.outcome(UNSOLVED_ON_CONTACT_NODES)
             # Inexact Newton: no more digits than the linearised material has.
             enough = 0.1 * options.tolerance
@@ -260,8 +227,6 @@ class Newton:
             increment = self.condensation.expand(condensed, end.x)
             state = replace(end, x=body.updated(state.x, increment), history=state.history)
             secant_at = None
-            if not body.linear:
-                chord.note_factorisation()
             monitor.evaluate(state)
             taken = [word for word in FALLBACKS if any(word in r.note for r in records)]
             note = ", ".join([*["chord step"] * reuse, *taken])

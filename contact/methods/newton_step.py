@@ -54,16 +54,9 @@ SMALL = 0.1
 class LinearisedLaws:
     """Contact, friction, layer and charge at the contact nodes, linearised for a step.
 
-    Attributes
-    ----------
-    active_set, unchanged
-        Active set of the step, and whether it is that of the last one, on all ranks.
-    multipliers, contact
-        lambda^0 and the blocks B of (19) of the algorithms page.
-    layer, layer_shift
-        Blocks of the layer, and its linearised pressure at dx = 0 less its pressure, shape (n,).
-    charge
-        Blocks of the charge, or 0.
+    The active set, and whether it is that of the last step, on all ranks; lambda^0 and the blocks B
+    of (19) of docs/algorithms.md; blocks of the layer, and its linearised pressure at dx = 0 less
+    its pressure, shape (n,); blocks of the charge.
     """
 
     active_set: ActiveSet
@@ -72,41 +65,17 @@ class LinearisedLaws:
     contact: Array
     layer: Array
     layer_shift: Array
-    charge: Array | float
-
-
-@dataclass(frozen=True)
-class MaterialLinearisation:
-    """The linearisation of the material in a step: its kind, and where the secant is taken.
-
-    Attributes
-    ----------
-    tangent
-        By the tangent, or by the secant (Kacanov).
-    secant_at
-        Unknowns at which the secant modulus is taken; None for those of the iterate.
-    """
-
-    tangent: bool
-    secant_at: Array | None = None
+    charge: Array
 
 
 class NewtonStep:
     """One assembly, one factorisation, one solve of the linearised problem.
 
-    Parameters
-    ----------
-    problem
-        The problem of the operator; steps may be those of the same body with another interface.
-    options, parameters
-        The options and the complementarity parameters.
-    counters
-        Counters of factorisations and solves.
-    underconstrained
-        Whether a rigid-body mode is constrained neither by the supports nor by the nodes that touch
-        in the reference configuration: a body that touches at one node rolls until it touches at
-        another one. A Levenberg-Marquardt regularisation at all contact nodes bounds the steps
-        while the active set changes, and decreases with the residual.
+    Steps may be those of the same body with another interface. `underconstrained`: a rigid-body
+    mode is constrained neither by the supports nor by the nodes that touch in the reference
+    configuration. A body that touches at one node rolls until it touches at another one: a
+    Levenberg-Marquardt regularisation at all contact nodes bounds the steps while the active set
+    changes, and decreases with the residual.
     """
 
     def __init__(
@@ -179,7 +148,8 @@ class NewtonStep:
         self,
         problem: AnyProblem,
         iterate: EvaluatedState,
-        material: MaterialLinearisation,
+        tangent: bool,
+        secant_at: Array | None = None,
         exact: bool = False,
     ) -> State | None:
         """Return the next iterate; None if the matrix is singular there. Collective.
@@ -188,8 +158,9 @@ class NewtonStep:
         ----------
         problem, iterate
             The problem, and the iterate with its residuals.
-        material
-            How the material is linearised.
+        tangent, secant_at
+            Whether the material is linearised by its tangent, else by its secant (Kacanov), and the
+            unknowns of the secant modulus; None for those of the iterate.
         exact
             Whether iterative solvers go to their own tolerance, without the forcing term.
 
@@ -201,8 +172,8 @@ class NewtonStep:
         """
         body, state, largest = problem.body, iterate.state, iterate.residuals.significant
         laws = self._linearise(problem.interface, state, largest)
-        self._update(problem, iterate, laws, material)
-        residual = _residual(problem, iterate, laws, material)
+        self._update(problem, iterate, laws, tangent, secant_at)
+        residual = _residual(problem, iterate, laws, secant_at)
         forcing = None if exact else self._forcing_term(largest)
         try:
             increment = self.operator.solve(-residual, forcing)
@@ -229,32 +200,22 @@ class NewtonStep:
         bound = LinearisedBound(s, interface.friction.by_pressure(total, length), by_slip)
         multipliers, contact = linearise(interface, jump, forces, active, parameters, bound)
         layer, shift = linearised_layer(interface, jump, state, parameters, unchanged)
-        charge = self._charge(interface, jump, multipliers, unchanged, residual)
+        law, charge = interface.foundation, np.zeros_like(contact)
+        if law.active:
+            # With the derivative of psi(u_nu - rho), or psi frozen.
+            follow = unchanged
+            if law.follows_gap:
+                follow = self.conductivity_derivative(residual, unchanged)
+            charge = law.charge_block(jump, interface.pressure(jump, multipliers), follow)
         return LinearisedLaws(active, unchanged, multipliers, contact, layer, shift, charge)
-
-    def _charge(
-        self,
-        interface: Interface,
-        jump: Array,
-        multipliers: Multipliers,
-        unchanged: bool,
-        residual: float,
-    ) -> Array | float:
-        """Return the derivative of the charge, with that of psi(u_nu - rho) or psi frozen."""
-        law = interface.foundation
-        if not law.active:
-            return 0.0
-        follow = unchanged
-        if law.follows_gap:
-            follow = self.conductivity_derivative(residual, unchanged)
-        return law.charge_block(jump, interface.pressure(jump, multipliers), follow)
 
     def _update(
         self,
         problem: AnyProblem,
         iterate: EvaluatedState,
         laws: LinearisedLaws,
-        material: MaterialLinearisation,
+        tangent: bool,
+        secant_at: Array | None,
     ) -> None:
         """Assemble and factorise the operator. Collective."""
         interface, body = problem.interface, problem.body
@@ -265,23 +226,19 @@ class NewtonStep:
                 interface, residuals.significant, self.parameters.nodal_stiffness
             )
         reuse = self._assembled and residuals.equilibrium < SMALL * residuals.significant
-        kind = "tangent" if material.tangent else "secant"
-        at = state if material.secant_at is None else replace(state, x=material.secant_at)
+        at = state if secant_at is None else replace(state, x=secant_at)
         weighted = interface.weighted(blocks, state.x)
-        self.operator.update(kind, at, weighted, reuse=reuse)
+        self.operator.update("tangent" if tangent else "secant", at, weighted, reuse=reuse)
         self._assembled = True
 
 
 def _residual(
-    problem: AnyProblem,
-    iterate: EvaluatedState,
-    laws: LinearisedLaws,
-    material: MaterialLinearisation,
+    problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws, secant_at: Array | None
 ) -> Array:
     """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
     here, nodes = replace(iterate.state, forces=laws.multipliers), problem.interface.nodes
-    internal = iterate.internal if material.secant_at is None else None
-    residual = residual_forces(problem, here, material.secant_at, internal)
+    internal = iterate.internal if secant_at is None else None
+    residual = residual_forces(problem, here, secant_at, internal)
     nodes.add_jump_transposed((nodes.weight * laws.layer_shift)[:, None] * nodes.normal, residual)
     return residual
 

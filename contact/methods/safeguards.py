@@ -37,12 +37,7 @@ def guarded_active_set(
 ) -> tuple[ActiveSet, Multipliers]:
     """Return the active set (18) of a step, and the multipliers about which it linearises.
 
-    Parameters
-    ----------
-    interface, jump, multipliers, bound, c
-        As `Interface.active_set` takes them.
-    before
-        Active set of the last step; None in the first one, where closed nodes stick.
+    `before` is the active set of the last step; None in the first one, where closed nodes stick.
     """
     if before is None:
         closed = interface.normal_gap(jump) <= 1e-12 * interface.size
@@ -76,14 +71,9 @@ def _power(friction: Array, slip: Array) -> Array:
 
 
 def bound_by_slip(interface: Interface, total: Array, length: Array, limit: float) -> Array:
-    """Return ds/d|u_tau|, at least -limit: a node that falls faster snaps, shape (n,). Collective.
+    """Return ds/d|u_tau| at pressures and |u_tau|, (n,), at least -limit: a faster fall snaps.
 
-    Parameters
-    ----------
-    interface, total, length
-        The laws, the total pressure and |u_tau|, shape (n,).
-    limit
-        Stiffness that a falling bound may take away (stress/length).
+    The limit is the stiffness that a falling bound may take away (stress/length). Collective.
     """
     return np.maximum(interface.friction.by_slip(total, length), -limit)
 
@@ -105,14 +95,8 @@ class ConductivityDerivative:
     With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and steep
     ramps psi converge fast. But a node that opens draws less charge, and may open further: the
     linearised charge leads back to contact, the node is then under tension, and the active set
-    cycles. With psi frozen it opens to the other end of the ramp.
-
-    Attributes
-    ----------
-    near
-        Largest residual with the derivative.
-    included
-        Whether the last step had it.
+    cycles. With psi frozen it opens to the other end of the ramp. `near` is the largest residual
+    with the derivative, `included` tells whether the last step had it.
     """
 
     near: float = np.inf

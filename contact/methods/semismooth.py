@@ -11,19 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from contact.interface.multipliers import Multipliers, constraint_active
-from contact.methods.newton_step import MaterialLinearisation, NewtonStep
+from contact.methods.newton_step import NewtonStep
 from contact.methods.options import NewtonOptions
 from contact.methods.report import PROGRESS, Best, Outcome, Record, Recorder, Stagnation
-from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
 from contact.problem.condensed import AnyProblem
-from contact.problem.residuals import (
-    Residuals,
-    evaluate_state,
-    residual_forces,
-    undeformed_equilibrium,
-)
+from contact.problem.residuals import Residuals, evaluate_state, undeformed_equilibrium
 from contact.problem.state import State
-from contact.ranks import summed
 from contact.typing import Array
 
 #: Ratio of c times the penetration of the first step to all loads above which c overestimates the
@@ -35,23 +29,10 @@ OVERESTIMATED = "the complementarity parameter is far above the stiffness of the
 
 
 class SemismoothNewton:
-    """The semismooth Newton method on one problem, with one operator.
+    """The semismooth Newton method on one problem, with one operator, that of its step.
 
-    Parameters
-    ----------
-    problem, options
-        The problem; tolerances and limits.
-    step
-        One linearisation and solve.
-    modes
-        Rigid-body modes of the whole problem.
-    recorder
-        Recorder of the steps.
-
-    Attributes
-    ----------
-    last, best
-        Last iterate, and iterate of least residual.
+    `modes` are those of the whole problem; `last` and `best` are the last iterate and that of least
+    residual.
     """
 
     def __init__(
@@ -136,7 +117,7 @@ class SemismoothNewton:
         tangent = state.active_set is not None and secant_at is None and not linear
         for _ in range(min(options.max_iterations, self.steps_left if steps is None else steps)):
             previous = monitor.iterate
-            taken = step(problem, previous, MaterialLinearisation(tangent, secant_at), exact)
+            taken = step(problem, previous, tangent, secant_at, exact)
             if taken is None:
                 return state, monitor.outcome(step.fault)
             state, secant_at = taken, None
@@ -272,8 +253,5 @@ def _overestimates_stiffness(problem: AnyProblem, c: float, state: State) -> boo
     """Tell whether c times the penetration of a first state is far above all loads. Collective."""
     interface = problem.interface
     penetration = np.maximum(-interface.normal_gap(interface.nodes.jump(state.x)), 0.0)
-    forces = np.abs(residual_forces(problem, problem.start()))
-    on_nodes, on_global = np.split(forces, [problem.body.owned])
-    loads = float(summed(interface.comm, on_nodes.sum())) + on_global.sum()
     # A given motion of the foundation alone is no load to compare with.
-    return bool(c * interface.nodes.sum(penetration) > OVERESTIMATE * loads > 0)
+    return bool(c * interface.nodes.sum(penetration) > OVERESTIMATE * all_loads(problem) > 0)

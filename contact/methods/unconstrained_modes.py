@@ -49,18 +49,9 @@ RIGID_MOTION = "rigid motion"
 class RigidMotion:
     """The m unconstrained modes of a solution, and the amounts to subtract.
 
-    Attributes
-    ----------
-    motions, columns
-        Modes in the unknowns of the whole problem, shape (unknowns, m), and in the jumps,
-        (n, d, m).
-    wanted, amounts
-        Amounts for the displacements of least norm, without and with the constraint that nothing
-        penetrates, (m,).
-    depth
-        Penetration with `wanted` (length).
-    limited
-        Whether `depth` is more than rounding.
+    Modes in the unknowns of the whole problem, (unknowns, m), and in the jumps, (n, d, m); amounts
+    for the displacements of least norm, without and with the constraint that nothing penetrates;
+    the penetration without it, and whether that is more than rounding.
     """
 
     motions: Array
@@ -125,13 +116,8 @@ class UnconstrainedModes:
         """Return a state with all nodes open after a rigid motion; None without one. Collective.
 
         None too where the motion is more than 45 degrees off the normal: out of a wedge, in which
-        friction might constrain the body.
-
-        Parameters
-        ----------
-        problem, step
-            The condensed problem, and its operator. A proximal term of sqrt(EPS) times the
-            stiffness of a node makes the system regular; a second step removes its forces.
+        friction might constrain the body. A proximal term of sqrt(EPS) times the stiffness of a
+        node makes the system regular; a second step removes its forces.
         """
         nodes, start = problem.interface.nodes, problem.start()
         blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))

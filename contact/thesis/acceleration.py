@@ -26,19 +26,9 @@ SWEEPS = 20
 class ResidualMinimiser:
     """Nonlinear GMRES for lambda = P(z), z = lambda + r u, with u affine in lambda.
 
-    Points are pairs (lambda, z), arrays of shape (2, m) with m values on this rank.
-
-    Parameters
-    ----------
-    inner
-        Global inner products: maps two matrices (m, k) and (m, l) of local values to the
-        (k, l) matrix of sums over all ranks.
-    project
-        P: the projections of z, the next contact forces, shape (..., m).
-    derivative
-        Maps z and directions, shape (m, k), to the directional derivatives of P, (m, k).
-    depth
-        Number of directions kept.
+    Points are pairs (lambda, z), arrays of shape (2, m) with m values on this rank. `inner` maps
+    matrices (m, k) and (m, l) to the (k, l) inner products over all ranks, `project` z to P, shape
+    (..., m), `derivative` z and directions (m, k) to the derivatives of P; `depth` directions stay.
 
     References
     ----------
@@ -59,14 +49,9 @@ class ResidualMinimiser:
         self._best: Array | None = None
 
     def next(self, force: Array, z: Array, image: Array) -> Array:
-        """Return the next z. Collective.
+        """Return the next z, given lambda, lambda + r u, and the z of the plain relaxation, (m,).
 
-        Parameters
-        ----------
-        force, z
-            The last lambda and lambda + r u, shape (m,).
-        image
-            The next z of the plain relaxation.
+        Collective.
         """
         new, old = np.stack([force, z]), self._best
         if old is None:

@@ -45,15 +45,7 @@ from forms.foundation import penalty_friction_modulus, penalty_pressure
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Parameters of the penalised laws.
-
-    Attributes
-    ----------
-    contact
-        eps of [u_nu - rho]^+/eps (length^3/force).
-    slip
-        eps of u_tau/(|u_tau| + eps) (length).
-    """
+    """Parameters eps of [u_nu - rho]^+/eps (length^3/force) and u_tau/(|u_tau| + eps) (length)."""
 
     contact: float
     slip: float
@@ -67,14 +59,9 @@ def outer(a: Array, b: Array) -> Array:
 class PenalisedLaw:
     """Contact forces as a function of the jumps, with their derivative.
 
-    Parameters
-    ----------
-    interface, eps
-        The contact nodes with their laws, and the parameters of these.
-    iterate
-        Nodal unknowns at which the friction modulus s/(|u_tau| + eps), (4.32)-(4.33), is frozen,
-        shape (n, block size). None: the modulus is implicit, (4.3), but for a smoothed pressure in
-        its derivative.
+    `iterate`: jumps at which the friction modulus s/(|u_tau| + eps), (4.32)-(4.33), is frozen,
+    shape (n, block size). None: it is implicit, (4.3), but for a smoothed pressure in its
+    derivative.
     """
 
     def __init__(

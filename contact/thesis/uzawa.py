@@ -90,18 +90,8 @@ def normal_and_tangential(nodes: ContactNodes, jump: Array, friction: bool) -> A
 class RelaxationResult:
     """End of a Uzawa block relaxation.
 
-    Attributes
-    ----------
-    increment
-        dx on the owned unknowns.
-    forces
-        Multipliers in equilibrium with the iterate.
-    z
-        Variable of the next relaxation, about the new iterate, shape (n, 1 + d).
-    iterations
-        Number of linear solves.
-    stalled
-        Whether the stagnation limit has ended it.
+    dx on the owned unknowns, multipliers in equilibrium with it, z of the next relaxation, about
+    the new iterate, (n, 1 + d), and the number of linear solves; whether it has stagnated.
     """
 
     increment: Array
@@ -112,47 +102,27 @@ class RelaxationResult:
 
 
 def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
-    """Return the derivatives of `project_disc` along directions.
+    """Return derivatives of `project_disc` at z, (n, d), along directions, (n, d, k).
 
-    Parameters
-    ----------
-    z, radius
-        Vectors, shape (n, d), and radii, shape (n,).
-    directions
-        Shape (n, d, k).
-
-    Returns
-    -------
-    Shape (n, d, k); on the rim that of the inside.
+    On the rim those of the inside.
     """
     length = np.linalg.norm(z, axis=1)
     beyond = length > radius
-    unit = z[beyond] / length[beyond, None]
-    outside = directions[beyond]
-    radial = np.einsum("ni,nik->nk", unit, outside)
-    outside = outside - unit[:, :, None] * radial[:, None, :]
-    result = directions.copy()
-    result[beyond] = (radius[beyond] / length[beyond])[:, None, None] * outside
-    return result
+    unit, scale = np.zeros_like(z), np.ones_like(length)
+    unit[beyond] = z[beyond] / length[beyond, None]
+    scale[beyond] = radius[beyond] / length[beyond]
+    across = directions - unit[:, :, None] * np.einsum("ni,nik->nk", unit, directions)[:, None, :]
+    return scale[:, None, None] * across
 
 
 @dataclass(frozen=True)
 class FrozenProblem:
     """The problem of one outer iteration, with its frozen terms, and the steps on it.
 
-    Contact forces and jumps are arrays of normal and tangential parts, shape (n, 1 + d). Steps take
-    the friction bound s_n, shape (n,): with `single_loop` it is not frozen.
-
-    Parameters
-    ----------
-    problem, state
-        The problem, and the iterate u_0 at which layer, charge and geometry are frozen.
-    secant_at
-        Unknowns of the secant modulus.
-    friction
-        Whether there is friction.
-    r
-        Augmentation parameter (stress/length).
+    The problem, the iterate u_0 at which layer and charge are frozen, the unknowns of the secant
+    modulus, whether there is friction, and r (stress/length). Contact forces and jumps are arrays
+    of normal and tangential parts, shape (n, 1 + d). Steps take the friction bound s_n, shape (n,):
+    with `single_loop` it is not frozen.
     """
 
     problem: ContactProblem
@@ -264,14 +234,7 @@ class FrozenProblem:
 class ThesisCriterion:
     """The thesis's criterion (3.45), (5.38): relative change of unknowns and auxiliary variables.
 
-    Attributes
-    ----------
-    frozen
-        The problem.
-    domain_norm
-        L2(Omega) norm of owned unknowns.
-    eps
-        Its tolerance.
+    `domain_norm` is that of L2(Omega) of owned unknowns, `eps` the tolerance.
     """
 
     frozen: FrozenProblem
@@ -304,16 +267,10 @@ def uzawa_block_relaxation(
 
     Parameters
     ----------
-    frozen
-        The problem.
-    operator
-        Factorised operator with `augmentation(nodes, r, friction)`.
-    z
-        Initial lambda + r (u - u_0), shape (n, 1 + d).
-    bound
-        Friction bound s_n, shape (n,).
-    options
-        The options.
+    frozen, operator
+        The problem, and its factorised operator with `augmentation(nodes, r, friction)`.
+    z, bound
+        Initial lambda + r (u - u_0), shape (n, 1 + d), and friction bound s_n, shape (n,).
     domain_norm
         L2(Omega) norm of owned unknowns, for the thesis's criterion; None for residuals.
     poll

@@ -79,7 +79,6 @@ def begun(reached: float) -> tuple[Chord, State]:
     chord = Chord(1e-8, 10.0)
     iterate, reuse = chord.choose(state, 1.0)
     assert not reuse
-    chord.note_factorisation()
     iterate, reuse = chord.choose(state, reached)
     assert reuse
     return chord, iterate
