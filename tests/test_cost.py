@@ -41,10 +41,9 @@ from tests.interface.test_compliance import COLUMNS
 from tests.linear.test_linear_contact import operator_of, sliding, sticking
 from tests.linear.test_two_bodies import balls
 from tests.linear.test_two_bodies import blocks as two_blocks
-from tests.methods.test_belt import STRAPS, around_a_drum
+from tests.methods.test_belt import STRAPS, around_a_drum, wall
 from tests.methods.test_chord import followed, yielding
-from tests.methods.test_curved import flattened
-from tests.methods.test_free_body import between_jaws, pads
+from tests.methods.test_free_body import between_jaws, on_a_bent_one, pads, pushed, relaxed, stack
 from tests.methods.test_nothing_touches import (
     APPROACH,
     LIFTED,
@@ -55,14 +54,11 @@ from tests.methods.test_nothing_touches import (
     stepped,
     unloaded,
 )
-from tests.methods.test_overload import wall
 from tests.methods.test_penalty import stiff
-from tests.methods.test_slender import LIGHT, TIP, UNIFORM, beam, bent, on_the_ground
-from tests.methods.test_stuck import on_a_bent_one, pushed, relaxed, stack
+from tests.methods.test_slender import LIGHT, TIP, UNIFORM, beam, bent, flattened, on_the_ground
 from tests.problem.test_bolts import tightened
 from tests.problem.test_moved_nodes import halved
-from tests.problem.test_rigid import FREE
-from tests.problem.test_rigid_pairs import stacked
+from tests.problem.test_rigid import FREE, stacked
 from tests.problems import pairs
 from tests.problems.mechanics import attempt, bar_case, leaning_block, newton, pressed_block
 from tests.problems.mechanics import bar as short_bar

@@ -149,7 +149,7 @@ MUTANTS = (
         "contact/interface/complementarity.py",
         "length = np.linalg.norm(z, axis=-1)",
         "length = np.abs(z).max(axis=-1)",
-        ("tests/methods/test_projections.py",),
+        ("tests/methods/test_interior_point.py",),
     ),
     Mutant(
         "friction-of-open-nodes",
@@ -263,7 +263,7 @@ MUTANTS = (
         "contact/model/evolution.py",
         "* (k + 1) / count",
         "* k / count",
-        ("tests/case/test_evolution.py",),
+        ("tests/case/test_case.py",),
     ),
 )
 

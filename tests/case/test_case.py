@@ -1,16 +1,24 @@
-"""The case file: what is accepted, files, overrides."""
+"""The case file: what is accepted, files, overrides.
+
+What objects in Python replace need not stand in the case.
+The case file's `[evolution]`: steps, amplitudes, formulas in t, and what is refused.
+"""
 
 import pickle
 import tomllib
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+from contact import Linear, solve
 from contact.case.file import load_case, parse_case, to_toml
 from contact.errors import InputError
+from contact.mesh.grid import rectangle
 from contact.model.formula import Expression
 from contact.model.friction import SlipLaw
 from contact.model.obstacle import Sphere
+from forms.laws import ConstantCoefficient
 from tests.problems.bar import BAR, changed
 from tests.problems.messages import message_of
 
@@ -160,3 +168,75 @@ def test_what_only_the_mesh_can_tell():
         case.check_mesh(2, ["left", "loaded", "arc"])
     with pytest.raises(InputError, match=r"fixed\.0\.displacement.*\[value\]"):
         case.check_mesh(3, ["left", "loaded", "bottom"])
+
+
+BARE = {
+    "fixed": [{"on": "top", "displacement": [0.02, -0.02]}],
+    "contact": {"on": "bottom"},
+}
+
+
+def objects() -> dict[str, object]:
+    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
+    return {"domain": domain, "law": Linear(10.0, 0.3), "coefficient": ConstantCoefficient(0.3)}
+
+
+@pytest.mark.parallel
+def test_the_same_as_in_the_case() -> None:
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]}
+    material = {"young": 10.0, "poisson": 0.3}
+    friction = {"law": "coulomb", "mu": 0.3}
+    whole = solve(parse_case({**BARE, "mesh": mesh, "material": material, "friction": friction}))
+    bare = solve(parse_case(BARE), **objects())
+    assert bare.converged
+    assert bare.contact_force == pytest.approx(whole.contact_force, rel=1e-9)
+
+
+@pytest.mark.parametrize(("key", "name"), [("mesh", "domain"), ("material", "law")])
+def test_an_object_that_is_not_there(key: str, name: str) -> None:
+    others = {k: v for k, v in objects().items() if k != name}
+    with pytest.raises(InputError, match=rf"{key}.*\[missing\]"):
+        solve(parse_case(BARE), **others)
+
+
+STEPS = {"times": [0.0, 1.0, 3.0], "steps": [2, 4]}
+PRESS = {"time": [0.0, 3.0], "value": [0.0, 1.0]}
+
+
+def evolution(**changes):
+    return {**STEPS, "amplitudes": {"press": PRESS}, **changes}
+
+
+@pytest.mark.core
+def test_ends_of_the_steps():
+    case = parse_case(changed(evolution=STEPS))
+    assert case.evolution.ends == [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
+
+
+@pytest.mark.core
+def test_an_amplitude_is_linear_between_its_values():
+    case = parse_case(changed(evolution=evolution(), load__0__amplitude="press"))
+    function = case.evolution.amplitudes["press"]
+    assert [function(time) for time in (0.0, 1.5, 3.0)] == [0.0, 0.5, 1.0]
+
+
+BAD = [
+    {"evolution": evolution(), "load__0__amplitude": "pres"},
+    {"load__0__amplitude": "press"},
+    {"load__0__traction": [0.0, "-t"]},
+    {"evolution": evolution(), "contact__gap": "0.1*t"},
+    {"evolution": evolution(times=[0.0, 1.0, 1.0])},
+    {"evolution": evolution(steps=[2, 0])},
+    {"evolution": evolution(steps=[2])},
+    {"evolution": evolution(amplitudes={"press": {**PRESS, "value": [1.0]}})},
+    {"evolution": evolution(amplitudes={"press": {**PRESS, "time": [0.0, 2.0]}})},
+    {"evolution": evolution(amplitudes={"press": {**PRESS, "time": [3.0, 0.0]}})},
+    {"evolution": {"times": [0.0, 1.0]}},
+    {"evolution": STEPS, "solver__nested": True},
+]
+
+
+@pytest.mark.wording
+def test_messages_of_bad_evolutions(snapshot):
+    said = {str(k): message_of(parse_case, changed(**changes)) for k, changes in enumerate(BAD)}
+    snapshot("refused-evolutions", said)

@@ -1,14 +1,26 @@
-"""Domains: named parts of generated meshes, of dolfinx meshes, and of refined ones."""
+"""Domains: named parts of generated meshes, of dolfinx meshes, and of refined ones.
 
+Regions of cells, and refinement, which hands down regions and parts.
+Meshes that fall apart: every piece has to be held.
+"""
+
+from pathlib import Path
+
+import gmsh
 import numpy as np
 import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact.case.build import build_problem
+from contact.case.file import parse_case
 from contact.case.mesh import Mesh as MeshSection
+from contact.errors import InputError
 from contact.mesh.domain import from_mesh
+from contact.mesh.entities import connected_components
 from contact.mesh.grid import Piece, box, rectangle
+from contact.mesh.transfer import refined
 from tests.problems.messages import message_of
 from tests.problems.sizes import integral, measures
 
@@ -213,3 +225,115 @@ def test_domain_of_a_case_file_section(kind, monkeypatch, request):
     given, expected = SECTIONS[kind]
     domain = MeshSection.model_validate(given).build(COMM)
     assert measures(domain) == pytest.approx(expected)
+
+
+def two_regions():
+    mesh = dmesh.create_rectangle(
+        COMM, [(0, 0), (4, 1)], [8, 2], ghost_mode=dmesh.GhostMode.shared_facet
+    )
+    regions = {"left": lambda x: x[0] < 1.01, "all": lambda x: x[0] < 5.0}
+    return from_mesh(mesh, {"bottom": lambda x: x[1] < 0.01}, regions=regions)
+
+
+@pytest.mark.core
+@pytest.mark.parallel
+@pytest.mark.parametrize("refine", [False, True])
+def test_regions(refine):
+    domain = refined(two_regions()) if refine else two_regions()
+    volumes = {name: integral(domain, region=name) for name in domain.regions}
+    assert volumes == pytest.approx({"left": 1.0, "all": 4.0})
+    one = fem.Constant(domain.mesh, 1.0)
+    mixed = fem.form(one * domain.dx + one * domain.dx_in("left") + one * domain.ds("bottom"))
+    assert COMM.allreduce(fem.assemble_scalar(mixed)) == pytest.approx(9.0)
+    with pytest.raises(InputError, match=r"\[part-name\]"):
+        domain.cells("lift")
+    with pytest.raises(InputError, match=r"\[part-facets\]"):
+        from_mesh(domain.mesh, {}, regions={"none": lambda x: x[0] > 5.0})
+
+
+def refinable():
+    ghosted = dmesh.create_unit_cube(COMM, 2, 2, 2, ghost_mode=dmesh.GhostMode.shared_facet)
+    return {
+        "rectangle": lambda: rectangle(
+            COMM, (0, 0), (4, 1), (8, 2), {"a": Piece("top", 2.0, 4.0)}, rotation=20.0
+        ),
+        "box": lambda: box(COMM, (0, 0, 0), (4, 1, 2), (4, 1, 2), {"a": Piece("left")}),
+        "ghosted": lambda: from_mesh(ghosted, {"a": lambda x: x[2] < 0.6}),
+        "two cells": lambda: rectangle(COMM, (0, 0), (1, 1), (1, 1)),
+    }
+
+
+@pytest.mark.core
+@pytest.mark.parallel
+@pytest.mark.parametrize("kind", ["rectangle", "box", "ghosted", "two cells"])
+def test_refinement_keeps_the_parts(kind):
+    coarse = refinable()[kind]()
+    fine = refined(refined(coarse))
+    assert measures(fine) == pytest.approx(measures(coarse))
+    assert integral(fine) == pytest.approx(integral(coarse))
+    assert fine.size == coarse.size
+    assert list(fine.parts) == list(coarse.parts)
+    dim = coarse.dim
+    count = [d.mesh.topology.index_map(dim).size_global for d in (coarse, fine)]
+    assert count[1] == count[0] * 2 ** (2 * dim)
+    for name in coarse.parts:
+        facets = [COMM.allreduce(d.facets(name).size) for d in (coarse, fine)]
+        assert facets[1] == facets[0] * 2 ** (2 * (dim - 1))
+
+
+def write_two_squares(path: Path, *, share: bool) -> None:
+    """Write two squares side by side, with one edge between them or two on top of each other."""
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        occ, model = gmsh.model.occ, gmsh.model
+        squares = [(2, occ.addRectangle(x, 0, 0, 1, 1)) for x in (0.0, 1.0)]
+        if share:
+            occ.fragment(squares[:1], squares[1:])
+        occ.synchronize()
+        edges = [(tag, occ.getCenterOfMass(1, tag)) for _, tag in model.getEntities(1)]
+        for name, axis, value in (("left", 0, 0.0), ("bottom", 1, 0.0), ("top", 1, 1.0)):
+            tags = [tag for tag, middle in edges if abs(middle[axis] - value) < 1e-9]
+            model.addPhysicalGroup(1, tags, name=name)
+        model.addPhysicalGroup(2, [tag for _, tag in model.getEntities(2)], name="body")
+        model.mesh.setSize(model.getEntities(0), 0.3)
+        model.mesh.generate(2)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+
+
+def squares(folder: Path, *, share: bool, friction: bool = True) -> dict:
+    path = folder / "squares.msh"
+    if COMM.rank == 0:
+        write_two_squares(path, share=share)
+    COMM.Barrier()
+    case = {
+        "mesh": {"file": str(path)},
+        "material": {"law": "linear", "young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "top", "traction": [0.0, -0.01]}],
+        "contact": {"on": "bottom"},
+    }
+    return {**case, "friction": {"law": "coulomb", "mu": 0.3}} if friction else case
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("share", [True, False])
+def test_nodes_of_one_piece(share: bool, shared_tmp_path: Path) -> None:
+    problem = build_problem(parse_case(squares(shared_tmp_path, share=share)), COMM)
+    labels, count = connected_components(problem.body.space)
+    assert count == (1 if share else 2)
+    x = problem.body.space.tabulate_dof_coordinates()[: labels.size, 0]
+    inner = np.abs(x - 1) > 1e-9
+    found = COMM.allgather(set(zip((x[inner] > 1).tolist(), labels[inner].tolist(), strict=True)))
+    assert len(set().union(*found)) == 2, "left and right of the edge: one label each"
+
+
+@pytest.mark.parallel
+def test_a_piece_that_nothing_holds_sideways_is_refused(shared_tmp_path: Path) -> None:
+    case = squares(shared_tmp_path, share=False, friction=False)
+    said = r"the body about \(1.5, 0.5\) is not held.*along x"
+    with pytest.raises(InputError, match=said):
+        build_problem(parse_case(case), COMM)
+    build_problem(parse_case(squares(shared_tmp_path, share=True, friction=False)), COMM)

@@ -1,4 +1,7 @@
-"""Load steps: friction remembers, methods agree, a state can be gone on from."""
+"""Load steps: friction remembers, methods agree, a state can be gone on from.
+
+Load steps that fail: they are halved, and an evolution ends with what it has.
+"""
 
 from dataclasses import replace
 
@@ -7,10 +10,13 @@ import pytest
 
 from contact import evolve, load_case
 from contact.errors import InputError
+from contact.methods.load_stepping import LoadStepping
+from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions, PenaltyOptions
+from contact.methods.report import Outcome
 from contact.problem.problem import SLIP
-from contact.problem.residuals import Balance, balance, evaluate
-from contact.solving import solve
+from contact.problem.residuals import Balance, Residuals, balance, evaluate
+from contact.solving import NotConvergedError, solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from scripts.cases import CASES
@@ -173,3 +179,41 @@ def test_a_cycle_of_fretting_comes_back():
     assert force[4.0] == pytest.approx(-force[2.0], rel=0.02)
     assert force[6.0] == pytest.approx(force[2.0], rel=1e-6)
     assert abs(force[3.0]) > 0.1 * abs(force[2.0])  # friction remembers
+
+
+def failing(problem, largest: float, options=TIGHT["newton"]):
+    """Return Newton's method that fails for steps longer than `largest`."""
+
+    class Careful(type(METHODS[options.method](problem, options, None))):
+        def solve(self, *given):
+            state, outcome = super().solve(*given)
+            since = self.problem.since or 0.0
+            if self.problem.time - since > largest * (1 + 1e-9):
+                kkt = Residuals(1.0, 1.0, 1.0)
+                outcome = Outcome(kkt, outcome.allowed, "too long")
+                state = replace(state, x=state.x + 1.0)
+            return state, outcome
+
+    return Careful(problem, options, None)
+
+
+@pytest.mark.parametrize("parts", [1, 2, 16])
+def test_a_step_that_fails_is_halved(parts):
+    problem = shaken()
+    steps = list(LoadStepping(problem, failing(problem, 1 / parts)).steps([1.0, 2.0]))
+    assert all(outcome.converged for _, outcome in steps)
+    assert [state.time for state, _ in steps] == [(k + 1) / parts for k in range(2 * parts)]
+
+
+def test_an_evolution_ends_with_what_it_has():
+    problem = shaken()
+    steps = list(LoadStepping(problem, failing(problem, 1 / 17)).steps([0.05, 1.05, 2.0]))
+    assert [outcome.converged for _, outcome in steps] == [True, False]
+    assert [state.time for state, _ in steps] == [0.05, 0.05 + 1 / 16]
+
+
+def test_evolve_says_that_a_step_fails():
+    options = NewtonOptions(tolerance=1e-12, max_outer=1, max_iterations=1, condense=False)
+    states = evolve(shaken(), [1.0, 2.0], options)
+    with pytest.raises(NotConvergedError, match=r"no step to 0\.0625: .*"):
+        list(states)

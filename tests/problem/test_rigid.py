@@ -1,4 +1,8 @@
-"""Foundations that move as rigid bodies."""
+"""Foundations that move as rigid bodies.
+
+Rigid motions, plates and electrodes that are none.
+Rigid plates on bodies that touch each other.
+"""
 
 from itertools import pairwise
 
@@ -7,16 +11,29 @@ import pytest
 from mpi4py import MPI
 
 from contact import write_outputs
+from contact.body.description import Body
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.model.body import Fixed
+from contact.model.contact import Contact
+from contact.model.friction import Friction
+from contact.model.rigid import Motion, Rigid
 from contact.plot.figures import plot
+from contact.problem.checks import check_rigid_modes
+from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
+from contact.results.resultants import movements
 from contact.solving import build_problem, solve
-from tests.problems.rigid import indented, solved
+from contact.thesis.fixed_point import FixedPoint
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.blocks import Blocks
+from tests.problems.mechanics import constant, flat
+from tests.problems.rigid import indented, plate, solved
 
 SELF = MPI.COMM_SELF
 
@@ -195,3 +212,99 @@ def test_an_indentation_driven_by_force_goes_the_way_of_one_driven_by_displaceme
         assert row["work"] == pytest.approx(mean * (row["rigid_y"] - before["rigid_y"]), rel=1e-9)
         lost = row["work"] - (row["energy"] - before["energy"])
         assert abs(lost - row["dissipation"]) < 0.1 * row["work"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"force": [0.0, -1.0]}, r"contact.rigid.force.1.*\[value\]"),
+        ({"rotation": 1.0, "centre": None}, r"contact.rigid.centre.*\[missing\]"),
+        ({"displacement": [0.0, "-0.01*t"]}, r"\[value\]"),
+        (
+            {"displacement": [0.0, "free"], "force": [0.0, 0.01]},
+            r"\[pulled-off\]",
+        ),
+        ({"rotation": "free"}, r"\[unsupported\]"),
+    ],
+)
+def test_bad_motions_are_refused(changes, words):
+    data = indented().model_dump(exclude_unset=True)
+    data["friction"] = {"law": "none"}
+    rigid = {**data["contact"]["rigid"], **changes}
+    data["contact"]["rigid"] = {key: value for key, value in rigid.items() if value is not None}
+    with pytest.raises(InputError, match=words):
+        build_problem(parse_case(data), SELF)
+
+
+@pytest.mark.parametrize(
+    ("rigid", "words"),
+    [
+        ([{"on": "bottom"}], r"rigid.0.on.*\[value\]"),
+        ([{"on": "top"}, {"on": "right"}], r"\[rigid-part\]"),
+        ([{"on": "top", "displacement": ["free", 0.0]}], r"\[rigid-part\]"),
+    ],
+)
+def test_bad_rigid_parts_are_refused(rigid, words):
+    with pytest.raises(InputError, match=words):
+        build_problem(plate(rigid=rigid), SELF)
+
+
+@pytest.mark.parametrize(("end", "held"), [(2.0, True), (1.2, False)])
+def test_nodes_beyond_the_foundation_hold_nothing(end, held):
+    """A block 2 x 1 on a ledge that ends at 1.2: pressed at its right end it tips."""
+    ledge = {"shape": "punch", "centre": [0.5 * end, 0.0], "axis": [0.0, -1.0]}
+    ledge["radius"] = 0.51 * end
+    case = {
+        "mesh": {
+            "generator": "rectangle",
+            "size": [2.0, 1.0],
+            "cells": [20, 10],
+            "parts": {"end": {"side": "top", "from": 1.6, "to": 2.0}},
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "load": [{"on": "end", "pressure": 1e-4}],
+        "contact": {"on": "bottom", "foundation": ledge},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    if held:
+        build_problem(parse_case(case), SELF)
+        return
+    with pytest.raises(InputError, match=r"\[pulled-off\]"):
+        build_problem(parse_case(case), SELF)
+
+
+def stacked() -> ContactProblem:
+    """Return a block on another, pressed and tilted by a plate that is free to move."""
+    plate = Motion([None, None], [None], [0.001, -0.01], [0.001], [0.5, 2.0])
+    still = [constant(0.0, 2), constant(0.0, 2)]
+    body = Body(Linear(1.0, 0.3), [Fixed("bottom", still)], (), rigid=(Rigid("top", plate),))
+    friction = Friction(ConstantCoefficient(0.5))
+    contact = Contact("under", flat(), friction=friction, against="over")
+    return ContactProblem(Blocks().domain(SELF), body, contact)
+
+
+@pytest.mark.core
+@pytest.mark.parametrize("how", ["condensed", "whole", "uzawa"])
+def test_a_free_plate_loads_two_bodies(how):
+    problem = stacked()
+    check_rigid_modes(problem)
+    if how == "uzawa":
+        method = FixedPoint(problem, FixedPointOptions(tolerance=1e-10))
+    else:
+        method = Newton(problem, NewtonOptions(tolerance=1e-10, condense=how == "condensed"))
+    state, outcome = method.solve()
+    assert outcome.converged
+    nodes = problem.nodes
+    stress = problem.interface.stress(problem.nodal(state), state.forces)
+    force = nodes.weight[:, None] * stress
+    # What the upper body exerts on the lower one is what acts on the plate.
+    assert force.sum(axis=0) == pytest.approx([0.001, -0.01], abs=1e-12)
+    arm = nodes.points - np.array([0.5, 2.0])
+    moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
+    assert moment == pytest.approx(0.001, rel=1e-9)
+    # The same motion by all methods: that of the condensed one.
+    plate = movements(problem, state)["rigid_parts"]["top"]
+    exact, _ = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
+    expected = movements(problem, exact)["rigid_parts"]["top"]
+    for key in ("displacement", "rotation"):
+        assert plate[key] == pytest.approx(expected[key], rel=1e-6), key

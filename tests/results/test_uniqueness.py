@@ -1,16 +1,39 @@
-"""Friction from which on there may be several solutions, by the solution's own Jacobian."""
+"""Friction from which on there may be several solutions, by the solution's own Jacobian.
+
+Where several solutions may exist it is said, also of nearly incompressible bodies.
+The other side of contacts between bodies: forces and pressures, tables and figures.
+Starts: used, and said to be what they are; refused where they would be ignored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, solve
+from contact import FixedPointOptions, InputError, PenaltyOptions, build_problem, load_case, solve
+from contact.body.description import Body
 from contact.case.file import parse_case
+from contact.interface.multipliers import Multipliers
+from contact.methods.options import NewtonOptions
+from contact.model.body import Fixed, Load
+from contact.model.contact import Contact
+from contact.model.obstacle import GapFunction
+from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
+from contact.refining import prolong
+from contact.results.contact_nodes import opposite_surface
 from contact.results.uniqueness import uniqueness
+from contact.solving import solve_problem
+from forms.hencky import Linear
+from scripts.cases import CASES
 from scripts.studies.robustness.bodies import Bodies
 from scripts.studies.robustness.check import Mesh, write_msh
 from scripts.studies.robustness.problems import problems
+from tests.problems.blocks import Blocks
+from tests.problems.mechanics import constant
 from tests.problems.rings import between_plates, squeezed
 
 SAID = "several solutions may exist"
@@ -260,3 +283,104 @@ def test_a_weight_needs_contact_however_hard_jaws_clamp(tmp_path):
 def test_a_ring_that_is_squeezed_without_friction_too(seed):
     held = solve(squeezed("newton"), domain=between_plates(MPI.COMM_WORLD, seed))
     assert held.converged and held.problem.frictional and not held.jammed
+
+
+FALLING = "friction.mu={law='slip', a=0.5, b=0.2, rho=1e4}"
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("bar", ["material.law='linear'", "material.poisson=0.499", FALLING, "mesh.cells=[32, 8]"]),
+        ("piezo-8-1-conductive", ["electric.phi_f=1e6", "mesh.cells=[16, 8]"]),
+    ],
+)
+def test_several_solutions_are_warned_of(name, changes):
+    """Methods were 3 to 5 % apart, and 24 %, without a word."""
+    solution = solve(load_case(CASES / f"{name}.toml", changes), comm=MPI.COMM_SELF)
+    assert any("several solutions may exist" in text for text in solution.warnings)
+
+
+COMM = MPI.COMM_WORLD
+
+
+@pytest.mark.core
+@pytest.mark.parallel
+@pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
+def test_a_constant_pressure_is_constant_on_both_sides(dim: int, degree: int) -> None:
+    domain = Blocks(dim, *((5, 8) if dim == 2 else (2, 3)), turn=30.0).domain(COMM)
+    up, zero = Blocks(dim, turn=30.0).axes[:, -1], constant(0.0, dim)
+    body = Body(
+        Linear(1.0, 0.0),
+        [Fixed("bottom", [zero] * dim)],
+        [Load("top", pressure=constant(0.01, dim))],
+    )
+    gap = GapFunction(lambda points: np.zeros(len(points)))
+    problem = ContactProblem(domain, body, Contact("under", gap, against="over"), degree=degree)
+    # The upper block can move as a rigid body, which `solve` would refuse.
+    found = solve_problem(problem, NewtonOptions(tolerance=1e-13))
+    surface = opposite_surface(found)
+    assert surface is not None
+    fields = surface.at_points
+    np.testing.assert_allclose(fields["pressure"], 0.01, rtol=1e-11)
+    np.testing.assert_allclose(
+        fields["traction"], np.tile(-0.01 * up, (len(fields["weight"]), 1)), atol=1e-13
+    )
+    np.testing.assert_allclose(
+        fields["normal"], np.tile(up, (len(fields["weight"]), 1)), atol=1e-12
+    )
+    assert COMM.allreduce(fields["weight"].sum()) == pytest.approx(1.0)
+
+
+SMALL = ["mesh.cells=[16, 4]", "solver.method=newton"]
+
+
+def bar(*changes: str):
+    return load_case(CASES / "bar.toml", [*SMALL, *changes])
+
+
+@pytest.mark.core
+@pytest.mark.parametrize("options", [NewtonOptions(), FixedPointOptions(), PenaltyOptions()])
+def test_a_solution_is_found_again_at_once(options):
+    problem = build_problem(bar())
+    cold = solve(problem, options)
+    warm = solve(problem, options, start=cold.state)
+    assert cold.converged and warm.converged
+    assert sum(r.inner for r in warm.history) < sum(r.inner for r in cold.history)
+    assert warm.contact_force == pytest.approx(cold.contact_force, rel=1e-6)
+    assert (cold.start, warm.start) == ("the zero initial guess", "the state that was given")
+
+
+@pytest.mark.parallel
+def test_a_coarse_state_is_linear_between_its_nodes_on_any_ranks():
+    """Pressures 1 + x at the coarse nodes, of whatever ranks these are, are so at all between."""
+    coarse, fine = (build_problem(bar(f"mesh.cells={cells}")) for cells in ("[16, 4]", "[64, 16]"))
+    x = coarse.nodes.points[:, 0]
+    ends = -coarse.nodes.maximum(-x, -np.inf), coarse.nodes.maximum(x)
+    forces = Multipliers.of(coarse.nodes, 1 + x, np.zeros((x.size, 2)))
+    found = prolong(coarse, replace(coarse.start(), forces=forces), fine).forces.pressure
+    at = fine.nodes.points[:, 0]
+    between = (at >= ends[0]) & (at <= ends[1])
+    assert fine.comm.allreduce(int(between.sum())) > 50
+    assert found[between] == pytest.approx(1 + at[between], abs=1e-6)
+
+
+@pytest.mark.core
+def test_the_solution_of_a_case_starts_another():
+    """With other loads: prescribed values are those of the new problem."""
+    first = solve(bar("load.0.traction=[0, -0.004]"))
+    case = bar("solver.tolerance=1e-11")
+    warm, cold = (solve(case, start=start) for start in (first.state, None))
+    assert warm.contact_force == pytest.approx(cold.contact_force, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"law": 1}, r"\[ignored-argument\]"),
+        ({"settings": NewtonOptions(nested=True)}, r"\[ignored-argument\]"),
+    ],
+)
+def test_what_a_problem_would_ignore_is_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        solve(build_problem(bar()), **given)

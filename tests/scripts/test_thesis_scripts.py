@@ -1,16 +1,38 @@
-"""Scripts beside the thesis on coarse meshes: set-ups, stopping by (6.40), refinement, norms."""
+"""Scripts beside the thesis on coarse meshes: set-ups, stopping by (6.40), refinement, norms.
+
+The scripts of Examples 8.1 and 8.2 on coarse meshes: tables, figures, Theorem 5.2, sensor.
+The results pages and the runner of tables and figures.
+Pages of the benchmarks, from the files of a run that has measured a part.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import contact
 from contact import build_problem, solve
 from contact.model.friction import Friction
+from scripts.benchmarks.pages import summary, write_memory
+from scripts.benchmarks.phases import PHASES
 from scripts.cases import bar
-from scripts.reporting import Report
-from scripts.studies import corner, pressure_convergence, refinement_8, sensitivity
+from scripts.examples import sensor
+from scripts.reporting import Report, subplots
+from scripts.studies import corner, lagged_current, pressure_convergence, refinement_8, sensitivity
 from scripts.studies.dual_norm import DualNorm
 from scripts.studies.hertz_exact import Line, Point
-from scripts.thesis import setups, stopping_8_3
+from scripts.thesis import (
+    chapters,
+    figures_piezo,
+    hertz,
+    results_page,
+    setups,
+    stopping_8_3,
+    tables_piezo,
+)
 from tests.problems.written import rows_of
 
 
@@ -108,3 +130,93 @@ def test_corner_exponents(tmp_path):
     assert corner.exponent(0.3) == pytest.approx(0.7112, abs=1e-4)
     fitted = corner.main(["--coarse", "--out", str(tmp_path)])
     assert fitted[-1] == pytest.approx(corner.exponent(0.3), abs=0.03)
+
+
+@pytest.mark.slow
+def test_theorem_5_2(tmp_path):
+    """The rate of the lagged charge grows with k_e up to a limit, that of the implicit does not."""
+    rates = lagged_current.theorem_5_2(Report(tmp_path), coarse=True)
+    assert 1.1 < rates["threshold"] < 1.3
+    assert rates["lagged, 2"] > 0.9
+    assert rates["lagged, 0.5"] < 0.6
+    assert rates["implicit, 2"] < 0.5
+    assert (tmp_path / "theorem-5-2.png").is_file()
+
+
+def test_tables(tmp_path):
+    report = Report(tmp_path)
+    tables_piezo.series(report, "8.3", (16, 8))
+    for row in rows_of(tmp_path / "series-k-e-8-2.csv"):
+        assert row["converged"] == "True" and float(row["charge imbalance"]) < 1e-8
+    tables_piezo.iterative(report, coarse=True)
+    assert len(rows_of(tmp_path / "piezo-linear-iterations.csv")) == 4
+
+
+def test_figures(tmp_path):
+    report = Report(tmp_path)
+    figures_piezo.figure_8_2a(report, (16, 8))
+    figures_piezo.example(report, "8-5", "piezo-8-2", "Example 8.2", (16, 8))
+    for name in ("figure-8-2a", "figure-8-5a", "figure-8-5b"):
+        assert (tmp_path / f"{name}.png").is_file()
+    assert "yielded: 0 % of the body" in (tmp_path / "figure-8-5a.md").read_text()
+
+
+def test_sensor(tmp_path):
+    sensor.main(["--coarse", "--out", str(tmp_path)])
+    charge = [float(row["charge per load"]) for row in rows_of(tmp_path / "sensor-table.csv")]
+    # In proportion at small loads, no longer at the largest.
+    assert charge[1] == pytest.approx(charge[0], rel=1e-2)
+    assert abs(charge[2]) > 1.2 * abs(charge[0])
+    assert (tmp_path / "sensor.png").is_file()
+
+
+def test_page(tmp_path):
+    report = Report(tmp_path / "results" / "hertz")
+    report.table("one", "A table", {"|a|": [1, 2.5, float("nan")], "b": ["x", True, None]}, "Why.")
+    figure, axes = subplots()
+    axes.plot([0, 1], [0, 1])
+    link = "See [two](thesis-studies.md#two)."
+    report.figure("two", "A figure", figure, {"x": [0, 1], "y": [0]}, link)
+    (tmp_path / "results" / "hertz" / "three.csv").write_text("a,b\n1,2\n")
+    page = tmp_path / "docs" / "page.md"
+    results_page.gather(tmp_path / "results", page)
+    assert "hertz" in page.read_text()
+    words = page.with_name("thesis-mechanics.md").read_text()
+    assert "| \\|a\\| | b |" in words
+    assert "| 2.5 | yes |" in words
+    assert "| — | — |" in words
+    assert "Why." in words
+    assert words.index("A table") < words.index("A figure") < words.index("three")
+    assert "](page/hertz/two.png)" in words and link in words
+    assert (tmp_path / "docs" / "page" / "hertz" / "two.png").is_file()
+    assert (tmp_path / "docs" / "page" / "hertz" / "one.csv").read_text().startswith("|a|,b")
+    assert "Not computed yet: `make table_7_2`" in words
+
+
+@pytest.mark.parametrize("part", chapters.PARTS, ids=lambda part: part.script)
+def test_all_scripts_are_there(part):
+    assert importlib.util.find_spec(part.module) is not None
+
+
+def test_hertz(tmp_path):
+    hertz.main(["--coarse", "--out", str(tmp_path)])
+    for name in ("hertz-cylinder.csv", "hertz-sphere.md", "figure-7-2a.png", "figure-7-2b.png"):
+        assert (tmp_path / name).is_file()
+
+
+DOCS = Path(__file__).parents[2] / "docs"
+SCALING, MEASURED = DOCS / "scaling.md", DOCS / "benchmarks"
+
+
+def test_tables_of_pages_are_those_of_the_measured_files(tmp_path):
+    assert (MEASURED / "summary.md").read_text() == summary(MEASURED)
+    page = tmp_path / "scaling.md"
+    page.write_text(SCALING.read_text())
+    write_memory(MEASURED, page)
+    assert page.read_text() == SCALING.read_text()
+
+
+@pytest.mark.parametrize(("place", "name"), [where for where in PHASES.values() if where[0] != "~"])
+def test_what_a_phase_is_measured_by_is_there(place, name):
+    """A function that has moved would be a phase of no seconds."""
+    assert f"def {name}(" in (Path(contact.__file__).parent / place).read_text()

@@ -1,4 +1,8 @@
-"""Errors between meshes, and coarse versions of the convergence studies of the scripts."""
+"""Errors between meshes, and coarse versions of the convergence studies of the scripts.
+
+The script of Table 7.1 on a coarse mesh.
+The inf-sup constant of the nodal multipliers does not depend on the mesh size.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,8 @@ from scripts.studies import nonlocal_friction
 from scripts.studies.error_norms import errors
 from scripts.studies.fixed_point_rates import fixed_points, secant_rate
 from scripts.studies.grading import grade, pulled
-from scripts.thesis import figures_mechanics, table_7_2
+from scripts.studies.inf_sup import SERIES, constant
+from scripts.thesis import figures_mechanics, table_7_1, table_7_2
 from tests.problems.mechanics import bar
 from tests.problems.written import rows_of
 
@@ -174,3 +179,50 @@ def test_figures_mechanics(tmp_path):
         assert (tmp_path / f"figure-{name}.png").stat().st_size > 3_000
         assert (tmp_path / f"figure-{name}.csv").is_file()
     assert (tmp_path / "multipliers-and-penalty.png").is_file()
+
+
+@pytest.mark.slow
+def test_the_table(tmp_path, capsys):
+    found = table_7_1.main(["--cells", "4", "--out", str(tmp_path)])
+    assert len(found) == len(table_7_1.rows()) == 8
+    for runs in found:
+        # The rules of the thesis leave residuals well above those of converged ones.
+        assert runs["converged"].residual <= 1e-8
+        assert runs["printed"].residual > 1e-7
+        assert runs["thesis"].residual < 1e-4
+        assert 3 <= runs["converged"].outer <= 20
+        assert runs["converged"].square <= 9
+        assert runs["single"].residual <= 1e-8
+        assert runs["single"].solves < 0.5 * runs["converged"].solves
+    rows = rows_of(tmp_path / "table-7-1.csv")
+    assert [int(row["thesis"]) for row in rows] == [3, 3, 4, 6, 5, 5, 6, 8]
+    assert [int(row["to 1e-8"]) for row in rows] == [runs["converged"].outer for runs in found]
+    assert "| f2 | rho | thesis |" in (tmp_path / "table-7-1.md").read_text()
+    assert "Table 7.1" in capsys.readouterr().out
+
+
+def test_r_taken_at_its_word(tmp_path):
+    """It stops far from the solution, or not at all."""
+    runs = table_7_1.literal(table_7_1.Report(tmp_path), 8, 2000)
+    assert all(run.residual > 1e-4 for run in runs)
+
+
+@pytest.mark.parametrize(
+    ("name", "degree", "cells", "least"),
+    [
+        ("uniform", 1, (4, 8, 16), 0.62),
+        ("uniform", 2, (4, 8), 0.58),
+        ("alternating", 1, (4, 8, 16), 0.45),
+        ("crosspoints", 1, (4, 8, 16), 0.62),
+        ("crosspoints", 2, (4, 8), 0.58),
+        ("uniform, 3-D", 1, (2, 4), 0.55),
+        ("uniform, 3-D", 2, (2,), 0.55),
+        ("crosspoints, 3-D", 2, (2,), 0.55),
+    ],
+)
+def test_multipliers_are_stable(name, degree, cells, least):
+    """Bounded from below, at crosspoints, between unlike edges, and on quadratic triangles."""
+    kind, levels = SERIES[name][0], 1 if "3-D" in name else 3
+    found = [constant(kind, kind.make(n), degree, levels)[0] for n in cells]
+    assert least < min(found) <= max(found) < 1, found
+    assert max(found) - min(found) < 0.15 * max(found)

@@ -40,9 +40,9 @@ from scripts.studies.robustness.bodies import Bodies
 from scripts.studies.robustness.check import write_msh
 from scripts.studies.robustness.problems import problems
 from scripts.thesis.tables_compliance import case_of
+from tests.methods.test_belt import wall
 from tests.methods.test_free_body import pads
 from tests.methods.test_nothing_touches import unloaded
-from tests.methods.test_overload import wall
 from tests.methods.test_slender import TIP, UNIFORM, beam
 
 #: Times as long as with the device, and seconds more, from which on a problem counts as slow.
