@@ -159,13 +159,8 @@ def rings(rng: Rng, b: Bodies) -> Tables:
     b.block("lid", _box(rng.uniform(-0.1, 0.1), high, 2.0, 0.5), rng.uniform(0.15, 0.4))
     way = -float(10 ** rng.uniform(-3, -1.5))
     push = one(rng, 0.0, 0.3, -1.0) * way
-    return {
-        "fixed": [_clamp("plate_bottom"), _clamp("lid_top", push, way)],
-        "contact": [
-            _pair(rng, "plate_top", "ring_outside", True),
-            _pair(rng, "lid_bottom", "ring_outside", True),
-        ],
-    }  # fmt: skip
+    contacts = [_pair(rng, side, "ring_outside", True) for side in ("plate_top", "lid_bottom")]
+    return {"fixed": [_clamp("plate_bottom"), _clamp("lid_top", push, way)], "contact": contacts}
 
 
 def stacks(rng: Rng, b: Bodies) -> Tables:
@@ -177,13 +172,8 @@ def stacks(rng: Rng, b: Bodies) -> Tables:
         y += high + one(rng, 0.0, 0.0, 0.001)
     way = float(10 ** rng.uniform(-3, -1.5))
     pairs = [_pair(rng, f"b{k}_top", f"b{k + 1}_bottom") for k in range(count - 1)]
-    return {
-        "fixed": [
-            _clamp("b0_bottom"),
-            _clamp(f"b{count - 1}_top", one(rng, 0, 1, -2) * way, -way),
-        ],
-        "contact": pairs,
-    }  # fmt: skip
+    lid = _clamp(f"b{count - 1}_top", one(rng, 0, 1, -2) * way, -way)
+    return {"fixed": [_clamp("b0_bottom"), lid], "contact": pairs}
 
 
 def wedges(rng: Rng, b: Bodies) -> Tables:
@@ -198,9 +188,8 @@ def wedges(rng: Rng, b: Bodies) -> Tables:
         sign = np.sign(x)
         normal = [float(-sign * np.cos(angle)), float(np.sin(angle))]
         point = [float(x + sign * (gap + 0.03 * (gap > 0))), 0.0]
-        contacts.append(
-            {"on": f"wedge_{side}", "foundation": plane(point, normal), **friction(rng)}
-        )
+        ground = plane(point, normal)
+        contacts.append({"on": f"wedge_{side}", "foundation": ground, **friction(rng)})
     way = float(10 ** rng.uniform(-2.5, -1.2))
     aside = one(rng, 0.0, 0.4) * way
     return {"fixed": [_clamp("wedge_top", aside, -way - gap)], "contact": contacts}
@@ -215,15 +204,9 @@ def driven_wedges(rng: Rng, b: Bodies) -> Tables:
     b.block("l", [[-far, 0], [-narrow - gap, 0], [-spread - gap, 1], [-far, 1]], 0.8 * h)
     b.block("r", [[narrow + gap, 0], [far, 0], [far, 1], [spread + gap, 1]], 1.2 * h)
     way = float(10 ** rng.uniform(-2.5, -1.2))
-    return {
-        "fixed": [
-            _clamp("l_left"), _clamp("r_right"),
-            _clamp("wedge_top", one(rng, 0.0, 0.5) * way, -way),
-        ],
-        "contact": [
-            _pair(rng, "wedge_left", "l_right"), _pair(rng, "wedge_right", "r_left"),
-        ],
-    }  # fmt: skip
+    top = _clamp("wedge_top", one(rng, 0.0, 0.5) * way, -way)
+    contacts = [_pair(rng, "wedge_left", "l_right"), _pair(rng, "wedge_right", "r_left")]
+    return {"fixed": [_clamp("l_left"), _clamp("r_right"), top], "contact": contacts}
 
 
 def snap_fits(rng: Rng, b: Bodies) -> Tables:
@@ -235,12 +218,9 @@ def snap_fits(rng: Rng, b: Bodies) -> Tables:
     motion = [f"{float(rng.uniform(-0.1, 0.1))!r}*t", f"{depth + away!r}*min(t, 2 - t)"]
     pin = {"shape": "sphere", "centre": [x, -radius - away], "radius": radius}
     contact = {"on": "beam_bottom", "foundation": pin, "rigid": {"displacement": motion}}
-    steps = int(rng.integers(3, 6))
-    return {
-        "fixed": [_clamp("beam_left")],
-        "contact": [contact | friction(rng)],
-        "evolution": {"times": [0.0, 1.0, 2.0], "steps": [steps, steps]},
-    }
+    evolution = {"times": [0.0, 1.0, 2.0], "steps": [int(rng.integers(3, 6))] * 2}
+    contacts = [contact | friction(rng)]
+    return {"fixed": [_clamp("beam_left")], "contact": contacts, "evolution": evolution}
 
 
 def lifted_off(rng: Rng, b: Bodies) -> Tables:
@@ -262,11 +242,12 @@ def lifted_off(rng: Rng, b: Bodies) -> Tables:
     lift = "max(0, min(t - 2, 4 - t))"
     way = f"{-down!r}*min(t, 1) + {down + up!r}*{lift}"
     push = f"{aside!r}*max(0, min(1, t - 1))"
-    return {
-        "fixed": [_clamp("a_bottom"), _clamp("b_top", push, way)],
-        "contact": [_pair(rng, "a_top", "b_bottom")],
-        "evolution": {"times": [0.0, 1.0, 2.0, 3.0, 4.0], "steps": [2, 2, 2, 2]},
-    }
+    evolution = {"times": [0.0, 1.0, 2.0, 3.0, 4.0], "steps": [2, 2, 2, 2]}
+    fixed, contacts = (
+        [_clamp("a_bottom"), _clamp("b_top", push, way)],
+        [_pair(rng, "a_top", "b_bottom")],
+    )
+    return {"fixed": fixed, "contact": contacts, "evolution": evolution}
 
 
 def indenters(rng: Rng, b: Bodies) -> Tables:
@@ -309,12 +290,8 @@ def tilted_blocks(rng: Rng, b: Bodies) -> Tables:
     b.block("b", corners, rng.uniform(0.12, 0.25))
     on = "b_bottom" if abs(turn) < 0.6 else ["b_bottom", "b_left" if turn > 0 else "b_right"]
     way = float(10 ** rng.uniform(-3, -1.7))
-    return {
-        "fixed": [
-            _clamp("a_bottom"), _clamp("b_top", one(rng, 0.0, 1.0, -0.3) * way, -way),
-        ],
-        "contact": [{"on": on, "against": "a_top", **friction(rng)}],
-    }  # fmt: skip
+    fixed = [_clamp("a_bottom"), _clamp("b_top", one(rng, 0.0, 1.0, -0.3) * way, -way)]
+    return {"fixed": fixed, "contact": [{"on": on, "against": "a_top", **friction(rng)}]}
 
 
 def clouds(rng: Rng, b: Bodies) -> Tables:
@@ -345,10 +322,8 @@ def layers(rng: Rng, b: Bodies) -> Tables:
         "limit": one(rng, 0.002, 1.0),
     }  # fmt: skip
     way = float(10 ** rng.uniform(-2.5, -1.2))
-    return {
-        "fixed": [_clamp("body_top", one(rng, 0, 1) * way, -way)],
-        "contact": [{"on": "body_bottom", **layer, **friction(rng)}],
-    }
+    fixed = [_clamp("body_top", one(rng, 0, 1) * way, -way)]
+    return {"fixed": fixed, "contact": [{"on": "body_bottom", **layer, **friction(rng)}]}
 
 
 def small_bodies(rng: Rng, b: Bodies) -> Tables:
@@ -368,12 +343,9 @@ def small_bodies(rng: Rng, b: Bodies) -> Tables:
     b.block("above", _box(*(high * direction), 1.6, 0.6, tilt), rng.uniform(0.1, 0.3))
     way = float(10 ** rng.uniform(-3, -1.7))
     move = -way * direction + one(rng, 0.0, 0.3) * way * np.array([1.0, 0.0])
-    return {
-        "fixed": [_clamp("below_bottom"), _clamp("above_top", *move.tolist())],
-        "contact": [
-            _pair(rng, "below_top", under, disc), _pair(rng, "above_bottom", over, disc),
-        ],
-    }  # fmt: skip
+    contacts = [_pair(rng, "below_top", under, disc), _pair(rng, "above_bottom", over, disc)]
+    fixed = [_clamp("below_bottom"), _clamp("above_top", *move.tolist())]
+    return {"fixed": fixed, "contact": contacts}
 
 
 BODIES: Families = {draw.__name__: (draw, range(count)) for draw, count in (

@@ -18,7 +18,16 @@ from mpi4py import MPI
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.typing import Array
-from scripts.studies.robustness.one_body import Families, Rng, Tables, grid, plane
+from scripts.studies.robustness.one_body import (
+    Families,
+    Rng,
+    Tables,
+    case,
+    elastic,
+    grid,
+    plane,
+    sliding,
+)
 
 #: Tables, and the mesh in place of theirs.
 Drawn = tuple[Tables, Domain | None]
@@ -29,13 +38,6 @@ PLANE_STRESS = {"degree": 2, "kinematics": "plane_stress"}
 def _on(*parts: str) -> Tables:
     """Return the mesh of a case on a domain of its own, which has these parts beside the sides."""
     return grid([1.0, 1.0], [1, 1], parts={name: {"side": "top"} for name in parts})
-
-
-def _held(mu: float, contact: Any, *loads: Tables, **more: Any) -> Tables:
-    """Return a case without supports, of unit modulus unless another material is given."""
-    friction = {"law": "coulomb", "mu": mu}
-    rest = {"load": [*loads], "contact": contact, "friction": friction}
-    return {"material": {"young": 1.0, "poisson": 0.3}} | more | rest
 
 
 def _round(radius: float) -> Tables:
@@ -61,11 +63,11 @@ def belt(rng: Rng) -> Drawn:
     layers, tension = int(rng.integers(1, 3)), thick * float(10 ** rng.uniform(-6, -4))
     pull = ratio * tension * np.array([np.sin(angle), np.cos(angle)])
     loads = {"on": "left", "force": [0.0, -tension]}, {"on": "right", "force": pull.tolist()}
-    space, material = PLANE_STRESS | {"degree": degree}, {"young": 1.0, "poisson": 0.0}
+    space, material = PLANE_STRESS | {"degree": degree}, elastic(1.0, 0.0)
     domain = bent(
         angle, thick, (cells, layers), lambda a, r: (-(1 + r) * np.cos(a), (1 + r) * np.sin(a))
     )
-    return _held(mu, _round(1.0), *loads, mesh=_on(), space=space, material=material), domain
+    return case(_on(), material, [], _round(1.0), sliding(mu), *loads, space=space), domain
 
 
 def _arch(long: float, rise: float) -> tuple[float, Any]:
@@ -81,8 +83,9 @@ def _between_plates(mu: float, poisson: float, low: float, high: float, force: f
         {"on": "bottom", "foundation": plane([0.0, low], [0.0, 1.0])},
         {"on": "top", "foundation": plane([0.0, high], [0.0, -1.0]), "rigid": lid},
     ]
-    material = {"young": 200e3, "poisson": poisson}
-    return _held(mu, contacts, mesh=_on("inner", "outer"), space=PLANE_STRESS, material=material)
+    material = elastic(200e3, poisson)
+    mesh = _on("inner", "outer")
+    return case(mesh, material, [], contacts, sliding(mu), space=PLANE_STRESS)
 
 
 def leaf(rng: Rng) -> Drawn:
@@ -112,7 +115,7 @@ def strip(rng: Rng) -> Drawn:
     mesh = grid([long, *side, 1.0], [cells // 5, 1, 1] if solid else [cells, 2])
     pressed = {"on": "top", "traction": [0.0, *aside, -press]}
     pulled = {"on": "right", "traction": [share * mu * long * press, *aside, 0.0]}
-    return _held(mu, {"on": "bottom"}, pressed, pulled, mesh=mesh), None
+    return case(mesh, elastic(), [], {"on": "bottom"}, sliding(mu), pressed, pulled), None
 
 
 def stack(rng: Rng) -> Drawn:
@@ -159,7 +162,8 @@ def clip(rng: Rng) -> Drawn:
     force = (pull * np.array([-np.sin(angle), np.cos(angle)])).tolist()
     loads = [{"on": "right", "force": force}] if pull else []
     space = {"degree": degree}
-    return _held(mu, _round(1.0 + spread), *loads, mesh=_on(), space=space), domain
+    contact = _round(1.0 + spread)
+    return case(_on(), elastic(), [], contact, sliding(mu), *loads, space=space), domain
 
 
 def ring(rng: Rng) -> Drawn:
@@ -175,8 +179,8 @@ def ring(rng: Rng) -> Drawn:
     load = {"on": str(rng.choice(["top", "bottom"])), "traction": [0.0, pull]}
     shaft = plane([inner + fit, 0.0], [1.0, 0.0])
     contact = {"on": "left", "overlap": "press", "foundation": shaft}
-    mesh, material = grid([wide, tall], cells, origin=[inner, 0.0]), {"young": 1.0, "poisson": 0.0}
-    return _held(mu, contact, load, mesh=mesh, space=space, material=material), None
+    mesh, material = grid([wide, tall], cells, origin=[inner, 0.0]), elastic(1.0, 0.0)
+    return case(mesh, material, [], contact, sliding(mu), load, space=space), None
 
 
 def jaws(rng: Rng) -> Drawn:
@@ -197,8 +201,9 @@ def jaws(rng: Rng) -> Drawn:
             "rigid": jaw,
         },
     ]
-    material = {"young": 1.0, "poisson": float(rng.choice([0.0, 0.3]))}
-    return _held(mu, contacts, weight, mesh=grid(size.tolist(), cells), material=material), None
+    material = elastic(1.0, float(rng.choice([0.0, 0.3])))
+    mesh = grid(size.tolist(), cells)
+    return case(mesh, material, [], contacts, sliding(mu), weight), None
 
 
 FAMILIES = belt, belt, leaf, strip, stack, clip, ring, jaws

@@ -44,10 +44,28 @@ def clamp(*sides: str, dim: int = 2) -> list[Tables]:
     return [{"on": side, "displacement": [0.0] * dim} for side in sides]
 
 
+def elastic(young: float = 1.0, poisson: float = 0.3, **more: Any) -> Tables:
+    """Return a material."""
+    return {"young": young, "poisson": poisson, **more}
+
+
+def sliding(mu: float) -> Tables:
+    """Return a constant coefficient of friction."""
+    return {"law": "coulomb", "mu": mu} if mu > 0 else {"law": "none"}
+
+
 def coulomb(rng: Rng, *coefficients: float) -> Tables:
     """Draw a constant coefficient of friction."""
-    mu = one(rng, *coefficients)
-    return {"law": "coulomb", "mu": mu} if mu > 0 else {"law": "none"}
+    return sliding(one(rng, *coefficients))
+
+
+def case(
+    mesh: Tables, material: Any, fixed: list[Tables], contact: Any, friction: Tables,
+    *loads: Tables, **more: Any,
+) -> Tables:  # fmt: skip
+    """Return the tables of a case."""
+    found = {"mesh": mesh, "material": material, "fixed": fixed, "load": [*loads]}
+    return found | {"contact": contact, "friction": friction} | more
 
 
 #: Coefficients of friction, and rates at which they fall with the slip.
@@ -76,41 +94,29 @@ def bar(rng: Rng) -> Tables:
     mesh = grid([4.0, 1.0], [4 * n, n], rotation=one(rng, 0.0, 0.0, 30.0))
     mesh["parts"] = {"loaded": {"side": "top", "from": 2.0, "to": 4.0}}
     load = -0.005 * one(rng, 1.0, 3.0, 10.0)
-    direction = one(rng, "body", "foundation")
-    angle = np.deg2rad(mesh["rotation"])
-    gap = one(rng, 0.0, 0.0, 0.002)
-    normal = [float(-np.sin(angle)), float(np.cos(angle))]
+    direction, angle = one(rng, "body", "foundation"), np.deg2rad(mesh["rotation"])
+    gap, normal = one(rng, 0.0, 0.0, 0.002), [float(-np.sin(angle)), float(np.cos(angle))]
     ground = plane([-gap * n for n in normal], normal)
-    return {
-        "mesh": mesh,
-        "space": {"degree": one(rng, 1, 1, 2)},
-        "material": {
-            "law": one(rng, "log", "log", "linear"), "young": 1.0,
-            "poisson": one(rng, 0.1, 0.3, 0.45), "yield_strain": 0.05,
-        },
-        "fixed": clamp("left"),
-        "load": [{"on": "loaded", "traction": [load * n for n in normal]}],
-        "contact": {"on": "bottom", "foundation": ground, "direction": direction},
-        "friction": slip_weakening(rng, radius=one(rng, 0.0, 0.0, 0.1)),
-    }  # fmt: skip
+    space, law = {"degree": one(rng, 1, 1, 2)}, one(rng, "log", "log", "linear")
+    material = elastic(1.0, one(rng, 0.1, 0.3, 0.45), law=law, yield_strain=0.05)
+    friction = slip_weakening(rng, radius=one(rng, 0.0, 0.0, 0.1))
+    contact = {"on": "bottom", "foundation": ground, "direction": direction}
+    loads = {"on": "loaded", "traction": [load * n for n in normal]}
+    return case(mesh, material, clamp("left"), contact, friction, loads, space=space)
 
 
 def piezo(rng: Rng) -> Tables:
     """Draw Examples 8.1 and 8.2: k_e 0 to 10, phi_F 0 to 32, loads to 15 x."""
     n = one(rng, 8, 16)
-    case = {
-        "mesh": grid([8.0, 4.0], [2 * n, n]),
-        "space": {"degree": one(rng, 1, 1, 2)},
-        "material": {"law": one(rng, "linear", "log"), "yield_strain": 1.8, **SHARP},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0], "potential": 0.0}],
-        "load": [{"on": "top", "traction": [0.0, f"{-one(rng, 5.0, 10.0, 15.0)}*x"]}],
-        "contact": {"on": "bottom"},
-        "friction": slip_weakening(rng, 1e4),
-    }
-    k_e = one(rng, 0.0, 1e-3, 1e-1, 1.0, 10.0)
+    space = {"degree": one(rng, 1, 1, 2)}
+    material = {"law": one(rng, "linear", "log"), "yield_strain": 1.8, **SHARP}
+    fixed = [{"on": "left", "displacement": [0.0, 0.0], "potential": 0.0}]
+    load = {"on": "top", "traction": [0.0, f"{-one(rng, 5.0, 10.0, 15.0)}*x"]}
+    mesh, friction = grid([8.0, 4.0], [2 * n, n]), slip_weakening(rng, 1e4)
+    k_e, more = one(rng, 0.0, 1e-3, 1e-1, 1.0, 10.0), {}
     if k_e > 0:
-        case["electric"] = {"law": "shifted", "k_e": k_e, "phi_f": one(rng, 0.0, 8.0, 32.0)}
-    return case
+        more = {"electric": {"law": "shifted", "k_e": k_e, "phi_f": one(rng, 0.0, 8.0, 32.0)}}
+    return case(mesh, material, fixed, {"on": "bottom"}, friction, load, space=space, **more)
 
 
 def layer(rng: Rng) -> Tables:
@@ -119,74 +125,55 @@ def layer(rng: Rng) -> Tables:
     small = one(rng, 0.0, 1e-6, 1e-4, 1e-2, 0.2, 0.6)
     ends = [{"side": "top"}, {"side": "bottom", "to": 2.0}, {"side": "bottom", "from": 10.0}]
     parts = {"foundation": {"side": "bottom", "from": 2.0, "to": 10.0}, "grounded": ends}
-    case = {
-        "mesh": grid([12.0, 2.0], [6 * n, n], parts=parts),
-        "material": {"law": "log", "yield_strain": 1.8, **SHARP},
-        "fixed": [*clamp("left", "right"), {"on": "grounded", "potential": 0.0}],
-        "load": [{"on": "grounded", "traction": [0.0, -one(rng, 3.0, 5.0, 8.0)]}],
-        "contact": {
-            "on": "foundation", "law": "compliance", "gap": one(rng, 0.3, 0.5),
-            "layer": one(rng, 0.0, 0.1), "stiffness": one(rng, 1.0, 10.0, 100.0), "limit": 0.1,
-            "potential_factor": one(rng, 1.0, 2.0),
-        },
-        "friction": {"law": "coulomb", "mu": small} if small > 0 else {"law": "none"},
+    load = {"on": "grounded", "traction": [0.0, -one(rng, 3.0, 5.0, 8.0)]}
+    contact = {
+        "on": "foundation", "law": "compliance", "gap": one(rng, 0.3, 0.5),
+        "layer": one(rng, 0.0, 0.1), "stiffness": one(rng, 1.0, 10.0, 100.0), "limit": 0.1,
+        "potential_factor": one(rng, 1.0, 2.0),
     }  # fmt: skip
-    if small > 0:
-        case["electric"] = {"law": "shifted", "k_e": small, "phi_f": 32.0}
-    return case
+    more = {"electric": {"law": "shifted", "k_e": small, "phi_f": 32.0}} if small > 0 else {}
+    fixed = [*clamp("left", "right"), {"on": "grounded", "potential": 0.0}]
+    material = {"law": "log", "yield_strain": 1.8, **SHARP}
+    mesh = grid([12.0, 2.0], [6 * n, n], parts=parts)
+    return case(mesh, material, fixed, contact, sliding(small), load, **more)
 
 
 def hertz(rng: Rng) -> Tables:
     """Draw Example 7.1: both contact directions, loads 160 to 1600, mu 0 to 1."""
-    load = one(rng, 160.0, 800.0, 1600.0) / 16
-    return {
-        "mesh": {"generator": "quarter_disc", "radius": 8.0, "contact_size": one(rng, 0.1, 0.2)},
-        "material": {"law": "linear", "young": 2000.0, "poisson": one(rng, 0.1, 0.3, 0.45)},
-        "fixed": [{"on": "symmetry", "displacement": [0.0, "free"]}],
-        "load": [{"on": "top", "traction": [0.0, -load]}],
-        "contact": {
-            "on": "contact", "foundation": plane([0.0, 0.0], [0.0, 1.0]),
-            "direction": one(rng, "foundation", "body"),
-        },
-        "friction": slip_weakening(rng),
-    }  # fmt: skip
+    load = {"on": "top", "traction": [0.0, -one(rng, 160.0, 800.0, 1600.0) / 16]}
+    mesh = {"generator": "quarter_disc", "radius": 8.0, "contact_size": one(rng, 0.1, 0.2)}
+    material = elastic(2000.0, one(rng, 0.1, 0.3, 0.45), law="linear")
+    contact = {"on": "contact", "foundation": plane([0.0, 0.0], [0.0, 1.0])}
+    contact["direction"] = one(rng, "foundation", "body")
+    fixed = [{"on": "symmetry", "displacement": [0.0, "free"]}]
+    return case(mesh, material, fixed, contact, slip_weakening(rng), load)
 
 
 def block(rng: Rng) -> Tables:
     """Draw a block in 3-D, clamped on one side, pressed and pushed aside on top."""
     n = one(rng, 4, 6)
     push, press = 0.005 * one(rng, 0.0, 1.0, 2.0), -0.01 * one(rng, 1.0, 3.0)
-    return {
-        "mesh": grid([2.0, 1.0, 1.0], [2 * n, n, n]),
-        "space": {"degree": one(rng, 1, 1, 1, 2) if n == 4 else 1},
-        "material": {
-            "law": one(rng, "linear", "log"), "young": 1.0, "poisson": one(rng, 0.1, 0.3, 0.45),
-            "yield_strain": 0.02,
-        },
-        "fixed": clamp("left", dim=3),
-        "load": [{"on": "top", "traction": [0.0, push, press]}],
-        "contact": {"on": "bottom", "gap": one(rng, 0.0, 0.0, 0.005)},
-        "friction": slip_weakening(rng),
-    }  # fmt: skip
+    space, law = {"degree": one(rng, 1, 1, 1, 2) if n == 4 else 1}, one(rng, "linear", "log")
+    material = elastic(1.0, one(rng, 0.1, 0.3, 0.45), law=law, yield_strain=0.02)
+    contact = {"on": "bottom", "gap": one(rng, 0.0, 0.0, 0.005)}
+    load = {"on": "top", "traction": [0.0, push, press]}
+    mesh, friction = grid([2.0, 1.0, 1.0], [2 * n, n, n]), slip_weakening(rng)
+    return case(mesh, material, clamp("left", dim=3), contact, friction, load, space=space)
 
 
 def _beam(rng: Rng, slender: float, *supports: str) -> Tables:
     """Return a beam of height 1, clamped at some ends, without load and gap."""
     high = one(rng, 1, 2, 4)
-    return {
-        "mesh": grid([slender, 1.0], [int(min(slender * high, 400)), high]),
-        "space": {"degree": one(rng, 1, 1, 2)},
-        "material": {"young": 1.0, "poisson": one(rng, 0.0, 0.3, 0.45)},
-        "fixed": clamp(*supports),
-        "contact": {"on": "bottom"},
-        "friction": coulomb(rng, 0.0, 0.3, 0.8),
-    }
+    space, material = {"degree": one(rng, 1, 1, 2)}, elastic(1.0, one(rng, 0.0, 0.3, 0.45))
+    mesh, friction = grid([slender, 1.0], [int(min(slender * high, 400)), high]), (0.0, 0.3, 0.8)
+    contact, mu = {"on": "bottom"}, coulomb(rng, *friction)
+    return case(mesh, material, clamp(*supports), contact, mu, space=space)
 
 
 def cantilever(rng: Rng) -> Tables:
     """Draw a cantilever over a stop: loads that bend its tip to 1.5 to 30 times the gap."""
     slender = one(rng, 10.0, 30.0, 100.0, 300.0, 1000.0)
-    case = _beam(rng, slender, "left")
+    drawn = _beam(rng, slender, "left")
     gap = one(rng, 1e-3, 0.1, 0.5, 2.0, 10.0)
     bend = gap * one(rng, 1.5, 5.0, 30.0)
     stiffness = 1.0 / 12.0
@@ -195,24 +182,24 @@ def cantilever(rng: Rng) -> Tables:
         "uniform": ("top", [0.0, -8 * stiffness * bend / slender**4]),
         "moment": ("right", [f"{12 * (2 * stiffness * bend / slender**2)}*(y-0.5)", 0.0]),
     }[one(rng, "tip", "uniform", "moment")]
-    case["load"], case["contact"]["gap"] = [{"on": side, "traction": traction}], gap
-    return case
+    drawn["load"], drawn["contact"]["gap"] = [{"on": side, "traction": traction}], gap
+    return drawn
 
 
 def clamped(rng: Rng) -> Tables:
     """Draw a beam clamped at both ends over a gap, pressed down."""
     slender = one(rng, 10.0, 40.0, 100.0, 300.0)
-    case = _beam(rng, slender, "left", "right")
+    drawn = _beam(rng, slender, "left", "right")
     gap = one(rng, 1e-2, 0.3, 1.0)
     load = 384 * (gap * one(rng, 1.2, 5.0, 50.0)) / 12 / slender**4
-    case["load"], case["contact"]["gap"] = [{"on": "top", "traction": [0.0, -load]}], gap
-    return case
+    drawn["load"], drawn["contact"]["gap"] = [{"on": "top", "traction": [0.0, -load]}], gap
+    return drawn
 
 
 def lifted(rng: Rng) -> Tables:
     """Draw a long beam, unloaded, half loaded, lifted at its end, pushed or sheared."""
     slender = one(rng, 20.0, 100.0, 600.0)
-    case = _beam(rng, slender, "left")
+    drawn = _beam(rng, slender, "left")
     side, traction = one(
         rng,
         ("top", [0.0, 0.0]),
@@ -221,18 +208,18 @@ def lifted(rng: Rng) -> Tables:
         ("right", [-1e-4, 0.0]),
         ("top", [1e-5, -1e-5]),
     )
-    return case | {"load": [{"on": side, "traction": traction}]}
+    return drawn | {"load": [{"on": side, "traction": traction}]}
 
 
 def bimorph(rng: Rng) -> Tables:
     """Draw a piezoelectric beam that its voltage bends onto a conductive foundation."""
     slender = one(rng, 10.0, 40.0)
-    case = _beam(rng, slender, "left") | {"space": {"degree": 1}, "material": SHARP}
-    case["fixed"].append({"on": "top", "potential": one(rng, 0.1, 0.3)})
-    case["load"] = [{"on": "right", "traction": [0.0, -58.7 * 0.2 / slender**3]}]
-    case["contact"]["gap"] = one(rng, 0.01, 0.1)
-    case["electric"] = {"k_e": one(rng, 1e-9, 1e-3, 1.0, 1e3), "phi_f": 0.0, "delta": 10.0}
-    return case
+    drawn = _beam(rng, slender, "left") | {"space": {"degree": 1}, "material": SHARP}
+    drawn["fixed"].append({"on": "top", "potential": one(rng, 0.1, 0.3)})
+    drawn["load"] = [{"on": "right", "traction": [0.0, -58.7 * 0.2 / slender**3]}]
+    drawn["contact"]["gap"] = one(rng, 0.01, 0.1)
+    drawn["electric"] = {"k_e": one(rng, 1e-9, 1e-3, 1.0, 1e3), "phi_f": 0.0, "delta": 10.0}
+    return drawn
 
 
 def plate(rng: Rng) -> Tables:
@@ -240,29 +227,19 @@ def plate(rng: Rng) -> Tables:
     wide, n, gap = one(rng, 10.0, 30.0), one(rng, 8, 12), one(rng, 0.05, 0.5)
     sides = one(rng, ("left",), ("left", "right"))
     factor = 8.0 if len(sides) == 1 else 384.0
-    load = factor * gap * one(rng, 1.5, 10.0) / 12 / wide**4
-    return {
-        "mesh": grid([wide, wide, 1.0], [n, n, 1]),
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": clamp(*sides, dim=3),
-        "load": [{"on": "top", "traction": [0.0, 0.0, -load]}],
-        "contact": {"on": "bottom", "gap": gap},
-        "friction": coulomb(rng, 0.0, 0.3),
-    }
+    load = {"on": "top", "traction": [0.0, 0.0, -factor * gap * one(rng, 1.5, 10.0) / 12 / wide**4]}
+    contact, friction = {"on": "bottom", "gap": gap}, coulomb(rng, 0.0, 0.3)
+    mesh = grid([wide, wide, 1.0], [n, n, 1])
+    return case(mesh, elastic(), clamp(*sides, dim=3), contact, friction, load)
 
 
 def _block(
     rng: Rng, cells: tuple[int, int] = (32, 8), size: tuple[float, float] = (4.0, 1.0)
 ) -> Tables:
     """Return a block, clamped on the left, pressed and pushed aside on top."""
-    return {
-        "mesh": grid([*size], [*cells]),
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": clamp("left"),
-        "load": [{"on": "top", "traction": [2e-3, f"-0.01*(1+x/{size[0]})"]}],
-        "contact": {"on": "bottom"},
-        "friction": coulomb(rng, 0.0, 0.3, 0.6),
-    }
+    load = {"on": "top", "traction": [2e-3, f"-0.01*(1+x/{size[0]})"]}
+    mesh, friction = grid([*size], [*cells]), coulomb(rng, 0.0, 0.3, 0.6)
+    return case(mesh, elastic(), clamp("left"), {"on": "bottom"}, friction, load)
 
 
 def stretched(rng: Rng) -> Tables:
@@ -275,9 +252,9 @@ def stretched(rng: Rng) -> Tables:
 
 def stiff(rng: Rng) -> Tables:
     """Draw a nearly incompressible block."""
-    case = _block(rng)
-    case["material"]["poisson"] = one(rng, 0.49, 0.499)
-    return case | {"space": {"degree": one(rng, 1, 2)}}
+    drawn = _block(rng)
+    drawn["material"]["poisson"] = one(rng, 0.49, 0.499)
+    return drawn | {"space": {"degree": one(rng, 1, 2)}}
 
 
 def rough(rng: Rng) -> Tables:
@@ -287,79 +264,76 @@ def rough(rng: Rng) -> Tables:
 
 def few(rng: Rng) -> Tables:
     """Draw a disc that touches at single nodes, or at none."""
-    return {
-        "mesh": {"generator": "quarter_disc", "radius": 8.0, "contact_size": 0.8},
-        "material": {"young": 2000.0, "poisson": 0.3},
-        "fixed": [{"on": "symmetry", "displacement": [0.0, "free"]}],
-        "load": [{"on": "top", "traction": [0.0, -one(rng, 1e-3, 1e-1, 1.0, 10.0)]}],
-        "contact": {"on": "contact", "foundation": plane([0.0, -0.01], [0.0, 1.0])},
-        "friction": coulomb(rng, 0.0, 0.5),
-    }
+    mesh = {"generator": "quarter_disc", "radius": 8.0, "contact_size": 0.8}
+    load = {"on": "top", "traction": [0.0, -one(rng, 1e-3, 1e-1, 1.0, 10.0)]}
+    contact = {"on": "contact", "foundation": plane([0.0, -0.01], [0.0, 1.0])}
+    fixed = [{"on": "symmetry", "displacement": [0.0, "free"]}]
+    return case(mesh, elastic(2000.0), fixed, contact, coulomb(rng, 0.0, 0.5), load)
 
 
 def units(rng: Rng) -> Tables:
     """Draw a block, or a cantilever, in other units of length and stress."""
     stress, length = one(rng, 1e-12, 1.0, 1e12), one(rng, 1e-9, 1.0, 1e6)
-    case = one(rng, cantilever, rough)(rng)
-    case["mesh"]["size"] = [length * side for side in case["mesh"]["size"]]
-    case["material"]["young"] = stress
+    drawn = one(rng, cantilever, rough)(rng)
+    drawn["mesh"]["size"] = [length * side for side in drawn["mesh"]["size"]]
+    drawn["material"]["young"] = stress
     scaled = []
-    for component in case["load"][0]["traction"]:
+    for component in drawn["load"][0]["traction"]:
         text = component if isinstance(component, str) else repr(float(component))
         for name in "xy":
             text = text.replace(name, f"({name}/{length!r})")
         scaled.append(f"{stress!r}*({text})")
-    case["load"][0]["traction"] = scaled
-    case["contact"]["gap"] = length * case["contact"].get("gap", 0.0)
-    return case
+    drawn["load"][0]["traction"] = scaled
+    drawn["contact"]["gap"] = length * drawn["contact"].get("gap", 0.0)
+    return drawn
 
 
 def layers(rng: Rng) -> Tables:
     """Draw a block on a layer much softer to much stiffer than itself."""
-    case = _block(rng)
-    case["contact"] |= {
+    drawn = _block(rng)
+    drawn["contact"] |= {
         "law": "compliance", "gap": 0.02, "layer": one(rng, 0.02, 0.03),
         "stiffness": one(rng, 1e-3, 1.0, 1e3, 1e6), "limit": one(rng, 1e-3, 0.1),
         "potential_factor": 1.0,
     }  # fmt: skip
-    return case
+    return drawn
 
 
 def yielding(rng: Rng) -> Tables:
     """Draw a bar far beyond its yield strain."""
-    case = _block(rng)
-    case["material"] |= {"law": "log", "yield_strain": 0.01}
-    case["load"][0]["traction"] = [0.0, -one(rng, 0.05, 0.1, 0.3)]
-    return case
+    drawn = _block(rng)
+    drawn["material"] |= {"law": "log", "yield_strain": 0.01}
+    drawn["load"][0]["traction"] = [0.0, -one(rng, 0.05, 0.1, 0.3)]
+    return drawn
 
 
 def corners(rng: Rng) -> Tables:
     """Draw a block or a beam over a foundation with a step, an edge or a groove."""
-    case = one(rng, _block(rng, (64, 8)), _block(rng, (160, 4), (40.0, 1.0)))
-    long = case["mesh"]["size"][0]
+    drawn = one(rng, _block(rng, (64, 8)), _block(rng, (160, 4), (40.0, 1.0)))
+    long = drawn["mesh"]["size"][0]
     depth = one(rng, 1e-3, 1e-2) * long
-    case["contact"]["gap"] = one(
+    drawn["contact"]["gap"] = one(
         rng,
         f"where(x > {0.6 * long}, {depth}, 0)",
         f"{depth / long}*abs(x-{0.6 * long})",
         f"where(x > {0.3 * long}, where(x < {0.7 * long}, {depth}, 0), 0)",
     )
     if long > 10:
-        case["load"][0]["traction"] = [0.0, -one(rng, 1e-5, 1e-4)]
-    return case
+        drawn["load"][0]["traction"] = [0.0, -one(rng, 1e-5, 1e-4)]
+    return drawn
 
 
 def unsupported(rng: Rng) -> Tables:
     """Draw a block that contact alone holds up; its top, or a side, is guided."""
-    case = _block(rng, (one(rng, 32, 64), 8))
-    case["fixed"] = [{"on": one(rng, "top", "left"), "displacement": [0.0, "free"]}]
+    drawn = _block(rng, (one(rng, 32, 64), 8))
+    drawn["fixed"] = [{"on": one(rng, "top", "left"), "displacement": [0.0, "free"]}]
     push = one(rng, 0.0, 1e-3, -1e-3)
-    case["load"] = [
+    drawn["load"] = [
         {"on": "top", "traction": [0.0, f"-0.01*(1+x/{one(rng, 4.0, 40.0)})"]},
         {"on": "right", "traction": [push, 0.0]},
     ]
-    case["contact"]["gap"] = one(rng, 0.0, 1e-2)
-    return case
+    drawn["contact"]["gap"] = one(rng, 0.0, 1e-2)
+    return drawn
 
 
 #: Friction of the problems on cells of all shapes.
@@ -372,28 +346,19 @@ def round_body(rng: Rng, dim: int) -> Tables:
     mesh = {"generator": "quarter_disc" if dim == 2 else "sphere", "radius": 8.0, "size": 3.0}
     mesh |= {"contact_size": size, "order": one(rng, 1, 2)}
     up = [0.0] * (dim - 1)
-    ground = one(
-        rng,
-        plane([*up, 0.0], [*up, 1.0]),
-        {"shape": "sphere", "centre": [*up, -12.0], "radius": 12.0},
-    )
+    ball = {"shape": "sphere", "centre": [*up, -12.0], "radius": 12.0}
+    ground = one(rng, plane([*up, 0.0], [*up, 1.0]), ball)
     load, law = -one(rng, 1.0, 10.0, 100.0), one(rng, "linear", "log")
     sides = ["symmetry"] if dim == 2 else ["symmetry_x", "symmetry_y"]
-    return {
-        "mesh": mesh,
-        "space": {"degree": one(rng, 1, 2)},
-        "material": {"law": law, "young": 2000.0, "poisson": one(rng, 0.1, 0.3, 0.45)}
-        | ({"yield_strain": 0.02} if law == "log" else {}),
-        "fixed": [
-            {"on": side, "displacement": [0.0 if i == k else "free" for i in range(dim)]}
-            for k, side in enumerate(sides)
-        ],
-        "load": [{"on": "top", "traction": [*up, load]}],
-        "contact": {
-            "on": "contact", "foundation": ground, "direction": one(rng, "foundation", "body"),
-        },
-        "friction": _friction(rng),
-    }  # fmt: skip
+    space, more = {"degree": one(rng, 1, 2)}, {"yield_strain": 0.02} if law == "log" else {}
+    material = elastic(2000.0, one(rng, 0.1, 0.3, 0.45), law=law, **more)
+    fixed = [
+        {"on": side, "displacement": [0.0 if i == k else "free" for i in range(dim)]}
+        for k, side in enumerate(sides)
+    ]
+    contact = {"on": "contact", "foundation": ground, "direction": one(rng, "foundation", "body")}
+    loads = {"on": "top", "traction": [*up, load]}
+    return case(mesh, material, fixed, contact, _friction(rng), loads, space=space)
 
 
 def pair(rng: Rng, dim: int) -> Tables:
@@ -432,45 +397,36 @@ def pair(rng: Rng, dim: int) -> Tables:
 
 def _on_cells(rng: Rng, draws: tuple[Draw, ...], cell: str) -> Tables:
     """Draw one of some problems, on cells of a shape and of degree 1 or 2."""
-    case: Tables = one(rng, *draws)(rng)
-    case["mesh"]["cell"] = cell
-    case.setdefault("space", {"degree": one(rng, 1, 2)})
-    return case
+    drawn: Tables = one(rng, *draws)(rng)
+    drawn["mesh"]["cell"] = cell
+    drawn.setdefault("space", {"degree": one(rng, 1, 2)})
+    return drawn
 
 
 def two_blocks(rng: Rng, _: int) -> Tables:
     """Draw a block pressed on another one and pushed along: moduli, sizes, gaps, mu at random."""
     width = rng.uniform(1.0, 4.0)
     upper = width * rng.uniform(0.3, 1.5)
-    heights = rng.uniform(0.3, 2.0, 2)
-    sizes = rng.uniform(0.06, 0.4, 2)
-    ratio = 10 ** rng.uniform(-3, 3)
-    press = rng.uniform(0.001, 0.03)
+    heights, sizes = rng.uniform(0.3, 2.0, 2), rng.uniform(0.06, 0.4, 2)
+    ratio, press = 10 ** rng.uniform(-3, 3), rng.uniform(0.001, 0.03)
     gap: float | str = rng.choice([0.0, 0.5 * press])
     if rng.random() < 0.3:
         gap = f"{rng.uniform(0, 0.01):.4g}*x**2"
-    on, against = ("upper_bottom", "lower_top") if rng.random() < 0.5 else (
-        "lower_top", "upper_bottom",
-    )  # fmt: skip
-    return {
-        "mesh": {
-            "generator": "two_blocks", "lower_width": width, "upper_width": upper,
-            "lower_height": heights[0], "upper_height": heights[1],
-            "lower_size": sizes[0], "upper_size": sizes[1],
-        },
-        "space": {"degree": int(rng.integers(1, 3))},
-        "material": [
-            {"on": "upper", "young": ratio, "poisson": rng.uniform(0.0, 0.45)},
-            {"on": "lower", "young": 1.0, "poisson": rng.uniform(0.0, 0.45)},
-        ],
-        "fixed": [
-            {"on": "lower_bottom", "displacement": [0.0, 0.0]},
-            {"on": "upper_top", "displacement": [rng.uniform(-1, 1) * press, -press]},
-        ],
-        "contact": {"on": on, "against": against, "gap": gap},
-        "friction": {"law": "coulomb", "mu": rng.uniform(0.0, 1.0)},
-        "solver": {"tolerance": 1e-10},
+    on, against = ("upper_bottom", "lower_top")[:: 1 if rng.random() < 0.5 else -1]
+    mesh = {
+        "generator": "two_blocks", "lower_width": width, "upper_width": upper,
+        "lower_height": heights[0], "upper_height": heights[1],
+        "lower_size": sizes[0], "upper_size": sizes[1],
     }  # fmt: skip
+    space = {"degree": int(rng.integers(1, 3))}
+    material = [
+        {"on": name, **elastic(young, rng.uniform(0.0, 0.45))}
+        for name, young in (("upper", ratio), ("lower", 1.0))
+    ]
+    fixed = clamp("lower_bottom")
+    fixed.append({"on": "upper_top", "displacement": [rng.uniform(-1, 1) * press, -press]})
+    contact, friction = {"on": on, "against": against, "gap": gap}, sliding(rng.uniform(0.0, 1.0))
+    return case(mesh, material, fixed, contact, friction, space=space, solver={"tolerance": 1e-10})
 
 
 #: Hardening of metals (MPa), by family.
