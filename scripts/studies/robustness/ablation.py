@@ -38,6 +38,7 @@ from scripts.cases import CASES
 from scripts.reporting import Report, append, empty, parser
 from scripts.studies.robustness.bodies import Bodies
 from scripts.studies.robustness.check import write_msh
+from scripts.studies.robustness.one_body import case, clamp, elastic, grid, sliding
 from scripts.studies.robustness.problems import problems
 from scripts.thesis.tables_compliance import case_of
 from tests.methods.test_belt import wall
@@ -103,56 +104,44 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
     return plain
 
 
-ELASTIC, COULOMB = {"young": 1.0, "poisson": 0.3}, {"law": "coulomb", "mu": 0.3}
+MU = sliding(0.3)
+ON_PLANE = {"on": "bottom"}
 
-_STOP = beam(100.0, [1600, 16], TIP, 0.5, 0.3)
 _STRIP = beam(100.0, [1600, 16], {}, 0.0, 0.3)
+_PRESSED = {"on": "top", "traction": [0.0, -1e-3]}, {"on": "right", "traction": [0.015, 0.0]}
+_SPHERES = {
+    "generator": "two_spheres", "quarters": 2, "size": 25.0, "contact_size": 2.5,
+    "contact_width": 5.0,
+}  # fmt: skip
+_HALF_SPHERES = [
+    {"on": "symmetry_y", "displacement": ["free", 0.0, "free"]}, *clamp("lower_cut", dim=3),
+]  # fmt: skip
 _PIEZO = {"e31": -0.3, "e33": 0.8, "e15": 0.6, "beta11": 1.0, "beta33": 0.9}
 
 #: Tables of problems that a device alone solves, or solves in time.
 OWN: dict[str, dict[str, Any]] = {
     # A cantilever whose tip touches a stop, on one mesh alone, as of a file.
-    "stop": {**_STOP, "solver": {"nested": False}},
+    "stop": beam(100.0, [1600, 16], TIP, 0.5, 0.3, solver={"nested": False}),
     # A cantilever most of which lies on the ground, and that is condensed.
     "lying": beam(100.0, [500, 20], UNIFORM, 0.5, space={"degree": 2}),
     # A pressed strip, clamped at one end and pulled at the other: half of it slides.
-    "pulled-strip": {
-        **_STRIP,
-        "load": [{"on": "top", "traction": [0.0, -1e-3]},
-                 {"on": "right", "traction": [0.015, 0.0]}],
-    },
-    # A long strip that friction alone holds, pulled with 99 % of the friction.
-    "dragged-strip": {
-        "mesh": {"generator": "rectangle", "size": [50.0, 1.0], "cells": [50, 2]},
-        "material": ELASTIC,
-        "load": [{"on": "top", "traction": [0.0, -1e-6]},
-                 {"on": "right", "traction": [0.99 * 0.2 * 50e-6, 0.0]}],
-        "contact": {"on": "bottom"},
-        "friction": COULOMB | {"mu": 0.2},
-    },
+    "pulled-strip": {**_STRIP, "load": [*_PRESSED]},
     # A ball that another one alone holds, pushed aside.
-    "two-spheres": {
-        "mesh": {"generator": "two_spheres", "quarters": 2, "size": 25.0, "contact_size": 2.5,
-                 "contact_width": 5.0},
-        "material": {"young": 20e3, "poisson": 0.3},
-        "fixed": [{"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},
-                  {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]}],
-        "load": [{"on": "upper_cut", "traction": [0.5, 0.0, -8.0]}],
-        "contact": {"on": "upper_round", "against": "lower_round"},
-        "friction": COULOMB,
-        "solver": {"linear": "iterative"},
-    },
+    "two-spheres": case(
+        _SPHERES, elastic(20e3), _HALF_SPHERES, {"on": "upper_round", "against": "lower_round"},
+        MU, {"on": "upper_cut", "traction": [0.5, 0.0, -8.0]}, solver={"linear": "iterative"},
+    ),
     # Two piezoelectric bodies below a plate, with a current across both contacts.
     "piezoelectric-pair": {
         "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.22},
-        "material": {**ELASTIC, "piezo": _PIEZO},
+        "material": elastic(piezo=_PIEZO),
         "fixed": [{"on": "lower_left", "displacement": [0.0, "free"]}],
         "rigid": [{"on": "upper_top", "displacement": [0.002, "free"], "force": [0.0, -0.02]}],
         "electrode": [{"on": "upper_top", "charge": 0.003}],
         "contact": [
-            {"on": "upper_bottom", "against": "lower_top", "friction": COULOMB,
+            {"on": "upper_bottom", "against": "lower_top", "friction": MU,
              "electric": {"k_e": 2.0, "delta": 5.0}},
-            {"on": "lower_bottom", "friction": COULOMB | {"mu": 0.1},
+            {"on": "lower_bottom", "friction": sliding(0.1),
              "electric": {"k_e": 1.0, "delta": 5.0}},
         ],
         "solver": {"linear": "iterative", "tolerance": 1e-9},
@@ -176,32 +165,21 @@ def _belt() -> Case:
     write_msh(bodies.mesh(), folder / "belt.msh")
     pull = 1 + 0.95 * (np.exp(mu * angle) * (1 - thick) - 1)
     drum = {"shape": "sphere", "centre": [0.0, 0.0], "radius": 1.0}
-    tables = {
-        "mesh": {"file": str(folder / "belt.msh")},
-        "space": {"degree": 2, "kinematics": "plane_stress"},
-        "material": {"young": 1.0, "poisson": 0.0},
-        "load": [
-            {"on": "belt_left", "force": [0.0, -1e-7]},
-            {"on": "belt_right", "force": [0.0, -1e-7 * float(pull)]},
-        ],
-        "contact": {"on": "belt_inside", "overlap": "press", "foundation": drum},
-        "friction": {"law": "coulomb", "mu": mu},
-    }
+    contact = {"on": "belt_inside", "overlap": "press", "foundation": drum}
+    left = {"on": "belt_left", "force": [0.0, -1e-7]}
+    right = {"on": "belt_right", "force": [0.0, -1e-7 * float(pull)]}
+    mesh, space = {"file": str(folder / "belt.msh")}, {"degree": 2, "kinematics": "plane_stress"}
+    tables = case(mesh, elastic(1.0, 0.0), [], contact, sliding(mu), left, right, space=space)
     return parse_case(tables, source="belt")
 
 
 def _layer() -> Case:
     """Return a block on a layer that the load presses to 95 % of its limit."""
-    stiffness, limit = 500.0, 3e-3
-    tables = {
-        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [6, 3]},
-        "material": {"young": 1000.0, "poisson": 0.0},
-        "fixed": [{"on": "left", "symmetry": "x"}],
-        "load": [{"on": "top", "pressure": 0.95 * stiffness * limit}],
-        "contact": {"on": "bottom", "law": "compliance", "layer": np.inf,
-                    "stiffness": stiffness, "limit": limit},
-        "friction": {"law": "none"},
-    }  # fmt: skip
+    layer = {"stiffness": 500.0, "limit": 3e-3, "layer": np.inf}
+    load = {"on": "top", "pressure": 0.95 * layer["stiffness"] * layer["limit"]}
+    contact, fixed = {**ON_PLANE, "law": "compliance", **layer}, [{"on": "left", "symmetry": "x"}]
+    mesh = grid([2.0, 1.0], [6, 3])
+    tables = case(mesh, elastic(1000.0, 0.0), fixed, contact, sliding(0.0), load)
     return parse_case(tables, source="layer")
 
 
@@ -356,8 +334,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]
     common = list(cases(given.coarse, given.every, given.only))
     own = {device.name: device.problem() for device in chosen if device.problem is not None}
-    for case in own.values():
-        run(case, NewtonOptions())  # loads its forms
+    for one in own.values():
+        run(one, NewtonOptions())  # loads its forms
     whole = {case.source: run(case, NewtonOptions()) for case in [*common, *own.values()]}
     rows = empty(
         "device", "lines", "failed", "slow", "seconds", "problems that need it", "literature",
