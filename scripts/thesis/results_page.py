@@ -2,23 +2,25 @@
 
 `python3 -m scripts.thesis.results_page [--page docs/results.md] [--out results] [--coarse]
 [--gather] [--only SCRIPT...]`. With --gather nothing is computed: the page is put together from
-the results of earlier runs of `make tables` and `make figures` in the folder of results. Sections
-that are not among --only, or of which nothing is left there, stay as they are on the page.
+the results of earlier runs in the folder of results. Sections that are not among --only, or of
+which nothing is left there, stay as they are on the page. Without --gather also under mpirun.
 """
 
 from __future__ import annotations
 
-import argparse
 import csv
+import importlib
 import re
 import shutil
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from mpi4py import MPI
 
 from contact._compat import versions
-from scripts.thesis.chapters import PAGES, PARTS, Part, add_only, run, wanted
+from scripts.reporting import parser
+from scripts.thesis.chapters import PAGES, PARTS, Part
 from scripts.thesis.summary import table
 
 #: Longest table that is shown; longer ones are in their CSV file.
@@ -173,14 +175,13 @@ def address(part: Part) -> str:
     return f"{part.page}.md#{anchor}"
 
 
-def gather(results: Path, page: Path, only: Sequence[str] | None = None) -> None:
-    """Write the pages, and copy pictures and numbers beside them."""
-    place = page.with_suffix("")
-    said, renewed = sections(page.parent), wanted(only)
+def gather(results: Path, page: Path, only: Sequence[str]) -> None:
+    """Write the pages, and copy pictures and numbers of some scripts beside them."""
+    place, said = page.with_suffix(""), sections(page.parent)
     written = {name: [f"# {title}\n"] for name, title in PAGES.items()}
     for part in PARTS:
         folder = results / part.script
-        if part not in renewed or not folder.is_dir():
+        if part.script not in only or not folder.is_dir():
             nothing = f"## {part.heading}\n\nNot computed yet: `make {part.script}`.\n"
             written[part.page].append(said.get(part.heading, nothing))
             continue
@@ -206,16 +207,26 @@ def overview(results: Path, made: str) -> str:
     return "\n".join(pieces)
 
 
+def run(part: Part, folder: Path, coarse: bool) -> None:
+    """Run a script. Collective."""
+    begin = time.perf_counter()
+    flags = ["--out", str(folder), *["--coarse"] * coarse]
+    importlib.import_module(part.module).main(flags)
+    if MPI.COMM_WORLD.rank == 0:
+        print(f"\n== {part.script}: {time.perf_counter() - begin:.0f} s", flush=True)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Compute all unless told not to, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--page", type=Path, default=Path("docs/results.md"))
-    parser.add_argument("--out", type=Path, default=Path("results"))
-    parser.add_argument("--gather", action="store_true", help="compute nothing")
-    add_only(parser)
-    chosen, others = parser.parse_known_args(arguments)
-    if not chosen.gather:
-        run(wanted(chosen.only), __doc__, ["--out", str(chosen.out), *others])
+    given = parser(__doc__, "")
+    given.add_argument("--page", type=Path, default=Path("docs/results.md"))
+    given.add_argument("--gather", action="store_true", help="compute nothing")
+    names = [part.script for part in PARTS]
+    given.add_argument("--only", nargs="+", choices=names, default=names, metavar="SCRIPT")
+    chosen = given.parse_args(arguments)
+    for part in PARTS:
+        if part.script in chosen.only and not chosen.gather:
+            run(part, chosen.out / part.script, chosen.coarse)
     if MPI.COMM_WORLD.rank == 0:
         gather(chosen.out, chosen.page, chosen.only)
 

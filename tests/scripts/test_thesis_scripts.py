@@ -179,7 +179,7 @@ def test_page(tmp_path):
     report.figure("two", "A figure", figure, {"x": [0, 1], "y": [0]}, link)
     (tmp_path / "results" / "hertz" / "three.csv").write_text("a,b\n1,2\n")
     page = tmp_path / "docs" / "page.md"
-    results_page.gather(tmp_path / "results", page)
+    results_page.main(["--gather", "--out", str(tmp_path / "results"), "--page", str(page)])
     assert "hertz" in page.read_text()
     words = page.with_name("thesis-mechanics.md").read_text()
     assert "| \\|a\\| | b |" in words
