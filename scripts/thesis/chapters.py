@@ -39,11 +39,7 @@ PARTS = (
         page="thesis-mechanics",
     ),
     Part("hertz", "Example 7.1: Hertz's cylinder, and a sphere", page="thesis-mechanics"),
-    Part(
-        "table_7_1",
-        "Example 7.2: Table 7.1, Algorithms 1 and 2",
-        page="thesis-mechanics",
-    ),
+    Part("table_7_1", "Example 7.2: Table 7.1, Algorithms 1 and 2", page="thesis-mechanics"),
     Part(
         "figures_mechanics",
         "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8",
@@ -66,39 +62,15 @@ PARTS = (
         package="studies",
         page="thesis-mechanics",
     ),
-    Part(
-        "pressure_convergence",
-        "Convergence of the contact pressure",
-        package="studies",
-    ),
+    Part("pressure_convergence", "Convergence of the contact pressure", package="studies"),
     Part("curved_foundations", "Curved foundations", package="studies"),
     Part("pressure_on_axis", "Pressure on the axis", package="studies"),
     Part("nonlocal_friction", "Non-local friction at work", package="studies"),
-    Part(
-        "tables_piezo",
-        "Examples 8.1 and 8.2: Tables 8.2 and 8.3",
-        page="thesis-piezo",
-    ),
-    Part(
-        "figures_piezo",
-        "Examples 8.1 and 8.2: Figures 8.2 to 8.7",
-        page="thesis-piezo",
-    ),
-    Part(
-        "tables_compliance",
-        "Examples 8.3 and 8.4: Table 8.4",
-        page="thesis-compliance",
-    ),
-    Part(
-        "stopping_8_3",
-        "Example 8.3: the thesis's two iterations",
-        page="thesis-compliance",
-    ),
-    Part(
-        "figures_compliance",
-        "Examples 8.3 and 8.4: figures",
-        page="thesis-compliance",
-    ),
+    Part("tables_piezo", "Examples 8.1 and 8.2: Tables 8.2 and 8.3", page="thesis-piezo"),
+    Part("figures_piezo", "Examples 8.1 and 8.2: Figures 8.2 to 8.7", page="thesis-piezo"),
+    Part("tables_compliance", "Examples 8.3 and 8.4: Table 8.4", page="thesis-compliance"),
+    Part("stopping_8_3", "Example 8.3: the thesis's two iterations", page="thesis-compliance"),
+    Part("figures_compliance", "Examples 8.3 and 8.4: figures", page="thesis-compliance"),
     Part(
         "limit_theorem",
         "Theorems 6.3 to 6.5: limits of the compliant foundation",
@@ -106,10 +78,6 @@ PARTS = (
         page="thesis-compliance",
     ),
     Part("refinement_8", "Chapter 8 on finer meshes", package="studies"),
-    Part(
-        "sensitivity",
-        "Parameters that the thesis does not print",
-        package="studies",
-    ),
+    Part("sensitivity", "Parameters that the thesis does not print", package="studies"),
     Part("agreement", "Agreement of the methods", package="studies"),
 )
