@@ -26,15 +26,10 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact import solve
+from contact import Body, Contact, Domain, Fixed, Friction, NewtonOptions, solve
 from contact._compat import destinations
-from contact.body.description import Body
 from contact.interface import pairing
-from contact.mesh.domain import Domain, from_mesh
-from contact.methods.options import NewtonOptions
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.friction import Friction
+from contact.mesh.domain import from_mesh
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from contact.refining import prolong

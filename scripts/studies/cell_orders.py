@@ -18,15 +18,12 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact import Domain, Fixed, Sphere
-from contact.body.description import Body
+from contact import Body, Contact, Domain, Fixed, NewtonOptions, Sphere
 from contact.mesh.cells import SHAPES, Shape, rule, shape_of
 from contact.mesh.domain import from_mesh
 from contact.mesh.geometry import geometry_nodes, volume_factors
 from contact.mesh.grid import SIDES, box, rectangle
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
-from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

@@ -12,11 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from contact import load_case, parse_case, solve
-from contact.case.build import build_problem
-from contact.case.file import Case
+from contact import Case, NewtonOptions, build_problem, load_case, parse_case, solve
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated

@@ -13,18 +13,11 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.description import Body
-from contact.case.build import build_problem
-from contact.case.file import parse_case
-from contact.mesh.domain import Domain, revolved
+from contact import Body, Contact, Domain, Fixed, Friction, Motion, Plane, build_problem, parse_case
+from contact.mesh.domain import revolved
 from contact.mesh.geometry import geometry_nodes
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import carry, refined
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.friction import Friction
-from contact.model.obstacle import Plane
-from contact.model.rigid import Motion
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.error_estimate import estimated

@@ -16,12 +16,10 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.body.description import Body
+from contact import Body, Contact, Fixed, Load
 from contact.body.elements import MEAN_DILATATION
 from contact.mesh.grid import box
 from contact.mesh.transfer import carry
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated
 from forms.hencky import Linear, Log

@@ -12,13 +12,8 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.body.description import Body
-from contact.mesh.domain import Domain
+from contact import Body, Contact, Domain, Fixed, GapFunction, Load, Material
 from contact.mesh.grid import box, rectangle
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.material import Material
-from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

@@ -12,11 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.description import Body
-from contact.mesh.domain import Domain
+from contact import Body, Contact, Domain, Fixed
 from contact.mesh.grid import box, rectangle
-from contact.model.body import Fixed
-from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.hencky import Linear

@@ -16,10 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from contact import Case, NotConvergedError, build_problem, load_case
-from contact.model.contact import Contact
-from contact.model.foundation import Layer
-from contact.model.obstacle import GapFunction
+from contact import Case, Contact, GapFunction, Layer, NotConvergedError, build_problem, load_case
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor

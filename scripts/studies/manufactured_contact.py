@@ -12,15 +12,10 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact import Body, Conductor, Contact, Domain, Fixed, Friction, Load, Material
 from contact._compat import geometry_dofmap
-from contact.body.description import Body
-from contact.mesh.domain import Domain, from_mesh
+from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.foundation import Conductor
-from contact.model.friction import Friction
-from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from forms.hencky import Hencky, Linear, stress
 from forms.kinematics import strain

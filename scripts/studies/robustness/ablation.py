@@ -23,13 +23,11 @@ from unittest.mock import patch
 
 import numpy as np
 
-from contact import Solution, load_case, refining, solve
-from contact.case.file import Case, parse_case
+from contact import Case, NewtonOptions, Solution, load_case, parse_case, refining, solve
 from contact.linear import multigrid, schur
 from contact.linear.operator import BlockPreconditioner
 from contact.methods import fallbacks, interior_point, newton_step, safeguards, semismooth
 from contact.methods.newton import Chord, Newton
-from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.residuals import evaluate, undeformed_equilibrium
