@@ -10,19 +10,15 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact import Elastic, Linear, Load, build_problem
+from contact import Body, Case, Contact, Elastic, Fixed, Linear, Load, build_problem, parse_case
 from contact.body import materials
-from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.loads import assembled
-from contact.case.file import Case, parse_case
 from contact.history import BodyState
 from contact.linear.layout import times
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import compiled
 from contact.mesh.grid import rectangle
-from contact.model.body import Fixed
-from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate
 from forms.hencky import energy_density

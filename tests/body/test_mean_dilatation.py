@@ -7,16 +7,13 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact import parse_case, solve
-from contact.body.description import Body
+from contact import Body, InputError, NewtonOptions, parse_case, solve
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
-from contact.errors import InputError
 from contact.history import BodyState
 from contact.mesh.domain import revolved
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
 from contact.results.fields import DerivedFields
 from forms.elasticity import Anisotropic, isotropic
 from forms.hencky import Linear, Log

@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Linear, solve
-from contact.case.file import load_case, parse_case, to_toml
-from contact.errors import InputError
+from contact import InputError, Linear, Sphere, load_case, parse_case, solve
+from contact.case.file import to_toml
 from contact.mesh.grid import rectangle
 from contact.model.formula import Expression
 from contact.model.friction import SlipLaw
-from contact.model.obstacle import Sphere
 from forms.laws import ConstantCoefficient
 from tests.problems.bar import BAR, changed
 from tests.problems.messages import message_of

@@ -6,11 +6,8 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.errors import InputError
+from contact import Contact, Friction, GapFunction, InputError, Plane, Sphere
 from contact.mesh.grid import box, rectangle
-from contact.model.contact import Contact
-from contact.model.friction import Friction
-from contact.model.obstacle import GapFunction, Plane, Sphere
 from contact.problem.problem import ContactProblem
 from contact.thesis.penalty import PenalisedLaw, Regularisation
 from contact.thesis.uzawa import augmentation

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body
+from contact import Body, Contact, Fixed, GapFunction, Motion, Sphere
 from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.obstacle import GapFunction, Sphere
-from contact.model.rigid import Motion
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.blocks import Blocks

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import parse_case, solve
-from contact.case.build import build_problem
-from contact.errors import InputError
+from contact import InputError, build_problem, parse_case, solve
 from contact.interface.grouping import GroupedConductivity
 from contact.results.contact_nodes import contact_table
 from forms.laws import PerfectConductivity, ShiftedConductivity

@@ -6,12 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from contact.body.description import Body
+from contact import Body, Contact, Fixed, Friction
 from contact.interface.friction import Smoothing
 from contact.mesh.grid import rectangle
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.case.build import build_problem
-from contact.errors import InputError
+from contact import InputError, build_problem, solve, write_outputs
 from contact.history import BodyState
 from contact.io.checkpoint import read_checkpoint
 from contact.problem.residuals import evaluate
 from contact.results.fields import DerivedFields
 from contact.results.options import OutputOptions
-from contact.solving import solve
-from contact.writing import write_outputs
 from tests.problems.written import block, electric, written
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from contact import sensitivity
+from contact import sensitivity, solve, write_outputs
 from contact.case.file import number_at, with_number
 from contact.io.tables import files_help
 from contact.plot.run import read_grid
@@ -25,8 +25,6 @@ from contact.results.quantities import (
     Quantity,
     quantities,
 )
-from contact.solving import solve
-from contact.writing import write_outputs
 from scripts.output_page import PAGE, page
 from tests.problems.rigid import column, indented, plate
 from tests.problems.written import block, electric, rows_of

@@ -11,15 +11,12 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.body.description import Body
+from contact import Body, Contact, Fixed, Load, Plane
 from contact.linear.layout import options
 from contact.linear.multigrid import AGGREGATES, DEFAULTS, Aggregation, masked_motions, tentative
 from contact.linear.operator import SparseOperator
 from contact.linear.petsc import refine
 from contact.mesh.grid import box
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.obstacle import Plane
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems import mechanics

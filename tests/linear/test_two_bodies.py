@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, parse_case, solve
-from contact.body.description import Body
+from contact import Body, Contact, Fixed, Friction, Load, build_problem, parse_case, solve
 from contact.linear import multigrid
 from contact.linear.operator import SparseOperator
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

@@ -9,15 +9,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body
-from contact.mesh.domain import Domain
-from contact.mesh.reader import from_file
+from contact import Body, Contact, Domain, Fixed, GapFunction, Material, NewtonOptions, from_file
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.material import Material
-from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.mesh.test_input_files import cube

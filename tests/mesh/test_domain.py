@@ -13,10 +13,8 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.case.build import build_problem
-from contact.case.file import parse_case
+from contact import InputError, build_problem, parse_case
 from contact.case.mesh import Mesh as MeshSection
-from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.mesh.entities import connected_components
 from contact.mesh.grid import Piece, box, rectangle

@@ -4,16 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import parse_case, solve
-from contact.body.description import Body
+from contact import Body, Fixed, InputError, Load, Material, build_problem, parse_case, solve
 from contact.body.equilibrium import BodyEquilibrium
-from contact.case.build import build_problem
-from contact.errors import InputError
 from contact.history import BodyState
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
-from contact.model.body import Fixed, Load
-from contact.model.material import Material
 from contact.results.fields import DerivedFields
 from forms.hencky import Linear
 from forms.piezo import hexagonal

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, solve
+from contact import Friction, NewtonOptions, build_problem, solve
 from contact.linear.operator import Counters
 from contact.methods.newton import Chord, Newton
-from contact.methods.options import NewtonOptions
-from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from forms.hencky import Log

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, solve
+from contact import FixedPointOptions, Friction, NewtonOptions, build_problem, solve
 from contact.methods.fallbacks import FIRST_PART, continuation
 from contact.methods.newton import Newton
-from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.safeguards import ConductivityDerivative
-from contact.model.friction import Friction
 from contact.thesis.fixed_point import FixedPoint
 from forms.laws import SlipCoefficient
 from scripts.studies.robustness.problems import problems

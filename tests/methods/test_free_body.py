@@ -12,13 +12,10 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.optimize import minimize
 
-from contact import build_problem
-from contact.case.file import parse_case
+from contact import FixedPointOptions, NewtonOptions, build_problem, parse_case, solve
 from contact.methods.newton import Newton
-from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.unconstrained_modes import UnconstrainedModes, _least_distance
 from contact.problem.rigid_modes import groups
-from contact.solving import solve
 from contact.thesis.fixed_point import FixedPoint
 from scripts.studies.robustness.bodies import Bodies
 from scripts.studies.robustness.check import write_msh

@@ -12,21 +12,17 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.case.build import build_problem
-from contact.case.file import parse_case
+from contact import Friction, InputError, NewtonOptions, build_problem, parse_case, solve
 from contact.cli.main import main
-from contact.errors import InputError, SingularError
+from contact.errors import SingularError
 from contact.interface.complementarity import project_disc, project_half_line
 from contact.interface.foundation import NormalGraph
 from contact.methods.interior_point import Cones, InteriorPoint, interior_point
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome, Record
 from contact.methods.signals import Interrupted
-from contact.model.friction import Friction
 from contact.model.rigid import rigid_motions
 from contact.problem.residuals import Residuals, evaluate
-from contact.solving import solve
 from contact.thesis.acceleration import ResidualMinimiser
 from contact.thesis.uzawa import FrozenProblem, disc_derivative
 from forms.laws import Compliance, ConstantCoefficient

@@ -10,15 +10,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.case.file import parse_case
-from contact.mesh.domain import Domain, from_mesh
+from contact import Domain, FixedPointOptions, NewtonOptions, build_problem, parse_case, solve
+from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods import fallbacks, newton
-from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
 from contact.problem.residuals import evaluate
 from contact.results.solution import Solution
-from contact.solving import build_problem, solve
 from contact.thesis.fixed_point import FixedPoint
 from contact.thesis.softest_mode import softest_mode
 from tests.problems.everywhere import agree

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, parse_case
-from contact.body.description import Body
-from contact.methods.options import FixedPointOptions
-from contact.model.contact import Contact
-from contact.model.friction import Friction
+from contact import Body, Contact, FixedPointOptions, Friction, build_problem, parse_case
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.thesis.fixed_point import FixedPoint

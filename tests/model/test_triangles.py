@@ -9,14 +9,8 @@ import pytest
 from dolfinx import mesh
 from mpi4py import MPI
 
-from contact.body.description import Body
-from contact.errors import InputError
+from contact import Body, Contact, Fixed, InputError, Triangles
 from contact.mesh.domain import from_mesh
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.obstacle import (
-    Triangles,
-)
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant

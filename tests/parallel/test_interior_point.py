@@ -2,9 +2,7 @@
 
 import pytest
 
-from contact.case.file import parse_case
-from contact.methods.options import NewtonOptions
-from contact.solving import solve
+from contact import NewtonOptions, parse_case, solve
 from tests.problems.everywhere import agree
 
 pytestmark = pytest.mark.parallel(alone=False)

@@ -5,14 +5,11 @@ import pytest
 from dolfinx import fem, graph, mesh
 from mpi4py import MPI
 
+from contact import Body, Contact, Fixed, Friction, Load
 from contact._compat import geometry_dofmap
-from contact.body.description import Body
 from contact.interface.friction import Smoothing
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from forms.hencky import Log
 from forms.laws import SlipCoefficient

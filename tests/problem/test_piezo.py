@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.errors import InputError
+from contact import FixedPointOptions, InputError, Material, NewtonOptions
 from contact.methods.newton import Newton
-from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.model.material import Material
 from contact.results.resultants import charge_balance
 from contact.thesis.fixed_point import FixedPoint
 from forms.laws import (

@@ -4,16 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import parse_case, solve
+from contact import Body, Contact, Fixed, GapFunction, InputError, build_problem, parse_case, solve
 from contact._compat import geometry_dofmap
-from contact.body.description import Body
-from contact.case.build import build_problem
 from contact.cli.check import expectations
-from contact.errors import InputError
 from contact.interface.pairing import find_pair
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.blocks import Blocks

@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body
-from contact.case.file import parse_case
+from contact import Body, Contact, Fixed, Friction, Load, parse_case
 from contact.mesh.grid import rectangle
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.friction import Friction
 from contact.problem import residuals
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate, residual_forces

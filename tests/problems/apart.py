@@ -6,12 +6,9 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact import Body, Contact, Domain, Fixed, Friction, Load
 from contact._compat import geometry_dofmap
-from contact.body.description import Body
-from contact.mesh.domain import Domain, from_mesh
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.friction import Friction
+from contact.mesh.domain import from_mesh
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

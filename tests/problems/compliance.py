@@ -6,11 +6,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from contact.body.description import Body
+from contact import Body, Conductor, Contact, Fixed, Layer, Load
 from contact.mesh.grid import box, rectangle
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.foundation import Conductor, Layer
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import (

@@ -6,12 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.description import Body
+from contact import Body, Conductor, Contact, Fixed, Friction, Load
 from contact.mesh.grid import box, rectangle
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.foundation import Conductor
-from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

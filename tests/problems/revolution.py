@@ -10,15 +10,10 @@ import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact import Body, Contact, Domain, Fixed, Friction, GapFunction, Load, Material
 from contact._compat import geometry_dofmap
-from contact.body.description import Body
-from contact.mesh.domain import Domain, from_mesh, revolved
+from contact.mesh.domain import from_mesh, revolved
 from contact.mesh.grid import rectangle
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.friction import Friction
-from contact.model.material import Material
-from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import ConstantCoefficient

@@ -3,15 +3,10 @@
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.description import Body
+from contact import Body, Contact, Fixed, FixedPointOptions, Friction, GapFunction, NewtonOptions
 from contact.mesh.grid import rectangle
 from contact.methods.load_stepping import LoadStepping
 from contact.methods.method import METHODS
-from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.friction import Friction
-from contact.model.obstacle import GapFunction
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from forms.hencky import Linear

@@ -7,12 +7,10 @@ import pytest
 from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
 
-from contact import load_case, parse_case, solve
-from contact.case.build import build_problem
+from contact import build_problem, load_case, parse_case, solve, write_outputs
 from contact.io.fields import body_share, gathered, regions_of
 from contact.plot.run import read_grid
 from contact.results.fields import DerivedFields
-from contact.writing import write_outputs
 from forms.kinematics import principal_values
 from scripts.cases import CASES
 from tests.forms.test_elasticity import numbers

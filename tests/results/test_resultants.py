@@ -11,11 +11,9 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact import Body, Contact, Linear, Load, Problem
-from contact.errors import InputError
+from contact import Body, Contact, InputError, Linear, Load, Problem, solve
 from contact.io.fields import body_share
 from contact.mesh.grid import rectangle
-from contact.solving import solve
 from tests.problems.written import block, electric, written
 
 PRESSURE = 0.1

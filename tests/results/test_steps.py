@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import parse_case, solve, write_outputs
-from contact.case.build import build_problem
+from contact import build_problem, evolve, parse_case, solve, write_outputs
 from contact.plot.run import read_grid
 from contact.results.resultants import rigid_columns
-from contact.solving import evolve
 from tests.problems.bar import changed
 from tests.problems.mechanics import close
 from tests.problems.piezo import COUPLING, PERMITTIVITY

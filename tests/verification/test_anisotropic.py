@@ -4,15 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import solve
-from contact.body.description import Body
+from contact import Body, Contact, Fixed, Friction, NewtonOptions, Plane, solve
 from contact.library.materials import find
 from contact.mesh.grid import box, rectangle
-from contact.methods.options import NewtonOptions
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.friction import Friction
-from contact.model.obstacle import Plane
 from contact.problem.problem import ContactProblem
 from forms.crystal import PLANE, about_z
 from forms.elasticity import Anisotropic, isotropic

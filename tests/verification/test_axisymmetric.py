@@ -9,10 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 import contact
-from contact import solve
-from contact.body.description import Body
-from contact.case.file import parse_case
-from contact.errors import InputError
+from contact import Body, Contact, Fixed, InputError, NewtonOptions, parse_case, solve
 from contact.history import BodyState
 from contact.interface.friction import Smoothing
 from contact.mesh.domain import revolved
@@ -20,9 +17,6 @@ from contact.mesh.geometry import area, volume
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
-from contact.model.body import Fixed
-from contact.model.contact import Contact
 from contact.problem.checks import check_rigid_modes
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields

@@ -9,10 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from contact import Solution, build_problem, load_case, solve
+from contact import Friction, Layer, Solution, build_problem, load_case, solve
 from contact.model.formula import Expression
-from contact.model.foundation import Layer
-from contact.model.friction import Friction
 from contact.problem.problem import ContactProblem
 from contact.results.contact_nodes import contact_table
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient

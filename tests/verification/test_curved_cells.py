@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body
-from contact.errors import InputError
+from contact import Body, Contact, InputError, NewtonOptions, Sphere
 from contact.mesh.cells import SHAPES, rule, shape_of
 from contact.mesh.geometry import (
     area,
@@ -25,9 +24,6 @@ from contact.mesh.geometry import (
 )
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
-from contact.model.contact import Contact
-from contact.model.obstacle import Sphere
 from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated
 from scripts.force_balance import force_balance

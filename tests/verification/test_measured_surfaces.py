@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import parse_case, solve
-from contact.errors import InputError
-from contact.model.obstacle import Heights
+from contact import Heights, InputError, parse_case, solve
 
 COMM = MPI.COMM_WORLD
 YOUNG, POISSON = 10.0, 0.3

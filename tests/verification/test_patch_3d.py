@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body
+from contact import Body, Contact, Fixed
 from contact.mesh.grid import rectangle
-from contact.model.body import Fixed
-from contact.model.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body
+from contact import Body, Contact, Fixed, Friction, Load, Plane
 from contact.mesh.domain import revolved
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.friction import Friction
-from contact.model.obstacle import Plane
 from contact.problem.problem import ContactProblem
 from contact.results.fields import DerivedFields
 from forms.hencky import Linear, Log

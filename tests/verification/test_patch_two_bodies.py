@@ -10,15 +10,9 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial import cKDTree
 
-from contact.body.description import Body
+from contact import Body, Contact, Domain, Fixed, Friction, GapFunction, Load, Material, from_file
 from contact.mesh.cells import Shape
-from contact.mesh.domain import Domain, revolved
-from contact.mesh.reader import from_file
-from contact.model.body import Fixed, Load
-from contact.model.contact import Contact
-from contact.model.friction import Friction
-from contact.model.material import Material
-from contact.model.obstacle import GapFunction
+from contact.mesh.domain import revolved
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.fields import DerivedFields

@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body
-from contact.errors import InputError
-from contact.mesh.domain import Domain, from_mesh
+from contact import Body, Contact, Domain, Fixed, InputError, Motion, Plane, Rigid, solve
+from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
-from contact.model.body import Fixed
-from contact.model.contact import Contact
-from contact.model.obstacle import Plane
-from contact.model.rigid import Motion, Rigid
 from contact.problem.problem import ContactProblem
 from contact.results.resultants import movements
-from contact.solving import solve
 from forms.hencky import Linear
 from scripts.studies.indentation_in_space import punch, rotation
 from tests.problems.mechanics import constant, newton
