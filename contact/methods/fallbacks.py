@@ -87,14 +87,11 @@ def solve_contact(
 
     Parameters
     ----------
-    newton
-        The method on the problem.
-    begin, secant_at
-        Initial guess, and unknowns of the first secant.
-    condensed
-        Solver of the same problem on the condensed body; None for none.
-    condensation_pays
-        Whether that is the first stage, or the last one.
+    newton, begin, secant_at
+        The method on the problem, the initial guess, and unknowns of the first secant.
+    condensed, condensation_pays
+        Solver of the same problem on the condensed body, if any, and whether that is the first
+        stage, or the last one.
     """
     if condensed is not None and condensation_pays:
         state, outcome = condensed(begin, secant_at)

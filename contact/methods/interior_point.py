@@ -333,10 +333,7 @@ def interior_point(
             jump
         ):
             break
-        # Pressures that miss a share of the loads may be larger by it, and so friction; those that
-        # bear less than half of the loads prove nothing.
-        missing = modes.missing_pressure(interface.pressure(jump, state.forces))
-        if missing <= 1 and modes.overloaded((1 + missing) * bound):
+        if modes.overloaded(bound, interface.pressure(jump, state.forces)):
             outcome = replace(outcome, residuals=evaluate(problem, state))
             last, outcome = state, replace(outcome, ended=OVERLOADED, overloaded=True)
             break

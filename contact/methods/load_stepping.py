@@ -49,12 +49,8 @@ class LoadStepping:
     def steps(self, times: Sequence[float], begin: float = 0.0) -> Iterator[tuple[State, Outcome]]:
         """Yield state and outcome of each step; a step that fails is the last one. Collective.
 
-        Parameters
-        ----------
-        times
-            Ends of the steps, increasing; those before the time of the start are left out.
-        begin
-            Time of the reference configuration.
+        The ends of the steps increase, and those before the time of the start are left out; `begin`
+        is the time of the reference configuration.
         """
         for k, end in enumerate(times):
             whole = end - (times[k - 1] if k > 0 else begin)
@@ -108,14 +104,8 @@ def predicted(
 
     Where the loads turn round the last solution is taken. The material is then linearised there,
     with the change of the prescribed values as an increment: set at once, they would strain the
-    elements beside them alone.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    ends
-        The last solution, behind the one before it if there is one, with their problems.
+    elements beside them alone. `ends`: the last solution, behind the one before it if there is one,
+    with their problems.
     """
     last, body, factor = ends[-1][1], problem.body, 0.0
     x = last.x

@@ -154,15 +154,8 @@ class NewtonStep:
     ) -> State | None:
         """Return the next iterate; None if the matrix is singular there. Collective.
 
-        Parameters
-        ----------
-        problem, iterate
-            The problem, and the iterate with its residuals.
-        tangent, secant_at
-            Whether the material is linearised by its tangent, else by its secant (Kacanov), and the
-            unknowns of the secant modulus; None for those of the iterate.
-        exact
-            Whether iterative solvers go to their own tolerance, without the forcing term.
+        The material is linearised by its tangent, or by its secant (Kacanov) at given unknowns,
+        those of the iterate by default. `exact`: iterative solvers go to their own tolerance.
 
         Raises
         ------

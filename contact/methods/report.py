@@ -186,19 +186,10 @@ class Best(Generic[T]):
 
 @dataclass
 class Stagnation:
-    """Stagnation limit: number of steps without progress.
+    """Stagnation limit: number of steps without progress, a ratio to the reference residual.
 
-    Attributes
-    ----------
-    limit
-        Steps without progress at which the iteration is given up.
-    progress
-        Ratio to the reference residual that is progress.
-    cumulative
-        Whether the reference is the least residual at the last progress, so that a slow decrease
-        over several steps counts; else the least residual of all steps before.
-    best
-        Least residual so far.
+    The reference is the least residual of all steps before; where it is cumulative that at the last
+    progress, so that a slow decrease over several steps counts. `best` is the least residual.
     """
 
     limit: int

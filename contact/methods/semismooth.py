@@ -88,24 +88,20 @@ class SemismoothNewton:
         exact: bool = False,
         steps: int | None = None,
     ) -> tuple[State, Outcome]:
-        """Iterate until the residuals converge or stagnate. Collective.
+        """Iterate from an initial guess until the residuals converge or stagnate. Collective.
 
         Parameters
         ----------
-        state
-            Initial guess.
-        secant_at
-            Unknowns of the first secant; those of the state by default.
+        state, secant_at
+            Initial guess, and unknowns of the first secant; those of the state by default.
         note
             Note of the steps in their records.
-        stagnation_limit
-            Stagnation limit; that of the options by default.
+        stagnation_limit, steps
+            Stagnation limit, that of the options by default; most steps, those left by default.
         give_up
             Whether to end after a first step from zero that shows c to overestimate the stiffness.
         exact
             Whether iterative solvers go to their own tolerance, without a forcing term.
-        steps
-            Most steps; those left of the limit by default.
         """
         problem, options, step = self.problem, self.options, self.step
         linear = problem.body.linear

@@ -47,18 +47,9 @@ class Terminated(KeyboardInterrupt):
 
 @dataclass
 class Stop:
-    """A monitor that raises `Interrupted` on all ranks after a signal on any.
+    """A monitor that calls another, and raises `Interrupted` on all ranks after a signal on any.
 
-    Attributes
-    ----------
-    comm
-        Communicator of the problem.
-    monitor
-        Called after each outer iteration first.
-    caught
-        Signals on this rank.
-    raised
-        Whether `Interrupted` has been raised for them.
+    `caught` are the signals on this rank, `raised` tells whether it has been raised for them.
     """
 
     comm: MPI.Intracomm
@@ -88,12 +79,8 @@ class Stop:
 class RunEnding:
     """Handler of signals outside of a solve: ends the run by an exception.
 
-    Attributes
-    ----------
-    caught
-        Signals so far, for the next solve where a library swallows the exception.
-    echo_until
-        End of the time in which signals are echoes (monotonic seconds).
+    `caught` are the signals so far, for the next solve where a library swallows the exception;
+    before `echo_until` (monotonic seconds) signals are echoes.
     """
 
     caught: list[int] = field(default_factory=list)

@@ -95,17 +95,23 @@ class UnconstrainedModes:
         grams = [group.constraints(friction, touching) for group in groups(self.problem)]
         return all(null_space(gram).size == 0 for gram in grams)
 
-    def overloaded(self, bound: Array) -> bool:
-        """Tell whether the loads are more than friction bounds (n,) balance. Collective."""
-        friction, time = self.problem.nodes.weight * bound, self.problem.time
+    def overloaded(self, bound: Array, pressure: Array | None = None) -> bool:
+        """Tell whether the loads are more than friction bounds (n,) balance. Collective.
+
+        Of pressures that miss a share of the loads, which may be larger by it, and so friction;
+        those that bear less than half of the loads prove nothing.
+        """
+        weight, time, missing = self.problem.nodes.weight, self.problem.time, 0.0
+        if pressure is not None:
+            shares = [
+                missing_pressure(group, time, weight * pressure) for group in self._unsupported
+            ]
+            missing = max(shares, default=0.0)
+        if not missing <= 1:
+            return False
+        friction = (1 + missing) * weight * bound
         found = [sliding_mode(group, time, friction) for group in self._unsupported]
         return any(mode is not None for mode in found)
-
-    def missing_pressure(self, pressure: Array) -> float:
-        """Return the share by which pressures (n,) miss the loads. Collective."""
-        forces, time = self.problem.nodes.weight * pressure, self.problem.time
-        found = [missing_pressure(group, time, forces) for group in self._unsupported]
-        return max(found, default=0.0)
 
     @cached_property
     def _unsupported(self) -> list[Group]:

@@ -436,8 +436,8 @@ class UnilateralSupport:
 
         # On rigid parts in place of the layers first: no larger limit helps there.
         found = released(np.where(self.normal, np.inf, self.bound), 0.0)
-        saturated = found is None
-        if found is None:
+        saturated = found is None and bool(np.isfinite(self.bound[self.normal]).any())
+        if saturated:
             # With the whole layer at its limit the position of a body is undetermined.
             found = released(self.bound, 2 * BALANCED)
         if found is None:

@@ -72,17 +72,17 @@ def conditioning(scales: Scales, r: float) -> str:
 def softest_mode(problem: ContactProblem, operator: Operator, state: State, shift: float) -> float:
     """Return the least stiffness of normal displacements, but for rigid motions. Collective.
 
-    With that of a layer: 1/(largest Ritz value of the compliance in L2(Gamma_3)) - shift, without
-    rigid motions that nothing holds; `shift` is added to all stiffnesses (stress/length).
+    With that of a layer at its first touch: 1/(largest Ritz value of the compliance in
+    L2(Gamma_3)) - shift, without rigid motions that nothing holds; `shift` is added to all
+    stiffnesses (stress/length).
     """
     interface, nodes = problem.interface, problem.interface.nodes
-    blocks, law = augmentation(nodes, shift, False), interface.foundation
-    if law.active:
-        jump = nodes.jump(state.x)
-        blocks += law.charge_block(jump, interface.pressure(jump, state.forces))
-    if (graph := law.normal_graph(nodes.jump(state.x))) is not None:
-        layer = graph.stiffness * law.largest_secant(interface.size)
+    law, jump = interface.foundation, nodes.jump(state.x)
+    blocks, graph = augmentation(nodes, shift, False), law.normal_graph(jump)
+    if graph is not None:
+        layer = graph.layer_slope(graph.rho_0)
         blocks += layer[:, None, None] * augmentation(nodes, 1.0, False)
+    blocks += law.charge_block(jump, interface.pressure(jump, state.forces))
     weighted = interface.weighted(blocks, state.x)
     operator.update("secant", state, weighted)
 
