@@ -16,7 +16,7 @@ from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.supports import APART
 from contact.errors import InputError
-from contact.interface.mortar.coupling import Coupling, couple
+from contact.interface.mortar.coupling import LEAST_COVERED, Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, Geometry, contact_directions
@@ -27,6 +27,9 @@ from contact.model.obstacle import Obstacle
 from contact.model.obstacle.shapes import measured
 from contact.tolerances import ROUNDING, TOUCHING
 from contact.typing import Array
+
+#: Share of a facet that faces the master, if its nodes are not beyond the rim of that.
+FACES = 0.9
 
 #: Share of the mesh's extent up to which facets are taken to face each other.
 REACH = 0.25
@@ -157,10 +160,19 @@ def find_pair(
     master = surface_of(body.domain, body.space, against)
     _refuse_shared(slave, master, label)
     reach = REACH * body.domain.size
+    expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     found = couple(slave, master, reach)
+    beyond, alone = _beyond_rim(slave, found)
     no_multiplier: NDArray[np.int64] = np.empty(0, dtype=np.int64)
     while True:
+        _, local = owned_among(body.layout.index_map, found.nodes)
+        points = body.space.tabulate_dof_coordinates()[local, : body.dim]
+        _, added = measured(distance, points, found.normal, body.comm, key)
+        check_gap(body.domain, added, key)
+        least = body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
         lost = _without_multiplier(body, slave, found, label, part if friction else None)
+        if press or least < 0:
+            lost = np.union1d(lost, beyond)
         new = np.setdiff1d(lost, no_multiplier)
         if body.comm.allreduce(new.size, op=MPI.SUM) == 0:
             break
@@ -176,17 +188,13 @@ def find_pair(
             "pair",
         )
     _check_apart(body, found, slave.owners, label)
-    expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
-    _, local = owned_among(body.layout.index_map, found.nodes)
-    points = body.space.tabulate_dof_coordinates()[local, : body.dim]
-    _, added = measured(distance, points, found.normal, body.comm, key)
-    check_gap(body.domain, added, key)
     rounding = TOUCHING * body.domain.size
     depth, resolved = found.interference(slave.owners, added)
-    least = body.comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
     depth = max(depth, inside - max(least, 0.0))
     # Sides that do not face each other see nothing of an overlap.
     resolved &= inside <= 2 * found.depth
+    coarse = bool((alone & (found.depths > least + rounding)).any())
+    resolved &= not body.comm.allreduce(coarse, op=MPI.LOR)
     drawn = max(found.depth, inside) > rounding
     if depth > rounding and ((drawn and not press) or not resolved):
         if drawn and _connected(body, found, slave.owners):
@@ -223,6 +231,21 @@ def _without_multiplier(
         _check_rim(body, slave, rough, [coupling.nodes[lost] for lost in one_sided.T], label)
         stuck = np.union1d(stuck, coupling.nodes[one_sided.any(axis=1)])
     return owners.among(stuck, slave.nodes.ravel())
+
+
+def _beyond_rim(slave: Surface, coupling: Coupling) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return nodes of this rank and its facets beyond the rim of the master. Collective.
+
+    They have neighbours that are not; also which facets have none of these, shape (f,).
+    """
+    # Their jump is extrapolated, and closing it would press on the master beyond its rim.
+    owners, faces = slave.owners, coupling.faces > FACES
+    within = owners.requested(slave.nodes[faces].ravel())
+    known = owners.values(slave.nodes.ravel(), lambda given: np.isin(given, within))
+    known = known.reshape(slave.nodes.shape)
+    partly, beside = ~faces & (coupling.faces > LEAST_COVERED), known.any(axis=1)
+    beyond = owners.requested(slave.nodes[partly & beside][~known[partly & beside]])
+    return owners.among(beyond, slave.nodes.ravel()), partly & ~beside
 
 
 def _check_apart(body: BodyEquilibrium, coupling: Coupling, owners: Owners, label: str) -> None:

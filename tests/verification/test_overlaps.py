@@ -368,6 +368,32 @@ def test_a_corner_is_pressed_out_from_its_side(degree):
     assert force == pytest.approx(depth / compliance, rel=1e-9 if degree == 1 else 1e-5)
 
 
+@pytest.mark.parallel
+@pytest.mark.parametrize("cell", [*PLANE, pytest.param("hexahedron", marks=pytest.mark.slow)])
+def test_a_press_beyond_the_end_of_one_side(cell):
+    """Either side as slave has the force of a fine mesh: no node beyond the rim bears any."""
+    d = 2 if cell in PLANE else 3
+
+    def force(counts, degree, backwards, end=0.62):
+        domain = layers(COMM, cell, 1, "flat", 0.002, counts=counts)
+        x, second = domain.mesh.geometry.x, overlapping.of_layer(domain, 1)
+        x[second, 1] = 0.12 + (end - 0.12) * x[second, 1]
+        held = [Fixed(part, [0.0] * d) for part in ("inner0", "outer1", "above")]
+        given = Body(Linear(YOUNG, POISSON), held)
+        on, against = ("inner1", "outer0") if backwards else ("outer0", "inner1")
+        contact = Contact(on, against=against, press=True)
+        solution = solve(Problem(domain, given, contact, degree=degree))
+        assert solution.converged
+        return abs(solution.contact_force[0])
+
+    exact = force((48, 32) if d == 2 else (12, 10), 2, True)
+    for counts, backwards in (((7, 4), False), ((7, 4), True), ((9, 5), False)):
+        assert force(counts, 2, backwards) == pytest.approx(exact, rel=0.07)
+    # No facet of a coarse side is within the other one.
+    with pytest.raises(InputError, match=r"shorter facets of on.*\[overlap\]"):
+        force((2, 8), 2, False, 0.4)
+
+
 def side_of(points, first):
     """Return a chain of straight facets along points from left to right, its left side outside."""
     corners = np.stack([points[:-1], points[1:]], axis=1)

@@ -287,6 +287,8 @@ class Coupling(JumpRows):
         Global numbers of the nodes of the functions Phi' on the facets of this rank, shape (f, k).
     depths
         Of the deepest overlap on each of these; below 0 the least distance, shape (f,) (length).
+    faces
+        Share of each of these that faces the master, shape (f,).
     """
 
     weight: Array
@@ -298,6 +300,7 @@ class Coupling(JumpRows):
     depth: float
     dual_nodes: NDArray[np.int64]
     depths: Array
+    faces: Array
 
     def interference(self, owners: Owners, added: Array) -> tuple[float, bool]:
         """Return the largest depth of the overlap less an added gap. Collective.
@@ -417,4 +420,5 @@ def _assembled(
     jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
     depth = owners.comm.allreduce(float(parts.depths.max(initial=0.0)), op=MPI.MAX)
     state = weight, normal, gap, positive_part, curved_gap, covered[kept]
-    return Coupling(*jumps, *state, depth, parts.dual_nodes, parts.depths)
+    faces_master = parts.D.sum(axis=(1, 2)) / parts.whole.sum(axis=1)
+    return Coupling(*jumps, *state, depth, parts.dual_nodes, parts.depths, faces_master)
