@@ -26,7 +26,8 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.results.quantities import named_functionals
 from scripts.reporting import Report, append, empty, options, solved
-from scripts.studies.mindlin import MU, PRESS, RADIUS, YOUNG, write_mesh
+from scripts.studies import mindlin
+from scripts.studies.mindlin import MODULUS, MU, POISSON, RADIUS, YOUNG
 
 #: Q/(mu P), how near the first runs come to it, and the steps of the last run: so many, so far
 #: about it that the stick zone loses one or more rings of nodes.
@@ -34,9 +35,6 @@ SHARE, NEAR, STEPS, ABOUT = 2 / 3, 1e-2, 9, 0.06
 
 #: First step of the shear, in which all stick, over the last.
 FIRST = 1e-3
-
-#: Half width of the contact of the cylinders, their modulus, Poisson's ratio, and their approach.
-WIDTH, MODULUS, POISSON, APPROACH = 0.52, 1000.0, 0.3, 0.1
 
 MU_KEY, WAY_KEY = "friction.mu", "fixed.0.displacement.0"
 
@@ -75,60 +73,17 @@ def cylinder_values(x: float, mu: float = MU) -> Found:
     return Found(x, way, x + np.log(1 - x), y, x / (2 * mu * y))
 
 
-def case_of_balls(path: Path, elements: float, sectors: int) -> dict[str, Any]:
-    """Return half of two half balls, and write their mesh."""
-    write_mesh(path, np.sqrt(RADIUS / 2 * PRESS), elements, sectors)
-    return {
-        "mesh": {"file": str(path)},
-        "material": {"young": YOUNG, "poisson": 0.0},
-        "fixed": [
-            {"on": "upper_cut", "displacement": [1.0, 0.0, "free"], "amplitude": "shear"},
-            {"on": "upper_cut", "displacement": ["free", "free", -PRESS], "amplitude": "press"},
-            {"on": "symmetry", "displacement": ["free", 0.0, "free"]},
-            {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
-        ],
-        "contact": {"on": "upper_round", "against": "lower_round"},
-    }
-
-
-def case_of_cylinders(elements: float, degree: int) -> dict[str, Any]:
-    """Return two half cylinders."""
-    sizes = {"contact_size": WIDTH / elements, "contact_width": 1.3 * WIDTH}
-    return {
-        "mesh": {"generator": "two_half_cylinders", **sizes},
-        "space": {"degree": degree},
-        "material": {"young": MODULUS, "poisson": POISSON},
-        "fixed": [
-            {"on": "upper_cut", "displacement": [1.0, "free"], "amplitude": "shear"},
-            {"on": "upper_cut", "displacement": ["free", -APPROACH], "amplitude": "press"},
-            {"on": "lower_cut", "displacement": [0.0, 0.0]},
-        ],
-        "contact": {"on": "upper_arc", "against": "lower_arc"},
-    }
-
-
 def sheared(case: dict[str, Any], ways: Sequence[float]) -> Solution:
     """Press two bodies on each other, and move one along, first by a little."""
     case["fixed"][0]["displacement"][0] = ways[-1]
     shares = [0.0, 0.0, FIRST, *(way / ways[-1] for way in ways)]
     times = [float(k) for k in range(len(shares))]
-    return solved(
-        parse_case(
-            case
-            | {
-                "friction": {"law": "coulomb", "mu": MU},
-                "solver": {"tolerance": 1e-11},
-                "evolution": {
-                    "times": times,
-                    "steps": [1] * (len(times) - 1),
-                    "amplitudes": {
-                        "press": {"time": [0.0, 1.0, times[-1]], "value": [0.0, 1.0, 1.0]},
-                        "shear": {"time": times, "value": shares},
-                    },
-                },
-            }
-        )
-    )
+    amplitudes = {
+        "press": {"time": [0.0, 1.0, times[-1]], "value": [0.0, 1.0, 1.0]},
+        "shear": {"time": times, "value": shares},
+    }
+    steps = {"times": times, "steps": [1] * (len(times) - 1), "amplitudes": amplitudes}
+    return solved(parse_case({**case, "solver": {"tolerance": 1e-11}, "evolution": steps}))
 
 
 def stick(problem: ContactProblem, state: State) -> float:
@@ -189,7 +144,7 @@ def balls(elements: float, sectors: int) -> tuple[Found, float]:
         return float(8 / YOUNG * 2 * half / width)
 
     with TemporaryDirectory() as folder:
-        case = case_of_balls(Path(folder) / "balls.msh", elements, sectors)
+        case = mindlin.balls(Path(folder) / "balls.msh", elements, sectors, 1.0)
         # Of half spaces that stick: k Q/(8 a).
         return run(case, 0.022, unit, ball_values, 1 / 8)
 
@@ -201,7 +156,7 @@ def cylinders(elements: float, degree: int) -> tuple[Found, float]:
         """Return k P, k = 2 (1 - nu^2)/(pi E)."""
         return float(2 * (1 - POISSON**2) / (np.pi * MODULUS) * normal)
 
-    return run(case_of_cylinders(elements, degree), 0.02, unit, cylinder_values, 0.0)
+    return run(mindlin.cylinders(elements, degree, 1.0), 0.02, unit, cylinder_values, 0.0)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -28,6 +28,9 @@ from scripts.reporting import ONE_COLUMN, Report, append, empty, options, solved
 #: Radius (mm) and Young's modulus (N/mm^2) of the balls, and the friction coefficient.
 RADIUS, YOUNG, MU = 50.0, 20e3, 0.3
 
+#: Half width of the contact of the cylinders, their modulus and Poisson's ratio.
+WIDTH, MODULUS, POISSON = 0.52, 1000.0, 0.3
+
 #: Results of a step.
 Row = Mapping[str, Any]
 
@@ -141,26 +144,48 @@ def write_mesh(path: Path, width: float, elements: float, sectors: int) -> None:
         gmsh.finalize()
 
 
+def balls(
+    path: Path, elements: float, sectors: int, way: float, press: float = PRESS, nu: float = 0.0
+) -> dict[str, Any]:
+    """Return half of two half balls, moved along by a way, and write their mesh."""
+    write_mesh(path, np.sqrt(RADIUS / 2 * press), elements, sectors)
+    return {
+        "mesh": {"file": str(path)},
+        "material": {"young": YOUNG, "poisson": nu},
+        "fixed": [
+            {"on": "upper_cut", "displacement": [way, 0.0, "free"], "amplitude": "shear"},
+            {"on": "upper_cut", "displacement": ["free", "free", -press], "amplitude": "press"},
+            {"on": "symmetry", "displacement": ["free", 0.0, "free"]},
+            {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
+        ],
+        "contact": {"on": "upper_round", "against": "lower_round"},
+        "friction": {"law": "coulomb", "mu": MU},
+    }
+
+
+def cylinders(elements: float, degree: int, way: float) -> dict[str, Any]:
+    """Return two half cylinders, moved along by a way."""
+    sizes = {"contact_size": WIDTH / elements, "contact_width": 1.3 * WIDTH}
+    return {
+        "mesh": {"generator": "two_half_cylinders", **sizes},
+        "space": {"degree": degree},
+        "material": {"young": MODULUS, "poisson": POISSON},
+        "fixed": [
+            {"on": "upper_cut", "displacement": [way, "free"], "amplitude": "shear"},
+            {"on": "upper_cut", "displacement": ["free", -0.1], "amplitude": "press"},
+            {"on": "lower_cut", "displacement": [0.0, 0.0]},
+        ],
+        "contact": {"on": "upper_arc", "against": "lower_arc"},
+        "friction": {"law": "coulomb", "mu": MU},
+    }
+
+
 def turn(
     poisson: float, elements: float, sectors: int, press: float = PRESS, steps: int = 3
 ) -> Loop:
     """Press, push, and move there and back. Serial."""
-    shear = SHEAR * press
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "balls.msh"
-        write_mesh(path, np.sqrt(RADIUS / 2 * press), elements, sectors)
-        case = {
-            "mesh": {"file": str(path)},
-            "material": {"young": YOUNG, "poisson": poisson},
-            "fixed": [
-                {"on": "symmetry", "displacement": ["free", 0.0, "free"]},
-                {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
-                {"on": "upper_cut", "displacement": [shear, 0.0, "free"], "amplitude": "shear"},
-                {"on": "upper_cut", "displacement": ["free", "free", -press], "amplitude": "press"},
-            ],
-            "contact": {"on": "upper_round", "against": "lower_round"},
-            "friction": {"law": "coulomb", "mu": MU},
-        }
+        case = balls(Path(folder) / "balls.msh", elements, sectors, SHEAR * press, press, poisson)
         rows, turning = moved(case, steps)
     # Both halves of the balls.
     normal = -2 * rows[-1]["contact_force_z"]
@@ -196,25 +221,11 @@ def turn_of_cylinders(elements: float, steps: int, degree: int = 1) -> float:
     (Jaeger, Ciavarella), whose stiffness is constant but for -ln(P)/(pi E*): the loop is eight
     times mu^2 the area between d(P) and its chord (Masing).
     """
-    width, young = 0.52, 1000.0
-    sizes = {"contact_size": width / elements, "contact_width": 1.3 * width}
-    case = {
-        "mesh": {"generator": "two_half_cylinders", **sizes},
-        "space": {"degree": degree},
-        "material": {"young": young, "poisson": 0.3},
-        "fixed": [
-            {"on": "lower_cut", "displacement": [0.0, 0.0]},
-            {"on": "upper_cut", "displacement": [0.03, "free"], "amplitude": "shear"},
-            {"on": "upper_cut", "displacement": ["free", -0.1], "amplitude": "press"},
-        ],
-        "contact": {"on": "upper_arc", "against": "lower_arc"},
-        "friction": {"law": "coulomb", "mu": MU},
-    }
-    rows, turning = moved(case, steps)
+    rows, turning = moved(cylinders(elements, degree, 0.03), steps)
     normal = -rows[-1]["contact_force_y"]
     share = float(np.ptp([row["driven_force_x"] for row in turning])) / (2 * MU * normal)
     loads = np.linspace((1 - share) * normal, normal, 10_001)
-    yields = -2 * 0.91 / (np.pi * young) * np.log(loads)
+    yields = -2 * (1 - POISSON**2) / (np.pi * MODULUS) * np.log(loads)
     chord = (loads[-1] - loads[0]) / 2 * np.trapezoid(yields, loads)
     between = chord - np.trapezoid((loads - loads[0]) * yields, loads)
     taken = sum(row["dissipation"] for row in turning[1:])
