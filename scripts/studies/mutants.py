@@ -77,7 +77,7 @@ MUTANTS = (
         "forms/elasticity.py",
         "else 2 * e[i, j] for i, j in VOIGT",
         "else e[i, j] for i, j in VOIGT",
-        ("tests/forms/test_elasticity.py",),
+        ("tests/forms/test_piezo.py",),
     ),
     Mutant(
         "deviator-of-2d",

@@ -13,7 +13,7 @@ from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.reader import convert, from_file
 from contact.mesh.transfer import refined
-from tests.mesh.test_reader import FIXTURES
+from tests.mesh.test_input_files import FIXTURES
 
 COMM = MPI.COMM_WORLD
 

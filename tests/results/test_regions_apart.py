@@ -13,7 +13,7 @@ from contact.plot.run import read_grid
 from contact.results.fields import DerivedFields
 from forms.kinematics import principal_values
 from scripts.cases import CASES
-from tests.forms.test_elasticity import numbers
+from tests.forms.test_piezo import numbers
 
 COMM = MPI.COMM_WORLD
 

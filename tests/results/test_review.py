@@ -1,10 +1,20 @@
-"""What is said about a solution: assumptions, theorems with their constants, small strains."""
+"""What is said about a solution: assumptions, theorems with their constants, small strains.
+
+Names of units label figures and stand in the summary; nothing is assumed without them.
+"""
+
+import json
 
 import numpy as np
 import pytest
 
 from contact import Solution, UserLaw, load_case, solve
 from contact.case.file import parse_case
+from contact.cli.main import main
+from contact.plot.body import picture
+from contact.plot.run import read_run
+from contact.results.options import Units
+from contact.writing import written
 from forms.ops import exp
 from scripts.cases import CASES
 from tests.problems.rigid import indented
@@ -237,3 +247,27 @@ def test_a_body_that_passes_beside_its_contact_part_is_warned_of(moved, directio
         assert deep.contact.pressure.max() > 1.2 * whole.contact.pressure.max()
     shallow = on_a_disc("middle", 0.01, *given)
     assert not any("[part-end]" in text for text in shallow.warnings)
+
+
+SMALL = ("mesh.cells=[8, 4]", "solver.method=newton")
+
+
+def test_labels_name_units_where_they_are_given():
+    units = Units(length="mm", stress="MPa")
+    assert units.label("x", "length") == "x (mm)"
+    assert units.label("p", "stress") == "p (MPa)"
+    assert units.label("phi", "potential") == "phi"
+    assert Units().label("x", "length") == "x"
+
+
+def test_units_reach_figures_and_summary(tmp_path):
+    """Also the figures that are drawn later, from the files."""
+    sets = [word for setting in SMALL for word in ("--set", setting)]
+    folder = tmp_path / "out"
+    arguments = ["solve", str(CASES / "piezo-8-1.toml"), "--out", str(folder), "--quiet"]
+    assert main([*arguments, *sets]) == 0
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["units"] == {"length": "m", "stress": "GPa", "potential": "GV", "charge": "C"}
+    again = read_run(folder)
+    assert picture(again, "potential").label == r"potential $\varphi$ (GV)"
+    assert written(solve(load_case(CASES / "piezo-8-1.toml", SMALL))).units == again.units

@@ -3,23 +3,26 @@
 The scripts of Examples 8.1 and 8.2 on coarse meshes: tables, figures, Theorem 5.2, sensor.
 The results pages and the runner of tables and figures.
 Pages of the benchmarks, from the files of a run that has measured a part.
+The tables of the gallery are those of the program, and its references are met.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import contact
-from contact import build_problem, solve
+from contact import build_problem, load_case, solve
 from contact.model.friction import Friction
 from scripts.benchmarks.pages import summary, write_memory
 from scripts.benchmarks.phases import PHASES
-from scripts.cases import bar
+from scripts.cases import CASES, bar
 from scripts.examples import sensor
+from scripts.gallery import EXAMPLES, FOLDER, on_meshes, row, solved
 from scripts.reporting import Report, subplots
 from scripts.studies import corner, lagged_current, pressure_convergence, refinement_8, sensitivity
 from scripts.studies.dual_norm import DualNorm
@@ -33,13 +36,14 @@ from scripts.thesis import (
     stopping_8_3,
     tables_piezo,
 )
+from tests.docs.pages import ROOT
 from tests.problems.written import rows_of
 
 
 def test_constants_are_those_of_the_thesis(tmp_path):
     setups.constants(Report(tmp_path))
-    for row in rows_of(tmp_path / "table-8-1.csv"):
-        assert float(row["case file by the thesis"]) == pytest.approx(1.0, abs=1e-5)
+    for line in rows_of(tmp_path / "table-8-1.csv"):
+        assert float(line["case file by the thesis"]) == pytest.approx(1.0, abs=1e-5)
 
 
 def test_example_8_3_stops_after_two_iterations(tmp_path):
@@ -146,8 +150,8 @@ def test_theorem_5_2(tmp_path):
 def test_tables(tmp_path):
     report = Report(tmp_path)
     tables_piezo.series(report, "8.3", (16, 8))
-    for row in rows_of(tmp_path / "series-k-e-8-2.csv"):
-        assert row["converged"] == "True" and float(row["charge imbalance"]) < 1e-8
+    for line in rows_of(tmp_path / "series-k-e-8-2.csv"):
+        assert line["converged"] == "True" and float(line["charge imbalance"]) < 1e-8
     tables_piezo.iterative(report, coarse=True)
     assert len(rows_of(tmp_path / "piezo-linear-iterations.csv")) == 4
 
@@ -220,3 +224,64 @@ def test_tables_of_pages_are_those_of_the_measured_files(tmp_path):
 def test_what_a_phase_is_measured_by_is_there(place, name):
     """A function that has moved would be a phase of no seconds."""
     assert f"def {name}(" in (Path(contact.__file__).parent / place).read_text()
+
+
+#: Examples that take less than half a second.
+SHORT = ("hertz", "press-fit", "column", "layer")
+
+
+def shown(name: str) -> list[tuple[str, str, str]]:
+    """Return the rows of a table: quantity, computed, reference."""
+    text = (FOLDER / f"{name}.md").read_text()
+    return re.findall(r"^\| (.+) \| (\S+) \| (\S+) \| .+ \|$", text, re.M)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in SHORT else pytest.mark.slow)
+        for name, one in EXAMPLES.items()
+        if not one.meshes
+    ],
+)
+def test_an_example_has_the_values_of_its_table(name: str, tmp_path: Path) -> None:
+    pytest.importorskip("gmsh")
+    example = EXAMPLES[name]
+    found = list(example.compare(solved(example, tmp_path, figures=False)))
+    rows = shown(name)
+    assert [name for name, *_ in rows] == [quantity for quantity, _, _ in found]
+    for (_, *texts), (_, computed, reference) in zip(rows, found, strict=True):
+        assert float(texts[0]) == pytest.approx(computed, rel=1e-3)
+        assert float(texts[1]) == pytest.approx(reference, rel=1e-3)
+        assert computed == pytest.approx(reference, rel=example.within)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name, one in EXAMPLES.items() if one.meshes])
+def test_a_coarse_mesh_has_the_values_of_its_table(name: str, tmp_path: Path) -> None:
+    """That of the example and the finest one take minutes: their rows are those of its page."""
+    pytest.importorskip("gmsh")
+    example, kept = EXAMPLES[name], on_meshes(name)
+    run = solved(example, tmp_path, figures=False, changes=example.meshes[0][1])
+    case = load_case(CASES / f"{example.case}.toml")
+    assert case.title and max(run.summary["kkt"].values()) <= case.solver.tolerance
+    for quantity, computed in row(run).items():
+        assert float(kept[0][quantity]) == pytest.approx(computed, rel=1e-3)
+    assert [words for words, _ in example.meshes] == [one["cells"] for one in kept]
+    for quantity, computed, reference in shown(name):
+        assert float(computed) == pytest.approx(float(kept[1][quantity]), rel=1e-3)
+        assert float(reference) == pytest.approx(float(kept[-1][quantity]), rel=1e-3)
+        assert float(computed) == pytest.approx(float(reference), rel=example.within)
+    text = (FOLDER / f"{name}-meshes.md").read_text()
+    for one in kept:
+        error = f"{100 * float(one['estimated error']):.2g} %"
+        assert f"| {one['cells']} | {one['unknowns']} | " in text and f"| {error} |" in text
+
+
+def test_every_example_has_its_page() -> None:
+    pages = {path.stem.removeprefix("example-") for path in (ROOT / "docs").glob("example-*.md")}
+    assert pages == set(EXAMPLES)
+    for name, example in EXAMPLES.items():
+        text = (ROOT / "docs" / f"example-{name}.md").read_text()
+        assert f"scripts/cases/{example.case}.toml" in text
+        assert all(change in text for change in example.changes)
