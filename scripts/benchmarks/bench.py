@@ -53,11 +53,6 @@ class Bench:
         started([*command(name), "--out", str(self.report.out), *extra, *arguments])
 
 
-def by_method(bench: Bench) -> None:
-    """Part (a): every row of the tables by every method."""
-    bench.script("by_method")
-
-
 def against_one_solve(bench: Bench) -> None:
     """Part (b): nonlinear solves in units of one linear elasticity solve."""
     rows = []
@@ -192,11 +187,6 @@ def pair(problem: str, mesh: str, mu: str) -> Run:
     }
 
 
-def against_plain_dolfinx(bench: Bench) -> None:
-    """Part (e): a user's own program in dolfinx without this code."""
-    bench.script("peer_plain")
-
-
 def phases(bench: Bench) -> None:
     """Part (f): where the time goes."""
     for dimension, n in ((2, 32), (3, 8)) if bench.coarse else ((2, 256), (3, 28)):
@@ -215,33 +205,24 @@ def phases(bench: Bench) -> None:
         )
 
 
-def two_bodies(bench: Bench) -> None:
-    """Part (g): two boxes in 3-D that touch each other beside one."""
-    bench.script("pair_space")
+def _script(name: str) -> Callable[[Bench], None]:
+    """Return the part that is a script of its own."""
+    return lambda bench: bench.script(name)
 
 
-def linear_solvers(bench: Bench) -> None:
-    """Part (j): the linear solver beside others on the same matrix."""
-    bench.script("solvers")
-
-
-def load_steps(bench: Bench) -> None:
-    """Part (i): load steps beside one static solve."""
-    bench.script("steps")
-
-
-#: Part -> its function, and the tables and figures that it writes.
+#: Part -> its function, and the tables that it writes: by method, cost of one solve, ranks, GetFEM,
+#: plain dolfinx, phases, two bodies, memory, load steps, linear solvers.
 PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
-    "a": (by_method, ("bench-tables",)),
+    "a": (_script("by_method"), ("bench-tables",)),
     "b": (against_one_solve, ("bench-ratio",)),
     "c": (ranks, ("bench-ranks",)),
     "d": (against_getfem, ("bench-getfem", "peer-pair")),
-    "e": (against_plain_dolfinx, ("peer-plain",)),
+    "e": (_script("peer_plain"), ("peer-plain",)),
     "f": (phases, ("bench-phases-2d", "bench-phases-3d")),
-    "g": (two_bodies, ("pair-space",)),
+    "g": (_script("pair_space"), ("pair-space",)),
     "h": (memory, ("bench-memory",)),
-    "i": (load_steps, ("bench-steps",)),
-    "j": (linear_solvers, ("solvers",)),
+    "i": (_script("steps"), ("bench-steps",)),
+    "j": (_script("solvers"), ("solvers",)),
 }
 
 #: In which order the page has them.
