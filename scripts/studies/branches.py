@@ -19,7 +19,7 @@ from contact.problem.state import State
 from contact.refining import has_coarser, nested_start
 from contact.results.remarks import review
 from contact.typing import Array
-from scripts.studies.product_norm import ProductNorm
+from scripts.studies.error_norms import ProductNorm
 
 #: Relative difference up to which two solutions are the same. Pressures beneath indenters, whose
 #: elements differ by a factor of 4000, are known to 4e-7 at residuals of 1e-11; other solutions

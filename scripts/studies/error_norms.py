@@ -1,8 +1,11 @@
-"""Norms of the difference between two displacements, by quadrature in NumPy."""
+"""Norms of the difference between two displacements, by quadrature in NumPy.
+
+The dual norm of pressures, and the norms of the space of displacements and potentials.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +18,13 @@ from ufl.core.expr import Expr
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState
+from contact.linear.operator import SparseOperator
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import Indices
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.model.fields import constant
 from contact.model.material import Material
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.elasticity import Anisotropic, mandel
 from forms.history import PAIRS, components, to_vector
@@ -150,3 +155,81 @@ def _elastic(
         eps[..., 2] -= spared * eps[..., :3].sum(axis=2)
     trace = eps[..., :3].sum(axis=2)
     return factor * ((law.bulk - 2 * g / 3) * trace**2 + 2 * g * np.sum(eps**2, axis=2))
+
+
+class DualNorm:
+    """sup <q, v_nu> / |v|_V over the discrete displacements v, with |v|_V the linear energy.
+
+    The supremum is reached by the displacement w under the pressure q alone, and is its energy:
+    |q|^2 = <q, w_nu>. On Gamma_3 that is the inverse of the body condensed onto it, the discrete
+    Steklov operator, and as that is one of order 1/2, a norm of H^-1/2.
+
+    Parameters
+    ----------
+    problem
+        Whose contact nodes carry the pressures.
+    """
+
+    def __init__(self, problem: ContactProblem) -> None:
+        self.problem = problem
+        body, size = problem.body, problem.interface.nodes.block_size
+        self._rest = body.zero_displacement()
+        coupled = problem.interface.coupled
+        self._operator = SparseOperator(body, coupled)
+        self._operator.update("secant", BodyState(self._rest), np.zeros((coupled.size, size, size)))
+
+    def pressure(self, q: Array) -> float:
+        """Return the norm of nodal pressures, shape (n,). Collective."""
+        body, nodes = self.problem.body, self.problem.interface.nodes
+        load = np.zeros(body.owned)
+        vectors = np.zeros((q.size, nodes.block_size))
+        vectors[:, : nodes.dim] = (nodes.weight * q)[:, None] * nodes.normal
+        nodes.add_jump_transposed(vectors, load)
+        load = np.where(body.free.ravel(), load, 0.0)
+        return self._root(load, self._operator.solve(load))
+
+    def compliance(self, loads: Sequence[Array]) -> Array:
+        """Return the work of loads on each other's displacements, shape (n, n). Collective."""
+        free = self.problem.body.free.ravel()
+        acting = np.array([np.where(free, load, 0.0) for load in loads])
+        moved = np.array([self._operator.solve(load) for load in acting])
+        work = self.problem.comm.allreduce(acting @ moved[:, : free.size].T, op=MPI.SUM)
+        return np.asarray((work + work.T) / 2)
+
+    def displacement(self, x: Array, other: Array) -> float:
+        """Return |u - v|_V of local unknowns, the energy of the linear body. Collective."""
+        body = self.problem.body
+        forces = (body.internal_forces(BodyState(y), self._rest) for y in (x, other))
+        difference = (x - other)[: body.owned]
+        free = np.where(body.free.ravel(), np.subtract(*forces), 0.0)
+        return self._root(free, difference)
+
+    def _root(self, force: Array, displacement: Array) -> float:
+        total = self.problem.comm.allreduce(float(force @ displacement), op=MPI.SUM)
+        return float(np.sqrt(max(total, 0.0)))
+
+
+class ProductNorm:
+    """The norms of X = V x W, (5.15): |eps(u)| and |grad(phi)| in L2(Omega).
+
+    Parameters
+    ----------
+    problem
+        Whose local unknowns are measured.
+    """
+
+    def __init__(self, problem: ContactProblem) -> None:
+        body = self._body = problem.body
+        self._x = fem.Function(body.space)
+        u, phi = body.split(self._x)
+        parts = [ufl.inner(strain(u), strain(u))]
+        if phi is not None:
+            parts.append(ufl.inner(ufl.grad(phi), ufl.grad(phi)))
+        self._forms = [fem.form(part * problem.domain.dx) for part in parts]
+        self._comm = problem.comm
+
+    def __call__(self, x: Array) -> tuple[float, ...]:
+        """Return the norms in V and, with a potential, W of local unknowns. Collective."""
+        self._x.x.array[:] = self._body.nodal(x).ravel()
+        squares = [self._comm.allreduce(fem.assemble_scalar(form)) for form in self._forms]
+        return tuple(float(np.sqrt(square)) for square in squares)

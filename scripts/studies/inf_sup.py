@@ -32,7 +32,7 @@ from contact.mesh.transfer import refined
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.reporting import Report, append, empty, options
-from scripts.studies.dual_norm import DualNorm
+from scripts.studies.error_norms import DualNorm
 
 CAPTION = "Inf-sup constant of the nodal multipliers"
 NOTE = (

@@ -19,7 +19,7 @@ from contact.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import TWO_COLUMNS, Report, append, empty, iterates, subplots
-from scripts.studies.product_norm import ProductNorm
+from scripts.studies.error_norms import ProductNorm
 
 #: k_e of the figure.
 SHOWN = (0.1, 0.5, 1.0, 2.0)

@@ -30,7 +30,7 @@ from scripts.reporting import (
     solved,
     subplots,
 )
-from scripts.studies.product_norm import ProductNorm
+from scripts.studies.error_norms import ProductNorm
 
 #: mu = k_e of the limit: those of the table and some between them.
 SMALLEST = TABLE_8_4[-1]

@@ -12,13 +12,13 @@ from matplotlib.ticker import NullFormatter
 from mpi4py import MPI
 
 from contact import Solution, build_problem
+from contact.mesh.domain import Domain
 from contact.mesh.transfer import carry
 from contact.methods.report import Outcome
 from contact.typing import Array
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, empty, observed_orders, solved, subplots
 from scripts.studies.error_norms import errors
-from scripts.studies.grading import grade
 
 #: Decay of (7.16).
 RHO = 1e4
@@ -41,7 +41,7 @@ class Variant:
     reference: int
     #: Of the case.
     changes: tuple[str, ...] = ()
-    #: How far the mesh is pulled towards the corners and the end of the load, `grading.grade`.
+    #: How far the mesh is pulled towards the corners and the end of the load, `grade`.
     power: float = 1.0
 
     @property
@@ -131,3 +131,27 @@ def draw_series(columns: Mapping[str, Sequence[Any]]) -> Figure:
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.legend(fontsize=6)
     return figure
+
+
+def pulled(t: Array, power: float) -> Array:
+    """Return places in [0, 1], pulled towards both ends as t^power is towards 0."""
+    near = 0.5 * (2 * np.minimum(t, 1 - t)) ** power
+    return np.asarray(np.where(t < 0.5, near, 1 - near))
+
+
+def grade(domain: Domain, power: float, places: Sequence[Sequence[float]]) -> Domain:
+    """Move the nodes of a grid towards lines across it; return the domain.
+
+    Between two lines a node at the part t of the way goes to `pulled(t, power)`: near a line
+    elements are of the size r^(1 - 1/power) h at the distance r. For u ~ r^lambda they do away
+    with the singularity, for elements of degree k, where power > k/lambda (Babuska, Kellogg and
+    Pitkaranta, Numer. Math. 33 (1979) 447).
+    """
+    points = domain.mesh.geometry.x
+    for axis, lines in enumerate(places):
+        ends = np.asarray(lines, dtype=float)
+        x = points[:, axis].copy()
+        piece = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, ends.size - 2)
+        begin, length = ends[piece], np.diff(ends)[piece]
+        points[:, axis] = begin + length * pulled(np.clip((x - begin) / length, 0, 1), power)
+    return domain

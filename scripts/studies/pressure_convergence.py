@@ -20,7 +20,7 @@ from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.reporting import Report, empty, observed_orders, options
 from scripts.studies.curved_foundations import ring
-from scripts.studies.dual_norm import DualNorm
+from scripts.studies.error_norms import DualNorm
 from scripts.studies.exact_solutions import Singular
 from scripts.studies.hertz_exact import Line, Point
 

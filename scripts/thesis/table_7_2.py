@@ -14,8 +14,7 @@ from contact.problem.problem import ContactProblem
 from contact.results.solution import Solution
 from scripts.cases import bar
 from scripts.reporting import Report, append, empty, observed_orders, options, solved
-from scripts.studies.dual_norm import DualNorm
-from scripts.studies.error_norms import errors
+from scripts.studies.error_norms import DualNorm, errors
 
 LOADS = (-0.005, -0.05)
 EPS = (1e-2, 1e-3, 1e-4, 1e-5)

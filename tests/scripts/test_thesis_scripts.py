@@ -25,7 +25,7 @@ from scripts.examples import sensor
 from scripts.gallery import EXAMPLES, FOLDER, on_meshes, row, solved
 from scripts.reporting import Report, subplots
 from scripts.studies import corner, lagged_current, pressure_convergence, refinement_8, sensitivity
-from scripts.studies.dual_norm import DualNorm
+from scripts.studies.error_norms import DualNorm
 from scripts.studies.hertz_exact import Line, Point
 from scripts.thesis import (
     chapters,

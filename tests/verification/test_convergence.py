@@ -20,8 +20,8 @@ from scripts.studies import convergence_mechanics as study
 from scripts.studies import nonlocal_friction
 from scripts.studies.error_norms import errors
 from scripts.studies.fixed_point_rates import fixed_points, secant_rate
-from scripts.studies.grading import grade, pulled
 from scripts.studies.inf_sup import SERIES, constant
+from scripts.studies.mesh_series import grade, pulled
 from scripts.thesis import figures_mechanics, table_7_1, table_7_2
 from tests.problems.mechanics import bar
 from tests.problems.written import rows_of
