@@ -194,6 +194,13 @@ class FoundationPlacement:
     contact: NDArray[np.bool_]
     fixed_conducting: NDArray[np.bool_] | None
 
+    def refuse_unresolved(self) -> None:
+        """Refuse a shape that cuts facets between their nodes. Collective."""
+        try:
+            _refuse_unresolved(self.body.domain, self.obstacle, self.facets)
+        except InputError as error:
+            raise error.within(f"{self.key}.") from None
+
     def at(self, displacement: Array) -> Geometry:
         """Return the geometry at a displacement of the owned nodes, shape (nodes, d). Collective.
 

@@ -183,7 +183,7 @@ def test_rigid_foundations(degree):
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("cell", [*PLANE, *SPACE])
 def test_rigid_shapes_within_a_facet(cell, degree):
-    """What cuts a flat facet between its nodes is refused, but of a press: adaptation finds it."""
+    """What cuts a flat facet between its nodes is refused, of a press on the last mesh alone."""
     d = 2 if cell in PLANE else 3
     make = rectangle if d == 2 else box
     domain = make(COMM, (0.0,) * d, (4.0,) * d, (4,) * d, cell=cell)
@@ -196,7 +196,11 @@ def test_rigid_shapes_within_a_facet(cell, degree):
             for press in (False, True):
                 contact = Contact("bottom", shape, press=press)
                 if depth <= 0 or press:
-                    assert Problem(domain, given, contact, degree=degree).nodes.size > 0
+                    problem = Problem(domain, given, contact, degree=degree)
+                    assert problem.nodes.size > 0
+                    if press and depth == 0.1 and isinstance(shape, Sphere):
+                        with pytest.raises(InputError, match=r"shorter facets.*\[overlap\]"):
+                            solve(problem)
                     continue
                 with pytest.raises(InputError, match=r"shorter facets.*\[overlap\]"):
                     Problem(domain, given, contact, degree=degree)
