@@ -7,7 +7,7 @@ NAMES := $(notdir $(basename $(SCRIPTS)))
 MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
 	python3 -m mpi4py -m pytest $(TESTS) $(SHORT) -m 'parallel and $(MARKS)' -q --color=no -p no:cacheprovider
 
-.PHONY: help demo test test-rest test-all test-serial messages lint format docs release clean robustness $(NAMES)
+.PHONY: help demo test test-rest test-all test-serial messages lint format docs release clean robustness tables figures $(NAMES)
 .DEFAULT_GOAL := help
 
 help:
@@ -19,6 +19,7 @@ help:
 	@echo "make golden   small problems of all kinds against stored numbers (ARGS=--renew stores them)"
 	@echo "make lint     ruff and mypy"
 	@echo "make format   let ruff format the sources"
+	@echo "make tables figures  those of the thesis, and studies beside it, into results/"
 	@echo "make NAME     run a script: $(sort $(NAMES))"
 	@echo "make docs     the documentation, into build/docs (notebooks are executed)"
 	@echo "make release  wheel and source distribution, built, installed and tried elsewhere"
@@ -81,6 +82,13 @@ clean:
 robustness:
 	$(FX) python3 -m scripts.studies.robustness $(ARGS)
 
-# tables, figures, benchmarks, ...
+# A script that makes both is run once.
+tables: setups hertz table_7_1 table_7_2 convergence_mechanics corner pressure_convergence curved_foundations \
+	pressure_on_axis nonlocal_friction tables_piezo tables_compliance stopping_8_3 limit_theorem refinement_8 \
+	sensitivity agreement
+figures: setups hertz figures_mechanics convergence_mechanics nonlocal_friction figures_piezo figures_compliance \
+	limit_theorem
+
+# a table, a figure, benchmarks, ...
 $(NAMES):
 	$(FX) python3 -m $(subst /,.,$(basename $(filter %/$@.py,$(SCRIPTS)))) $(ARGS)
