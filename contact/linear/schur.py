@@ -27,6 +27,9 @@ from contact.typing import Array
 #: substitution alone.
 INTERIOR_SOLVE, REDUCE = (26, 0), (26, 1)
 
+#: MUMPS's ICNTL(7): order by minimum degree. METIS, the choice of some builds, doubles the time.
+ORDERING = (7, 0)
+
 #: PETSc's MAT_FACTOR_SCHUR_INVERTED.
 INVERTED = 2
 
@@ -159,6 +162,7 @@ class SchurComplement:
         pc.setFactorSetUpSolverType()
         pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
         if self.size > 0:
+            pc.getFactorMatrix().setMumpsIcntl(*ORDERING)
             handles = (pc.getFactorMatrix().handle, self._numbers.handle)
             _check(_petsc.MatFactorSetSchurIS(*map(ctypes.c_void_p, handles)))
 
