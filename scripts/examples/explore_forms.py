@@ -23,6 +23,7 @@ import basix.ufl
 import matplotlib.pyplot as plt
 import numpy as np
 import ufl
+from mpi4py import MPI
 
 from forms.foundation import augmentation_form
 from forms.hencky import Linear, Log, energy_density, secant_form
@@ -54,7 +55,6 @@ print("arguments:", B.arguments(), "coefficients:", B.coefficients())
 
 # %%
 from dolfinx import fem, mesh
-from mpi4py import MPI
 
 square = mesh.create_unit_square(MPI.COMM_SELF, 3, 3)
 space = fem.functionspace(square, ("Lagrange", 1, (2,)))

@@ -9,8 +9,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import ufl
+
+# before dolfinx: that of the wheels takes the library of MPI
+from mpi4py import MPI  # isort: skip
 from dolfinx import fem
-from mpi4py import MPI
 
 from contact import load_case, solve
 

@@ -17,8 +17,10 @@ import logging
 
 import matplotlib.pyplot as plt
 import numpy as np
+
+# before dolfinx: that of the wheels takes the library of MPI
+from mpi4py import MPI  # isort: skip
 from dolfinx.mesh import create_rectangle, locate_entities_boundary
-from mpi4py import MPI
 from scipy.fft import dct, idct
 from scipy.optimize import minimize
 
