@@ -43,10 +43,11 @@ exec "$@"
 """
 CHROOT = """
 name=${1##*/}
-echo "${name%%-*}" >"$FAKES/marker"
+export INSIDE=$$
+echo "${name%%-*}" >"$FAKES/marker$INSIDE"
 status=0
 "${@:2}" || status=$?
-rm -f "$FAKES/marker"
+rm -f "$FAKES/marker$INSIDE"
 exit $status
 """
 # answers the questions of the launcher, and makes a virtual environment with itself
@@ -77,8 +78,9 @@ class Launcher:
         shutil.copy(CLONE / "pyproject.toml", self.clone)
         shutil.copy(CLONE / "scripts/debian-packages.txt", self.clone / "scripts")
         text = (CLONE / "scripts/fx").read_text()
-        # inside a root the real marker would be seen
-        text, count = re.subn(r"^marker=\S+", "marker=$FAKES/marker", text, flags=re.MULTILINE)
+        # inside a root the real marker would be seen; each start enters a root of its own
+        mark = "marker=$FAKES/marker${INSIDE-}"
+        text, count = re.subn(r"^marker=\S+", mark, text, flags=re.MULTILINE)
         assert count == 1
         self.fx = self.clone / "scripts/fx"
         self.fx.write_text(text)
