@@ -1,11 +1,22 @@
 """The strategy: stages of the semismooth Newton method, and its fallbacks (`solve_contact`).
 
-Steps on the condensed body where that pays, then on the whole one, else on the whole one alone;
-where these end without convergence, the fallbacks in turn (`fall_back`), from the initial guess
-`problem.start()`; then the iterate of least residual. A condensed problem has fallbacks of its own,
-all but the last. The notes of the history name them. They are also tried where Newton's method has
-converged to a solution at which a rigid-body mode has become unconstrained, although friction could
-constrain it.
+1. Steps on the condensed body where that pays, then on the whole one; else on the whole one alone.
+2. Fallbacks, where these end without convergence, in turn (`fall_back`):
+
+   - all nodes open, by one linear solve from the best iterate, then a working set from there;
+   - continuation in psi of the charge, of a condensed problem alone, from the initial guess
+     `problem.start()`;
+   - secants of a layer that saturates, from that guess;
+   - a rigid motion that separates the bodies, of a condensed problem alone;
+   - proximal points, from that guess;
+   - the interior point from that guess, its first slacks from the gaps of the linear solve;
+   - steps on the condensed body, of a whole problem alone, from that guess.
+
+3. The iterate of least residual.
+
+A condensed problem has fallbacks of its own, all but the last. The notes of the history name them.
+They are also tried where Newton's method has converged to a solution at which a rigid-body
+mode has become unconstrained, although friction could constrain it.
 
 References
 ----------
@@ -312,10 +323,10 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     The tangent of the layer is zero where it is saturated, and before its first touch: Newton's
     matrix may be singular, or as weak as elastic supports. Kacanov's method takes the secant
     p_nu(s)/s of the last iterate (it is positive). Newton's method takes the last steps, where the
-    forces nearly balance, and where a secant leaves the regimes (open, below saturation, saturated)
-    unchanged: supports that bear little bring the load to balance slowly. Proximal points solve the
-    bed's problem where friction alone holds the body along it. After a failure that is not the
-    layer's, the first problems are not solved either.
+    forces nearly balance, and once where a secant leaves the regimes (open, below saturation,
+    saturated) unchanged: supports that bear little bring the load to balance slowly. Proximal
+    points solve the bed's problem where friction alone holds the body along it. After a failure
+    that is not the layer's, the first problems are not solved either.
     """
     problem, interface = newton.problem, newton.problem.interface
     foundation, near = interface.foundation, NEARLY_BALANCED

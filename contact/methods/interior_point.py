@@ -68,9 +68,16 @@ def _mixed(x: Array, y: Array) -> Array:
 
 @dataclass
 class ConeStep:
-    """A search direction: changes of slacks and forces, (n,), of (t, a) and (h, -q) in the frame.
+    """A search direction.
 
-    The latter of shape (k, 2 + t); `tails` are those of a and -q, (k, t).
+    Attributes
+    ----------
+    slack, force
+        Changes in the half lines, shape (n,).
+    slip, friction
+        Changes of (t, a) and (h, -q) in the frame, shape (k, 2 + t).
+    tails
+        Changes of a and -q, shapes (k, t).
     """
 
     slack: Array
@@ -83,8 +90,16 @@ class ConeStep:
 class Cones:
     """Slacks and multipliers strictly inside their cones, those of this rank.
 
-    Open gaps and contact forces, (n,), are positive; length t and slip a, (k,) and (k, t), t > |a|;
-    bound h and friction -q, h > |q|.
+    Parameters
+    ----------
+    slack, force
+        Open gaps and contact forces, shape (n,), positive.
+    length, slip
+        t and a, shapes (k,) and (k, t), t > |a|.
+    bound, friction
+        h and -q, shapes (k,) and (k, t), h > |q|.
+    comm
+        Communicator of the cones.
     """
 
     def __init__(

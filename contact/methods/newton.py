@@ -105,7 +105,13 @@ class Chord:
     ) -> tuple[State, bool]:
         """Return the iterate to step from, and whether the step is a chord step.
 
-        Of the last iterate and its residual; where a chord step has raised it, the one before.
+        Parameters
+        ----------
+        state, reached
+            Last iterate and its residual. Where a chord step has raised it, the one before is
+            taken.
+        secant_at
+            Unknowns of the secant; None for those of the state.
         """
         before, last = self._before, self._reached
         if not self._factorised or self._most_steps <= 0:

@@ -54,9 +54,16 @@ SMALL = 0.1
 class LinearisedLaws:
     """Contact, friction, layer and charge at the contact nodes, linearised for a step.
 
-    The active set, and whether it is that of the last step, on all ranks; lambda^0 and the blocks B
-    of (19) of docs/algorithms.md; blocks of the layer, and its linearised pressure at dx = 0 less
-    its pressure, shape (n,); blocks of the charge.
+    Attributes
+    ----------
+    active_set, unchanged
+        Active set of the step, and whether it is that of the last one, on all ranks.
+    multipliers, contact
+        lambda^0 and the blocks B of (19) of the algorithms page.
+    layer, layer_shift
+        Blocks of the layer, and its linearised pressure at dx = 0 less its pressure, shape (n,).
+    charge
+        Blocks of the charge, or 0.
     """
 
     active_set: ActiveSet

@@ -49,9 +49,18 @@ RIGID_MOTION = "rigid motion"
 class RigidMotion:
     """The m unconstrained modes of a solution, and the amounts to subtract.
 
-    Modes in the unknowns of the whole problem, (unknowns, m), and in the jumps, (n, d, m); amounts
-    for the displacements of least norm, without and with the constraint that nothing penetrates;
-    the penetration without it, and whether that is more than rounding.
+    Attributes
+    ----------
+    motions, columns
+        Modes in the unknowns of the whole problem, shape (unknowns, m), and in the jumps,
+        (n, d, m).
+    wanted, amounts
+        Amounts for the displacements of least norm, without and with the constraint that nothing
+        penetrates, (m,).
+    depth
+        Penetration with `wanted` (length).
+    limited
+        Whether `depth` is more than rounding.
     """
 
     motions: Array

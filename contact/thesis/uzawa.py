@@ -90,8 +90,18 @@ def normal_and_tangential(nodes: ContactNodes, jump: Array, friction: bool) -> A
 class RelaxationResult:
     """End of a Uzawa block relaxation.
 
-    dx on the owned unknowns, multipliers in equilibrium with it, z of the next relaxation, about
-    the new iterate, (n, 1 + d), and the number of linear solves; whether it has stagnated.
+    Attributes
+    ----------
+    increment
+        dx on the owned unknowns.
+    forces
+        Multipliers in equilibrium with the iterate.
+    z
+        Variable of the next relaxation, about the new iterate, shape (n, 1 + d).
+    iterations
+        Number of linear solves.
+    stalled
+        Whether the stagnation limit has ended it.
     """
 
     increment: Array
@@ -119,10 +129,19 @@ def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
 class FrozenProblem:
     """The problem of one outer iteration, with its frozen terms, and the steps on it.
 
-    The problem, the iterate u_0 at which layer and charge are frozen, the unknowns of the secant
-    modulus, whether there is friction, and r (stress/length). Contact forces and jumps are arrays
-    of normal and tangential parts, shape (n, 1 + d). Steps take the friction bound s_n, shape (n,):
-    with `single_loop` it is not frozen.
+    Contact forces and jumps are arrays of normal and tangential parts, shape (n, 1 + d). Steps take
+    the friction bound s_n, shape (n,): with `single_loop` it is not frozen.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, and the iterate u_0 at which layer, charge and geometry are frozen.
+    secant_at
+        Unknowns of the secant modulus.
+    friction
+        Whether there is friction.
+    r
+        Augmentation parameter (stress/length).
     """
 
     problem: ContactProblem
