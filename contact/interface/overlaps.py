@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from dolfinx import geometry
@@ -31,11 +32,18 @@ from contact.typing import Array
 #: Distance along a further axis, over the size of the mesh, by which searches keep bodies apart.
 ASIDE = 10.0
 
+#: Multiple of the heights of curved surfaces above their facets that is taken off a depth: they are
+#: known from the corners alone, and extrapolated at the ends of arcs.
+CURVES = 2.0
+
 #: Indices of points, bodies or facets.
 Numbers = NDArray[np.intp]
 
+#: Depths at the sides of a pair, and beside those of all pairs (length).
+Depths: TypeAlias = tuple[float, float]
 
-def overlap_depths(body: BodyEquilibrium, pairs: Sequence[tuple[str, str, bool]]) -> list[float]:
+
+def overlap_depths(body: BodyEquilibrium, pairs: Sequence[tuple[str, str, bool]]) -> list[Depths]:
     """Return how deep the bodies of pairs of sides lie in each other. Collective.
 
     Parameters
@@ -47,21 +55,24 @@ def overlap_depths(body: BodyEquilibrium, pairs: Sequence[tuple[str, str, bool]]
 
     Returns
     -------
-    The largest depth of each pair that curvature does not explain (length): at its sides, but where
-    another pair presses, and where there is no side of any pair; 0 for rounding.
+    The largest depths of each pair that curvature does not explain (length): at its sides, but
+    where another pair presses, and where there is no side of any pair; 0 for rounding.
     """
     if not pairs or body.components[1] == 1:
-        return [0.0] * len(pairs)
+        return [(0.0, 0.0)] * len(pairs)
     bodies = _Boundaries.of(body, [pair[:2] for pair in pairs])
-    facet, at, other = bodies.inside()
-    depth, on_sides = bodies.depths(facet, at, other)
+    facet, place, other = bodies.inside()
+    depth, on_sides = bodies.depths(facet, place, other)
     between = bodies.between(bodies.component[facet], other)
     press = np.array([press for *_, press in pairs])
     elsewhere = (on_sides & press).any(axis=1, keepdims=True) & ~press
-    mine = between & ((on_sides & ~elsewhere) | ~on_sides.any(axis=1, keepdims=True))
-    deepest = np.where(mine, depth[:, None], 0.0).max(axis=0, initial=0.0)
+    of_sides = between & on_sides & ~elsewhere
+    beside = between & ~on_sides.any(axis=1, keepdims=True)
+    both = np.stack([of_sides, beside], axis=2)
+    deepest = np.where(both, depth[:, None, None], 0.0).max(axis=0, initial=0.0)
     body.comm.Allreduce(MPI.IN_PLACE, deepest, op=MPI.MAX)
-    return [d if d > TOUCHING * body.domain.size else 0.0 for d in deepest.tolist()]
+    deepest[deepest <= TOUCHING * body.domain.size] = 0.0
+    return [(at_sides, elsewhere) for at_sides, elsewhere in deepest.tolist()]
 
 
 @dataclass(frozen=True)
@@ -116,11 +127,27 @@ class _Boundaries:
         both = (first[:, one] & second[:, other]) | (first[:, other] & second[:, one])
         return np.asarray(both.T)
 
-    def inside(self) -> tuple[Numbers, Array, Numbers]:
-        """Return facet, reference point and other body of points within that. Collective."""
+    @property
+    def places(self) -> Array:
+        """Reference points of the nodes and the middle of a facet."""
+        shape = self.surface.shape
+        return np.concatenate([shape.nodes(self.surface.order), shape.middle])
+
+    def on_sides(self) -> NDArray[np.bool_]:
+        """Return which `places` of facets are on sides of each pair, (f, k, pairs). Collective."""
+        nodes, owners = self.surface.nodes, self.surface.owners
+        facets = np.asarray(self.sides.any(axis=2))
+        found = np.repeat(facets[:, None], len(self.places), axis=1)
+        corners = self.surface.shape.corners
+        for pair, named in enumerate(facets.T):
+            own = owners.among(owners.requested(nodes[named].ravel()), nodes.ravel())
+            found[:, :corners, pair] |= np.isin(nodes[:, :corners], own)
+        return found
+
+    def inside(self) -> tuple[Numbers, Numbers, Numbers]:
+        """Return facet, number among `places` and other body of points within that. Collective."""
         domain, surface, comm, d = self.body.domain, self.surface, self.body.comm, self.body.dim
-        shape, mesh = surface.shape, domain.mesh
-        places = np.concatenate([shape.nodes(surface.order), shape.middle])
+        shape, mesh, places = surface.shape, domain.mesh, self.places
         x = (shape.lagrange(surface.order, places) @ surface.points).reshape(-1, d)
         of = np.repeat(self.component, len(places))
         cells = geometry_nodes(domain)
@@ -152,10 +179,13 @@ class _Boundaries:
         begin = of_cells.nodes(1)[of_cells.facet_corners[:, 0]]
         height = np.einsum("pfd,fd->pf", at[:, None] - begin, inward)
         held = height.min(axis=1, initial=np.inf) >= -NEGLIGIBLE
+        functions = of_cells.lagrange(of_cells.degree_of(cells.shape[1]), at)
+        missed = np.einsum("pk,pkd->pd", functions, cells[cell]) - there[point]
+        held &= np.linalg.norm(missed, axis=1) <= NEGLIGIBLE * domain.size
         point, other = point[held], component[cell[held]]
         _, number, other = exchanged(comm, source[point], number[point], other)
         number, other = np.unique(np.column_stack([number, other]), axis=0).T
-        return number // len(places), places[number % len(places)], other
+        return number // len(places), number % len(places), other
 
     def _near(self, x: Array, of: Numbers) -> NDArray[np.bool_]:
         """Return which points are in boxes of other bodies of the pairs of theirs. Collective."""
@@ -174,9 +204,12 @@ class _Boundaries:
                 near |= own[of] & held
         return near
 
-    def depths(self, facet: Numbers, at: Array, other: Numbers) -> tuple[Array, NDArray[np.bool_]]:
+    def depths(
+        self, facet: Numbers, place: Numbers, other: Numbers
+    ) -> tuple[Array, NDArray[np.bool_]]:
         """Return the depths of points in other bodies, (n,), and their `on_sides`. Collective."""
         surface, comm, far = self.surface, self.body.comm, ASIDE * self.body.domain.size
+        at, on_sides = self.places[place], self.on_sides()[facet, place]
         functions = surface.shape.lagrange(surface.order, at)
         x = np.einsum("nk,nkd->nd", functions, surface.points[facet])
         points = np.column_stack([x, far * other])
@@ -193,15 +226,15 @@ class _Boundaries:
         surface = self._curved()
         opposite = surface.sent(near, ranks)
         # A foot aside, where facets turn, has a height in another direction: none adds to depths.
-        own = np.minimum(surface.height_bounds(facet, at)[0], 0.0)
+        own = CURVES * np.minimum(surface.height_bounds(facet, at)[0], 0.0)
         sides = np.asarray(self.sides.any(axis=2))
         _, theirs, centres = exchanged(comm, ranks, sides[near], centres[near])
-        depth, on_sides = np.full(len(x), np.inf), sides[facet]
+        depth = np.full(len(x), np.inf)
         rounding = NEGLIGIBLE * self.body.domain.size
         for i, j in in_balls(centres, points, radius, CHUNK):
             distance, there = _from_facets(opposite, j, x[i])
-            behind = np.minimum(opposite.height_bounds(j, there)[0], 0.0) - _bow(opposite)[j]
-            np.minimum.at(depth, i, distance + own[i] + behind)
+            behind = CURVES * np.minimum(opposite.height_bounds(j, there)[0], 0.0)
+            np.minimum.at(depth, i, distance + own[i] + behind - _bow(opposite)[j])
             np.minimum.at(least, i, distance)
             nearest_ones = distance <= least[i] + rounding
             np.logical_or.at(on_sides, i[nearest_ones], theirs[j[nearest_ones]])

@@ -20,6 +20,7 @@ from contact.interface.mortar.coupling import LEAST_COVERED, Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, Geometry, contact_directions
+from contact.interface.overlaps import Depths
 from contact.interface.placing import check_gap
 from contact.mesh.entities import owned_among
 from contact.mesh.owners import Owners
@@ -121,7 +122,7 @@ def find_pair(
     key: str = "contact",
     press: bool = False,
     friction: bool = False,
-    inside: float = 0.0,
+    overlap: Depths = (0.0, 0.0),
 ) -> tuple[PairPlacement, Geometry]:
     """Choose the nodes of a part that may touch another one, in the reference place. Collective.
 
@@ -142,8 +143,9 @@ def find_pair(
         Whether the bodies may overlap in the reference configuration, and press each other out.
     friction
         Whether there is friction between them.
-    inside
-        Depth of the boundary of either body in the other (`overlap_depths`) (length).
+    overlap
+        Depths of the boundary of either body in the other, at the sides and beside those of all
+        pairs (`overlap_depths`) (length).
 
     Returns
     -------
@@ -180,8 +182,8 @@ def find_pair(
         no_multiplier = np.union1d(no_multiplier, new)
         found = couple(slave, master, reach, no_multiplier)
     if body.comm.allreduce(found.nodes.size, op=MPI.SUM) == 0:
-        if inside > 0:
-            raise _overlap(inside, True, False, label)
+        if max(overlap) > 0:
+            raise _overlap(max(overlap), True, False, label)
         raise InputError(
             f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
             "held there; accepted: sides of two bodies that look at each other",
@@ -190,12 +192,13 @@ def find_pair(
     _check_apart(body, found, slave.owners, label)
     rounding = TOUCHING * body.domain.size
     depth, resolved = found.interference(slave.owners, added)
-    depth = max(depth, inside - max(least, 0.0))
-    # Sides that do not face each other see nothing of an overlap.
-    resolved &= inside <= 2 * found.depth
+    inside, beside = overlap
+    depth = max(depth, max(overlap) - max(least, 0.0))
+    # Sides that do not face each other see nothing of an overlap, nor of one beside them.
+    resolved &= inside <= 2 * found.depth and beside - max(least, 0.0) <= rounding
     coarse = bool((alone & (found.depths > least + rounding)).any())
     resolved &= not body.comm.allreduce(coarse, op=MPI.LOR)
-    drawn = max(found.depth, inside) > rounding
+    drawn = max(found.depth, *overlap) > rounding
     if depth > rounding and ((drawn and not press) or not resolved):
         if drawn and _connected(body, found, slave.owners):
             raise InputError(

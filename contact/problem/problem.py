@@ -31,7 +31,7 @@ from contact.interface.nodes import (
     joined_nodes,
     motion_at_constant_jump,
 )
-from contact.interface.overlaps import overlap_depths
+from contact.interface.overlaps import Depths, overlap_depths
 from contact.interface.pairing import PairPlacement, find_pair
 from contact.interface.placing import FoundationPlacement, find_nodes
 from contact.linear.constraint import ConstrainedOperator, Constraint
@@ -174,7 +174,7 @@ class ContactProblem:
         pairs = {i: (c.on, c.against, c.press) for i, c in enumerate(self.contacts) if c.against}
         depths = dict(zip(pairs, overlap_depths(self.body, [*pairs.values()]), strict=True))
         placed = [
-            self._placed("contact" if one else f"contact.{i}", contact, depths.get(i, 0.0))
+            self._placed("contact" if one else f"contact.{i}", contact, depths.get(i, (0.0, 0.0)))
             for i, contact in enumerate(self.contacts)
         ]
         self.placements = tuple(placement for placement, _ in placed)
@@ -258,7 +258,7 @@ class ContactProblem:
         """Return the points of the places of a history that this rank owns, shape (n, d)."""
         return self.nodes.points if place == CONTACT_NODES else self.body.laws.places
 
-    def _placed(self, key: str, contact: Contact, inside: float) -> tuple[Placement, Geometry]:
+    def _placed(self, key: str, contact: Contact, overlap: Depths) -> tuple[Placement, Geometry]:
         """Return the placement of a contact, and its geometry in the reference configuration."""
         layer = contact.compliant_layer
         if layer is not None:
@@ -270,7 +270,7 @@ class ContactProblem:
         body, given = self.body, (contact.obstacle, key, contact.press)
         if contact.against is not None:
             acts = contact.friction.acts
-            return find_pair(body, contact.on, contact.against, *given, acts, inside)
+            return find_pair(body, contact.on, contact.against, *given, acts, overlap)
         conducts = contact.conductor is not None and self.piezoelectric
         return find_nodes(body, contact.on, *given, conducts)
 

@@ -97,6 +97,19 @@ def test_bodies_that_touch_are_accepted(cell, element):
 
 
 @pytest.mark.parallel
+@pytest.mark.parametrize("counts", [(7, 12), (16, 9)])
+@pytest.mark.parametrize("cell", [*PLANE, *SPACE])
+def test_ellipses_that_touch_are_accepted(cell, counts):
+    """Their curvature is known to some per cent alone, from the corners of facets."""
+    for axis in (0.5, 2.0):
+        domain = layers(COMM, cell, 1, "ring", 0.0, counts=counts)
+        domain.mesh.geometry.x[:, 1] *= axis
+        for on, against in (("outer0", "inner1"), ("inner1", "outer0")):
+            contact = Contact(on, against=against)
+            assert Problem(domain, body("ring", domain.dim, 2), contact).nodes.size > 0
+
+
+@pytest.mark.parallel
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize("cell", PLANE)
 def test_overlaps_are_pressed_out(cell, element):
@@ -493,6 +506,11 @@ def test_an_overlap_beside_the_sides_of_a_pair(cell):
         Problem(domain, given, contacts(False, False))
     nodes = Problem(domain, given, contacts(False, True)).nodes
     assert nodes.maximum(-nodes.gap) == pytest.approx(0.01, rel=1e-6)
+    # A press sees nothing of one beside it, though they are nearly alike.
+    x[second, 0] -= 0.008 * np.clip(3 - 8 * x[second, 1], 0.0, 1.0)
+    with pytest.raises(InputError, match=r"contact\.against.* up to 0.01 more.*\[overlap\]"):
+        Problem(domain, given, contacts(True))
+    assert Problem(domain, given, contacts(True, True)).nodes.size > 0
 
 
 @pytest.mark.parallel

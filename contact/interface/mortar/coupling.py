@@ -314,7 +314,8 @@ class Coupling(JumpRows):
 
         Returns
         -------
-        The depth, and whether nodes have gaps below 0 wherever the overlap is half as deep.
+        The depth, and whether nodes have gaps below half of that, negative, wherever the overlap is
+        half as deep.
         """
         comm = owners.comm
         least = comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
@@ -420,5 +421,6 @@ def _assembled(
     jumps = nodes, slaves, sparse.csr_array(divide @ D), masters, sparse.csr_array(divide @ M)
     depth = owners.comm.allreduce(float(parts.depths.max(initial=0.0)), op=MPI.MAX)
     state = weight, normal, gap, positive_part, curved_gap, covered[kept]
-    faces_master = parts.D.sum(axis=(1, 2)) / parts.whole.sum(axis=1)
+    whole_facets = parts.whole.sum(axis=1)
+    faces_master = parts.D.sum(axis=(1, 2)) / np.where(whole_facets > 0, whole_facets, 1.0)
     return Coupling(*jumps, *state, depth, parts.dual_nodes, parts.depths, faces_master)
