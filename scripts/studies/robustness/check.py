@@ -104,11 +104,8 @@ def external_forces(mesh: Mesh, tables: Tables) -> Array:
     forces = np.zeros_like(mesh.points)
     for load in tables.get("load", ()):
         if load.get("everywhere"):
-            corners = mesh.points[mesh.triangles]
-            a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-            area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
-            share = area[:, None, None] / 3 * np.asarray(load["body_force"])
-            np.add.at(forces, mesh.triangles, np.broadcast_to(share, corners.shape))
+            share = gradients(mesh)[1][:, None, None] / 3 * np.asarray(load["body_force"])
+            np.add.at(forces, mesh.triangles, np.broadcast_to(share, (len(share), 3, 2)))
         else:
             edges = mesh.parts[load["on"]]
             length = np.linalg.norm(np.diff(mesh.points[edges], axis=1), axis=2)
@@ -191,11 +188,9 @@ def _laws(
     entries = {_listed(entry["on"])[0]: entry for entry in tables["contact"]}
     entry = [entries[row["on"]] if "on" in row else tables["contact"][0] for row in rows]
     mu = np.array([float(one.get("friction", {}).get("mu", 0.0)) for one in entry])
-    layer = np.zeros(len(rows))
-    for k, one in enumerate(entry):
-        if one.get("law") == "compliance":
-            depth = min(u_n[k], gap[k]) - gap[k] + one["layer"]
-            layer[k] = one["stiffness"] * min(max(depth, 0.0), one["limit"])
+    names = "layer", "stiffness", "limit"
+    deep, stiffness, limit = np.array([[one.get(name, 0.0) for name in names] for one in entry]).T
+    layer = stiffness * np.clip(np.minimum(u_n, gap) - gap + deep, 0.0, limit)
     young = min(material["young"] for material in tables["material"])
     c, scale = young / size, max(pressure.max(), least / size)
     rigid = pressure - layer
@@ -299,15 +294,12 @@ def _shared(
 
 def _normals(mesh: Mesh, edges: NDArray[np.intp]) -> Array:
     """Return unit normals at nodes, out of the body: means of those of given edges."""
-    inside = np.zeros_like(mesh.points)
-    count = np.zeros(len(mesh.points))
-    np.add.at(inside, mesh.triangles, mesh.points[mesh.triangles].mean(axis=1, keepdims=True))
-    np.add.at(count, mesh.triangles, 1.0)
-    inside /= count[:, None]
-    total = np.zeros_like(mesh.points)
+    # The integral of a node's function's gradient is that of the normal times the function.
+    slopes, areas = gradients(mesh)
+    outward, total = np.zeros_like(mesh.points), np.zeros_like(mesh.points)
+    np.add.at(outward, mesh.triangles, areas[:, None, None] * slopes)
     along = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
     out = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    middle = mesh.points[edges].mean(axis=1) - inside[edges].mean(axis=1)
-    out *= np.sign(np.einsum("ni,ni->n", out, middle))[:, None]
+    out *= np.sign(np.einsum("ni,nki->n", out, outward[edges]))[:, None]
     np.add.at(total, edges, out[:, None, :].repeat(2, axis=1))
     return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
