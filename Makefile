@@ -83,7 +83,7 @@ robustness:
 	$(FX) python3 -m scripts.studies.robustness $(ARGS)
 
 # A script that makes both is run once.
-tables: setups hertz table_7_1 table_7_2 convergence_mechanics corner pressure_convergence curved_foundations \
+tables: setups hertz table_7_1 table_7_2 convergence_mechanics corner curved_foundations \
 	pressure_on_axis nonlocal_friction tables_piezo tables_compliance stopping_8_3 limit_theorem refinement_8 \
 	sensitivity agreement
 figures: setups hertz figures_mechanics convergence_mechanics nonlocal_friction figures_piezo figures_compliance \

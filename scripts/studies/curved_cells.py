@@ -1,6 +1,6 @@
 """Orders of convergence on straight cells and on those of second order, and times to 1 %.
 
-Rings here, a disc and a ball in `round_bodies`, known contacts and times in `cell_orders`.
+Rings here, known contacts and times in `cell_orders`.
 
 `python3 -m scripts.studies.curved_cells [--out DIR] [--coarse]`
 """
@@ -17,7 +17,7 @@ from contact.mesh.cells import SHAPES
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.reporting import Report, append, empty, observed_orders, options
-from scripts.studies import cell_orders, round_bodies
+from scripts.studies import cell_orders
 from scripts.studies.lame_rings import Lame, error, rings
 
 CAPTION = "Displacements of round bodies on straight and on curved cells"
@@ -142,7 +142,6 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, in
     report = Report(chosen.out)
     report.table("curved-cells", CAPTION, columns, NOTE)
     rim(report, chosen.coarse)
-    round_bodies.orders(report, chosen.coarse)
     cell_orders.orders(report, chosen.coarse)
     cell_orders.times(report, chosen.coarse)
     return orders

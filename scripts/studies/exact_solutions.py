@@ -209,14 +209,6 @@ class Singular:
         flat = GapFunction(lambda points: np.zeros(len(points)))
         return ContactProblem(domain, Body(self.law, fixed), Contact("bottom", flat), degree=degree)
 
-    def in_space(self, n: int, degree: int = 1) -> ContactProblem:
-        """Return the problem on a slice of the unit cube, two cells thick. Collective."""
-        domain = box(MPI.COMM_WORLD, [0.0] * 3, [1.0, 2 / n, 1.0], [n, 2, n])
-        one, other = (_Component(self, i, (0, 2)) for i in range(2))
-        fixed = [Fixed(side, [one, 0.0, other]) for side in ("left", "right", "top")]
-        fixed += [Fixed(side, [None, 0.0, None]) for side in ("front", "back")]
-        return ContactProblem(domain, Body(self.law, fixed), Contact("bottom", 0.0), degree=degree)
-
     def errors(self, problem: ContactProblem, state: State) -> tuple[Errors, float]:
         """Return the norms of a state's error, and the largest one at the nodes. Collective."""
         body = problem.body
@@ -229,14 +221,13 @@ class Singular:
 
 @dataclass(frozen=True)
 class _Component:
-    """A component of the displacement, as a boundary value; `axes` are those of its plane."""
+    """A component of the displacement, as a boundary value."""
 
     solution: Singular
     index: int
-    axes: tuple[int, int] = (0, 1)
 
     def ufl(self, x: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
-        return self.solution.ufl([x[axis] for axis in self.axes])[self.index]
+        return self.solution.ufl(x)[self.index]
 
     def numpy(self, points: Array) -> Array:
-        return self.solution.numpy(self.index, points[:, self.axes])
+        return self.solution.numpy(self.index, points)

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Body, Contact, Domain, Fixed
-from contact.mesh.grid import box, rectangle
+from contact.mesh.grid import rectangle
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.hencky import Linear
@@ -118,12 +118,8 @@ class Point:
         square = x[0] ** 2 + x[1] ** 2
         return np.asarray(-np.pi * self.peak / (4 * a * modulus) * (2 * a**2 - square))
 
-    def problem(self, n: int, degree: int) -> ContactProblem:
-        """Return the quarter [0, 1]^3, symmetric about x = 0 and y = 0. Collective."""
-        return self.on(box(MPI.COMM_WORLD, [0.0] * 3, [1.0] * 3, [n] * 3), degree)
-
     def on(self, domain: Domain, degree: int) -> ContactProblem:
-        """Return the problem on another mesh of that quarter, with the same sides. Collective."""
+        """Return the problem on a mesh of [0, 1]^3, a quarter by symmetry. Collective."""
         given = [_component(self.displacement, i) for i in range(3)]
         fixed = [Fixed("left", [0.0, None, None]), Fixed("front", [None, 0.0, None])]
         fixed += [Fixed(side, given) for side in ("right", "back", "top")]

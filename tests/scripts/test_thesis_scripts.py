@@ -24,7 +24,7 @@ from scripts.cases import CASES, bar
 from scripts.examples import sensor
 from scripts.gallery import EXAMPLES, FOLDER, on_meshes, row, solved
 from scripts.reporting import Report, subplots
-from scripts.studies import corner, lagged_current, pressure_convergence, refinement_8, sensitivity
+from scripts.studies import corner, lagged_current, refinement_8, sensitivity
 from scripts.studies.error_norms import DualNorm
 from scripts.studies.hertz_exact import Line, Point
 from scripts.thesis import (
@@ -81,20 +81,6 @@ def test_sensitivity(tmp_path):
     sensitivity.study(Report(tmp_path), "radius", coarse=True)
     found = rows_of(tmp_path / "sensitivity-radius-table.csv")
     assert {row["converged"] for row in found} == {"True"}
-
-
-@pytest.mark.slow
-def test_the_pressure_converges_in_the_dual_norm(tmp_path):
-    found = pressure_convergence.main(["--coarse", "--out", str(tmp_path)])
-    assert len(found) == 10
-    for key, errors in found.items():
-        if key[0] == "conforming":  # straight edges, whose polygons pressures feel to first order
-            assert errors[1, 1] < 0.6 * errors[0, 1], key
-            assert errors[:, 0].max() < 0.04, key
-            assert errors[1, 0] < 0.02, key
-            continue
-        assert errors[1, 1] < 0.55 * errors[0, 1], key
-        assert errors[1, 0] < 0.7 * errors[0, 0], key
 
 
 @pytest.mark.parametrize("exact", [Line(), Point()], ids=["line", "point"])

@@ -28,7 +28,7 @@ from contact.problem.problem import ContactProblem
 from contact.results.error_estimate import estimated
 from scripts.force_balance import force_balance
 from scripts.reporting import Report
-from scripts.studies import cell_orders, curved_cells, round_bodies
+from scripts.studies import cell_orders, curved_cells
 from scripts.studies.curved_cells import LAME, LAW, on_a_shaft, solved, supports, two_rings
 from scripts.studies.lame_rings import Lame, error, rings
 from tests.problems.written import rows_of
@@ -212,16 +212,18 @@ def test_known_contacts_on_moved_cells(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(cell_orders, "KNOWN", known)
     found = cell_orders.orders(Report(tmp_path), coarse=False)
     assert len(found) == 12
-    for (_, _, _, degree), (displacement, _) in found.items():
+    for (_, _, _, degree), (displacement, _, dual) in found.items():
         assert displacement > (1.6, 2.0)[degree - 1]
-    assert all(float(row["p in L2"]) < 0.017 for row in rows_of(tmp_path / "known-contacts.csv"))
+        assert degree == 2 or dual > 1.4  # of degree 2, two meshes show no order of the pressure
+    for row in rows_of(tmp_path / "known-contacts.csv"):
+        assert float(row["p in L2"]) < 0.017
+        assert float(row["p in H^-1/2"]) < 0.012
 
 
 def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(curved_cells, "SHAPES", SHAPES[:1])
     monkeypatch.setattr(curved_cells, "rim", lambda *_: {})
     monkeypatch.setattr(cell_orders, "orders", lambda *_: {})
-    monkeypatch.setattr(round_bodies, "orders", lambda *_: {})
     monkeypatch.setattr(cell_orders, "times", lambda *_: {})
     orders = curved_cells.main(["--coarse", "--out", str(tmp_path)])
     for kind in ("shaft", "two rings"):
@@ -232,25 +234,3 @@ def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
 def test_tetrahedra_on_a_shaft_are_of_order_2_by_their_forces_alone(tmp_path) -> None:
     found = curved_cells.rim(Report(tmp_path), coarse=True)
     assert found["load"] > 3 > 2.5 > found["shaft"] > 1.9
-
-
-def test_a_disc_on_a_plane_converges_on_straight_and_on_curved_cells(tmp_path, monkeypatch) -> None:
-    """Where contact ends limits both: displacements of order 2 at the vertices, pressures of 1."""
-    monkeypatch.setattr(round_bodies, "FINE", {2: 32})
-    monkeypatch.setattr(round_bodies, "CELLS", {(2, 1): (8, 16), (2, 2): (8, 16)})
-    found = round_bodies.orders(Report(tmp_path), coarse=False)
-    assert len(found) == 6
-    for (_, _, degree), (force, displacement, pressure) in found.items():
-        assert force > 1.6
-        assert displacement > (1.4, 1.8)[degree - 1]
-        assert pressure > 0.8
-
-
-@pytest.mark.core
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", NAMES[:2])
-def test_a_small_contact_of_a_disc_is_hertz(name: str, order: int) -> None:
-    """Its peak for its force, where the rim is twelve times as thick as half the contact."""
-    a, ratio = round_bodies.solution(2, name, order, 2, 48, 0.003).beside_hertz()
-    assert round_bodies.CORE / a == pytest.approx(12, abs=0.3)
-    assert ratio == pytest.approx(1.0, abs=0.005)
