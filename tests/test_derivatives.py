@@ -63,48 +63,6 @@ def test_bar_by_its_friction_coefficient():
     assert [found[name]["material.young"] for name in names] == pytest.approx([0, 0, 0], abs=1e-11)
 
 
-def turned(angle, size, young, mu=0.2):
-    """Return a block of a size and a modulus, pressed and moved aside, turned by an angle."""
-    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    way = size * np.array([[c, -s], [s, c]]) @ [1e-3, -4e-3]
-    return parse_case({
-        "mesh": {"generator": "rectangle", "size": [2 * size, size], "cells": [12, 6],
-                 "rotation": angle},
-        "material": {"young": young, "poisson": 0.3},
-        "fixed": [{"on": "top", "displacement": way.tolist()}],
-        "contact": {"on": "bottom", "gap": 1e-3 * size},
-        "friction": {"law": "coulomb", "mu": mu},
-        "solver": {"tolerance": 1e-11},
-    })  # fmt: skip
-
-
-@pytest.mark.parametrize("method", ["tangent", "adjoint"])
-@pytest.mark.parametrize("angle", [10.0, 30.0])
-def test_units_and_directions_change_nothing(angle, method):
-    """In SI units gaps, 1e-4 m, stood in one vector with stresses, 1e9 Pa, if normals are slant."""
-    found = []
-    for at, size, young in ((0.0, 1.0, 1.0), (angle, 0.1, 210e9), (angle, 1e-3, 200e9)):
-        one = solve(turned(at, size, young), comm=SELF)
-        values = sensitivity(one, ["max_pressure"], ["friction.mu", "material.young"], method)
-        by_mu, by_young = values["max_pressure"].values()
-        found.append([by_mu / young, by_young])
-    assert found[1] == pytest.approx(found[0], rel=1e-7)
-    assert found[2] == pytest.approx(found[0], rel=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("key", "words"),
-    [
-        ("friction.mu", r"\[value\]"),
-        ("solver.tolerance", r"\[value\]"),
-    ],
-)
-def test_numbers_without_a_derivative(key, words):
-    given = solve(turned(0.0, 1.0, 1.0, mu=0.0 if "mu" in key else 0.2), comm=SELF)
-    with pytest.raises(InputError, match=words):
-        sensitivity(given, ["max_pressure"], [key])
-
-
 @pytest.mark.core("number", "log", "3-D", "smoothed")
 @pytest.mark.parametrize("family", FAMILIES)
 def test_taylor_series_and_adjoint(family):
@@ -468,12 +426,20 @@ def test_an_unsymmetric_stiffness_beside_a_free_foundation_is_refused():
         ("max_pressure", "friction.nu", r"friction.nu.*\[no-number\]"),
         ("max_pressure", "friction.law", r"friction.law.*\[no-number\]"),
         ("max_pressure", "mesh.cells.0", r"mesh.cells.0.*\[value\]"),
+        ("max_pressure", "solver.tolerance", r"\[value\]"),
     ],
 )
 def test_refused(quantity, parameter, message):
     run = solution("number")
     with pytest.raises(InputError, match=message):
         sensitivity(run, [quantity], [parameter])
+
+
+def test_a_friction_coefficient_of_0_is_refused():
+    data = problem("number")
+    data["friction"]["mu"] = 0.0
+    with pytest.raises(InputError, match=r"\[value\]"):
+        sensitivity(solve(parse_case(data), comm=SELF), ["max_pressure"], ["friction.mu"])
 
 
 def test_an_end_that_has_not_converged_is_refused():

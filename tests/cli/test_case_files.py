@@ -13,23 +13,13 @@ FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"
 #: Name -> (text that is replaced, its replacement, key that the message names).
 WRONG = {
     "a typing error in a key": ("poisson", "poison", "material.poison"),
-    "a missing key": ("young = 1.0", "", "material.young"),
-    "Poisson's ratio 1/2": ("0.3\nyield", "0.5\nyield", "material.poisson"),
     "a negative size": ("[2.0, 1.0]", "[2.0, -1.0]", "mesh.size"),
-    "an unknown generator": ('"rectangle"', '"rectangel"', "mesh.generator"),
     "an unknown part": ('on = "bottom"', 'on = "botom"', "contact.on"),
-    "three components in the plane": (
-        "[0.0, -0.001]",
-        "[0.0, 0.0, -0.001]",
-        "load.0.traction",
-    ),
     "a load on the contact part": (
         'on = "top"',
         'on = "bottom"',
         "load.0.on",
     ),
-    "a formula with a mistake": ("-0.001", '"-0.001*(x"', "load.0.traction"),
-    "a formula that would run code": ("-0.001", '"__import__(x)"', "load.0.traction"),
     "a load that is not finite": ("-0.001", '"log(x-1)"', "load.0.traction.1"),
     "a load that overflows": ("-0.001", "-1e300", "load.0.traction.1"),
     "more cells than memory": (
@@ -43,11 +33,6 @@ WRONG = {
         "fixed.0.displacement.1",
     ),
     "a gap that is not finite": ("gap = 0.0", 'gap = "1/(x-1)"', "contact.gap"),
-    "a gap and a shape": (
-        "gap = 0.0",
-        'gap = 0.0\nfoundation = { shape = "plane", point = [0, 0], normal = [0, 1] }',
-        "contact.gap",
-    ),
     "a sphere around a contact node": (
         "gap = 0.0",
         'foundation = { shape = "sphere", centre = [1.0, 0.0], radius = 1.0 }',
@@ -64,7 +49,6 @@ WRONG = {
         "contact.foundation",
     ),
     "friction negative somewhere": ("mu = 0.3", 'mu = "0.3-x"', "friction.mu"),
-    "contact on a clamped part": ('on = "bottom"\ngap', 'on = "left"\ngap', "contact.on"),
     "contact nodes that are all fixed": (
         "displacement = [0.0, 0.0]",
         'displacement = [0.0, 0.0]\n[[fixed]]\non = "bottom"\ndisplacement = ["free", 0.0]',
@@ -80,13 +64,11 @@ WRONG = {
         '["free", 0.0]\n[contact]\non = "bottom"\n',
         "not held",
     ),
-    "a potential fixed nowhere": ("[[load]]", PIEZO + "[[load]]", "fixed"),
     "an indefinite permittivity": (
         "[[load]]",
         PIEZO.replace("7.4", "-7.4") + "[[load]]",
         "material.piezo.beta33",
     ),
-    "a tolerance of 0": ("[friction]", "[solver]\ntolerance = 0.0\n[friction]", "tolerance"),
 }
 
 MESHES = {

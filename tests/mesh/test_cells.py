@@ -23,10 +23,7 @@ from contact.mesh.geometry import (
     volumes,
 )
 from contact.mesh.grid import box, rectangle
-from contact.mesh.transfer import refined
 from tests.problems.quadrilaterals import unit_block
-from tests.problems.sizes import integral
-from tests.problems.sizes import measures as part_sizes
 
 COMM = MPI.COMM_WORLD
 NAMES = [shape.name for shape in SHAPES]
@@ -112,21 +109,6 @@ def test_sizes_of_facets_and_their_normals_close_the_cell(shape):
     np.testing.assert_allclose(total, 0, atol=1e-14)
     size = integration_weights(False, shape, of, *at).sum(axis=1)
     np.testing.assert_allclose(through, shape.dim * size, rtol=1e-12)
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("name", NAMES)
-def test_refined_meshes_keep_parts_regions_and_space(name):
-    make = rectangle if name in NAMES[:2] else box
-    dim = 2 if make is rectangle else 3
-    domain = make(COMM, (0.0,) * dim, (1.0,) * dim, (3,) * dim, cell=name)
-    whole = domain.mesh.topology.index_map(dim).size_global
-    fine = refined(refined(domain))
-    assert shape_of(fine.mesh).name == name
-    assert fine.mesh.topology.index_map(dim).size_global == whole * 4**dim
-    assert part_sizes(fine) == pytest.approx(part_sizes(domain))
-    assert integral(fine, region="body") == pytest.approx(1.0)
-    assert fine.levels == 2
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=NAMES)

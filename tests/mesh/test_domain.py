@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from contact import InputError, build_problem, parse_case
 from contact.case.mesh import Mesh as MeshSection
+from contact.mesh.cells import shape_of
 from contact.mesh.domain import from_mesh
 from contact.mesh.entities import connected_components
 from contact.mesh.grid import Piece, box, rectangle
@@ -89,19 +90,6 @@ def test_pieces_of_the_vertical_faces_of_a_box_run_along_the_other_axes():
     assert {n: m for n, m in measures(domain).items() if n in parts} == pytest.approx(
         {"a": 0.5, "b": 3.0}
     )
-
-
-@pytest.mark.parallel
-def test_overlapping_parts_share_their_facets():
-    domain = rectangle(COMM, (0, 0), (4, 1), (8, 4), {"loaded": Piece("top", 2.0, 4.0)})
-    loaded, top = domain.facets("loaded"), domain.facets("top")
-    assert np.all(np.isin(loaded, top))
-    assert COMM.allreduce(loaded.size) == 4
-    assert COMM.allreduce(top.size) == 8
-    # In one form, too.
-    one = fem.Constant(domain.mesh, 1.0)
-    form = fem.form(one * domain.ds("top") + one * domain.ds("loaded"))
-    assert COMM.allreduce(fem.assemble_scalar(form)) == pytest.approx(6.0)
 
 
 @pytest.mark.parallel
@@ -258,17 +246,23 @@ def refinable():
         "box": lambda: box(COMM, (0, 0, 0), (4, 1, 2), (4, 1, 2), {"a": Piece("left")}),
         "ghosted": lambda: from_mesh(ghosted, {"a": lambda x: x[2] < 0.6}),
         "two cells": lambda: rectangle(COMM, (0, 0), (1, 1), (1, 1)),
+        "quadrilaterals": lambda: rectangle(COMM, (0, 0), (1, 1), (3, 3), cell="quadrilateral"),
+        "hexahedra": lambda: box(COMM, (0, 0, 0), (1, 1, 1), (3, 3, 3), cell="hexahedron"),
     }
 
 
 @pytest.mark.core
 @pytest.mark.parallel
-@pytest.mark.parametrize("kind", ["rectangle", "box", "ghosted", "two cells"])
+@pytest.mark.parametrize(
+    "kind", ["rectangle", "box", "ghosted", "two cells", "quadrilaterals", "hexahedra"]
+)
 def test_refinement_keeps_the_parts(kind):
     coarse = refinable()[kind]()
     fine = refined(refined(coarse))
     assert measures(fine) == pytest.approx(measures(coarse))
     assert integral(fine) == pytest.approx(integral(coarse))
+    assert integral(fine, region="body") == pytest.approx(integral(coarse))
+    assert (shape_of(fine.mesh), fine.levels) == (shape_of(coarse.mesh), 2)
     assert fine.size == coarse.size
     assert list(fine.parts) == list(coarse.parts)
     dim = coarse.dim

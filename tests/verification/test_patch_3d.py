@@ -13,14 +13,6 @@ from tests.problems.mechanics import SlidingBlock, flat, pressed_block, solve
 
 
 @pytest.mark.core
-def test_weights_carry_a_constant_pressure():
-    for dim, degree in ((2, 1), (2, 2), (3, 1), (3, 2)):
-        nodes = pressed_block(MPI.COMM_SELF, dim, degree).nodes
-        assert nodes.sum(np.ones_like(nodes.gap)) == pytest.approx(1.0, rel=1e-13)
-        assert nodes.weight.min() > 1e-3
-
-
-@pytest.mark.core
 def test_p2_contact_nodes_of_triangles_are_all_nodes_with_positive_areas():
     problem = pressed_block(MPI.COMM_SELF, 3, 2)
     corners = problem.domain.mesh.geometry.x
