@@ -597,7 +597,7 @@ THESIS: Mapping[str, Callable[[], dict[str, Value]]] = {
     },
     **{
         f"Table {number}, {name}": partial(
-            counts, tables_piezo.case_of(file, (16, 8), "electric.phi_f=8", *changes)
+            counts, tables_compliance.case_of(file, (16, 8), "electric.phi_f=8", *changes)
         )
         for number, (file, _) in tables_piezo.THESIS.items()
         for name, changes in (

@@ -23,64 +23,35 @@ from scripts.benchmarks.bench_one import LINEAR, block
 from scripts.reporting import Report, append, empty, parser
 
 GAMG = {"pc_type": "gamg", "pc_gamg_agg_nsmooths": "1"}
-HYPRE = {
-    "pc_type": "hypre",
-    "pc_hypre_type": "boomeramg",
-    "pc_hypre_boomeramg_coarsen_type": "HMIS",
-}
 BOOMER = "pc_hypre_boomeramg_"
-NODAL = {f"{BOOMER}nodal_coarsen": "4", f"{BOOMER}vec_interp_variant": "2"}
-INTERPOLATION = {f"{BOOMER}interp_type": "ext+i", f"{BOOMER}P_max": "4"}
+HYPRE = {"pc_type": "hypre", "pc_hypre_type": "boomeramg", f"{BOOMER}coarsen_type": "HMIS",
+         f"{BOOMER}interp_type": "ext+i"}  # fmt: skip
+NODAL = HYPRE | {f"{BOOMER}nodal_coarsen": "4", f"{BOOMER}vec_interp_variant": "2"}
+SHORT = HYPRE | {f"{BOOMER}P_max": "4"}
 
 #: Options by the name of the row.
 SOLVERS: Mapping[str, Mapping[str, str]] = {
     "this code": {"pc_type": "gamg", **DEFAULTS},
     "GAMG, PETSc's defaults": {"pc_type": "gamg"},
-    "GAMG, threshold 0.02, SOR": {
-        **GAMG,
-        "pc_gamg_threshold": "0.02",
-        "mg_levels_pc_type": "sor",
+    "GAMG, threshold 0.02, SOR": GAMG | {
+        "pc_gamg_threshold": "0.02", "mg_levels_pc_type": "sor",
         "mg_levels_ksp_type": "chebyshev",
     },
-    "GAMG, no aggressive coarsening": {
-        **GAMG,
-        "pc_gamg_aggressive_coarsening": "0",
-        "pc_gamg_threshold": "0.01",
+    "GAMG, no aggressive coarsening": GAMG | {
+        "pc_gamg_threshold": "0.01", "pc_gamg_aggressive_coarsening": "0",
     },
-    "GAMG, Richardson with SOR": {
-        **GAMG,
-        "pc_gamg_threshold": "0.01",
+    "GAMG, Richardson with SOR": GAMG | {
+        "pc_gamg_threshold": "0.01", "mg_levels_pc_type": "sor",
         "mg_levels_ksp_type": "richardson",
-        "mg_levels_pc_type": "sor",
     },
-    "BoomerAMG, threshold 0.5": {
-        **HYPRE,
-        **INTERPOLATION,
-        f"{BOOMER}strong_threshold": "0.5",
-    },
-    "BoomerAMG, threshold 0.7": {
-        **HYPRE,
-        **INTERPOLATION,
-        f"{BOOMER}strong_threshold": "0.7",
-    },
-    "BoomerAMG, nodal, rigid modes": {
-        **HYPRE,
-        **NODAL,
-        f"{BOOMER}strong_threshold": "0.25",
-        f"{BOOMER}interp_type": "ext+i",
-    },
-    "BoomerAMG, nodal, rigid modes, threshold 0.5": {
-        **HYPRE,
-        **NODAL,
-        f"{BOOMER}strong_threshold": "0.5",
-        f"{BOOMER}interp_type": "ext+i",
-    },
+    "BoomerAMG, threshold 0.5": SHORT | {f"{BOOMER}strong_threshold": "0.5"},
+    "BoomerAMG, threshold 0.7": SHORT | {f"{BOOMER}strong_threshold": "0.7"},
+    "BoomerAMG, nodal, rigid modes": NODAL | {f"{BOOMER}strong_threshold": "0.25"},
+    "BoomerAMG, nodal, rigid modes, threshold 0.5": NODAL | {f"{BOOMER}strong_threshold": "0.5"},
     "MUMPS, LDL^T": {
-        "ksp_type": "preonly",
-        "pc_type": "cholesky",
-        "pc_factor_mat_solver_type": "mumps",
+        "ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps",
     },
-}
+}  # fmt: skip
 
 
 def measured(problem: ContactProblem, options: Mapping[str, str]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Derivatives by parameters: Taylor's series, closed forms and published values, and their cost.
+"""Derivatives by parameters: random problems, closed forms and published values, and their cost.
 
 `python3 -m scripts.studies.derivatives [--out DIR] [--coarse]`; the page is docs/derivatives.md.
 """
@@ -284,8 +284,7 @@ class Taylor:
     #: Largest difference of one-sided differences of second order, over derivative and a hundredth
     #: of the result.
     apart: float
-    #: Largest remainder of first order, over the result, and its order.
-    remainder: float
+    #: Order of the largest remainder of first order.
     order: float
     #: Number of weakly active nodes.
     weak: int
@@ -322,7 +321,6 @@ def taylor(
     return Taylor(
         float((np.abs(tangent - adjoint) / least).max()),
         float((np.abs(along - apart) / np.maximum(np.abs(apart), 1e-2 * natural)).max()),
-        first,
         float(np.log2(first / second)) if second else np.nan,
         len(both[0].weakly_active),
     )
@@ -337,11 +335,8 @@ MORE = {
 }
 
 
-def series(family: str, comm: MPI.Intracomm) -> tuple[Taylor, int]:
-    """Return Taylor's series of a problem along a random way of all of its parameters.
-
-    With it the number of derivatives. Collective.
-    """
+def series(family: str, comm: MPI.Intracomm) -> Taylor:
+    """Compare along a random way of all parameters of a random problem. Collective."""
     solution = solve(parse_case(problem(family)), comm=comm)
     case, names = solution.source, ["contact_force_y", "max_pressure", "max_displacement"]
     names += ([] if family == "revolution" else ["contact_force_x"]) + [*MORE.get(family, ())]
@@ -349,25 +344,7 @@ def series(family: str, comm: MPI.Intracomm) -> tuple[Taylor, int]:
     way = np.random.default_rng(FAMILIES.index(family)).uniform(-1, 1, len(sizes))
     at_zero = np.array([number_at(case, key) == 0 for key in sizes])
     way[at_zero] = np.abs(way[at_zero])  # 0 may be the least that is accepted
-    return taylor(solution, names, sizes, way), len(sizes) * len(names)
-
-
-def tabulate(report: Report) -> None:
-    """Tabulate Taylor's series of all families."""
-    columns = empty("problem", "derivatives", "adjoint", "apart", "remainder", "order")
-    for family in FAMILIES:
-        found, count = series(family, MPI.COMM_WORLD)
-        append(columns, family, count, found.adjoint, found.apart, found.remainder, found.order)
-    report.table(
-        "taylor",
-        "Taylor's series of results along a random way of all parameters",
-        columns,
-        "Adjoint: largest relative difference to the tangent. Apart: that of the tangent along the "
-        "way to a difference of three solutions, of second order. Derivatives are compared "
-        "relative to themselves, but to not less than the result (adjoint), or a hundredth of the "
-        f"result (apart). Remainder: that of first order for a step of {STEP:g} times the "
-        "parameters, over the result, with its order from half the step.",
-    )
+    return taylor(solution, names, sizes, way)
 
 
 def relative(solution: Solution, name: str, keys: Sequence[str]) -> Array:
@@ -553,7 +530,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
     given = options(__doc__, "derivatives", arguments)
     report = Report(given.out)
-    tabulate(report)
     known(report)
     exponents(report, 4.0 if given.coarse else 12.0)
     cost(report, given.coarse)

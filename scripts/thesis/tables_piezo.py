@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contact import Case, Solution, build_problem, load_case
+from contact import Solution, build_problem, load_case
 from contact.linear.operator import SparseOperator
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
@@ -18,7 +18,7 @@ from contact.thesis.uzawa import augmentation
 from scripts.cases import CASES
 from scripts.force_balance import force_balance
 from scripts.reporting import Report, append, empty, options
-from scripts.thesis.tables_compliance import difference, iterations, run
+from scripts.thesis.tables_compliance import case_of, difference, iterations, run
 
 PHI_F = (0, 1, 2, 4, 8, 16, 32)
 K_E = (0.0, 1e-3, 1e-2, 1e-1, 1.0)
@@ -59,11 +59,6 @@ LITERAL = (
     "solver.acceleration=none",
     "solver.max_outer=60",
 )
-
-
-def case_of(name: str, cells: tuple[int, int], *changes: str) -> Case:
-    """Return a case file on a mesh."""
-    return load_case(CASES / f"{name}.toml", [f"mesh.cells=[{cells[0]}, {cells[1]}]", *changes])
 
 
 def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:

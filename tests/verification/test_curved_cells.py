@@ -12,15 +12,10 @@ import pytest
 from mpi4py import MPI
 
 from contact import Body, Contact, InputError, NewtonOptions, Sphere
-from contact.mesh.cells import SHAPES, rule, shape_of
+from contact.mesh.cells import SHAPES
 from contact.mesh.geometry import (
     area,
-    geometry_nodes,
-    inverse,
-    jacobians,
     volume,
-    volume_factors,
-    volumes,
 )
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
@@ -132,25 +127,6 @@ def test_volumes_and_areas_are_those_of_round_bodies(name: str) -> None:
     assert area(domain, "inner0") == pytest.approx(np.pi / 2, rel=1e-5)
     nodes = on_a_shaft(domain, 2).nodes
     assert nodes.sum(np.ones(nodes.nodes.size)) == pytest.approx(np.pi / 2, rel=1e-5)
-
-
-@pytest.mark.core
-@pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
-def test_sizes_of_curved_facets_and_their_normals_close_the_cell(shape) -> None:
-    """The integral of n over the boundary is 0, and that of x.n is dim times the volume."""
-    domain = rings(MPI.COMM_SELF, shape.name, 2, (1.0, 2.0), (2,))
-    of, total, through = geometry_nodes(domain), 0.0, 0.0
-    points, weights = rule(shape.facet, 8)
-    for facet, nodes in enumerate(shape.facet_nodes(2)):
-        on_cell = shape.on_facet(facet, points)
-        normal = shape.facet_normals[facet] @ inverse(jacobians(shape, of, on_cell))
-        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-        area = (volume_factors(shape.facet, of[:, nodes], points) * weights)[..., None]
-        total += (area * normal).sum(axis=1)
-        through += (area * normal * (shape.lagrange(2, on_cell) @ of)).sum(axis=(1, 2))
-    np.testing.assert_allclose(total, 0, atol=1e-13)
-    assert shape_of(domain.mesh) == shape
-    np.testing.assert_allclose(through, shape.dim * volumes(domain), rtol=1e-10)
 
 
 @pytest.mark.parametrize("name", NAMES)
