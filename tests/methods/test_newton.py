@@ -36,7 +36,7 @@ from contact.refining import coarser_cases
 from contact.solving import solve
 from contact.thesis.fixed_point import FixedPoint
 from contact.thesis.penalty import Penalty
-from forms.hencky import Linear, Log
+from forms.hencky import Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from scripts.cases import bar
 from tests.problems import mechanics
@@ -186,16 +186,6 @@ def test_nested_levels_halve_the_cells():
     assert [c.mesh.cells for c in coarser_cases(case)] == [(64, 16), (128, 32)]
     assert [c.mesh.cells for c in coarser_cases(case, 2)] == [(128, 32)]
     assert coarser_cases(case, 5)[0].mesh.cells == (16, 4)
-
-
-@pytest.mark.core
-def test_a_condensed_body_is_solved_as_the_whole_one():
-    problem = mechanics.bar(
-        SELF, 8, law=Linear(1.0, 0.3), friction=Friction(ConstantCoefficient(0.5))
-    )
-    method = newton(problem)
-    whole = newton(problem, condense=False)
-    assert np.allclose(whole.state.x, method.state.x, rtol=0, atol=1e-9)
 
 
 def pushed_block(push: float) -> dict:

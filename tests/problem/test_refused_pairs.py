@@ -1,21 +1,10 @@
 """Pairs of bodies that are refused, and what is said of the others."""
 
-import numpy as np
 import pytest
-from mpi4py import MPI
 
-from contact import Body, Contact, Fixed, GapFunction, InputError, build_problem, parse_case, solve
-from contact._compat import geometry_dofmap
+from contact import InputError, build_problem, parse_case, solve
 from contact.cli.check import expectations
-from contact.interface.pairing import find_pair
-from contact.problem.problem import ContactProblem
-from forms.hencky import Linear
-from tests.problems.blocks import Blocks
-from tests.problems.mechanics import constant
 from tests.problems.pairs import case
-
-NOTHING = GapFunction(lambda points: np.zeros(len(points)))
-ZERO = constant(0.0, 2)
 
 
 @pytest.mark.parametrize(
@@ -56,20 +45,6 @@ ZERO = constant(0.0, 2)
 def test_what_is_refused(more, message):
     with pytest.raises(InputError, match=message):
         build_problem(parse_case(case(**more)))
-
-
-def test_overlapping_bodies_are_refused():
-    domain = Blocks(2, 5, 8).domain(MPI.COMM_SELF)
-    nodes = np.unique(geometry_dofmap(domain.mesh)[domain.cells("upper")])
-    domain.mesh.geometry.x[nodes, 1] -= 0.2
-    body = Body(Linear(1.0, 0.3), [Fixed("bottom", [ZERO, ZERO])])
-    problem = ContactProblem(
-        domain, body, Contact("left", GapFunction(lambda p: np.full(len(p), 9.0)))
-    )
-    with pytest.raises(InputError, match=r"\[overlap\]"):
-        find_pair(problem.body, "under", "over", NOTHING)
-    _, geometry = find_pair(problem.body, "under", "over", NOTHING, press=True)
-    np.testing.assert_allclose(geometry.nodes.gap, -0.2, atol=1e-12)
 
 
 def test_bodies_that_may_pass_through_each_other_are_named():
