@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,8 @@ from petsc4py import PETSc
 
 #: Of the messages by which an index map finds out whom it is asked by; dolfinx's own in 0.9.
 TAG = 1202
+
+_DOFMAPS: WeakKeyDictionary[Mesh, npt.NDArray[np.int32]] = WeakKeyDictionary()
 
 
 def geometry_degree(mesh: Mesh) -> int:
@@ -37,7 +40,12 @@ def geometry_degree(mesh: Mesh) -> int:
 def geometry_dofmap(mesh: Mesh) -> npt.NDArray[np.int32]:
     """Geometry nodes of each cell, shape (cells, nodes a cell)."""
     geometry = mesh.geometry
-    return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
+    if not hasattr(geometry, "dofmaps"):
+        return geometry.dofmap
+    # 0.11 copies all of it each time that it is asked for.
+    if mesh not in _DOFMAPS:
+        _DOFMAPS[mesh] = geometry.dofmaps[0]
+    return _DOFMAPS[mesh]
 
 
 def interpolation_points(space: fem.FunctionSpace) -> npt.NDArray[np.float64]:

@@ -12,7 +12,7 @@ import pytest
 CLONE = Path(__file__).resolve().parents[2]
 
 TOOLS = """awk bash cat cp cut df dirname env flock grep head id ls mkdir mktemp mv paste readlink
-rm sed sh sha256sum sleep tail tar touch true uname xargs""".split()
+rm sed sh sha256sum sleep sort tail tar touch true uname xargs""".split()
 
 #: What making a place takes: a call is counted, may take long, and may fail.
 MAKING = """
