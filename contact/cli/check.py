@@ -35,7 +35,7 @@ from contact.problem.checks import expected_displacements, meeting_supports
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.refining import coarser_cases
-from contact.results.bodies import apart
+from contact.results.bodies import apart, overlapping
 from contact.results.remarks import beyond_heights, own_shape
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
@@ -123,6 +123,7 @@ def expectations(problem: ContactProblem) -> list[str]:
             "curved-surface": own_shape(problem),
             "part-end": beyond_heights(problem, np.ones(len(problem.nodes.weight), dtype=bool)),
             "supports": meeting_supports(problem, [problem.time]),
+            "overlap": overlapping(problem),
             "two-bodies": apart(problem),
         }.items()
         for text in remarks

@@ -42,9 +42,14 @@ Numbers = NDArray[np.intp]
 #: Depths at the sides of a pair, and beside those of all pairs (length).
 Depths: TypeAlias = tuple[float, float]
 
+#: Depths of bodies in each other that are not of both sides of any pair, by their numbers (length).
+Unpaired: TypeAlias = dict[tuple[int, int], float]
 
-def overlap_depths(body: BodyEquilibrium, pairs: Sequence[tuple[str, str, bool]]) -> list[Depths]:
-    """Return how deep the bodies of pairs of sides lie in each other. Collective.
+
+def overlap_depths(
+    body: BodyEquilibrium, pairs: Sequence[tuple[str, str, bool]]
+) -> tuple[list[Depths], Unpaired]:
+    """Return how deep bodies lie in each other. Collective.
 
     Parameters
     ----------
@@ -55,24 +60,33 @@ def overlap_depths(body: BodyEquilibrium, pairs: Sequence[tuple[str, str, bool]]
 
     Returns
     -------
-    The largest depths of each pair that curvature does not explain (length): at its sides, but
-    where another pair presses, and where there is no side of any pair; 0 for rounding.
+    The largest depths that curvature does not explain (length), 0 for rounding, of the bodies of
+    each pair: at its sides, but where another pair presses, and where there is no side of any pair;
+    and those above rounding of bodies that no pair keeps apart.
     """
-    if not pairs or body.components[1] == 1:
-        return [(0.0, 0.0)] * len(pairs)
+    if body.components[1] == 1:
+        return [(0.0, 0.0)] * len(pairs), {}
     bodies = _Boundaries.of(body, [pair[:2] for pair in pairs])
     facet, place, other = bodies.inside()
     depth, on_sides = bodies.depths(facet, place, other)
-    between = bodies.between(bodies.component[facet], other)
-    press = np.array([press for *_, press in pairs])
+    own, rounding = bodies.component[facet], TOUCHING * body.domain.size
+    between = bodies.between(own, other)
+    press = np.array([press for *_, press in pairs], dtype=bool)
     elsewhere = (on_sides & press).any(axis=1, keepdims=True) & ~press
     of_sides = between & on_sides & ~elsewhere
     beside = between & ~on_sides.any(axis=1, keepdims=True)
     both = np.stack([of_sides, beside], axis=2)
     deepest = np.where(both, depth[:, None, None], 0.0).max(axis=0, initial=0.0)
     body.comm.Allreduce(MPI.IN_PLACE, deepest, op=MPI.MAX)
-    deepest[deepest <= TOUCHING * body.domain.size] = 0.0
-    return [(at_sides, elsewhere) for at_sides, elsewhere in deepest.tolist()]
+    deepest[deepest <= rounding] = 0.0
+    alone = np.flatnonzero(~between.any(axis=1) & (depth > rounding))
+    alone = alone[np.argsort(depth[alone])]  # the deepest of two bodies comes last
+    both = np.sort(np.column_stack([own, other])[alone], axis=1).tolist()
+    here = dict(zip(map(tuple, both), depth[alone].tolist(), strict=True))
+    unpaired: Unpaired = {}
+    for there in body.comm.allgather(here):
+        unpaired |= {two: max(found, unpaired.get(two, 0.0)) for two, found in there.items()}
+    return [(at_sides, elsewhere) for at_sides, elsewhere in deepest.tolist()], unpaired
 
 
 @dataclass(frozen=True)
@@ -151,7 +165,7 @@ class _Boundaries:
         x = (shape.lagrange(surface.order, places) @ surface.points).reshape(-1, d)
         of = np.repeat(self.component, len(places))
         cells = geometry_nodes(domain)
-        # Points beyond the boxes of the other bodies of their pairs are in none of these.
+        # Points beyond the boxes of all other bodies are in none of these.
         near = np.flatnonzero(self._near(x, of))
         within_box, rank = meeting(
             bounding_boxes(comm, cells.reshape(-1, d)), x[near], np.zeros(near.size)
@@ -169,9 +183,8 @@ class _Boundaries:
         dofmap = self.body.space.dofmap
         first = dofmap.index_map.local_to_global(dofmap.list[: len(cells), 0].copy())
         component = _components(self.body, surface.owners, first.astype(np.int64))
-        joined = component[cell] != of[point]
-        joined[joined] = self.between(of[point[joined]], component[cell[joined]]).any(axis=1)
-        point, cell = point[joined], cell[joined]
+        apart = component[cell] != of[point]
+        point, cell = point[apart], cell[apart]
         of_cells = shape_of(mesh)
         with np.errstate(divide="ignore", invalid="ignore"):  # far from a curved cell
             at = pulled_back(of_cells, cells[cell], there[point])
@@ -188,8 +201,8 @@ class _Boundaries:
         return number // len(places), number % len(places), other
 
     def _near(self, x: Array, of: Numbers) -> NDArray[np.bool_]:
-        """Return which points are in boxes of other bodies of the pairs of theirs. Collective."""
-        count, rounding = self.bodies.shape[2], TOUCHING * self.body.domain.size
+        """Return which points of bodies are in boxes of other ones. Collective."""
+        count, rounding = self.body.components[1], TOUCHING * self.body.domain.size
         low = np.full((count, x.shape[1]), np.inf)
         high = -low
         np.minimum.at(low, of, x)
@@ -197,11 +210,9 @@ class _Boundaries:
         self.body.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
         self.body.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
         near = np.zeros(len(x), dtype=bool)
-        for first, second in self.bodies[self.bodies.any(axis=1).sum(axis=1) > 1]:
-            for own, other in ((first, second), (second, first)):
-                lower, upper = low[other].min(axis=0), high[other].max(axis=0)
-                held = np.all((x > lower + rounding) & (x < upper - rounding), axis=1)
-                near |= own[of] & held
+        for body in range(count):
+            held = np.all((x > low[body] + rounding) & (x < high[body] - rounding), axis=1)
+            near |= held & (of != body)
         return near
 
     def depths(

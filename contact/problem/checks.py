@@ -249,7 +249,7 @@ def _unconstrained(group: Group, unconstrained: Array) -> str:
     about, motions = "", unconstrained
     if group.count > 1:
         moves = np.linalg.norm(group.of_components(unconstrained), axis=2).max(axis=1) > 1e-6
-        about = f" about {_places(group.centres[moves])}"
+        about = f" about {places(group.centres[moves])}"
     if group.cut:  # shortenings only follow
         motions = linalg.orth(np.concatenate(group.of_components(unconstrained)))
     modes = described(motions, group.names[: len(motions)])
@@ -259,8 +259,8 @@ def _unconstrained(group: Group, unconstrained: Array) -> str:
     )
 
 
-def _places(points: Array) -> str:
-    """Return points in words."""
+def places(points: Array) -> str:
+    """Return points in words, for messages."""
     return " and ".join(f"({', '.join(f'{x:.4g}' for x in point)})" for point in points)
 
 
@@ -305,7 +305,7 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     if count > 1:
         alone = np.flatnonzero(np.linalg.norm(floating[:count], axis=1) > 1e-6)
         middles = [middle(problem, body.layout.points[component == k])[0] for k in alone]
-        where = f" of the component of the mesh about {_places(np.array(middles))}"
+        where = f" of the component of the mesh about {places(np.array(middles))}"
         known += ", or with a body that conducts and whose potential is known"
     raise InputError(
         f"the potential{where} is not determined: it is prescribed nowhere, and the foundation "

@@ -124,6 +124,8 @@ class ContactProblem:
     placements, geometries
         Of each contact: which nodes, and their geometry where the bodies are: in the reference
         configuration, but of `with_geometry`.
+    unpaired
+        Overlaps of bodies between which there is no contact (`overlap_depths`).
     interface
         Gamma_3 with its laws.
     scales
@@ -172,7 +174,8 @@ class ContactProblem:
         self.body = BodyEquilibrium(domain, self.description, degree, element)
         one = len(self.contacts) == 1
         pairs = {i: (c.on, c.against, c.press) for i, c in enumerate(self.contacts) if c.against}
-        depths = dict(zip(pairs, overlap_depths(self.body, [*pairs.values()]), strict=True))
+        found, self.unpaired = overlap_depths(self.body, [*pairs.values()])
+        depths = dict(zip(pairs, found, strict=True))
         placed = [
             self._placed("contact" if one else f"contact.{i}", contact, depths.get(i, (0.0, 0.0)))
             for i, contact in enumerate(self.contacts)

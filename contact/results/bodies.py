@@ -9,12 +9,13 @@ from collections.abc import Iterator
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import linalg
 
 from contact.errors import counted
 from contact.mesh.entities import cells_at, owned_among
 from contact.mesh.owners import Owners
+from contact.problem.checks import places
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
@@ -22,6 +23,7 @@ from contact.problem.rigid_modes import (
     UnilateralSupport,
     described,
     groups,
+    middle,
     null_space,
     sliding_mode,
 )
@@ -138,6 +140,31 @@ def apart(problem: ContactProblem) -> Iterator[Remark]:
         )
 
 
+def overlapping(problem: ContactProblem) -> Iterator[Remark]:
+    """Warn of bodies that overlap in the reference configuration without contact. Collective."""
+    found = problem.unpaired
+    if not found:
+        return
+    piece, points = problem.body.components[0], problem.body.layout.points
+
+    def named(two: tuple[int, int]) -> list[str]:
+        names = [", ".join(_regions(problem, piece, [one])) for one in two]
+        if names[0] == names[1]:
+            centres = [middle(problem, points[piece == one])[0] for one in two]
+            names = [f"the body about {places(centre[None])}" for centre in centres]
+        return sorted(names)
+
+    # Numbers of components depend on the ranks.
+    deepest = max(found.values())
+    names = min(named(two) for two, depth in found.items() if depth > (1 - EPS) * deepest)
+    more = f"; so do {counted(len(found) - 1, 'pair')} more" if len(found) > 1 else ""
+    yield (
+        f"{' and '.join(names)} overlap by up to {deepest:.3g} in the reference configuration, "
+        f"and no contact is between them{more}; accepted: meshes that are apart or touch, or "
+        "[[contact]] with `on` one and `against` the other"
+    )
+
+
 def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     """Warn of rigid-body modes that the supports leave free and contact hardly resists. Collective.
 
@@ -183,16 +210,20 @@ def _named(group: Group, motions: Array) -> str:
     problem, names = group.problem, group.problem.domain.regions
     if group.count == 1 or len(names) == 1:
         return "the body"
-    component, dofs = group.component, problem.body.space.dofmap.list
     amounts = np.linalg.norm(group.of_components(motions), axis=(1, 2))
     moved = np.array(group.components)[amounts >= amounts.max() / 2]
-    found = []
-    for name, cells in names.items():
+    return ", ".join(_regions(problem, group.component, moved))
+
+
+def _regions(problem: ContactProblem, component: NDArray[np.int32], among: ArrayLike) -> list[str]:
+    """Return the regions of some of the components of the owned nodes. Collective."""
+    dofs, found = problem.body.space.dofmap.list, []
+    for name, cells in problem.domain.regions.items():
         nodes = dofs[cells].ravel()
-        inside = np.isin(component[nodes[nodes < component.size]], moved).any()
+        inside = np.isin(component[nodes[nodes < component.size]], among).any()
         if problem.comm.allreduce(bool(inside), op=MPI.LOR):
             found.append(name)
-    return ", ".join(found)
+    return found
 
 
 def not_held(solution: Solution) -> Iterator[Remark]:

@@ -128,6 +128,7 @@ def review(solution: Solution) -> None:
         "resolution": chain(resolution(solution), charge_resolution(solution)),
         "rounding": rounding(solution),
         "several-solutions": several_solutions(solution),
+        "overlap": bodies.overlapping(problem),
         "two-bodies": chain(bodies.sides(solution), bodies.apart(problem)),
         "supports": meeting_supports(problem, times),
         "unresisted-motion": bodies.unresisted_motions(solution),

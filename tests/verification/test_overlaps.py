@@ -23,6 +23,7 @@ from contact import (
     parse_case,
     solve,
 )
+from contact.cli.check import expectations
 from contact.cli.new import facing_parts
 from contact.errors import InputError
 from contact.interface.mortar.coupling import couple
@@ -511,6 +512,53 @@ def test_an_overlap_beside_the_sides_of_a_pair(cell):
     with pytest.raises(InputError, match=r"contact\.against.* up to 0.01 more.*\[overlap\]"):
         Problem(domain, given, contacts(True))
     assert Problem(domain, given, contacts(True, True)).nodes.size > 0
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("cell", [*PLANE, *SPACE])
+def test_an_overlap_of_bodies_in_no_pair_is_said(cell, element):
+    """Whichever pairs there are beside it; bodies that touch, or share nodes, have none."""
+    order, degree = element
+    for form in forms(cell):
+        for depth in (-0.01, 0.0, 0.01, 0.1):
+            ends, counts = (1.0, 1.5, 2.0, 2.5), (5, 4, 6) if form == "ring" else (3, 4, 3)
+            domain = layers(COMM, cell, order, form, (0.0, depth), ends, counts)
+            given = body(form, domain.dim, 3)
+            for pair in (Contact("outer0", against="inner1"), Contact("outer1", 0.1)):
+                problem = Problem(domain, given, pair, degree=degree)
+                assert bool(problem.unpaired) == (depth > 0)
+                if depth > 0:
+                    (told,) = problem.unpaired.values()
+                    # Behind the chords of a facet alone where these are deeper than the overlap.
+                    least = 0.3 if form == "ring" else 0.999
+                    assert least * depth < told < 1.01 * depth
+
+
+@pytest.mark.parallel
+def test_an_overlap_in_no_pair_is_a_warning():
+    """Of the set-up, and of the solution; the bodies have their names, or places."""
+    domain, given = three((0.0, 0.01)), Body(Linear(YOUNG, POISSON), [Fixed("below", [0.0, 0.0])])
+    contacts = [Contact("outer0", against="inner1"), Contact("outer2", 0.1)]
+    cells = fem.functionspace(domain.mesh, ("DG", 0)).tabulate_dof_coordinates()
+    owned = cells[: domain.mesh.topology.index_map(2).size_local, 0]
+    numbers = [np.flatnonzero((owned > low) & (owned < low + 0.5)) for low in (1.0, 1.5, 2.0)]
+    regions = dict(zip(("shaft", "hub", "ring"), np.asarray(numbers, dtype=object), strict=True))
+    for names, first, second in (
+        (domain.regions, r"the body about \(1.75, 0.5\)", r"the body about \(2.24, 0.5\)"),
+        (regions, "hub", "ring"),
+    ):
+        problem = Problem(replace(domain, regions=names), given, contacts)
+        said = rf"{first} and {second} overlap by up to 0.01 .*no contact.*\[overlap\]"
+        for texts in (expectations(problem), solve(problem).warnings):
+            assert sum(re.search(said, text) is not None for text in texts) == 1
+    assert not [
+        text
+        for text in expectations(
+            Problem(three((0.01, 0.0)), given, Contact("outer0", against="inner1", press=True))
+        )
+        if "[overlap]" in text
+    ]
 
 
 @pytest.mark.parallel
