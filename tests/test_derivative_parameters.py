@@ -1,11 +1,13 @@
 """Derivatives by every parameter of cases whose constraint, units or values at 0 are in the way."""
 
+import logging
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact import InputError, load_case, parse_case, sensitivity, solve
-from contact.case.file import number_at
+from contact.case.file import number_at, with_number
 from scripts.studies.derivatives import taylor
 
 SELF = MPI.COMM_SELF
@@ -157,6 +159,61 @@ def test_numbers_that_are_0_in_any_units(length, young):
     }
     case = parse_case(data)
     check(case, ["contact_force_x", "contact_force_y", "max_pressure"], [*sizes], sizes, 2e-6)
+
+
+@pytest.mark.parametrize(
+    ("key", "way"), [("contact.foundation.centre.1", 1), ("mesh.origin.1", -1)]
+)
+def test_bodies_that_touch_have_the_derivatives_of_the_side_on_which_they_are_apart(key, way):
+    """Overlaps of rounding are gaps of 0: the mean of both sides was half of it."""
+    case, names = parse_case(at_zero()), ["contact_force_y", "max_pressure"]
+    run, begin, step = solve(case, comm=SELF), number_at(case, key), way * 1e-5
+    found = sensitivity(run, names, [key])
+    forces = [
+        solve(with_number(case, key, begin + k * step), comm=SELF).contact_force[1]
+        for k in range(3)
+    ]
+    exact = (4 * forces[1] - 3 * forces[0] - forces[2]) / (2 * step)
+    assert found["contact_force_y"][key] == pytest.approx(exact, rel=1e-4)
+
+
+def test_a_parameter_that_overlaps_both_ways_is_refused():
+    data = at_zero()
+    data["contact"] = {"on": "top", "foundation": {"shape": "plane", "point": [1.0, 1.0],
+                       "normal": [0.0, -1.0]}}  # fmt: skip
+    run = solve(parse_case(data), comm=SELF)
+    with pytest.raises(InputError, match=r"overlap beside 0.*\[border\]"):
+        sensitivity(run, ["contact_force_y"], ["contact.foundation.normal.0"])
+
+
+@pytest.mark.parametrize("method", ["tangent", "adjoint"])
+@pytest.mark.parametrize(("gap", "down"), [(0.06, 0.01), (0.05, 0.0)])
+def test_a_layer_that_just_touches_is_said(gap, down, method, monkeypatch):
+    """Its stiffness jumps there, and the mean of both sides came without a word."""
+    said, logger = [], logging.getLogger("contact.sensitivity")
+    monkeypatch.setattr(logger, "warning", lambda text, *_: said.append(text))
+    layer = {"law": "compliance", "layer": 0.05, "stiffness": 2.0}
+    for more, count in ((0.0, 5), (1e-3, 0), (-1e-3, 0)):
+        contact = {"on": "bottom", "gap": gap + more, **layer}
+        run = solve(
+            block(fixed=[{"on": "top", "displacement": [0, -down]}], contact=contact), comm=SELF
+        )
+        found = sensitivity(run, ["contact_force_y"], ["contact.gap"], method)
+        assert len(found.weakly_active) == count and len(said) == min(count, 1)
+        said.clear()
+
+
+def test_a_gap_of_1e_12_has_the_derivative_of_0():
+    """Of a layer, from whose place steps of 2e-18 were lost: it was exactly 0."""
+    layer, found = {"law": "compliance", "layer": 0.05, "stiffness": 2.0}, []
+    for gap in (0.0, 1e-12):
+        contact = {"on": "bottom", "gap": gap, **layer}
+        run = solve(
+            block(fixed=[{"on": "top", "displacement": [0, -0.01]}], contact=contact), comm=SELF
+        )
+        found.append(sensitivity(run, ["contact_force_y"], ["contact.gap"]))
+    assert found[1]["contact_force_y"]["contact.gap"] > 1.0
+    assert found[1]["contact_force_y"] == pytest.approx(found[0]["contact_force_y"], rel=1e-6)
 
 
 def test_numbers_near_0():

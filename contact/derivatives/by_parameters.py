@@ -60,6 +60,7 @@ from contact.ranks import summed
 from contact.results.functionals import Differentiable, Functional, Largest, Reaction
 from contact.results.quantities import named_functionals
 from contact.results.solution import Solution
+from contact.tolerances import EPS
 from contact.typing import Array
 
 logger = logging.getLogger("contact.sensitivity")
@@ -85,6 +86,9 @@ STEP = 2e-6
 #: Least and largest accepted change of the equations, and that of a new step.
 LEAST, MOST, AIM = 1e-8, 1e-4, 3e-7
 
+#: Change of a gap with a parameter, over the largest of all, that is told from rounding.
+SEEN = 1e-3
+
 #: Most choices of a step, and largest factor.
 TRIES, FACTOR = 6, 1e4
 
@@ -98,8 +102,8 @@ class Sensitivities(dict[str, dict[str, float]]):
         Quantity -> parameter -> derivatives at the end of each step, shape (steps,); empty for the
         adjoint, which gives those of the last step alone.
     weakly_active
-        Points of contact nodes at the border of two states in a step, shape (n, d). There the
-        derivatives are one-sided: those of the active set of the solution.
+        Points of contact nodes at the border of two states in a step, shape (n, d). There results
+        have a kink, and derivatives are those of the active set of the solution.
     counters
         Factorisations and back-substitutions that they took.
     method
@@ -175,7 +179,8 @@ def sensitivity(
         _tangent(path, asked, families, found)
     if found.weakly_active.size:
         logger.warning(
-            "%s between two states, the first at %s: derivatives are one-sided",
+            "%s between two states, the first at %s: results have a kink there, and derivatives "
+            "may be those of neither side",
             counted(len(found.weakly_active), "contact node"),
             np.round(found.weakly_active[0], 6).tolist(),
         )
@@ -274,10 +279,10 @@ def family_of(
     InputError
         If no value beside it is accepted, or contact nodes, mesh or internal variables change.
     """
-    step, found, fault = STEP * (abs(parameter.value) or 1.0), None, None
+    base, step, found, fault = steps[0][0], STEP * (abs(parameter.value) or 1.0), None, None
     for _ in range(TRIES):
         try:
-            made = _made(name, parameter, step, steps[0][0])
+            made = _made(name, parameter, (step, -step), base)
         except InputError as error:
             fault = fault or error
             if found is not None:
@@ -287,19 +292,30 @@ def family_of(
         if found is not None and len(made.problems) > len(found.problems):
             break  # across a border
         found, change = made, _change(made, steps)
-        if LEAST <= change <= MOST or (change == 0 and parameter.value != 0):
+        # Of a number as small as 1e-12 rounding leaves nothing of its own steps.
+        if LEAST <= change <= MOST or (change == 0 and step >= STEP and parameter.value != 0):
             break
         step *= np.clip(AIM / change, 1 / FACTOR, FACTOR) if change > 0 else FACTOR
     if found is None:
         assert fault is not None
         raise fault
-    return found
+    closing = _closing(base, found)
+    if not closing:
+        return found
+    apart = [way for way in found.ways if way not in closing]
+    if not apart:
+        raise InputError(
+            f"{name}: bodies touch, and overlap beside {parameter.value:g}; accepted: bodies that "
+            "are apart, or a given gap",
+            "border",
+        )
+    return _made(name, parameter, apart, base)
 
 
-def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) -> Family:
+def _made(name: str, parameter: Parameter, ways: Sequence[float], base: ContactProblem) -> Family:
     """Return a central difference, or a one-sided one at a border. Collective."""
     problems, faults = dict[float, ContactProblem](), list[InputError]()
-    for way in (step, -step):
+    for way in ways:
         try:
             problems[way] = parameter.problem(parameter.value + way)
         except InputError as error:
@@ -307,7 +323,7 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
     if not problems:
         raise faults[0]
     factors: tuple[float, ...] = 1.0, -1.0
-    over = 2 * step
+    over = ways[0] - ways[-1]
     if len(problems) == 1:
         # One-sided, of second order.
         (way,) = problems
@@ -325,6 +341,23 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
                 "border",
             )
     return Family((*problems.values(),), (*problems,), factors, over)
+
+
+def _closing(base: ContactProblem, family: Family) -> list[float]:
+    """Return the ways of a central difference along which touching bodies overlap. Collective."""
+    # Overlaps of rounding are gaps of 0, which do not change with the parameter.
+    if len(family.problems) > 2:
+        return []
+    there = np.isfinite(base.nodes.gap)
+    rises = [np.abs(problem.nodes.gap - base.nodes.gap)[there] for problem in family.problems]
+    most = np.maximum(*rises)
+    least = SEEN * base.comm.allreduce(float(most.max(initial=0.0)), op=MPI.MAX)
+    least = max(least, EPS * base.domain.size)
+    return [
+        way
+        for way, rise in zip(family.ways, rises, strict=True)
+        if base.comm.allreduce(bool(np.any((most > least) & (rise < most / 2))), op=MPI.LOR)
+    ]
 
 
 def _change(family: Family, steps: Sequence[tuple[ContactProblem, State]]) -> float:

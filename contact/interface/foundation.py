@@ -27,6 +27,10 @@ from contact.typing import Array
 from forms.laws import PenetrationLaw
 from forms.ops import Value
 
+#: Change of a stiffness within a small penetration, over the larger one, that is a kink of the law;
+#: least one over c_0.
+KINK, SOFTEST = 0.01, 1e-5
+
 #: A pressure, or a penetration, above zero.
 TINY = np.finfo(float).tiny
 
@@ -286,6 +290,17 @@ class FoundationLaw:
         if self.conductor is not None:
             total[:, -1] -= self.phi_scale * self.charge(jump, pressure)
         return total
+
+    def kinks(self, jump: Array, reach: Array | float) -> NDArray[np.bool_]:
+        """Return where the layer's stiffness jumps within a penetration `reach`, shape (n,)."""
+        if self.layer is None:
+            return np.zeros(jump.shape[0], dtype=bool)
+        s, stiffness = self._layer_penetration(jump), self.layer.h_nu(self._difference(jump))
+        before, after = (
+            np.abs(stiffness * self.layer.p_nu.derivative(s + way)) for way in (-reach, reach)
+        )
+        least = np.maximum(KINK * np.maximum(before, after), SOFTEST * self.c_0)
+        return np.asarray(np.abs(after - before) > least)
 
     def pressure_gradient(self, jump: Array) -> Array:
         """Return the derivative of `pressure` by the jumps, shape (n, block size)."""

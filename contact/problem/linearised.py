@@ -103,8 +103,8 @@ def reference_norms(problem: ContactProblem, state: State) -> tuple[float, float
 def weakly_active(problem: ContactProblem, state: State) -> Array:
     """Return the points of weakly active nodes, shape (n, d). Collective.
 
-    In contact without pressure, sticking at the friction bound, or slipping by nothing: there the
-    solution has one-sided derivatives only.
+    In contact without pressure, sticking at the friction bound, slipping by nothing, or at a jump
+    of the layer's stiffness: there the solution has one-sided derivatives only.
     """
     interface, jump, forces = problem.interface, problem.nodal(state), state.forces
     active, c = active_set(problem, state), interface.c_0
@@ -117,6 +117,7 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
         left = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
         weak |= active.sticks & active.closed & (left < small) & (bound > 0)
         weak |= active.slips & (c * length < small)
+    weak |= interface.foundation.kinks(jump, max(small / c, EPS * interface.size))
     return problem.nodes.gather(problem.nodes.points[weak])
 
 
