@@ -28,6 +28,7 @@ from contact.mesh.transfer import carry, with_parents
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import tell
+from contact.problem.checks import check_presses
 from contact.problem.condensed import condensation_pays
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -231,6 +232,8 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
         rows.append(values_of(ADAPT, solution))
         domain = _next_mesh(asked, domain, solution, len(rows)) if solution.converged else None
     assert solution is not None
+    if not solution.outcome.signal:
+        check_presses(solution.problem)
     solution.adaptation = rows
     for identifier, remarks in {"adapt": missed(asked, rows if solution.converged else ())}.items():
         solution.warnings += [f"{text} [{identifier}]" for text in remarks]

@@ -23,7 +23,6 @@ from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, Replacements, build_problem, naming_case
 from contact.case.file import Case, load_case, to_toml
 from contact.errors import InputError
-from contact.interface.placing import FoundationPlacement
 from contact.methods.load_stepping import LoadStepping
 from contact.methods.method import METHODS, Method, solve_step
 from contact.methods.newton import Newton
@@ -303,13 +302,8 @@ def reviewed(
     """Return a solution with its warnings, and the titles of its case. Collective.
 
     Setup began at `clock`. A case with objects in place of its parts is not fully `described`.
-    If a signal has ended the solve, `SolveInterrupted` is raised with the solution. A press of a
-    shape between the nodes, which an adapted mesh may show, is refused.
+    If a signal has ended the solve, `SolveInterrupted` is raised with the solution.
     """
-    if not solution.outcome.signal:
-        for placement in solution.problem.placements:
-            if isinstance(placement, FoundationPlacement) and placement.press:
-                placement.refuse_unresolved()
     announce(solution)
     if case is not None:
         solution.title, solution.output, solution.units = case.title, case.output, case.case.units

@@ -99,7 +99,7 @@ def build_problem(
             domain, body, contacts, degree=case.space.degree, element=case.space.element
         )
         for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:
-            check_problem(problem.at(time))
+            check_problem(problem.at(time), refined=case.adapt is not None)
         for time in () if case.evolution is None else case.evolution.ends:
             check_supports(problem.at(time))
     return problem

@@ -81,11 +81,12 @@ def overlap_depths(
     deepest[deepest <= rounding] = 0.0
     alone = np.flatnonzero(~between.any(axis=1) & (depth > rounding))
     alone = alone[np.argsort(depth[alone])]  # the deepest of two bodies comes last
-    both = np.sort(np.column_stack([own, other])[alone], axis=1).tolist()
-    here = dict(zip(map(tuple, both), depth[alone].tolist(), strict=True))
+    two = np.sort(np.column_stack([own, other])[alone], axis=1)
+    deep = zip(*two.T, depth[alone], strict=True)
+    here: Unpaired = {(int(i), int(j)): float(d) for i, j, d in deep}
     unpaired: Unpaired = {}
     for there in body.comm.allgather(here):
-        unpaired |= {two: max(found, unpaired.get(two, 0.0)) for two, found in there.items()}
+        unpaired |= {k: max(d, unpaired.get(k, 0.0)) for k, d in there.items()}
     return [(at_sides, elsewhere) for at_sides, elsewhere in deepest.tolist()], unpaired
 
 
@@ -234,7 +235,7 @@ class _Boundaries:
         radius = least + widest
         ball, rank = meeting(bounding_boxes(comm, centres), points, radius)
         near, ranks = within(centres, *exchanged(comm, rank, points[ball], radius[ball]))
-        surface = self._curved()
+        surface = self._curved(np.union1d(near, facet))
         opposite = surface.sent(near, ranks)
         # A foot aside, where facets turn, has a height in another direction: none adds to depths.
         own = CURVES * np.minimum(surface.height_bounds(facet, at)[0], 0.0)
@@ -251,16 +252,23 @@ class _Boundaries:
             np.logical_or.at(on_sides, i[nearest_ones], theirs[j[nearest_ones]])
         return depth, on_sides
 
-    def _curved(self) -> Surface:
-        """Return the boundary with deviations, on the sides of pairs by these alone. Collective."""
-        curved = self.surface.with_deviations()
-        for k, both in enumerate(self.parts):
-            for side, part in enumerate(both):
-                alone = surface_of(self.body.domain, self.body.space, part)
-                there = self.sides[:, k, side]
-                row = np.searchsorted(self.body.domain.facets(part), self.facets[there])
-                curved.deviation[there] = alone.deviation[row]
-                curved.unknown[there] = alone.unknown[row]
+    def _curved(self, near: Numbers) -> Surface:
+        """Return the boundary with deviations, largest on parts of near facets. Collective."""
+        # Parts alone have no edges of the body, at whose vertices curvature is not known.
+        domain, curved = self.body.domain, self.surface.with_deviations()
+        names = [*dict.fromkeys([*domain.parts, *(part for both in self.parts for part in both)])]
+        met = np.array([np.isin(self.facets[near], domain.facets(name)).any() for name in names])
+        self.body.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.LOR)
+        for name in np.array(names, dtype=object)[met]:
+            alone = surface_of(domain, self.body.space, name)
+            _, there, row = np.intersect1d(self.facets, domain.facets(name), return_indices=True)
+            before, after = (
+                np.abs(side.deviation).max(axis=1, initial=0.0) for side in (curved, alone)
+            )
+            larger = after[row] >= before[there]
+            there, row = there[larger], row[larger]
+            curved.deviation[there] = alone.deviation[row]
+            curved.unknown[there] = alone.unknown[row]
         return curved
 
 

@@ -14,6 +14,7 @@ from scipy import linalg
 from contact.body.loads import wrong_load
 from contact.errors import InputError
 from contact.interface.foundation import FoundationLaw
+from contact.interface.placing import FoundationPlacement
 from contact.model.fields import values_at
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
@@ -50,19 +51,35 @@ def expected_displacements(
     return float(force / scales.area / scales.young * scales.size), largest
 
 
-def check_problem(problem: ContactProblem) -> None:
-    """Check loads, supports and rigid-body modes, at the time of a problem. Collective.
+def check_problem(problem: ContactProblem, refined: bool = False) -> None:
+    """Check presses, loads, supports and rigid-body modes, at the time of a problem. Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    refined
+        Whether its mesh is to be refined, which may show a press of a shape within a facet.
 
     Raises
     ------
     InputError
-        If a load acts on a contact part or is not finite, two supports contradict each other, or
-        a rigid-body mode is unconstrained.
+        If a shape presses within a facet, a load acts on a contact part or is not finite, two
+        supports contradict each other, or a rigid-body mode is unconstrained.
     """
+    if not refined:
+        check_presses(problem)
     _check_plane_stress(problem)
     _check_loads(problem)
     check_supports(problem)
     check_rigid_modes(problem)
+
+
+def check_presses(problem: ContactProblem) -> None:
+    """Refuse presses of shapes that cut facets between their nodes. Collective."""
+    for placement in problem.placements:
+        if isinstance(placement, FoundationPlacement) and placement.press:
+            placement.refuse_unresolved()
 
 
 def _check_plane_stress(problem: ContactProblem) -> None:

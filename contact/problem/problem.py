@@ -229,14 +229,14 @@ class ContactProblem:
         The contact nodes, the history and the time are the same. Collective.
         """
         other = copy(self)
-        other.__dict__.pop("constraint", None)  # of the other geometry, where it is asked for
         other.geometries = tuple(geometries)
-        other.interface = other._interface().at(self.time, self.slip_history)
-        return other
+        return other.with_interface(other._interface().at(self.time, self.slip_history))
 
     def with_interface(self, interface: Interface) -> ContactProblem:
-        """Return the problem with other laws at the same contact nodes."""
+        """Return the problem with another interface; its constraint is that of its nodes."""
         other = copy(self)
+        if interface.nodes is not self.nodes:
+            other.__dict__.pop("constraint", None)
         other.interface = interface
         return other
 

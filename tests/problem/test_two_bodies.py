@@ -1,5 +1,7 @@
 """Two bodies: how they are held, and methods and ranks that agree."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -48,7 +50,7 @@ def pushed(comm, degree=1, dim=2, mu=0.3, supports=(), gap=0.0, **given):
 
 
 @pytest.mark.core
-def test_another_geometry_has_its_own_constraint():
+def test_another_geometry_or_interface_has_its_own_constraint():
     """A copy of the problem kept the constraint of the first one, once that had been asked for."""
     problem = pushed(MPI.COMM_SELF)
     swapped = ContactProblem(
@@ -56,9 +58,15 @@ def test_another_geometry_has_its_own_constraint():
     )
     jumps = np.random.default_rng(1).standard_normal(problem.body.owned)
     first = problem.constraint.expand(jumps)
-    other = problem.with_geometry(swapped.geometries).constraint.expand(jumps)
-    np.testing.assert_array_equal(other, swapped.constraint.expand(jumps))
-    assert np.abs(other - first).max() > 0.1
+    for another in (
+        problem.with_geometry(swapped.geometries),
+        problem.with_interface(swapped.interface),
+    ):
+        other = another.constraint.expand(jumps)
+        np.testing.assert_array_equal(other, swapped.constraint.expand(jumps))
+        assert np.abs(other - first).max() > 0.1
+    laws = problem.with_interface(replace(problem.interface, gap=problem.interface.gap + 1.0))
+    assert laws.constraint is problem.constraint
 
 
 @pytest.mark.core

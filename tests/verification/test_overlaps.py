@@ -20,6 +20,8 @@ from contact import (
     Plane,
     Problem,
     Sphere,
+    build_problem,
+    evolve,
     parse_case,
     solve,
 )
@@ -29,6 +31,7 @@ from contact.errors import InputError
 from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.surface import Surface
 from contact.mesh.grid import box, rectangle
+from contact.problem.checks import check_problem
 from tests.problems import overlapping
 from tests.problems.overlapping import POISSON, UNIAXIAL, YOUNG, body, corner, layers, pressure
 
@@ -197,7 +200,7 @@ def test_rigid_foundations(degree):
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("cell", [*PLANE, *SPACE])
 def test_rigid_shapes_within_a_facet(cell, degree):
-    """What cuts a flat facet between its nodes is refused, of a press on the last mesh alone."""
+    """What cuts a flat facet between its nodes is refused; of a press if none is to refine it."""
     d = 2 if cell in PLANE else 3
     make = rectangle if d == 2 else box
     domain = make(COMM, (0.0,) * d, (4.0,) * d, (4,) * d, cell=cell)
@@ -213,11 +216,39 @@ def test_rigid_shapes_within_a_facet(cell, degree):
                     problem = Problem(domain, given, contact, degree=degree)
                     assert problem.nodes.size > 0
                     if press and depth == 0.1 and isinstance(shape, Sphere):
-                        with pytest.raises(InputError, match=r"shorter facets.*\[overlap\]"):
-                            solve(problem)
+                        for start in (check_problem, solve, lambda p: next(evolve(p, [1.0]))):
+                            with pytest.raises(InputError, match=r"shorter facets.*\[overlap\]"):
+                                start(problem)
+                        check_problem(problem, refined=True)
                     continue
                 with pytest.raises(InputError, match=r"shorter facets.*\[overlap\]"):
                     Problem(domain, given, contact, degree=degree)
+
+
+@pytest.mark.parallel
+def test_a_press_within_a_facet_is_refused_before_the_solve():
+    """Unless the mesh is to be adapted: then on the last mesh, where it is still between nodes."""
+    ball = {"shape": "sphere", "centre": [1.5, -0.9], "radius": 1.0}
+    case = {
+        "mesh": {"generator": "rectangle", "size": [4.0, 4.0], "cells": [4, 4]},
+        "material": {"young": YOUNG, "poisson": POISSON},
+        "fixed": [{"on": "top", "displacement": [0.0, 0.0]}],
+        "contact": {"on": "bottom", "foundation": ball, "overlap": "press"},
+    }
+    refused = pytest.raises(InputError, match=r"shorter facets.*\[overlap\]")
+    with refused:
+        build_problem(parse_case(case))
+    case["evolution"] = {"times": [0.0, 1.0], "steps": [2]}
+    with refused:
+        build_problem(parse_case(case))
+    del case["evolution"]
+    case["mesh"]["adapt"] = {"error": 0.1, "max_unknowns": 60}
+    build_problem(parse_case(case))
+    with refused:
+        solve(parse_case(case))
+    case["mesh"]["adapt"]["max_unknowns"] = 2000
+    solution = solve(parse_case(case))
+    assert solution.converged and solution.pressure.max() > 0
 
 
 @pytest.mark.parallel
