@@ -327,8 +327,8 @@ def _overlap(depth: float, drawn: bool, resolved: bool, label: str) -> InputErro
             "facets of on"
         )
     return InputError(
-        f"{label}: the undeformed {bodies} overlap, by up to {depth:.3g} more than straight "
-        f"facets deviate from a curve; accepted: meshes that are apart or touch, or {way}",
+        f"{label}: the undeformed {bodies} overlap, by up to {depth:.3g} more than facets "
+        f"deviate from a curve; accepted: meshes that are apart or touch, or {way}",
         "overlap",
     )
 

@@ -295,7 +295,7 @@ def find_nodes(
     found = candidates(body, facets, obstacle, rest, key)
     if obstacle.is_shape:
         try:
-            _refuse_behind(body, found)
+            _refuse_behind(body, obstacle, facets, found)
             _refuse_within(body.domain, obstacle, found)
             if not press:  # an adaptive run starts on facets that hide the shape
                 _refuse_overlap(body, found)
@@ -361,12 +361,16 @@ def _check_charged(
         )
 
 
-def _refuse_behind(body: BodyEquilibrium, found: Candidates) -> None:
+def _refuse_behind(
+    body: BodyEquilibrium, obstacle: Obstacle, facets: Surface, found: Candidates
+) -> None:
     """Refuse a foundation behind the contact part; all of a disc may be one. Collective."""
     # Where no ray meets the foundation the gap is infinite, and `find_nodes` has its message.
     seen = np.isfinite(found.measured)
     best = body.comm.allreduce(np.max(found.facing[seen], initial=-np.inf), op=MPI.MAX)
     if np.isfinite(best) and best <= 1e-9:
+        # Nodes beside a punch that is within facets see it sideways.
+        _refuse_unresolved(body.domain, obstacle, facets, facing=False)
         raise InputError(
             "foundation: it lies behind the contact part: the contact direction points "
             "into the body at every node; accepted: a normal towards the body, a shape in front "
@@ -396,7 +400,7 @@ def _refuse_within(domain: Domain, obstacle: Obstacle, found: Candidates) -> Non
 
 
 def _refuse_overlap(body: BodyEquilibrium, found: Candidates) -> None:
-    """Refuse nodes in a shape by more than straight facets deviate from a curve. Collective."""
+    """Refuse nodes in a shape by more than facets deviate from a curve. Collective."""
     # Nodes on straight facets of a curved part may lie in a ball that the facets' corners touch.
     depth = np.where(found.facing > 0, -found.gap, 0.0)
     cut = body.comm.allreduce(np.max(depth, initial=0.0), op=MPI.MAX)
@@ -404,13 +408,18 @@ def _refuse_overlap(body: BodyEquilibrium, found: Candidates) -> None:
         raise InputError(
             f"foundation: the undeformed body cuts it, by up to {cut:.3g}; accepted: gaps "
             f">= 0 but for {ROUNDED * body.domain.size:.1g} (rounding), and the deviation of "
-            'straight facets from a curve, or overlap = "press"',
+            'facets from a curve, or overlap = "press"',
             "overlap",
         )
 
 
-def _refuse_unresolved(domain: Domain, obstacle: Obstacle, facets: Surface) -> None:
-    """Refuse shapes that cut facets between their nodes, deeper than at these. Collective."""
+def _refuse_unresolved(
+    domain: Domain, obstacle: Obstacle, facets: Surface, facing: bool = True
+) -> None:
+    """Refuse shapes that cut facets between their nodes, deeper than at these. Collective.
+
+    `facing`: only where their surface faces that of the body.
+    """
     if not isinstance(obstacle, Shape):
         return
     comm, shape = domain.comm, facets.shape
@@ -423,7 +432,7 @@ def _refuse_unresolved(domain: Domain, obstacle: Obstacle, facets: Surface) -> N
     normal = facets.normal[every]
     # No overlap where the facets, or the surfaces that they approximate, have none.
     behind = np.minimum(facets.distance_bounds(every, there, normal)[0], 0.0)
-    faces = np.einsum("pd,pd->p", normal, outward) < 0
+    faces = (np.einsum("pd,pd->p", normal, outward) < 0) | (not facing)
     depths = np.where(faces, -distance + 1.1 * behind, 0.0).reshape(near.size, len(at))
     nodes = depths[:, : len(shape.nodes(facets.degree))].max(axis=1)
     deepest = depths.max(axis=1)

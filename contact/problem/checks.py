@@ -250,15 +250,22 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
         )
     words, along = described(found.motion[:, None], group.names), group.translation(found.motion)
     if along is None:
-        sums = f"{found.power / found.resisted:.6g} times its resistance"
+        sums = f"{_told_apart(found.power / found.resisted, 1.0)[0]} times its resistance"
     else:
-        sums = f"{found.power / along:.6g}, it bears less than {found.resisted / along:.6g}"
+        loads, borne = _told_apart(found.power / along, found.resisted / along)
+        sums = f"{loads}, it bears less than {borne}"
     raise InputError(
         f"the loads {PUSHED_THROUGH} ({words}): they are {sums}, with its largest "
         f"pressure of {problem.interface.saturation:.4g} (stiffness x limit); accepted: smaller "
         "loads, a larger limit, a layer on a rigid part, or supports",
         "saturated",
     )
+
+
+def _told_apart(one: float, other: float) -> tuple[str, str]:
+    """Return two numbers with as many digits, from six to twelve, as tell them apart."""
+    every = [(f"{one:.{digits}g}", f"{other:.{digits}g}") for digits in range(6, 13)]
+    return next((both for both in every if both[0] != both[1]), every[0])
 
 
 def _unconstrained(group: Group, unconstrained: Array) -> str:

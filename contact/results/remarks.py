@@ -372,7 +372,7 @@ def charge_resolution(solution: Solution) -> Iterator[Remark]:
 
 
 def own_shape(problem: ContactProblem) -> Iterator[Remark]:
-    """Warn of a curved part without a gap anywhere: its foundation has then its very shape."""
+    """Warn of a part that is not flat, without any gap: its foundation has then its very shape."""
     comm, size = problem.comm, problem.domain.size
     for contact, geometry in zip(problem.contacts, problem.geometries, strict=True):
         nodes = geometry.nodes
@@ -383,8 +383,8 @@ def own_shape(problem: ContactProblem) -> Iterator[Remark]:
         rigid = contact.against is None and not contact.obstacle.is_shape
         if rigid and not flat and gap <= 1e-9 * size:
             yield (
-                f"the part {contact.on} is curved and its gap is 0 everywhere: the foundation has "
-                "the body's own shape, unless contact.foundation or a gap is given"
+                f"the part {contact.on} is not flat and its gap is 0 everywhere: the foundation "
+                "has the body's own shape, unless contact.foundation or a gap is given"
             )
 
 
@@ -461,7 +461,7 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     problem, nodes = solution.problem, solution.problem.nodes
     if nodes.cut > 0:
         yield (
-            f"straight facets of curved contact surfaces overlap by up to {nodes.cut:.3g}, less "
+            f"facets of curved contact surfaces overlap by up to {nodes.cut:.3g}, less "
             f"than they deviate from the curves: the gap there is taken as 0; accepted: {FINER}"
         )
     closed, uncertainty = solution.status != "open", nodes.maximum(nodes.deviation)

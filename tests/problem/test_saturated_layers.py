@@ -75,6 +75,16 @@ def test_loads_beyond_the_limit_are_refused_with_both(kind):
     assert f"largest pressure of {LARGEST:.4g} (stiffness x limit)" in message
 
 
+@pytest.mark.parametrize("excess", [1e-5, 1e-8])
+def test_loads_just_beyond_the_limit_are_told_from_it(excess):
+    """With six digits both read alike."""
+    with pytest.raises(InputError, match=r"\[saturated\]") as refused:
+        solve(parse_case(block("plane", 1 + excess)), comm=SELF)
+    words = r"they are (\S+), it bears less than (\S+),"
+    loads, borne = re.search(words, str(refused.value)).groups()
+    assert loads != borne and float(loads) > float(borne)
+
+
 @pytest.mark.core
 @pytest.mark.parametrize("kind", BLOCKS)
 def test_a_load_of_exactly_the_limit_is_refused(kind):

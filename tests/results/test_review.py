@@ -185,7 +185,7 @@ def test_a_gap_that_was_forgotten() -> None:
     (warning,) = (
         w for w in solve(block(2, contact={"on": "contact"}, **disc)).warnings if "curved" in w
     )
-    assert warning.startswith("the part contact is curved and its gap is 0 everywhere")
+    assert warning.startswith("the part contact is not flat and its gap is 0 everywhere")
     plane = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
     for other in (block(2), block(2, contact={"on": "contact", "foundation": plane}, **disc)):
         assert not any("curved and its gap" in text for text in solve(other).warnings)

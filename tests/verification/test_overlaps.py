@@ -228,6 +228,8 @@ def test_rigid_shapes_within_a_facet(cell, degree):
 @pytest.mark.parallel
 def test_a_press_within_a_facet_is_refused_before_the_solve():
     """Unless the mesh is to be adapted: then on the last mesh, where it is still between nodes."""
+    # The centre of a small ball within the body is beside all nodes: it was said to lie behind.
+    small = {"shape": "sphere", "centre": [1.5, 0.1], "radius": 0.3}
     ball = {"shape": "sphere", "centre": [1.5, -0.9], "radius": 1.0}
     case = {
         "mesh": {"generator": "rectangle", "size": [4.0, 4.0], "cells": [4, 4]},
@@ -236,8 +238,12 @@ def test_a_press_within_a_facet_is_refused_before_the_solve():
         "contact": {"on": "bottom", "foundation": ball, "overlap": "press"},
     }
     refused = pytest.raises(InputError, match=r"shorter facets.*\[overlap\]")
-    with refused:
-        build_problem(parse_case(case))
+    for given in (ball, small):
+        for overlap in ("press", "refuse"):
+            case["contact"] |= {"foundation": given, "overlap": overlap}
+            with refused:
+                build_problem(parse_case(case))
+    case["contact"] |= {"foundation": ball, "overlap": "press"}
     case["evolution"] = {"times": [0.0, 1.0], "steps": [2]}
     with refused:
         build_problem(parse_case(case))
