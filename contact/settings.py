@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeVar, get_args
 
-from annotated_types import Ge, Gt, Le, Len, Lt, Predicate
+from annotated_types import Ge, Gt, Le, Lt
 from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler
 from pydantic.json_schema import SkipJsonSchema
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, core_schema
 
-from contact.errors import shown
+from contact.errors import InputError, shown
 from contact.tolerances import PRECISION
 
 
@@ -24,13 +24,17 @@ class Words(str):
 MISSING = Words("missing")
 
 
-def fault(key: str, given: Any, accepted: str, identifier: str = "") -> PydanticCustomError:
+class Fault(InputError):
+    """Wrong value of a table: its words begin with the key, before which come those above."""
+
+
+def fault(key: str, given: Any, accepted: str, identifier: str = "") -> InputError:
     """Return an error for a validator to raise.
 
     Parameters
     ----------
     key
-        Dotted path below the model that raises it.
+        Dotted path below the model that raises it; empty for the value of the model itself.
     given
         The given value of the case file, or words inside `Words`.
     accepted
@@ -40,14 +44,11 @@ def fault(key: str, given: Any, accepted: str, identifier: str = "") -> Pydantic
     """
     identifier = identifier or ("missing" if given is MISSING else "value")
     words = given if isinstance(given, Words) else f"given {shown(given)}"
-    context = {"key": key, "given": words, "accepted": accepted, "identifier": identifier}
-    return PydanticCustomError("fault", "fault", context)
+    said = f"{words}; accepted: {accepted}"
+    return Fault(f"{key}: {said}", identifier) if key else InputError(said, identifier)
 
 
 One = TypeVar("One")
-
-#: Types of errors whose words are complete: `fault`, and an InputError.
-COMPLETE = ("fault", "value_error")
 
 
 def keys_in(location: tuple[int | str, ...]) -> list[str]:
@@ -79,12 +80,34 @@ class Accepted:
             return handler(given)
         except ValidationError as error:
             for one in error.errors(include_url=False):
-                if keys_in(one["loc"]) or one["type"] in COMPLETE:
-                    raise  # of a value inside
+                if keys_in(one["loc"]) or one["type"] == "value_error":
+                    raise  # of a value inside, or complete
             inner = isinstance(given, Mapping) and self.key in given
             raise fault(
                 *((self.key, given[self.key]) if inner else ("", given)), self.text
             ) from None
+
+
+@dataclass(frozen=True)
+class OrOwn:
+    """Marks a union of a kind that a table has, the first one, with objects of Python.
+
+    Attributes
+    ----------
+    own
+        The class of these objects, or a function that tells them; they are taken as they are.
+    """
+
+    own: Callable[[Any], object]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """Validate a table alone."""
+        of_table = handler.generate_schema(get_args(source)[0])
+        return core_schema.no_info_wrap_validator_function(self._take, of_table)
+
+    def _take(self, given: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+        own = isinstance(given, self.own) if isinstance(self.own, type) else self.own(given)
+        return given if own else handler(given)
 
 
 @dataclass(frozen=True)
@@ -122,23 +145,9 @@ class ReadWith:
 #: A setting for Python alone, not in the case file.
 Internal: TypeAlias = Annotated[One, Field(exclude=True), SkipJsonSchema()]
 
-#: Mark of a list with one number a dimension.
-SPATIAL = "spatial"
-
 Positive: TypeAlias = Annotated[float, Gt(0), Accepted("a number > 0")]
 NonNegative: TypeAlias = Annotated[float, Ge(0), Accepted("a number >= 0")]
 Number: TypeAlias = Annotated[float, Accepted("a number")]
-Vector: TypeAlias = Annotated[
-    tuple[Number, ...], Len(2, 3), SPATIAL, Accepted("a list of 2 numbers in 2-D, 3 in 3-D")
-]
-#: A direction, of any length but zero.
-Direction: TypeAlias = Annotated[
-    tuple[Number, ...],
-    Len(2, 3),
-    Predicate(any),
-    SPATIAL,
-    Accepted("a vector that is not zero, of 2 numbers in 2-D, 3 in 3-D"),
-]
 Tolerance: TypeAlias = Annotated[
     float,
     Ge(PRECISION),

@@ -22,7 +22,6 @@ from dolfinx.la import InsertMode
 from dolfinx.mesh import compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
-from pydantic_core import PydanticCustomError
 from scipy import sparse
 
 from contact.body.description import Body
@@ -30,9 +29,9 @@ from contact.errors import InputError
 from contact.mesh.domain import Domain, members
 from contact.mesh.entities import Indices, cell_facets, distributed_components
 from contact.model.body import Bolt, Electrode
-from contact.model.messages import describe_fault
 from contact.model.rigid import Rigid, numbers_at, rigid_motions
 from contact.ranks import summed
+from contact.settings import Fault
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
@@ -223,8 +222,8 @@ def _moving(rigid: Rigid, domain: Domain) -> Rigid:
             )
     try:
         rigid.check_dimension(domain.dim)
-    except PydanticCustomError as error:
-        raise describe_fault(error).within(place) from None
+    except Fault as error:
+        raise error.within(place) from None
     if domain.revolved and rigid.off_axis is not None:
         raise InputError(
             f"{rigid.name} on {rigid.on!r}: a rigid part moves along the axis alone where space is "

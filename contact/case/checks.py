@@ -12,9 +12,9 @@ from contact.model.body import ZERO
 from contact.model.fields import CONSTANT
 from contact.model.formula import Expression
 from contact.model.messages import listed
-from contact.model.section import AMPLITUDE, PART, as_given, walk
+from contact.model.section import Spatial, walk
 from contact.model.units import SYSTEMS, labels_of, other_label
-from contact.settings import MISSING, SPATIAL, Words, fault
+from contact.settings import Words, fault
 
 #: `contact.case.file.Case`, which calls these checks.
 Case: TypeAlias = Any
@@ -22,16 +22,16 @@ Case: TypeAlias = Any
 #: Quantities that the constants of a material have: elastic, and piezoelectric.
 ELASTIC, ELECTRIC = ("length", "stress"), ("length", "stress", "potential", "charge")
 
-#: Beginnings of the keys that may depend on the time.
-TIMED = ("fixed.", "load.", "rigid.", "electrode.", "bolt.")
+#: Ends of the paths of names of parts.
+PARTS = (".on", ".against")
 
 
 def check_sections(case: Case) -> None:
     """Raise a fault if sections contradict each other."""
-    for path, value, marks in walk(case):
+    for path, value in walk(case):
         if isinstance(value, Expression) and "t" in value.names:
-            _check_time(case, path, value)
-        if AMPLITUDE in marks and value is not None:
+            case.require(case.evolution, path, "a formula in t with [evolution] only")
+        if path.endswith(".amplitude") and isinstance(value, str):
             _check_amplitude(case, path, value)
     _check_regions(case)
     _check_units(case)
@@ -42,13 +42,12 @@ def check_sections(case: Case) -> None:
         _check_mechanical(case)
     _check_contacts(case)
     _check_rigid(case)
-    if case.evolution is not None and getattr(case.solver, "nested", False):
-        raise fault("solver.nested", True, "nested = false with [evolution]")
+    fits = case.evolution is None or not getattr(case.solver, "nested", False)
+    case.require(fits, "solver.nested", "nested = false with [evolution]")
     mesh = case.mesh
     if mesh is not None and mesh.shape is not None:
         accepted = needed(case.space.element, case.space.degree, mesh.shape)
-        if accepted is not None:
-            raise fault("space.element", case.space.element, accepted)
+        case.require(accepted is None, "space.element", accepted)
     if case.space.kinematics == "plane_stress":
         _check_plane_stress(case)
     if mesh is not None and mesh.dimension is not None:
@@ -57,13 +56,12 @@ def check_sections(case: Case) -> None:
 
 def _check_plane_stress(case: Case) -> None:
     """Raise a fault if no stress acts across the body, and an element or a law does not fit."""
-    if case.space.element != "standard":
-        accepted = '"standard" in plane stress, where nothing locks'
-        raise fault("space.element", case.space.element, accepted, "plane-stress")
+    accepted = '"standard" in plane stress, where nothing locks'
+    case.require(case.space.element == "standard", "space.element", accepted, "plane-stress")
     for key, material in case.materials:
-        if material.piezoelectric and material.kind not in ("linear", "anisotropic"):
-            accepted = '"linear" or "anisotropic" in plane stress with piezoelectric constants'
-            raise fault(f"{key}.law", material.kind, accepted, "plane-stress")
+        fits = material.kind in ("linear", "anisotropic") or not material.piezoelectric
+        accepted = '"linear" or "anisotropic" in plane stress with piezoelectric constants'
+        case.require(fits, f"{key}.law", accepted, "plane-stress")
 
 
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
@@ -71,12 +69,12 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
     known = sorted(parts)
     for path, section in case.moving:
         section.check_dimension(dimension, f"{path}.")
-    for path, value, marks in walk(case):
-        if SPATIAL in marks and isinstance(value, tuple) and len(value) != dimension:
-            raise fault(path, as_given(value), f"{dimension} components in {dimension}-D")
-        if isinstance(value, Expression) and dimension == 2 and "z" in value.names:
-            raise fault(path, value.source, "formulas in x and y in 2-D", "formula-variable")
-        if PART in marks and value is not None:
+    for path, value in walk(case):
+        fits = not isinstance(value, Spatial) or len(value) == dimension
+        case.require(fits, path, f"{dimension} components in {dimension}-D")
+        fits = dimension == 3 or not isinstance(value, Expression) or "z" not in value.names
+        case.require(fits, path, "formulas in x and y in 2-D", "formula-variable")
+        if path.endswith(PARTS) and isinstance(value, str):
             for name in members(value):
                 if name not in known:
                     accepted = f"a part of the mesh: {listed(known)}{nearest(name, known)}"
@@ -86,16 +84,16 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
         if only is not None and only != dimension:
             words = Words(f'given "{contact.foundation.shape}" in {dimension}-D')
             raise fault(f"{path}.foundation.shape", words, f"this shape in {only}-D only")
-    if dimension == 3 and case.space.kinematics != "plane_strain":
-        accepted = '"plane_strain" with a mesh in 3-D, where it has no effect'
-        raise fault("space.kinematics", case.space.kinematics, accepted)
-    if dimension == 2 and case.mesh is not None and case.mesh.axis is not None:
-        raise fault("mesh.axis", case.mesh.axis, "no axis in 2-D")
+    fits = dimension == 2 or case.space.kinematics == "plane_strain"
+    accepted = '"plane_strain" with a mesh in 3-D, where it has no effect'
+    case.require(fits, "space.kinematics", accepted)
+    fits = dimension == 3 or case.mesh is None or case.mesh.axis is None
+    case.require(fits, "mesh.axis", "no axis in 2-D")
     for path, material in case.materials:
         key, poling = material.axis
-        if poling is not None and isinstance(poling, tuple) != (dimension == 3):
-            accepted = "an angle in 2-D" if dimension == 2 else "3 numbers in 3-D"
-            raise fault(f"{path}.{key}", poling, accepted)
+        fits = poling is None or isinstance(poling, tuple) == (dimension == 3)
+        accepted = "an angle in 2-D" if dimension == 2 else "3 numbers in 3-D"
+        case.require(fits, f"{path}.{key}", accepted)
 
 
 def growing(case: Case) -> list[str]:
@@ -109,29 +107,19 @@ def growing(case: Case) -> list[str]:
     ]
     found = []
     for path, section in (*sections, *case.moving):
-        values = [v for _, v, _ in walk(section) if isinstance(v, Expression)]
+        values = [v for _, v in walk(section) if isinstance(v, Expression)]
         moves = any("t" in value.names for value in values)
         if section.amplitude is None and not moves and any(value != ZERO for value in values):
             found.append(path)
     return found
 
 
-def _check_time(case: Case, path: str, formula: Expression) -> None:
-    """Raise a fault if a formula uses t where it has no meaning."""
-    if not (path.startswith(TIMED) or ".rigid." in path or path.endswith(".phi_f")):
-        raise fault(path, formula.source, "a formula without t")
-    if case.evolution is None:
-        raise fault(path, formula.source, "a formula in t with [evolution] only")
-
-
 def _check_amplitude(case: Case, path: str, name: str) -> None:
     """Raise a fault if there is no amplitude of a name."""
-    if case.evolution is None:
-        raise fault(path, name, "an amplitude with [evolution] only")
+    case.require(case.evolution, path, "an amplitude with [evolution] only")
     known = sorted({*case.evolution.amplitudes, CONSTANT})
-    if name not in known:
-        names = f"{listed(known)}{nearest(name, known)}"
-        raise fault(path, name, f"a name below evolution.amplitudes: {names}")
+    names = f"{listed(known)}{nearest(name, known)}"
+    case.require(name in known, path, f"a name below evolution.amplitudes: {names}")
 
 
 def _check_mechanical(case: Case) -> None:
@@ -140,10 +128,8 @@ def _check_mechanical(case: Case) -> None:
     for key, names in (("fixed", ("potential",)), ("load", ("charge", "body_charge"))):
         for i, section in enumerate(getattr(case, key)):
             for name in names:
-                if getattr(section, name) is not None:
-                    raise fault(
-                        f"{key}.{i}.{name}", as_given(getattr(section, name)), accepted, "piezo"
-                    )
+                fits = getattr(section, name) is None
+                case.require(fits, f"{key}.{i}.{name}", accepted, "piezo")
     for path, contact in case.contacts:
         key, electric = case.electric_of(path, contact)
         if electric is not None:
@@ -160,8 +146,8 @@ def _check_potential(case: Case) -> None:
         accepted = "a potential on at least one part, or [electric] with k_e > 0"
         raise fault("fixed", Words("no potential fixed"), accepted, "ungrounded")
     for i, section in enumerate(case.electrode):
-        if any(meet(section.on, other) for other in grounded):
-            raise fault(f"electrode.{i}.on", section.on, "a part whose potential is not fixed")
+        fits = not any(meet(section.on, other) for other in grounded)
+        case.require(fits, f"electrode.{i}.on", "a part whose potential is not fixed")
 
 
 def _check_contacts(case: Case) -> None:
@@ -169,18 +155,17 @@ def _check_contacts(case: Case) -> None:
     seen: dict[str, str] = {}
     for path, contact in case.contacts:
         for i, fixed in enumerate(case.fixed):
-            if fixed.is_clamped and {*members(contact.on)} <= {*members(fixed.on)}:
-                accepted = f"a part that fixed.{i} does not fix wholly"
-                raise fault(f"{path}.on", contact.on, accepted)
+            fits = not fixed.is_clamped or {*members(contact.on)} - {*members(fixed.on)}
+            case.require(fits, f"{path}.on", f"a part that fixed.{i} does not fix wholly")
         key, electric = case.electric_of(path, contact)
-        if contact.against is not None and electric is not None and electric.phi_f != ZERO:
-            accepted = "0, or none, with against: the other body has a potential of its own"
-            raise fault(f"{key}.phi_f", electric.phi_f.source, accepted)
+        fits = contact.against is None or electric is None or electric.phi_f == ZERO
+        accepted = "0, or none, with against: the other body has a potential of its own"
+        case.require(fits, f"{key}.phi_f", accepted)
         # Newton's method linearises layer and charge; it has no previous outer iteration.
         for place, section in ((path, contact), (key, electric)):
-            if section is not None and section.lagged and case.solver.method == "newton":
-                accepted = 'lagged with solver.method = "uzawa" or "penalty"'
-                raise fault(f"{place}.lagged", section.lagged, accepted)
+            fits = section is None or not section.lagged or case.solver.method != "newton"
+            accepted = 'lagged with solver.method = "uzawa" or "penalty"'
+            case.require(fits, f"{place}.lagged", accepted)
         for part in members(contact.on):
             if seen.setdefault(part, path) != path:
                 raise fault(f"{path}.on", part, f"a part that {seen[part]} does not have")
@@ -196,8 +181,8 @@ def _check_regions(case: Case) -> None:
     """Raise a fault unless each of several materials has regions of its own."""
     seen: dict[str, str] = {}
     for path, material in case.materials:
-        if material.on is None and len(case.materials) > 1:
-            raise fault(f"{path}.on", MISSING, "regions for each of several materials")
+        fits = material.on is not None or len(case.materials) == 1
+        case.require(fits, f"{path}.on", "regions for each of several materials")
         for name in material.on or ():
             if seen.setdefault(name, path) != path:
                 raise fault(f"{path}.on", name, f"regions that {seen[name]} does not have")
@@ -206,8 +191,8 @@ def _check_regions(case: Case) -> None:
 def _check_rigid(case: Case) -> None:
     """Raise a fault if a part is rigid or an electrode twice, or leaves the axis of revolution."""
     for i, part in enumerate(case.rigid):
-        if any(meet(part.on, contact.on) for _, contact in case.contacts):
-            raise fault(f"rigid.{i}.on", part.on, "a part beside the contact part")
+        fits = not any(meet(part.on, contact.on) for _, contact in case.contacts)
+        case.require(fits, f"rigid.{i}.on", "a part beside the contact part")
     for path, motion in case.moving:
         if case.space.kinematics == "axisymmetric" and (key := motion.off_axis) is not None:
             accepted = "0 across the axis of a body of revolution, and no rotation"
@@ -215,8 +200,8 @@ def _check_rigid(case: Case) -> None:
     for key in ("rigid", "electrode", "bolt"):
         parts = [section.on for section in getattr(case, key)]
         for i, on in enumerate(parts):
-            if any(meet(on, other) for other in parts[:i]):
-                raise fault(f"{key}.{i}.on", on, f"a part that no other [[{key}]] has")
+            fits = not any(meet(on, other) for other in parts[:i])
+            case.require(fits, f"{key}.{i}.on", f"a part that no other [[{key}]] has")
 
 
 def _check_units(case: Case) -> None:
@@ -224,7 +209,7 @@ def _check_units(case: Case) -> None:
     by_name = [entry for entry in case.materials if entry[1].name is not None]
     for path, material in by_name:
         first, other = by_name[0]
-        if material.system != other.system:
+        if any(material.system.unit(key) != other.system.unit(key) for key in ELECTRIC):
             words = Words(f"{_units_of(material)}, and {first} has {_units_of(other)}")
             raise fault(f"{path}.units", words, "one system of units for all materials", "units")
         if not isinstance(material.units, str):

@@ -39,7 +39,7 @@ def digest(case: Case) -> dict[str, str]:
     InputError
         If a file cannot be read.
     """
-    given = [(key, Path(value)) for key, value, _ in walk(case) if isinstance(value, FilePath)]
+    given = [(key, Path(value)) for key, value in walk(case) if isinstance(value, FilePath)]
     for key, material in case.materials:
         if material.name is not None and material.library is None:
             given.append((f"{key}.library", PACKAGED))

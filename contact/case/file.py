@@ -26,7 +26,6 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
 
 from contact.case.checks import check_mesh, check_sections
 from contact.case.mesh import Adapt, Mesh, cut_about_axis
@@ -39,7 +38,7 @@ from contact.model.fields import CONSTANT, Factor, Ramp, steady
 from contact.model.foundation import Electric
 from contact.model.friction import Friction
 from contact.model.material import Material
-from contact.model.messages import describe, describe_fault, either, shown
+from contact.model.messages import describe, either, shown
 from contact.model.rigid import Motion, Rigid
 from contact.model.section import (
     OneOrSome,
@@ -49,7 +48,7 @@ from contact.model.section import (
 )
 from contact.model.units import NAMES, SYSTEMS, labels_of
 from contact.results.options import OutputOptions, Units
-from contact.settings import Accepted
+from contact.settings import Accepted, Fault
 
 Kind = TypeVar("Kind")
 Materials: TypeAlias = Annotated[
@@ -228,8 +227,8 @@ class Case(Section):
         """Refuse a case that does not fit its mesh, of a dimension and with some parts."""
         try:
             check_mesh(self, dimension, parts)
-        except PydanticCustomError as error:
-            raise describe_fault(error).within(f"{self._source}: ") from None
+        except Fault as error:
+            raise error.within(f"{self._source}: ") from None
 
 
 def _share_units(given: Any) -> Any:
@@ -329,7 +328,7 @@ def parse_case(
         On the first mistake; the message is one line.
     """
     try:
-        case = Case.model_validate(dict(data), context={"folder": folder})
+        case = Case.model_validate(data, context={"folder": folder})
     except ValidationError as error:
         raise describe(error, source) from None
     file = None if case.mesh is None else case.mesh.file

@@ -21,22 +21,22 @@ from contact.mesh.grid import rotate
 from contact.mesh.reader import from_file, from_generator
 from contact.mesh.transfer import check_adaptable, refined
 from contact.methods.signals import killed_on_signal
-from contact.model.formula import Expression
+from contact.model.fields import Field as Given
 from contact.model.messages import unknown
 from contact.model.section import (
     Axis,
     Either,
     Few,
     File,
-    Formula,
     Name,
     OneOrSome,
     Section,
+    StaticValue,
     Vector,
     as_tuple,
 )
 from contact.ranks import on_all_ranks
-from contact.settings import MISSING, Accepted, Count, Number, Positive, Words, fault
+from contact.settings import Accepted, Count, Number, Positive, Words, fault
 from contact.typing import Array
 from meshes.grading import memory
 
@@ -157,12 +157,12 @@ class Mesh(Section):
     """Adaptive refinement, `[mesh.adapt]`. Default: none."""
     parts: dict[Name, Pieces] = Field(default={})
     """Further parts of a rectangle or box by name: `[mesh.parts.NAME]`."""
-    inside: dict[Name, Formula] = Field(default={})
+    inside: dict[Name, StaticValue] = Field(default={})
     """Parts inside of the body by name, of any mesh: the facets at all of whose corners a formula
     is not 0, such as `middle = "abs(y - 0.5) < 1e-6"`, in the coordinates before rotation.
     `[[fixed]]`, `[[electrode]]`, `[[rigid]]` and `[[bolt]]` may name them: an electrode between two
     layers."""
-    regions: dict[Name, Formula] = Field(default={})
+    regions: dict[Name, StaticValue] = Field(default={})
     """Further regions by name, of any mesh: the cells in whose middle a formula is not 0, likewise.
     `[[material]]` names them."""
     parameters: dict[Name, Number] = Field(default={})
@@ -217,30 +217,29 @@ class Mesh(Section):
         if (self.generator is None) == (self.file is None):
             given = "neither generator nor file" if self.file is None else "generator and file"
             raise fault("generator", Words(given), "one of generator and file", "exclusive-keys")
-        if self.diagonal is not None and self.generator != "rectangle":
-            raise fault("diagonal", self.diagonal, "diagonal for a rectangle only")
+        fits = self.diagonal is None or self.generator == "rectangle"
+        self.require(fits, "diagonal", "diagonal for a rectangle only")
         known = grid.CELLS.get(self.generator or "", tuple(shape.name for shape in SHAPES))
-        if self.cell is not None and (self.file is not None or self.cell not in known):
-            accepted = " or ".join(f'"{name}"' for name in known)
-            raise fault("cell", self.cell, accepted if self.file is None else "cell of generators")
-        if self.order > 1 and (self.file is not None or self.sides):
-            raise fault("order", self.order, "order 2 of other generators than rectangle and box")
+        self.require(None in (self.cell, self.file), "cell", "cell of generators")
+        fits = self.cell is None or self.cell in known
+        self.require(fits, "cell", " or ".join(f'"{name}"' for name in known))
+        fits = self.order == 1 or (self.file is None and not self.sides)
+        self.require(fits, "order", "order 2 of other generators than rectangle and box")
         if self.generator is not None and self.sides:
             self._check_keys()
             return self
         for key in ("origin", "size", "cells", "parts"):
-            if getattr(self, key):
-                raise fault(key, getattr(self, key), f"{key} for a rectangle or box only")
-        if self.generator is None and self.parameters:
-            raise fault("parameters", self.parameters, "parameters of a generator only")
+            self.require(not getattr(self, key), key, f"{key} for a rectangle or box only")
+        fits = self.generator is not None or not self.parameters
+        self.require(fits, "parameters", "parameters of a generator only")
         return self
 
     def _check_keys(self) -> None:
-        for key, value in self.parameters.items():
-            raise fault(f"parameters.{key}", value, "parameters of another generator only")
+        for key in self.parameters:
+            self.require(False, f"parameters.{key}", "parameters of another generator only")
         for key in ("size", "cells"):
-            if getattr(self, key) is None:
-                raise fault(key, MISSING, f"a list of {self.dimension} numbers")
+            accepted = f"a list of {self.dimension} numbers"
+            self.require(getattr(self, key) is not None, key, accepted)
         try:
             self.check_grid()
         except grid.GridError as error:
@@ -291,7 +290,7 @@ class Mesh(Section):
             for name, formula in getattr(self, key).items():
                 yield name, partial(marked, formula, f"mesh.{key}.{name}")
 
-        def marked(formula: Expression, label: str, x: Array) -> NDArray[np.bool_]:
+        def marked(formula: Given, label: str, x: Array) -> NDArray[np.bool_]:
             try:
                 return formula.numpy(x[: domain.dim].T) != 0
             except InputError as error:

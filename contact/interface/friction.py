@@ -33,7 +33,7 @@ from contact.interface.nodes import ContactNodes, Geometry
 from contact.linear.layout import times
 from contact.model.fields import Field, Moving, values_at
 from contact.model.formula import Expression
-from contact.model.friction import Friction, MuLaw
+from contact.model.friction import Friction
 from contact.ranks import neighbours, on_all_ranks
 from contact.typing import Array
 from forms.laws import (
@@ -150,7 +150,7 @@ def law_at(friction: Friction, nodes: ContactNodes) -> FrictionLaw | None:
         If a bound or coefficient is negative or no number at a node, or without slip; or a wrong
         derivative, maximum or Lipschitz constant.
     """
-    given: Any = friction.mu.coefficient if isinstance(friction.mu, MuLaw) else friction.mu
+    given: Any = friction.mu
     if friction.law == "none":
         return None
     if friction.law == "tresca":

@@ -33,9 +33,8 @@ from contact.model.section import (
     Timed,
     Value,
     Values,
-    as_given,
 )
-from contact.settings import MISSING, SPATIAL, Accepted, Switch, Words, fault
+from contact.settings import Accepted, Switch, Words, fault
 
 ZERO = Expression(0.0)
 
@@ -53,8 +52,7 @@ class Fixed(Described):
     """Part of the boundary, or a list of parts."""
     displacement: (
         Annotated[
-            Few[Free],
-            SPATIAL,
+            Few[Free[Value]],
             Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula or "free"'),
         ]
         | None
@@ -81,14 +79,7 @@ class Fixed(Described):
         normal: Scalar | None = None,
         symmetry: Literal["x", "y", "z"] | None = None,
     ) -> None:
-        super().__init__(
-            on=on,
-            displacement=displacement,
-            symmetry=symmetry,
-            normal=normal,
-            potential=potential,
-            amplitude=amplitude,
-        )
+        self._set(locals())
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -96,11 +87,9 @@ class Fixed(Described):
         one = [key for key in keys if getattr(self, key) is not None]
         if len(one) > 1:
             accepted = f"one of {' and '.join(one)}, and for more another entry"
-            raise fault(one[0], as_given(getattr(self, one[0])), accepted, "one-condition")
-        if all(value is None for value in self.given.values()):
-            given = as_given(self.displacement) or MISSING
-            accepted = "a component that is fixed, normal, symmetry or a potential"
-            raise fault("displacement", given, accepted, "supports")
+            self.require(False, one[0], accepted, "one-condition")
+        accepted = "a component that is fixed, normal, symmetry or a potential"
+        self.require(self.given, "displacement", accepted, "supports")
         return self
 
     @property
@@ -139,7 +128,6 @@ class Elastic(Described):
     stiffness: (
         Annotated[
             Few[NonNegativeValue],
-            SPATIAL,
             Accepted("a list of 2 numbers >= 0 or formulas in 2-D, 3 in 3-D"),
         ]
         | None
@@ -154,12 +142,12 @@ class Elastic(Described):
         stiffness: Vector | None = None,
         normal: Static | None = None,
     ) -> None:
-        super().__init__(on=on, stiffness=stiffness, normal=normal)
+        self._set(locals())
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.stiffness is None and self.normal is None:
-            raise fault("stiffness", MISSING, "stiffness, normal, or both", "elastic")
+        fits = self.stiffness is not None or self.normal is not None
+        self.require(fits, "stiffness", "stiffness, normal, or both", "elastic")
         return self
 
 
@@ -184,7 +172,6 @@ class Load(Described):
     force: (
         Annotated[
             Few[Placeless],
-            SPATIAL,
             Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
         ]
         | None
@@ -220,17 +207,7 @@ class Load(Described):
             charge, body_charge = None, one_of("Load", charge=charge, body_charge=body_charge)
         else:
             traction = one_of("Load", density=density, traction=traction)
-        super().__init__(
-            on=on,
-            everywhere=on is None,
-            traction=traction,
-            force=force,
-            pressure=pressure,
-            charge=charge,
-            body_force=body_force,
-            body_charge=body_charge,
-            amplitude=amplitude,
-        )
+        self._set(locals() | {"everywhere": on is None})
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -243,9 +220,7 @@ class Load(Described):
             if getattr(self, key) is not None:
                 accepted = f"{place}: {', '.join(right)}"
                 raise fault(key, Words(f"given {place}"), accepted, "exclusive-keys")
-        if not self.named:
-            accepted = f"at least one of {', '.join(right)}"
-            raise fault(right[0], MISSING, accepted, "load-values")
+        self.require(self.named, right[0], f"at least one of {', '.join(right)}", "load-values")
         return self
 
     @property
@@ -295,7 +270,7 @@ class Electrode(Described):
         charge: GivenTimed = 0.0,
         amplitude: GivenAmplitude | None = None,
     ) -> None:
-        super().__init__(on=on, charge=charge, amplitude=amplitude)
+        self._set(locals())
 
     @property
     def forces(self) -> tuple[Expression | OfTime | None, ...]:
@@ -326,7 +301,7 @@ class Bolt(Described):
         shortening: GivenTimed | None = None,
         amplitude: GivenAmplitude | None = None,
     ) -> None:
-        super().__init__(on=on, force=force, shortening=shortening, amplitude=amplitude)
+        self._set(locals())
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, WithJsonSchema, model_validator
@@ -17,26 +19,13 @@ from contact.model.formula import Expression
 from contact.model.foundation import Conductor, Electric, Layer
 from contact.model.friction import Friction
 from contact.model.messages import either, shown
-from contact.model.obstacle import (
-    Cone,
-    Cylinder,
-    GapFunction,
-    Heights,
-    Level,
-    Obstacle,
-    Paraboloid,
-    Plane,
-    Punch,
-    Shape,
-    Sphere,
-    Triangles,
-)
+from contact.model.obstacle import SHAPES, GapFunction, Obstacle, Shape
 from contact.model.rigid import Motion
-from contact.model.section import Described, Direction, FromTable, Own, Part, StaticValue
+from contact.model.section import Described, Direction, FromTable, Part, StaticValue
 from contact.settings import (
-    MISSING,
     Accepted,
     NonNegative,
+    OrOwn,
     Positive,
     ReadWith,
     Switch,
@@ -46,34 +35,21 @@ from contact.settings import (
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
 
-#: A further shape is a dataclass in `contact.model.obstacle` with its name as `shape`.
-SHAPES = (Plane, Sphere, Cylinder, Cone, Paraboloid, Punch, Level, Heights, Triangles)
-
-
-def _kind(given: Any) -> Any:
-    """Return the name of a shape; "own" for a user's."""
-    if isinstance(given, Mapping):
-        return f":{given.get('shape')}"
-    if isinstance(given, SHAPES):
-        return f":{given.shape}"
-    return ":own" if hasattr(given, "measure") else None
-
-
 #: A table, by the name of its shape, or an object with `measure`.
-Foundation: TypeAlias = Annotated[
-    Annotated[Plane, FromTable, Tag(":plane")]
-    | Annotated[Sphere, FromTable, Tag(":sphere")]
-    | Annotated[Cylinder, FromTable, Tag(":cylinder")]
-    | Annotated[Cone, FromTable, Tag(":cone")]
-    | Annotated[Paraboloid, FromTable, Tag(":paraboloid")]
-    | Annotated[Punch, FromTable, Tag(":punch")]
-    | Annotated[Level, FromTable, Tag(":distance")]
-    | Annotated[Heights, FromTable, Tag(":heights")]
-    | Annotated[Triangles, FromTable, Tag(":surface")]
-    | Annotated[Obstacle, Own(), Tag(":own")],
-    Discriminator(_kind),
-    Accepted(f"a table with shape = {either(shown(kind.shape) for kind in SHAPES)}", "shape"),
-]
+if TYPE_CHECKING:
+    Foundation: TypeAlias = Obstacle
+else:
+    Foundation = Annotated[
+        Annotated[
+            reduce(or_, (Annotated[kind, FromTable, Tag(f":{kind.shape}")] for kind in SHAPES)),
+            Discriminator(lambda given: isinstance(given, Mapping) and f":{given.get('shape')}"),
+        ]
+        | Obstacle,
+        OrOwn(lambda given: hasattr(given, "measure")),
+        Accepted(f"a table with shape = {either(shown(kind.shape) for kind in SHAPES)}", "shape"),
+    ]
+
+NAME = "a text without blanks at its ends"
 
 #: Of the layer; the thesis does not give its constants (section 8.1.2).
 COMPLIANT = ReadWith("law", "compliance")
@@ -101,7 +77,7 @@ class Contact(Described):
 
     on: Part
     """Part of the boundary, or a list of parts, that may touch the foundation."""
-    name: Annotated[str, Field(min_length=1), Accepted("a text")] | None = None
+    name: Annotated[str, Field(pattern=r"^\S(.*\S)?$"), Accepted(NAME)] | None = None
     """Name of its results, `contacts` of the summary. Default: that of its part."""
     law: Literal["signorini", "compliance"] = "signorini"
     """`signorini`: rigid foundation; `compliance`: with a compliant layer in front."""
@@ -126,9 +102,8 @@ class Contact(Described):
     rigid: Motion | None = None
     """Motion of the foundation: `[contact.rigid]`. Absent: it is fixed."""
     layer: Annotated[
-        Annotated[float, Field(ge=0, allow_inf_nan=True), Tag(":number")]
-        | Annotated[Layer | None, Own(), Tag(":own")],
-        Discriminator(lambda given: ":own" if isinstance(given, Layer | None) else ":number"),
+        Annotated[float, Field(ge=0, allow_inf_nan=True)] | Layer | None,
+        OrOwn(lambda given: isinstance(given, Layer | None)),
         COMPLIANT,
         Accepted("a number >= 0, or inf"),
         WithJsonSchema({"type": INFINITE, "minimum": 0}),
@@ -156,14 +131,7 @@ class Contact(Described):
         Friction | None, Accepted("a table; [friction] at the top level is for all contacts")
     ] = None
     """Friction on this part. Default: that of `[friction]`."""
-    electric: (
-        Annotated[
-            Annotated[Electric, Tag(":table")] | Annotated[Conductor, Own(), Tag(":own")],
-            Discriminator(lambda given: ":own" if isinstance(given, Conductor) else ":table"),
-            Accepted("a table"),
-        ]
-        | None
-    ) = None
+    electric: Annotated[Electric | Conductor, OrOwn(Conductor), Accepted("a table")] | None = None
     """Electric contact of this part. Default: that of `[electric]`."""
 
     def __init__(
@@ -200,26 +168,10 @@ class Contact(Described):
             gap, foundation = one_of("Contact", foundation=foundation, gap=gap), None
         if isinstance(gap, float) and np.isinf(gap):  # which is no value of a field
             gap, foundation = None, GapFunction.of(gap)
-        super().__init__(
-            on=on,
-            name=name,
-            law=law or ("signorini" if layer is None else "compliance"),
-            against=against,
-            gap=gap,
-            foundation=foundation,
-            direction=direction,
-            axis=axis,
-            overlap="press" if press else overlap,
-            rigid=rigid,
-            layer=0.0 if layer is None else layer,
-            stiffness=stiffness,
-            limit=limit,
-            potential_factor=potential_factor,
-            potential_range=potential_range,
-            lagged=lagged,
-            friction=friction,
-            electric=electric,
-        )
+        law = law or ("signorini" if layer is None else "compliance")
+        overlap = "press" if press else overlap
+        layer = 0.0 if layer is None else layer
+        self._set(locals())
 
     @model_validator(mode="before")
     @classmethod
@@ -237,21 +189,18 @@ class Contact(Described):
             if given[one] is not None and given[other] is not None:
                 key = other if other == "rigid" else one
                 raise fault(key, Words(f"both {one} and {other}"), "one of them", "exclusive-keys")
-        if self.name is not None and self.name.strip() != self.name:
-            raise fault("name", self.name, "a text without blanks at its ends")
-        if self.against is not None and meet(self.against, self.on):
-            raise fault("against", self.against, "another part than `on`")
-        if (self.axis is None) != (self.direction != "axis"):
-            accepted = 'a vector with direction = "axis", and with that alone'
-            raise fault("axis", MISSING if self.axis is None else self.axis, accepted)
-        if self.direction != "foundation" and not isinstance(shape, Shape | None):
-            raise fault("direction", self.direction, "that of a Shape; others have their own")
-        if self.foundation is None and self.axis is not None:
-            raise fault("direction", self.direction, "axis with a foundation that is a shape")
+        fits = self.against is None or not meet(self.against, self.on)
+        self.require(fits, "against", "another part than `on`")
+        fits = (self.axis is not None) == (self.direction == "axis")
+        self.require(fits, "axis", 'a vector with direction = "axis", and with that alone')
+        fits = self.direction == "foundation" or isinstance(shape, Shape | None)
+        self.require(fits, "direction", "that of a Shape; others have their own")
+        fits = self.foundation is not None or self.axis is None
+        self.require(fits, "direction", "axis with a foundation that is a shape")
         none = isinstance(self.gap, Expression) and self.gap.is_constant and self.gap.value >= 0
-        if self.overlap == "press" and none and self.against is None:
-            accepted = "press with against, a foundation that is a shape, or a gap below 0"
-            raise fault("overlap", self.overlap, accepted)
+        fits = self.overlap == "refuse" or self.against is not None or not none
+        accepted = "press with against, a foundation that is a shape, or a gap below 0"
+        self.require(fits, "overlap", accepted)
         return self
 
     @property

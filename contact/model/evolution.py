@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Self, TypeAlias
 
 import numpy as np
+from annotated_types import Predicate
 from pydantic import Field, model_validator
 
+from contact.arguments import expect
 from contact.errors import InputError
 from contact.model.data import read_data
 from contact.model.section import Described, File, Text, as_tuple
-from contact.settings import MISSING, Accepted, Count, Number, Words, fault
+from contact.settings import Accepted, Count, Fault, Number, Words, fault
+from contact.typing import Array
 
 #: Share of an amplitude's range from which on an extreme value that no step meets is told.
 LOST = 0.02
 
+
+def increase(times: Sequence[float] | Array) -> bool:
+    """Tell whether times increase."""
+    return all(before < after for before, after in pairwise(times))
+
+
 Increasing: TypeAlias = Annotated[
     tuple[Number, ...],
     Field(min_length=2),
+    Predicate(increase),
     as_tuple,
     Accepted("a list of 2 numbers or more that increase"),
 ]
-
-
-def _check_increasing(key: str, times: tuple[float, ...]) -> None:
-    if any(after <= before for before, after in pairwise(times)):
-        raise fault(key, times, "numbers that increase")
 
 
 class Amplitude(Described):
@@ -60,18 +66,15 @@ class Amplitude(Described):
                 if getattr(self, key) is not None:
                     raise fault(key, Words("given with file"), f"{key}, or file", "exclusive-keys")
             try:
-                _check_increasing("file", self.points[0])
+                _ = self.points
             except InputError as error:
-                words, _, accepted = error.words.partition("; accepted: ")
-                raise fault("file", Words(words), accepted, error.identifier) from None
+                raise Fault(f"file: {error.words}", error.identifier) from None
             return self
         for key in ("time", "value"):
-            if getattr(self, key) is None:
-                raise fault(key, MISSING, f"{key}, or file with times and values")
-        times, values = self.points
-        _check_increasing("time", times)
-        if len(values) != len(times):
-            raise fault("value", values, f"{len(times)} values, as many as times")
+            accepted = f"{key}, or file with times and values"
+            self.require(getattr(self, key) is not None, key, accepted)
+        count = len(self.points[0])
+        self.require(len(self.points[1]) == count, "value", f"{count} values, as many as times")
         return self
 
     def __call__(self, time: float) -> float:
@@ -92,6 +95,7 @@ def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
         accepted = "a row of names, then two rows or more of a finite time and value"
         raise InputError(f"{path}: no curve; accepted: {accepted}", "amplitude-file")
     times, values = columns
+    expect(f"{path}: times", times.tolist(), "numbers that increase", increase(times))
     return tuple(float(time) for time in times), tuple(float(value) for value in values)
 
 
@@ -117,10 +121,9 @@ class Evolution(Described):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_increasing("times", self.times)
         stages = len(self.times) - 1
-        if len(self.steps) != stages:
-            raise fault("steps", self.steps, f"{stages} numbers, one for each stage between times")
+        accepted = f"{stages} numbers, one for each stage between times"
+        self.require(len(self.steps) == stages, "steps", accepted)
         for name, amplitude in self.amplitudes.items():
             times = amplitude.points[0]
             if times[0] > self.times[0] or times[-1] < self.times[-1]:

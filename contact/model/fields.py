@@ -16,7 +16,7 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact import _compat
-from contact.arguments import check_finite, expect, naming, real
+from contact.arguments import check_finite, naming, real
 from contact.errors import InputError
 from contact.model.formula import Expression, InTime
 from contact.ranks import on_all_ranks
@@ -143,8 +143,8 @@ ACCEPTED = (
 )
 
 
-def field(value: Scalar | None, name: str = "") -> Field | Moving | None:
-    """Return a given function of position as a `Field` or `Moving`; None as it is.
+def field(value: Scalar) -> Field | Moving:
+    """Return a given function of position as a `Field` or `Moving`.
 
     Parameters
     ----------
@@ -152,8 +152,6 @@ def field(value: Scalar | None, name: str = "") -> Field | Moving | None:
         A number, a formula of x, y, z and t as in a case file (``"-10*x"``), a function of x as
         dolfinx interpolates it, a scalar `ufl.core.expr.Expr` or `dolfinx.fem.Function`, or an
         object that is a `Field` or `Moving`.
-    name
-        Its name in messages.
 
     Returns
     -------
@@ -164,14 +162,7 @@ def field(value: Scalar | None, name: str = "") -> Field | Moving | None:
     InputError
         If it is nothing of the kind.
     """
-    try:
-        return _field(value)
-    except InputError as error:
-        raise error.within(f"{name}: " if name else "") from None
-
-
-def _field(value: Scalar | None) -> Field | Moving | None:
-    if value is None or isinstance(value, Moving):
+    if isinstance(value, Moving):
         return value
     if isinstance(value, np.ndarray) and value.shape == ():
         value = value[()]
@@ -194,18 +185,25 @@ def _field(value: Scalar | None) -> Field | Moving | None:
     raise InputError(f"given {value!r} for a function of position; accepted: {ACCEPTED}", "field")
 
 
-def static(value: Static, name: str) -> Field:
-    """Return a given function of position that depends on no time, as `field` does.
+def static(given: Field | Moving) -> Field:
+    """Return a field, if it is the same at all times; else raise an InputError."""
+    if isinstance(given, Moving):
+        raise InputError(
+            f"{given} depends on the time; accepted: a number or a function of position, the same "
+            "at all times",
+            "formula-variable",
+        )
+    return given
 
-    Raises
-    ------
-    InputError
-        If it is nothing of the kind, with the name of the value where it depends on time.
-    """
-    made = field(value, name)
-    accepted = "a number or a function of position, the same at all times"
-    expect(name, value, accepted, not isinstance(made, Moving))
-    return cast(Field, made)
+
+def placeless(given: Field | Moving) -> Field | Moving:
+    """Return a field, if it is the same everywhere; else raise an InputError."""
+    if not (given.names <= {"t"} if isinstance(given, Expression) else isinstance(given, Moving)):
+        raise InputError(
+            f"{given} depends on the place; accepted: a number or a formula in t",
+            "formula-variable",
+        )
+    return given
 
 
 @dataclass(frozen=True)

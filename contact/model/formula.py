@@ -211,16 +211,6 @@ def is_zero(given: object) -> bool:
     return isinstance(given, Expression) and given.is_constant and given.value == 0
 
 
-def of_time(given: Any) -> Any:
-    """Return a given value, if it is no formula of the coordinates."""
-    if isinstance(given, Expression) and given.names - {"t"}:
-        raise InputError(
-            f"{given} depends on the place; accepted: a number or a formula in t",
-            "formula-variable",
-        )
-    return given
-
-
 def as_number(given: Expression | OfTime) -> float | OfTime:
     """Return a formula without coordinates as a number, or as a function of the time."""
     if isinstance(given, OfTime):

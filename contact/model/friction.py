@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias
+from dataclasses import field
+from typing import Annotated, Literal, TypeAlias
 
-from pydantic import AfterValidator, Discriminator, Tag
+from pydantic import Discriminator, Tag
 
 from contact.arguments import expect
 from contact.errors import InputError
 from contact.model.fields import Scalar
-from contact.model.section import Described, NonNegativeValue, Own, Section
-from contact.settings import Accepted, NonNegative, ReadWith
+from contact.model.section import Described, FromTable, NonNegativeValue, described
+from contact.settings import Accepted, NonNegative, OrOwn, ReadWith
 from forms.laws import FrictionCoefficient, FrictionLaw, SlipCoefficient
 
 #: Attributes of a coefficient, and of a law of friction.
@@ -20,57 +20,40 @@ COEFFICIENT = ("maximum", "lipschitz", "__call__", "derivative")
 LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 
 
-class MuLaw(Section, ABC):
-    """A table `mu = { law = ..., ... }`; its `law` names it."""
-
-    law: str
-
-    @property
-    @abstractmethod
-    def coefficient(self) -> FrictionCoefficient | FrictionLaw:
-        """The coefficient, or the law of friction, itself."""
-
-
-class SlipLaw(MuLaw):
+@described()
+class SlipLaw(SlipCoefficient):
     """`mu = { law = "slip", ... }`: coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
 
-    law: Literal["slip"]
-    """The slip-dependent law."""
     a: NonNegative = 0.5
     """Coefficient at large slip."""
     b: NonNegative = 0.2
     """Twice the excess without slip."""
-    rho: NonNegative
+    rho: NonNegative = field(kw_only=True)
     """Decay rate (1/length)."""
-
-    @property
-    def coefficient(self) -> SlipCoefficient:
-        """The coefficient itself."""
-        return SlipCoefficient(self.a, self.b, self.rho)
+    law: Literal["slip"] = field(kw_only=True)
+    """The slip-dependent law."""
 
 
-def _own(given: Any) -> Any:
-    """Return a coefficient, or law, of Python's with all of its attributes."""
-    if all(any(not hasattr(given, name) for name in names) for names in (COEFFICIENT, LAW)):
-        either = f"an object with {', '.join(COEFFICIENT)}, or with {', '.join(LAW)}"
-        raise InputError(f"given {given!r}; accepted: {either}", "value")
-    return given
+def _is_own(given: object) -> bool:
+    """Tell a coefficient, or law, of Python's; one that lacks something is no field."""
+    if not any(hasattr(given, name) for name in {*COEFFICIENT, *LAW} - {"__call__"}):
+        return False
+    has_all = any(all(hasattr(given, name) for name in names) for names in (COEFFICIENT, LAW))
+    accepted = f"an object with {', '.join(COEFFICIENT)}, or with {', '.join(LAW)}"
+    if not has_all:
+        raise InputError(f"given {given!r}; accepted: {accepted}", "value")
+    return True
 
 
-def _kind(given: Any) -> str:
-    if isinstance(given, Mapping | MuLaw):
-        return f":{given.get('law') if isinstance(given, Mapping) else given.law}"
-    # One that lacks something is no function of position.
-    named = ("maximum", "lipschitz", "derivative", "by_slip", "by_pressure")
-    return ":own" if any(hasattr(given, name) for name in named) else ":formula"
-
-
-#: A coefficient of friction. A further law is a subclass of `MuLaw`, and a line here.
+#: A coefficient of friction. A further law is a class like `SlipLaw`, and a line here.
 Mu: TypeAlias = Annotated[
-    Annotated[NonNegativeValue, Tag(":formula")]
-    | Annotated[SlipLaw, Tag(":slip")]
-    | Annotated[FrictionCoefficient | FrictionLaw, Own(), AfterValidator(_own), Tag(":own")],
-    Discriminator(_kind),
+    Annotated[
+        Annotated[NonNegativeValue, Tag(":formula")] | Annotated[SlipLaw, FromTable, Tag(":slip")],
+        Discriminator(lambda x: f":{x.get('law')}" if isinstance(x, Mapping) else ":formula"),
+    ]
+    | FrictionCoefficient
+    | FrictionLaw,
+    OrOwn(_is_own),
     Accepted('a number >= 0 or a formula, or a table with law = "slip"', "law"),
 ]
 

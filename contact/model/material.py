@@ -10,21 +10,33 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 import numpy as np
 from dolfinx.fem import Function
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, PrivateAttr, Tag, ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from contact.arguments import CONSTANTS as NUMBERS
 from contact.arguments import expect, is_law, several
-from contact.errors import InputError
+from contact.errors import InputError, shown
 from contact.library.materials import PACKAGED, Entry, find
 from contact.model import fields
-from contact.model.messages import describe, shown
-from contact.model.section import Axis, Described, Either, File, Names, Own, Section, Text, as_tuple
-from contact.model.units import System, SystemOfUnits, UnitSystem, system_named
+from contact.model.messages import describe
+from contact.model.section import (
+    Axis,
+    Described,
+    Either,
+    File,
+    Names,
+    Section,
+    StaticValue,
+    Text,
+    as_tuple,
+)
+from contact.model.units import SystemOfUnits, UnitSystem, named
 from contact.settings import (
-    MISSING,
     Accepted,
+    Fault,
+    Internal,
     NonNegative,
     Number,
+    OrOwn,
     Positive,
     ReadWith,
     Words,
@@ -212,14 +224,7 @@ class Material(Described):
     ] = None
     """With `name`: a library of one's own (TOML), relative to the case file. Default: that of the
     package."""
-    kind: Annotated[
-        Annotated[
-            Annotated[LawName, Tag(":name")] | Annotated[Law, Own(), Tag(":own")],
-            Discriminator(lambda given: ":own" if is_law(given) else ":name"),
-        ]
-        | None,
-        Field(alias="law"),
-    ] = None
+    kind: Annotated[LawName | Law, OrOwn(is_law)] | None = Field(None, alias="law")
     """`linear`: g = mu1; `log`: g = mu1 (s/t)(ln(t/s) + 1) for t = |dev eps| above the yield strain
     s; `j2`: flow theory (von Mises), with plastic strain that remains; `anisotropic`:
     sigma = C eps. Default: `linear`."""
@@ -263,17 +268,12 @@ class Material(Described):
     points, linear between them and constant behind."""
     kinematic: Annotated[Kinematic, J2] = 0.0
     """Kinematic hardening: Prager's modulus, uniaxial stress over plastic strain."""
-    coupling: Annotated[
-        Annotated[
-            Annotated[Piezo, Tag(":table")] | Annotated[PiezoTensors, Own(), Tag(":own")],
-            Discriminator(lambda given: ":own" if isinstance(given, PiezoTensors) else ":table"),
-        ]
-        | None,
-        Field(alias="piezo"),
-    ] = None
+    coupling: Annotated[Piezo | PiezoTensors, OrOwn(PiezoTensors)] | None = Field(
+        None, alias="piezo"
+    )
     """Piezoelectric constants, `[material.piezo]`. Absent: mechanical only."""
-
-    _factor: fields.Field | None = PrivateAttr(None)
+    factor: Internal[StaticValue | None] = None
+    """A function of position > 0 that its stresses are multiplied by; None for 1."""
 
     def __init__(
         self,
@@ -301,25 +301,17 @@ class Material(Described):
         hardening: float | Mapping[str, float] | Sequence[Sequence[float]] | None = None,
         kinematic: float | Sequence[Mapping[str, float]] | None = None,
     ) -> None:
-        every: dict[str, Any] = {"name": name, "units": units, "library": library, "young": young}
-        every |= {"poisson": poisson, "stiffness": stiffness, "poling": poling}
-        every |= {"c11": c11, "c12": c12, "c13": c13, "c33": c33, "c44": c44}
-        every |= {"yield_strain": yield_strain, "argument": argument, "g_min": g_min}
-        every |= {"yield_stress": yield_stress, "hardening": hardening, "kinematic": kinematic}
-        keys = {key: value for key, value in every.items() if value is not None}
+        keys = {key: value for key, value in locals().items() if value is not None}
         fits = isinstance(law, str) or is_law(law)
         by_keys = law is None and {*keys} & {"name", "young", "poisson", "stiffness", "c11"}
         expect("law", law, OWN_LAW, fits or by_keys)
         fits = isinstance(piezo, PiezoTensors | Mapping | None)
         expect("piezo", piezo, "Piezo(...), a table of constants, or None", fits)
         names = several("on", on, str, "the name of a region, or a list of names")
-        super().__init__(law=law, piezo=piezo, on=names or None, **keys)
-        if factor is not None:
-            factor = factor.copy() if isinstance(factor, Function) else factor
-            self._factor = fields.static(factor, "factor")
-            fits = not (self.piezo or isinstance(self.law, HistoryLaw))
-            accepted = "a material without coupling and internal variables"
-            expect("factor", factor, accepted, fits)
+        keys["factor"] = factor.copy() if isinstance(factor, Function) else factor
+        self._set(keys | {"on": names or None})
+        fits = factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
+        expect("factor", factor, "a material without coupling and internal variables", fits)
 
     @property
     def law(self) -> Law:
@@ -339,14 +331,9 @@ class Material(Described):
         if self.entry is None or self.entry.piezo is None:
             return None
         tensors = self.entry.piezo
-        units = self.system
         coupling, beta = np.asarray(tensors.e), np.asarray(tensors.beta)
-        return PiezoTensors(coupling / units.unit("coupling"), beta / units.unit("permittivity"))
-
-    @property
-    def factor(self) -> fields.Field | None:
-        """The function of position > 0 that its stresses are multiplied by; None for 1."""
-        return self._factor
+        unit = self.system.unit
+        return PiezoTensors(coupling / unit("coupling"), beta / unit("permittivity"))
 
     @cached_property
     def entry(self) -> Entry | None:
@@ -356,18 +343,14 @@ class Material(Described):
         return find(self.name, PACKAGED if self.library is None else Path(self.library))
 
     @property
-    def system(self) -> System:
+    def system(self) -> UnitSystem:
         """The system of units of a material by name."""
-        if isinstance(self.units, UnitSystem):
-            return self.units.system
-        return system_named(self.units or "SI")
+        return self.units if isinstance(self.units, UnitSystem) else named(self.units or "SI")
 
     @property
     def piezoelectric(self) -> bool:
         """Whether it couples stresses with an electric field."""
-        return self.coupling is not None or (
-            self.entry is not None and self.entry.piezo is not None
-        )
+        return self.piezo is not None
 
     @property
     def axis(self) -> tuple[str, float | tuple[float, ...] | None]:
@@ -406,13 +389,13 @@ class Material(Described):
         if self.kind == "anisotropic":
             self._check_stiffness()
         elif self.poling is not None and table is None:
-            raise fault("poling", self.poling, 'an axis with law = "anisotropic" or piezo')
+            self.require(False, "poling", 'an axis with law = "anisotropic" or piezo')
         elif self.kind == "log":
             self._check_log()
         elif self.kind == "j2":
             self._check_j2()
-        if self.poling is not None and table is not None and table.poling is not None:
-            raise fault("piezo.poling", table.poling, "one of poling and piezo.poling")
+        both = self.poling is not None and table is not None and table.poling is not None
+        self.require(not both, "piezo.poling", "one of poling and piezo.poling")
         return self
 
     def _check_name(self) -> None:
@@ -420,39 +403,31 @@ class Material(Described):
             entry = self.entry
         except InputError as error:
             key = "library" if self.library is not None and error.words[0] == "/" else "name"
-            words, _, accepted = error.words.partition("; accepted: ")
-            raise fault(key, Words(words), accepted, error.identifier) from None
-        if self.poling is not None and entry is not None and entry.isotropic is not None:
-            raise fault("poling", self.poling, f"no axis: {self.name} is isotropic")
+            raise Fault(f"{key}: {error.words}", error.identifier) from None
+        fits = self.poling is None or entry is None or entry.isotropic is None
+        self.require(fits, "poling", f"no axis: {self.name} is isotropic")
 
     def _check_log(self) -> None:
-        if self.yield_strain is None:
-            raise fault("yield_strain", MISSING, 'a number > 0 with law = "log"')
+        self.require(self.yield_strain is not None, "yield_strain", 'a number > 0 with law = "log"')
         assert self.young is not None and self.poisson is not None  # required
         _, mu1 = moduli(self.young, self.poisson)
-        if self.g_min > mu1:
-            raise fault("g_min", self.g_min, f"at most the shear modulus {mu1:g}")
+        self.require(self.g_min <= mu1, "g_min", f"at most the shear modulus {mu1:g}")
 
     def _check_j2(self) -> None:
-        if self.yield_strain is not None:
-            raise fault("yield_strain", self.yield_strain, "yield_stress")
+        self.require(self.yield_strain is None, "yield_strain", "yield_stress")
         points, given = self.hardening, self.yield_stress
-        first = points[0][1] if isinstance(points, tuple) else None
-        if given is None and first is None:
-            raise fault("yield_stress", MISSING, 'a number > 0 with law = "j2"')
-        if given is not None and first is not None and given != first:
-            raise fault("yield_stress", given, f"that of the first point of hardening, {first:g}")
+        first = points[0][1] if isinstance(points, tuple) and points else given
+        self.require(first is not None, "yield_stress", 'a number > 0 with law = "j2"')
+        accepted = f"that of the first point of hardening, {first:g}"
+        self.require(given in (None, first), "yield_stress", accepted)
         try:
             self._law(np.eye(3))
         except ValueError as error:
-            words, _, accepted = str(error).removeprefix("hardening: ").partition("accepted: ")
-            raise fault(
-                "hardening", Words(words or shown(points)), accepted, "material-constants"
-            ) from None
+            words = str(error).replace("hardening: accepted", f"{shown(points)}; accepted")
+            raise Fault(f"hardening: {words}", "material-constants") from None
 
     def _check_stiffness(self) -> None:
-        if self.yield_strain is not None:
-            raise fault("yield_strain", self.yield_strain, "yield_strain with another law")
+        self.require(self.yield_strain is None, "yield_strain", "yield_strain with another law")
         either_way(self, SHORT, ("stiffness",))
         try:
             Anisotropic(self.voigt).check()

@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import types
 from collections.abc import Iterable, Mapping
-from dataclasses import is_dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic.dataclasses import is_pydantic_dataclass
 from pydantic.fields import FieldInfo
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails
 
 from contact.errors import InputError, clipped, nearest, shown
-from contact.settings import MISSING, Accepted, Words, fault, keys_in
+from contact.settings import MISSING, Accepted, Fault, OrOwn, Words, fault, keys_in
 
 #: Most characters of a list of accepted names.
 LIST = 300
 
 
-def unknown(key: str, known: Iterable[str], hint: str = "") -> PydanticCustomError:
+def unknown(key: str, known: Iterable[str], hint: str = "") -> InputError:
     """Return the error for an unknown key of a table: with a hint, or the nearest known one."""
     words = Words(f"unknown key{nearest(key, known, ', did you mean {}?')}")
     return fault(clipped(key), words, hint or listed(known), "unknown-key")
@@ -47,35 +47,21 @@ def describe(error: ValidationError, source: str) -> InputError:
     its consequence.
     """
     errors = error.errors(include_url=False)
-    own = [e for e in errors if e.get("ctx", {}).get("identifier") == "unknown-key"]
-    return _message([*own, *errors][0]).within(f"{source}: ")
-
-
-def describe_fault(error: PydanticCustomError) -> InputError:
-    """Return the error for a fault that was raised outside of pydantic's validation."""
-    return _line([], **(error.context or {}))
+    made = [_message(e) for e in errors]
+    own = [e for e in made if e.identifier == "unknown-key"]
+    return [*own, *made][0].within(f"{source}: ")
 
 
 def _message(error: ErrorDetails) -> InputError:
-    keys, context = keys_in(error["loc"]), error.get("ctx", {})
-    if error["type"] == "fault":
-        return _line(keys, **context)
-    if error["type"] == "value_error":  # of a formula, say: its message is complete
+    path, context = clipped(".".join(keys_in(error["loc"]))), error.get("ctx", {})
+    if error["type"] == "value_error":  # its words are complete
         whole: InputError = context["error"]
-        return whole.within(f"{clipped('.'.join(keys))}: " if keys else "")
+        return whole.within(path and path + ("." if isinstance(whole, Fault) else ": "))
     if error["type"] == "missing":
-        return _line(keys, "", MISSING, "a value", "missing")
+        return fault(path, MISSING, "a value")
     # Of pydantic's own errors those of a literal have the accepted values.
     accepted = str(context.get("expected", "a table")).replace("'", '"')
-    return _line(keys, "", f"given {shown(error['input'])}", accepted)
-
-
-def _line(
-    keys: list[str], key: str, given: str, accepted: str, identifier: str = "value"
-) -> InputError:
-    """Return the error for a fault of a key below others; see `fault`."""
-    path = clipped(".".join([*keys, key] if key else keys))
-    return InputError(f"{path}: {given}; accepted: {accepted}", identifier)
+    return fault(path, error["input"], accepted)
 
 
 def sections_of(annotation: Any) -> dict[str, type]:
@@ -83,20 +69,14 @@ def sections_of(annotation: Any) -> dict[str, type]:
 
     These are sections, and dataclasses (`section.described`).
     """
-    if isinstance(annotation, type) and (
-        issubclass(annotation, BaseModel) or is_dataclass(annotation)
-    ):
-        return {annotation.__name__: annotation}
+    if isinstance(annotation, type):
+        reads = issubclass(annotation, BaseModel) or is_pydantic_dataclass(annotation)
+        return {annotation.__name__: annotation} if reads else {}
     found: dict[str, type] = {}
     if get_origin(annotation) is not Literal:
         for argument in get_args(annotation):
-            found |= {} if is_own(argument) else sections_of(argument)
+            found |= sections_of(argument)
     return found
-
-
-def is_own(annotation: Any) -> bool:
-    """Tell whether it stands for objects of Python, see `section.Own`."""
-    return any(getattr(mark, "tag", "") == ":own" for mark in get_args(annotation))
 
 
 @cache
@@ -134,13 +114,14 @@ def accepted_by(annotation: Any, metadata: Iterable[Any] = ()) -> str:
     for item in reversed([*metadata]):  # the last one is of the narrower type
         if isinstance(item, Accepted):
             return item.text
+        if isinstance(item, OrOwn):
+            return accepted_by(get_args(annotation)[0])
     if get_origin(annotation) is Annotated:
         return accepted_by(get_args(annotation)[0], get_args(annotation)[1:])
     if get_origin(annotation) is Literal:
         return either(shown(value) for value in get_args(annotation))
     if get_origin(annotation) in (Union, types.UnionType):
-        known = (kind for kind in get_args(annotation) if not is_own(kind))
-        some = [kind for kind in known if kind is not type(None)]
+        some = [kind for kind in get_args(annotation) if kind is not type(None)]
         if len(some) == 1:  # a value that may be missing
             return accepted_by(some[0])
         others += [accepted_by(kind) for kind in some if not sections_of(kind)]

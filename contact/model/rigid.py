@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     PlainSerializer,
-    PrivateAttr,
     ValidationInfo,
     model_validator,
 )
@@ -25,14 +24,16 @@ from contact.model.section import (
     Either,
     FactorOfTime,
     FewTimed,
-    FreeTimed,
+    Free,
     Part,
     Timed,
     Vector,
-    as_given,
 )
-from contact.settings import MISSING, SPATIAL, Accepted, Words, fault
+from contact.settings import Accepted, Internal, Words, fault
 from contact.typing import Array
+
+#: A component of a motion.
+FreeTimed: TypeAlias = Annotated[Free[Timed], Accepted('a number, a formula in t or "free"')]
 
 #: A component as it is given.
 GivenFree: TypeAlias = GivenTimed | Literal["free"] | None
@@ -42,13 +43,10 @@ Given: TypeAlias = GivenFree | Sequence[GivenFree] | Array
 
 Components: TypeAlias = Annotated[
     FewTimed[FreeTimed],
-    SPATIAL,
     Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula in t or "free"'),
 ]
 Forces: TypeAlias = Annotated[
-    FewTimed[Timed],
-    SPATIAL,
-    Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
+    FewTimed[Timed], Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D")
 ]
 #: Prefix of a formula in degrees that is in radians.
 DEGREES = "pi/180*("
@@ -121,19 +119,13 @@ class Motion(Described):
         centre: Sequence[float] | Array = (),
         amplitude: GivenAmplitude | None = None,
     ) -> None:
-        keys: dict[str, Any] = {
-            "displacement": displacement,
-            "rotation": "free" if rotation is None else rotation,
-            "force": force,
-            "moment": moment,
-            "centre": centre,
-        }
+        keys = locals() | {"rotation": "free" if rotation is None else rotation}
         lists = list | tuple | np.ndarray
         given = {k: v for k, v in keys.items() if not isinstance(v, lists) or len(v)}
         for key in {"rotation", "moment"} & {*given}:  # in 2-D of one component
             value = given[key]
             given[key] = value[0] if isinstance(value, lists) and len(value) == 1 else value
-        super().__init__(**given, amplitude=amplitude)
+        self._set(given)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -144,12 +136,12 @@ class Motion(Described):
                 if force != ZERO and moves[key][k : k + 1] != ("free",):
                     path = f"{key}.{k}" if len(forces) > 1 else key
                     name = "rotation" if key == "moment" else "displacement"
-                    raise fault(path, as_given(force), f'a {key} where the {name} is "free"')
+                    self.require(False, path, f'a {key} where the {name} is "free"')
         vectors = (self.displacement, self.force, self.centre)
         if 2 in {len(vector) for vector in vectors if vector is not None}:
             self.check_dimension(2)
-        if self.centre is None and any(turn != ZERO for turn in self.turns):
-            raise fault("centre", MISSING, "a point about which it turns")
+        fits = self.centre is not None or all(turn == ZERO for turn in self.turns)
+        self.require(fits, "centre", "a point about which it turns")
         return self
 
     @property
@@ -222,8 +214,8 @@ class Rigid(Motion):
 
     on: Part
     """Part of the boundary, or a list of parts."""
-
-    _foundation: bool = PrivateAttr(False)
+    foundation: Internal[bool] = False
+    """Whether it is the foundation in front of the part, as ``Contact(rigid=...)`` has it."""
 
     def __init__(
         self,
@@ -241,14 +233,7 @@ class Rigid(Motion):
         if motion is None:
             motion = Motion(displacement, rotation, force, moment, centre, amplitude)
         expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
-        given = {key: getattr(motion, key) for key in Motion.model_fields}
-        Described.__init__(self, on=on, **given)
-        self._foundation = foundation
-
-    @property
-    def foundation(self) -> bool:
-        """Whether it is the foundation in front of the part, as ``Contact(rigid=...)`` has it."""
-        return self._foundation
+        self._set({**dict(motion), "on": on, "foundation": foundation})
 
 
 def numbers_at(

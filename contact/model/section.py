@@ -1,7 +1,7 @@
 """Building blocks of descriptions: tables of a case file, and kinds of their values.
 
-Each kind of value carries the accepted ones in words, and where it matters a mark by which `walk`
-finds it: `SPATIAL`, `PART`, `AMPLITUDE`, `FilePath`.
+Each kind of value carries the accepted ones in words. `walk` finds `Spatial` lists and `FilePath`
+by their classes, parts and amplitudes by their keys.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import inspect
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, fields, is_dataclass
-from functools import cache, partial, wraps
+from functools import cache, partial, reduce, wraps
 from pathlib import Path
 from typing import (
     Annotated,
@@ -22,8 +22,6 @@ from typing import (
     TypeVar,
     cast,
     dataclass_transform,
-    get_args,
-    get_origin,
 )
 
 import numpy as np
@@ -49,18 +47,27 @@ from pydantic import (
 )
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError, PydanticOmit, core_schema
+from pydantic_core import core_schema
 from ufl.core.expr import Expr
 
-from contact import settings
 from contact.arguments import OfTime, shorten
 from contact.errors import InputError, shown
 from contact.mesh.domain import PART_ACCEPTED, part_name
-from contact.model.fields import CONSTANT, Factor, Field, GivenAmplitude, Moving, Ramp, steady
+from contact.model.fields import (
+    CONSTANT,
+    Factor,
+    Field,
+    GivenAmplitude,
+    Moving,
+    Ramp,
+    placeless,
+    static,
+    steady,
+)
 from contact.model.fields import field as given_field
-from contact.model.formula import Expression, of_time
+from contact.model.formula import Expression
 from contact.model.messages import accepted_by, describe, keys_of, table_fields, unknown
-from contact.settings import MISSING, SPATIAL, Accepted, Number, ReadWith, fault
+from contact.settings import MISSING, Accepted, Number, OrOwn, ReadWith, fault
 from contact.typing import Array
 
 Kind = TypeVar("Kind")
@@ -105,14 +112,19 @@ class Section(BaseModel):
     @model_validator(mode="after")
     def _check_conditions(self) -> Self:
         for key, info, needs in conditions(type(self)):
-            value, other = value_of(self, key), value_of(self, needs.key)
+            value, other = value_at(self, key), value_at(self, needs.key)
             if not needs.met(other):
-                if value != info.default:
-                    raise fault(key, as_given(value), f"{key} with {needs}")
+                self.require(value == info.default, key, f"{key} with {needs}")
             elif needs.required and value is None:
                 accepted = accepted_by(info.annotation, info.metadata)
                 raise fault(key, MISSING, f"{accepted} with {needs.key} = {shown(other)}")
         return self
+
+    def require(self, fits: object, path: str, accepted: str, identifier: str = "") -> None:
+        """Raise a fault with the value at a dotted path, and the accepted ones, unless it fits."""
+        if not fits:
+            value = as_given(value_at(self, path))
+            raise fault(path, MISSING if value is None else value, accepted, identifier)
 
     def __copy__(self) -> Self:
         """Return a copy without cached properties, which those of an update would not be."""
@@ -125,7 +137,7 @@ class Section(BaseModel):
     def _write(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         of = type(self)
         keys = {name: field.alias or name for name, field in of.model_fields.items()}
-        unread = {k for k, _, needs in conditions(of) if not needs.met(value_of(self, needs.key))}
+        unread = {k for k, _, needs in conditions(of) if not needs.met(value_at(self, needs.key))}
         written = {keys.get(name, name): value for name, value in handler(self).items()}
         return {k: value for k, value in written.items() if k not in unread and value != {}}
 
@@ -150,6 +162,12 @@ class Described(Section):
             )
         except ValidationError as error:
             raise describe(error, called(type(self).__name__, given.get("on"))) from None
+
+    def _set(self, given: Mapping[str, Any]) -> None:
+        """Check and set those of the local variables of an `__init__` that are keys."""
+        fields = type(self).model_fields.items()
+        names = {name for key, field in fields for name in (key, field.alias)}
+        Described.__init__(self, **{key: given[key] for key in given if key in names})
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Bounds, field))
@@ -232,63 +250,28 @@ def conditions(of: type) -> tuple[tuple[str, FieldInfo, ReadWith], ...]:
     )
 
 
-def value_of(table: BaseModel, key: str) -> Any:
-    """Return the value of a key, whose attribute may have another name."""
-    names = {field.alias or name: name for name, field in type(table).model_fields.items()}
-    return getattr(table, names[key])
-
-
-class Own:
-    """Marks an object of Python's among kinds of values: no case file has it."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
-        """Take it as it is; who gives the kind its tag knows it."""
-        return core_schema.any_schema()
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        """Leave it out."""
-        raise PydanticOmit
-
-
-def walk(
-    value: Any, path: tuple[str, ...] = (), marks: tuple[Any, ...] = ()
-) -> Iterator[tuple[str, Any, tuple[Any, ...]]]:
-    """Give all lists and values below a value of the case.
-
-    Yields
-    ------
-    The dotted path, the value, and the marks of its type.
-    """
+def entries(value: Any) -> dict[str, Any]:
+    """Return the values of a table by their keys, or of a list by their numbers; else nothing."""
     if isinstance(value, BaseModel) or is_dataclass(value):
         of: Any = type(value)
-        for name, key, below in _marked(of):
-            yield from walk(getattr(value, name), (*path, key), below)
-        return
-    if isinstance(value, Mapping):
-        for key, entry in value.items():
-            yield from walk(entry, (*path, key), marks)
-        return
-    yield ".".join(path), value, marks
+        fields = table_fields(of).items()
+        return {field.alias or name: getattr(value, name) for name, field in fields}
     if isinstance(value, tuple):
-        for i, entry in enumerate(value):
-            yield from walk(entry, (*path, str(i)), marks)
+        return {str(i): entry for i, entry in enumerate(value)}
+    return dict(value) if isinstance(value, Mapping) else {}
 
 
-@cache
-def _marked(of: Any) -> tuple[tuple[str, str, tuple[Any, ...]], ...]:
-    """Return the fields of a kind of table, their keys, and the marks of their types."""
-    return tuple(
-        (name, field.alias or name, (*field.metadata, *_marks(field.annotation)))
-        for name, field in table_fields(of).items()
-    )
+def value_at(table: BaseModel, path: str) -> Any:
+    """Return the value at a dotted path below a table."""
+    return reduce(lambda place, key: entries(place)[key], path.split("."), table)
 
 
-def _marks(annotation: Any) -> Iterator[Any]:
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is Annotated:
-        yield from arguments[1:]
-    for argument in arguments[:1] if origin is Annotated else arguments:
-        yield from _marks(argument)
+def walk(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the paths and values of all tables, lists and values below a value of the case."""
+    for key, entry in entries(value).items():
+        place = f"{path}.{key}" if path else key
+        yield place, entry
+        yield from walk(entry, place)
 
 
 def as_given(value: Any) -> Any:
@@ -313,38 +296,15 @@ def _placed(given: str, info: ValidationInfo) -> FilePath:
     return FilePath(Path((info.context or {}).get("folder", ".")) / given)
 
 
-def _expression(given: Any) -> Expression:
-    return given if isinstance(given, Expression) else Expression(given)
-
-
-def _expression_or_function(given: Any) -> Any:
-    return given if callable(given) else _expression(given)
+def _function_of_points(given: Any) -> Any:
+    """Return a function of points as it is, a number or a formula as an `Expression`."""
+    return given if callable(given) else static(_value(given))
 
 
 def _value(given: Any) -> Field | Moving:
     """Return a given function of position and time; of a case file a number or a formula."""
     plain = given is None or isinstance(given, bool | int | float | str | list | Mapping)
-    return cast(Field | Moving, given_field(Expression(given) if plain else given))
-
-
-def _static(given: Field | Moving, info: ValidationInfo) -> Field | Moving:
-    """Return a value that is the same at all times; of a case file that is checked with others."""
-    if isinstance(given, Moving) and info.context == IN_PYTHON:
-        raise InputError(
-            f"{given} depends on the time; accepted: a number or a function of position, the same "
-            "at all times",
-            "formula-variable",
-        )
-    return given
-
-
-def _placeless(given: Field | Moving) -> Field | Moving:
-    if not isinstance(given, Expression | Moving):
-        raise InputError(
-            f"{given} depends on the place; accepted: a number or a formula in t",
-            "formula-variable",
-        )
-    return cast(Field | Moving, of_time(given))
+    return given_field(Expression(given) if plain else given)
 
 
 def _timed(given: Any, info: ValidationInfo) -> Expression | OfTime:
@@ -356,18 +316,7 @@ def _timed(given: Any, info: ValidationInfo) -> Expression | OfTime:
             else OfTime(given, f"{_named(info)}: {info.field_name}")
         )
     given = float(given) if isinstance(given, np.number) else given
-    return cast(Expression, of_time(_value(given)))
-
-
-def _free(given: Any) -> Field | Moving | Literal["free"]:
-    """Return a component, or "free" where it is not given."""
-    unset = given is None or (isinstance(given, str) and given == "free")
-    return "free" if unset else _value(given)
-
-
-def _free_timed(given: Any, info: ValidationInfo) -> Expression | OfTime | Literal["free"]:
-    unset = given is None or (isinstance(given, str) and given == "free")
-    return "free" if unset else _timed(given, info)
+    return cast(Expression, placeless(_value(given)))
 
 
 def _factor(given: Any, info: ValidationInfo) -> GivenAmplitude | str:
@@ -375,7 +324,7 @@ def _factor(given: Any, info: ValidationInfo) -> GivenAmplitude | str:
     if info.context != IN_PYTHON:
         if isinstance(given, str) and given:
             return given
-        raise PydanticCustomError("amplitude", "amplitude")
+        raise fault("", given, NAMED)
     if given == CONSTANT:
         return steady
     if not callable(given):
@@ -396,13 +345,6 @@ def _not_negative(expression: Any) -> Any:
             f"{expression} is negative; accepted: a number >= 0 or a formula", "negative"
         )
     return expression
-
-
-def _part(given: Any) -> str:
-    try:
-        return part_name(given)
-    except InputError:
-        raise PydanticCustomError("part", "part") from None
 
 
 #: Tells a list from a single value.
@@ -429,21 +371,22 @@ def _in_time(given: Any, info: ValidationInfo) -> Any:
 
 
 as_tuple = BeforeValidator(_components)
-_as_source = PlainSerializer(lambda value: getattr(value, "source", value))
+
+
+class Spatial(tuple[One, ...]):
+    """A list of one entry a dimension."""
+
 
 #: A list of 2 or 3, of one or more; a single value, or a list; one, or a list of the same.
-Few: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=2, max_length=3), as_tuple]
-FewTimed: TypeAlias = Annotated[
-    tuple[One, ...], Bounds(min_length=2, max_length=3), BeforeValidator(_in_time)
+Few: TypeAlias = Annotated[
+    tuple[One, ...], Bounds(min_length=2, max_length=3), as_tuple, AfterValidator(Spatial)
 ]
+FewTimed: TypeAlias = Annotated[Few[One], BeforeValidator(_in_time)]
 Some: TypeAlias = Annotated[tuple[One, ...], Bounds(min_length=1), as_tuple]
 Either: TypeAlias = Annotated[
     Annotated[One, Tag(":one")] | Annotated[Many, Tag(":many")], one_or_many
 ]
 OneOrSome: TypeAlias = Either[One, Some[One]]
-
-#: Marks of a part of the mesh, and of a name below evolution.amplitudes.
-PART, AMPLITUDE = "part", "amplitude"
 
 #: Kinds of values that functions read, for the JSON schema: names, and a formula.
 _NAME = {"type": "string", "minLength": 1}
@@ -468,14 +411,18 @@ File: TypeAlias = Annotated[
 ]
 Part: TypeAlias = Annotated[
     str,
-    PlainValidator(_part),
+    PlainValidator(part_name),
     PlainSerializer(lambda name: [*getattr(name, "members", ())] or name),
-    PART,
     Accepted(PART_ACCEPTED),
     _NAMES,
 ]
-Vector: TypeAlias = Annotated[settings.Vector, as_tuple]
-Direction: TypeAlias = Annotated[settings.Direction, as_tuple]
+Vector: TypeAlias = Annotated[Few[Number], Accepted("a list of 2 numbers in 2-D, 3 in 3-D")]
+#: A direction, of any length but zero.
+Direction: TypeAlias = Annotated[
+    Few[Number],
+    Predicate(any),
+    Accepted("a vector that is not zero, of 2 numbers in 2-D, 3 in 3-D"),
+]
 Triple: TypeAlias = Annotated[
     tuple[Number, ...],
     Bounds(min_length=3, max_length=3),
@@ -487,34 +434,25 @@ Axis: TypeAlias = Annotated[
     Triple, Predicate(any), Accepted("a vector that is not zero, of 3 numbers")
 ]
 
-Formula: TypeAlias = Annotated[
-    Expression,
-    PlainValidator(_expression),
-    _as_source,
-    Accepted("a number or a formula"),
-    WithJsonSchema(_FORMULA),
-]
-#: The same; in Python a function of points of shape (n, d) too.
+#: Read from a number or a formula, and written as that.
+Given: TypeAlias = Annotated[One, PlainSerializer(as_given), WithJsonSchema(_FORMULA)]
+#: In Python a function of points of shape (n, d) too.
 FormulaOrFunction: TypeAlias = Annotated[
-    Expression | Callable[[Array], Array] | str,
-    PlainValidator(_expression_or_function),
-    _as_source,
+    Given[Annotated[Expression | Callable[[Array], Array], PlainValidator(_function_of_points)]],
     Accepted("a number or a formula"),
-    WithJsonSchema(_FORMULA),
 ]
-#: The same where Python may give functions, UFL and dolfinx Functions too.
+#: In Python functions, UFL and dolfinx Functions too.
 Value: TypeAlias = Annotated[
-    Field | Moving,
-    PlainValidator(_value),
-    _as_source,
-    Accepted("a number or a formula"),
-    WithJsonSchema(_FORMULA),
+    Given[Annotated[Field | Moving, PlainValidator(_value)]], Accepted("a number or a formula")
 ]
 Values: TypeAlias = Annotated[
-    Few[Value], SPATIAL, Accepted("a list of 2 numbers or formulas in 2-D, 3 in 3-D")
+    Few[Value], Accepted("a list of 2 numbers or formulas in 2-D, 3 in 3-D")
 ]
 #: One that is the same at all times.
-StaticValue: TypeAlias = Annotated[Value, AfterValidator(_static)]
+StaticValue: TypeAlias = Annotated[
+    Given[Annotated[Field, PlainValidator(_value), AfterValidator(static)]],
+    Accepted("a number or a formula"),
+]
 NonNegativeValue: TypeAlias = Annotated[
     StaticValue,
     AfterValidator(_not_negative),
@@ -522,33 +460,23 @@ NonNegativeValue: TypeAlias = Annotated[
     WithJsonSchema({**_FORMULA, "minimum": 0}),
 ]
 Placeless: TypeAlias = Annotated[
-    Value, AfterValidator(_placeless), Accepted("a number or a formula in t")
-]
-Free: TypeAlias = Annotated[
-    Field | Moving | Literal["free"],
-    PlainValidator(_free),
-    _as_source,
-    Accepted('a number, a formula or "free"'),
-    WithJsonSchema(_FORMULA),
+    Value, AfterValidator(placeless), Accepted("a number or a formula in t")
 ]
 Timed: TypeAlias = Annotated[
-    Expression | OfTime,
-    PlainValidator(_timed),
-    _as_source,
+    Given[Annotated[Expression | OfTime, PlainValidator(_timed)]],
     Accepted("a number or a formula in t"),
-    WithJsonSchema(_FORMULA),
 ]
-FreeTimed: TypeAlias = Annotated[
-    Expression | OfTime | Literal["free"],
-    PlainValidator(_free_timed),
-    _as_source,
-    Accepted('a number, a formula in t or "free"'),
-    WithJsonSchema(_FORMULA),
+#: A component that may be "free", in Python None.
+Free: TypeAlias = Annotated[
+    One | Literal["free"],
+    OrOwn(lambda given: isinstance(given, str) and given == "free"),
+    BeforeValidator(lambda given: "free" if given is None else given),
 ]
+#: A name of an amplitude in words.
+NAMED = 'a name below evolution.amplitudes, or "constant"'
 FactorOfTime: TypeAlias = Annotated[
     Factor | str,
     PlainValidator(_factor),
-    AMPLITUDE,
-    Accepted('a name below evolution.amplitudes, or "constant"'),
+    Accepted(NAMED),
     WithJsonSchema({"type": "string", "minLength": 1}),
 ]

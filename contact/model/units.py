@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Self, TypeAlias
 
 from annotated_types import Predicate
@@ -11,7 +11,7 @@ from pydantic import Discriminator, Tag, WithJsonSchema, model_validator
 
 from contact.model.messages import either, shown
 from contact.model.section import Section, Text
-from contact.settings import Accepted, fault
+from contact.settings import Accepted
 
 #: Prefixes of SI; the first one of a factor makes the names of units that follow.
 PREFIXES = {
@@ -47,31 +47,6 @@ SYSTEMS = {
 
 #: The system without a unit of length: stress in GPa, field in GV/m, charge per area in C/m2.
 ANY_LENGTH = "GPa"
-
-
-@dataclass(frozen=True)
-class System:
-    """Units of length, force and potential, in m, N and V."""
-
-    length: float = 1.0
-    force: float = 1.0
-    potential: float = 1.0
-
-    def unit(self, quantity: str) -> float:
-        """Return the unit of a quantity, in SI."""
-        length, force, potential = EXPONENTS[quantity]
-        return self.length**length * self.force**force * self.potential**potential
-
-
-def unit_in_si(name: str, quantity: str) -> float | None:
-    """Return the value in SI of m, N or V with a prefix of SI; None of other units."""
-    base = BASES[quantity]
-    return PREFIXES.get(name.removesuffix(base)) if name.endswith(base) else None
-
-
-def system_named(name: str) -> System:
-    """Return a system by its name."""
-    return System(*(PREFIXES[unit[:-1]] for unit in SYSTEMS[name][:3]))
 
 
 def labels_of(name: str) -> dict[str, str]:
@@ -123,20 +98,23 @@ class UnitSystem(Section):
     potential: Text = "V"
     """Unit of potential: V with a prefix."""
 
-    @property
-    def system(self) -> System:
-        """The system itself."""
-        units = (unit_in_si(getattr(self, key), key) for key in ("length", "force", "potential"))
-        return System(*(unit for unit in units if unit is not None))  # all, as checked
-
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for quantity in ("length", "force", "potential"):
-            given, base = getattr(self, quantity), BASES[quantity]
-            if unit_in_si(given, quantity) is None:
-                accepted = f'{base} with a prefix of SI, such as "m{base}" or "k{base}"'
-                raise fault(quantity, given, accepted)
+        for key, base in BASES.items():
+            fits = getattr(self, key)[-1:] == base and getattr(self, key)[:-1] in PREFIXES
+            accepted = f'{base} with a prefix of SI, such as "m{base}" or "k{base}"'
+            self.require(fits, key, accepted)
         return self
+
+    def unit(self, quantity: str) -> float:
+        """Return the unit of a quantity, in SI."""
+        units = (PREFIXES[getattr(self, key)[:-1]] for key in BASES)
+        return math.prod(map(pow, units, EXPONENTS[quantity]))
+
+
+def named(name: str) -> UnitSystem:
+    """Return a system by its name."""
+    return UnitSystem.model_validate(dict(zip(BASES, SYSTEMS[name], strict=False)))
 
 
 SystemOfUnits: TypeAlias = Annotated[

@@ -19,7 +19,8 @@ TREES = [ast.parse(path.read_text()) for path in SOURCES]
 DIFFERS = "…"
 
 #: What takes an identifier, and where.
-TAKES = {"InputError": 1, "SingularError": 1, "fault": 3, "expect": 4, "_line": 4, "refuse": 2}
+TAKES = {"InputError": 1, "SingularError": 1, "fault": 3, "require": 3, "expect": 4, "refuse": 2}
+TAKES["Fault"] = 1
 
 
 def text_of(node: ast.expr) -> str:
@@ -39,7 +40,9 @@ def identifiers() -> set[str]:
     found = set()
     for node in (node for tree in TREES for node in ast.walk(tree)):
         match node:
-            case ast.Call(func=ast.Name(id=name), args=args) if len(args) > TAKES.get(name, 99):
+            case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name), args=args) if len(
+                args
+            ) > TAKES.get(name, 99):
                 found |= {text_of(part) for part in ast.walk(args[TAKES[name]]) if is_text(part)}
             case ast.For() | ast.comprehension() if "remarks" in ast.unparse(node.target):
                 found |= set(re.findall(r"'([a-z-]+)':", ast.unparse(node.iter)))

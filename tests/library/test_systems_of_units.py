@@ -8,7 +8,7 @@ import pytest
 import contact
 from contact.case.file import parse_case, to_toml
 from contact.errors import InputError
-from contact.model.units import SYSTEMS, System, system_named
+from contact.model.units import SYSTEMS, UnitSystem, named
 
 
 def pressed(units, size, shift, volts=None, labels=None, name="steel", **more):
@@ -62,20 +62,20 @@ def test_a_piezoelectric_problem_is_the_same_in_all_systems(name):
     si = contact.solve(pressed("SI", length, shift, volts, name="PZT-5A"))
     table = {"length": "mm", "force": "daN", "potential": "kV"}
     units = table if name == "table" else name
-    system = System(1e-3, 10.0, 1e3) if name == "table" else system_named(name)
+    system = UnitSystem.model_validate(table) if name == "table" else named(name)
     case = pressed(
         units,
-        length / system.length,
-        shift / system.length,
-        volts / system.potential,
+        length / system.unit("length"),
+        shift / system.unit("length"),
+        volts / system.unit("potential"),
         name="PZT-5A",
     )
     other = contact.solve(case)
     assert np.allclose(other.pressure * system.unit("stress"), si.pressure, rtol=1e-8)
-    phi, given = si.potential.x.array, other.potential.x.array * system.potential
+    phi, given = si.potential.x.array, other.potential.x.array * system.unit("potential")
     assert np.allclose(given, phi, rtol=0, atol=1e-8 * volts)
     # Of a plane body, a unit of length thick.
-    charge = other.charges.electrodes["left"] * system.unit("charge") / system.length
+    charge = other.charges.electrodes["left"] * system.unit("charge") / system.unit("length")
     assert charge == pytest.approx(si.charges.electrodes["left"], rel=1e-7)
     assert np.abs(phi).max() > 1 and si.charges.electrodes["left"] != 0
 

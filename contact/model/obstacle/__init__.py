@@ -18,7 +18,11 @@ from contact.model.obstacle.shapes import (
 )
 from contact.model.obstacle.surfaces import Heights, Triangles
 
+#: The shapes that a case file has, by their names as `shape`.
+SHAPES = (Plane, Sphere, Cylinder, Cone, Paraboloid, Punch, Level, Heights, Triangles)
+
 __all__ = [
+    "SHAPES",
     "Cone",
     "Cylinder",
     "GapFunction",

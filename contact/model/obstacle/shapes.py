@@ -19,6 +19,7 @@ from pydantic import Field
 from contact.arguments import STEP, expect, naming, real
 from contact.errors import InputError
 from contact.model.fields import Static, static
+from contact.model.fields import field as given_field
 from contact.model.formula import Expression
 from contact.model.section import Direction, FormulaOrFunction, Vector, described
 from contact.ranks import on_all_ranks
@@ -237,7 +238,10 @@ class GapFunction:
         """
         if isinstance(value, float) and np.isinf(value):  # which is no value of a field
             return GapFunction(lambda points: np.full(len(points), value))
-        return GapFunction(static(value, "gap").numpy)
+        try:
+            return GapFunction(static(given_field(value)).numpy)
+        except InputError as error:
+            raise error.within("gap: ") from None
 
     direction = "body"
     is_shape = False
