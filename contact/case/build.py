@@ -94,7 +94,7 @@ def build_problem(
             electrodes=[_acting(case, electrode) for electrode in case.electrode],
             bolts=[_acting(case, bolt) for bolt in case.bolt],
         )
-        contacts = _contacts(case, domain, foundation, layer, coefficient, friction)
+        contacts = _contacts(case, foundation, layer, coefficient, friction)
         problem = ContactProblem(
             domain, body, contacts, degree=case.space.degree, element=case.space.element
         )
@@ -150,7 +150,6 @@ def _acting(case: Case, given: Given) -> Given:
 
 def _contacts(
     case: Case,
-    domain: Domain,
     foundation: Obstacle | None,
     layer: Layer | None,
     coefficient: FrictionCoefficient | None,

@@ -8,10 +8,11 @@ from typing import Any, TypeAlias
 from contact.body.elements import needed
 from contact.errors import nearest, shown
 from contact.mesh.domain import meet, members
-from contact.model.body import ZERO
+from contact.model.body import ZERO, Bolt, Electrode, Fixed, Load
 from contact.model.fields import CONSTANT
 from contact.model.formula import Expression
 from contact.model.messages import listed
+from contact.model.rigid import Motion
 from contact.model.section import Spatial, walk
 from contact.model.units import SYSTEMS, labels_of, other_label
 from contact.settings import Words, fault
@@ -67,7 +68,7 @@ def _check_plane_stress(case: Case) -> None:
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
     """Raise a fault if a case does not fit its mesh."""
     known = sorted(parts)
-    for path, section in case.moving:
+    for path, section in case.sections(Motion):
         section.check_dimension(dimension, f"{path}.")
     for path, value in walk(case):
         fits = not isinstance(value, Spatial) or len(value) == dimension
@@ -100,13 +101,8 @@ def growing(case: Case) -> list[str]:
     """Return the keys of sections whose values grow over the first stage, having no amplitude."""
     if case.evolution is None:
         return []
-    sections = [
-        (f"{k}.{i}", s)
-        for k in ("fixed", "load", "electrode", "bolt")
-        for i, s in enumerate(getattr(case, k))
-    ]
     found = []
-    for path, section in (*sections, *case.moving):
+    for path, section in case.sections(Fixed, Load, Electrode, Bolt, Motion):
         values = [v for _, v in walk(section) if isinstance(v, Expression)]
         moves = any("t" in value.names for value in values)
         if section.amplitude is None and not moves and any(value != ZERO for value in values):
@@ -193,7 +189,7 @@ def _check_rigid(case: Case) -> None:
     for i, part in enumerate(case.rigid):
         fits = not any(meet(part.on, contact.on) for _, contact in case.contacts)
         case.require(fits, f"rigid.{i}.on", "a part beside the contact part")
-    for path, motion in case.moving:
+    for path, motion in case.sections(Motion):
         if case.space.kinematics == "axisymmetric" and (key := motion.off_axis) is not None:
             accepted = "0 across the axis of a body of revolution, and no rotation"
             raise fault(f"{path}.{key}", Words("given"), accepted, "rigid-part")

@@ -39,13 +39,8 @@ from contact.model.foundation import Electric
 from contact.model.friction import Friction
 from contact.model.material import Material
 from contact.model.messages import describe, either, shown
-from contact.model.rigid import Motion, Rigid
-from contact.model.section import (
-    OneOrSome,
-    Section,
-    Text,
-    as_tuple,
-)
+from contact.model.rigid import Rigid
+from contact.model.section import OneOrSome, Section, Text, as_tuple, walk
 from contact.model.units import NAMES, SYSTEMS, labels_of
 from contact.results.options import OutputOptions, Units
 from contact.settings import Accepted, Fault
@@ -173,21 +168,16 @@ class Case(Section):
     @property
     def materials(self) -> tuple[tuple[str, Material], ...]:
         """The materials, each with its key in the file."""
-        return () if self.material is None else _entries("material", self.material)
+        return self.sections(Material)
 
     @property
     def contacts(self) -> tuple[tuple[str, Contact], ...]:
         """The contacts, each with its key in the file."""
-        return _entries("contact", self.contact)
+        return self.sections(Contact)
 
-    @property
-    def moving(self) -> Iterator[tuple[str, Motion]]:
-        """The sections about rigid motions, with their keys."""
-        for path, contact in self.contacts:
-            if contact.rigid is not None:
-                yield f"{path}.rigid", contact.rigid
-        for i, part in enumerate(self.rigid):
-            yield f"rigid.{i}", part
+    def sections(self, *kinds: type[Kind]) -> tuple[tuple[str, Kind], ...]:
+        """Return the sections of some kinds, each with its key in the file."""
+        return tuple(entry for entry in walk(self) if isinstance(entry[1], kinds))
 
     def friction_of(self, key: str, contact: Contact) -> tuple[str, Friction]:
         """Return the friction of a contact, with its key in the file."""
@@ -245,13 +235,6 @@ def _share_units(given: Any) -> Any:
 
     many = isinstance(tables, list | tuple)
     return {**given, "material": [*map(shared, tables)] if many else shared(tables)}
-
-
-def _entries(key: str, given: Kind | tuple[Kind, ...]) -> tuple[tuple[str, Kind], ...]:
-    """Return one section, or several of a list, each with its key."""
-    if isinstance(given, tuple):
-        return tuple((f"{key}.{i}", section) for i, section in enumerate(given))
-    return ((key, given),)
 
 
 def load_case(

@@ -22,7 +22,7 @@ LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 
 @described()
 class SlipLaw(SlipCoefficient):
-    """`mu = { law = "slip", ... }`: coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
+    """Coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
 
     a: NonNegative = 0.5
     """Coefficient at large slip."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import field, fields, is_dataclass
+from dataclasses import field, fields
 from functools import cache, partial, reduce, wraps
 from pathlib import Path
 from typing import (
@@ -46,6 +46,7 @@ from pydantic import (
     Field as Bounds,
 )
 from pydantic.dataclasses import dataclass as pydantic_dataclass
+from pydantic.dataclasses import is_pydantic_dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import core_schema
 from ufl.core.expr import Expr
@@ -252,8 +253,8 @@ def conditions(of: type) -> tuple[tuple[str, FieldInfo, ReadWith], ...]:
 
 def entries(value: Any) -> dict[str, Any]:
     """Return the values of a table by their keys, or of a list by their numbers; else nothing."""
-    if isinstance(value, BaseModel) or is_dataclass(value):
-        of: Any = type(value)
+    of: Any = type(value)
+    if isinstance(value, BaseModel) or is_pydantic_dataclass(of):
         fields = table_fields(of).items()
         return {field.alias or name: getattr(value, name) for name, field in fields}
     if isinstance(value, tuple):

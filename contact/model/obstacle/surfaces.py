@@ -162,28 +162,21 @@ def _columns(file: str) -> tuple[tuple[Array, ...], Array]:
     accepted = "columns x, y in the plane, x, y, z in 3-D"
     expect(file, f"columns {', '.join(columns)}", accepted, len(names) > 1)
     *across, heights = (columns[name] for name in names)
-    order = np.lexsort(across[::-1])
-    places = tuple(np.unique(values) for values in across)
+    places, at = zip(*(np.unique(x, return_inverse=True) for x in across), strict=True)
     shape = tuple(axis.size for axis in places)
     made = f"the grid of {' by '.join(map(str, shape))} points that their coordinates make"
-    if math.prod(shape) > 4 * len(heights):  # scattered points
-        raise InputError(
-            f"{file}: {len(heights)} points of {made}; accepted: each point of a grid once",
-            "heights",
-        )
-    grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(across))
-    given = np.column_stack(across)[order]
-    if given.shape != grid.shape or np.any(given != grid):
-        known, counts = np.unique(given, axis=0, return_counts=True)
-        twice = known[counts > 1]
-        missing = {*map(tuple, grid.tolist())} - {*map(tuple, known.tolist())}
-        one = twice[0].tolist() if twice.size else min(missing)
-        where = f"({', '.join(f'{x:g}' for x in one)})"
-        said = f"{where} stands twice" if twice.size else f"no height at {where}"
-        raise InputError(
-            f"{file}: {said}, of {made}; accepted: each point of a grid once", "heights"
-        )
-    return places, heights[order].reshape(shape)
+    said = f"{len(heights)} points" if math.prod(shape) > 4 * len(heights) else ""  # scattered
+    if not said:
+        grid, count = np.zeros(shape), np.zeros(shape, dtype=int)
+        grid[at] = heights
+        np.add.at(count, at, 1)
+        wrong = [*np.argwhere(count > 1), *np.argwhere(count == 0)]
+        if not wrong:
+            return places, grid
+        where = ", ".join(f"{axis[k]:g}" for axis, k in zip(places, wrong[0], strict=True))
+        twice = count[tuple(wrong[0])] > 1
+        said = f"({where}) stands twice," if twice else f"no height at ({where}),"
+    raise InputError(f"{file}: {said} of {made}; accepted: each point of a grid once", "heights")
 
 
 @described(eq=False)
