@@ -34,7 +34,8 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import neighbours
 from contact.results.error_estimate import estimated, intervals
-from contact.results.quantities import ADAPT, values_of
+from contact.results.quantities import values_of
+from contact.results.quantity import ADAPT
 from contact.results.solution import Remark
 from contact.solution import Solution
 from contact.tolerances import ROUNDING

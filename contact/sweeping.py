@@ -37,7 +37,8 @@ from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root
-from contact.results.quantities import SUMMARY, SWEEP, is_of, quantities, values_of
+from contact.results.quantities import quantities, values_of
+from contact.results.quantity import SUMMARY, SWEEP, is_of
 from contact.results.remarks import evaluate_extremes
 from contact.solution import Solution
 from contact.solving import solve_problem, step_times

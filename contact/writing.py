@@ -27,7 +27,8 @@ from contact.results.contact_nodes import (
     opposite_table,
 )
 from contact.results.options import OutputOptions
-from contact.results.quantities import (
+from contact.results.quantities import quantities, values_of
+from contact.results.quantity import (
     ADAPT,
     AGAINST,
     HISTORY,
@@ -36,8 +37,6 @@ from contact.results.quantities import (
     STEPS,
     SUMMARY,
     SURFACE,
-    quantities,
-    values_of,
 )
 from contact.results.solution import Solution
 

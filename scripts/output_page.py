@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from contact.io.tables import described
-from contact.results import quantities as q
+from contact.results import quantity as q
 
 #: Formulas in Markdown for the symbols of the command line's help.
 FORMULAS = {"σ_ν": r"$\sigma_\nu$", "σ_τ": r"$\sigma_\tau$", "u_τ": r"$u_\tau$"}

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from contact.results.contact_nodes import Table
-from contact.results.quantities import Quantity, quantities
+from contact.results.quantities import quantities
+from contact.results.quantity import Quantity
 
 
 def write_csv(

@@ -22,7 +22,7 @@ from contact.plot.style import heading
 from contact.ranks import refused
 from contact.results.contact_nodes import Table
 from contact.results.options import Units
-from contact.results.quantities import OPPOSITE
+from contact.results.quantity import OPPOSITE
 from contact.typing import Array
 
 

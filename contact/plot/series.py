@@ -37,7 +37,8 @@ from contact.plot.style import (
 )
 from contact.ranks import refused
 from contact.results.options import Units
-from contact.results.quantities import AXES, ENDS, SUMMARY, SWEEP, is_of, quantities
+from contact.results.quantities import quantities
+from contact.results.quantity import AXES, ENDS, SUMMARY, SWEEP, is_of
 from contact.typing import Array
 
 #: Parts that move, as the columns of ``steps.csv`` begin, and labels of their displacement.

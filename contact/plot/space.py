@@ -21,7 +21,7 @@ from contact import _compat
 from contact.plot.foundation import add_foundation, foundation, magnification
 from contact.plot.run import Run, linear, polygons
 from contact.plot.style import BLUE, NARROW, ORANGE, SKY, ZONES, Look, colour_bar, page_width, sheet
-from contact.results.quantities import STATUS
+from contact.results.quantity import STATUS
 from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")

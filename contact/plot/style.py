@@ -19,7 +19,8 @@ from matplotlib.tri import Triangulation
 
 from contact.model.units import force_of
 from contact.results.options import Units
-from contact.results.quantities import BODY, quantities
+from contact.results.quantities import quantities
+from contact.results.quantity import BODY
 from contact.typing import Array
 
 #: Settings of all figures.

@@ -23,7 +23,8 @@ from contact.mesh.owners import Owners
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import dissipated
 from contact.problem.state import State
-from contact.results.quantities import AGAINST, NODES, SURFACE, values_of
+from contact.results.quantities import values_of
+from contact.results.quantity import AGAINST, NODES, SURFACE
 from contact.results.resultants import resultant
 from contact.typing import Array
 

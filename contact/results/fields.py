@@ -29,7 +29,8 @@ from contact.mesh.geometry import volumes
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.results.quantities import BODY, of_law, quantities, values_of
+from contact.results.quantities import of_law, quantities, values_of
+from contact.results.quantity import BODY
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import is_linear, stress

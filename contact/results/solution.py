@@ -23,7 +23,8 @@ from contact.results.error_estimate import Estimate, Intervals
 from contact.results.fields import Deformation, DerivedFields, unknowns
 from contact.results.functionals import MaxDisplacement
 from contact.results.options import OutputOptions, Units
-from contact.results.quantities import STEPS, values_of
+from contact.results.quantities import values_of
+from contact.results.quantity import STEPS
 from contact.results.resultants import (
     ChargeBalance,
     DrivenPart,

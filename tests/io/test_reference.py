@@ -13,18 +13,8 @@ from contact.io.tables import files_help
 from contact.plot.run import read_grid
 from contact.results import quantities as registry
 from contact.results.functionals import Integral
-from contact.results.quantities import (
-    BODY,
-    HISTORY,
-    NODES,
-    QUANTITIES,
-    STEPS,
-    SUMMARY,
-    SURFACE,
-    SWEEP,
-    Quantity,
-    quantities,
-)
+from contact.results.quantities import QUANTITIES, quantities
+from contact.results.quantity import BODY, HISTORY, NODES, STEPS, SUMMARY, SURFACE, SWEEP, Quantity
 from scripts.output_page import PAGE, page
 from tests.problems.rigid import column, indented, plate
 from tests.problems.written import block, electric, rows_of

@@ -7,7 +7,8 @@ from mpi4py import MPI
 from contact import solve
 from contact.cli.solve import solve_and_keep
 from contact.ranks import on_root
-from contact.results.quantities import NODES, values_of
+from contact.results.quantities import values_of
+from contact.results.quantity import NODES
 from tests.results.test_steps import case_of
 
 pytestmark = pytest.mark.parallel

@@ -9,7 +9,7 @@ import pytest
 from contact import parse_case, sensitivity, solve, write_outputs
 from contact.case.file import Case
 from contact.results import quantities as registry
-from contact.results.quantities import CONTACTS, Quantity
+from contact.results.quantity import CONTACTS, Quantity
 from tests.problems.written import rows_of
 
 
