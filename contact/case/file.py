@@ -311,7 +311,8 @@ def parse_case(
         On the first mistake; the message is one line.
     """
     try:
-        case = Case.model_validate(data, context={"folder": folder})
+        given = dict(data) if isinstance(data, Mapping) else data
+        case = Case.model_validate(given, context={"folder": folder})
     except ValidationError as error:
         raise describe(error, source) from None
     file = None if case.mesh is None else case.mesh.file

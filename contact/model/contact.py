@@ -77,7 +77,7 @@ class Contact(Described):
 
     on: Part
     """Part of the boundary, or a list of parts, that may touch the foundation."""
-    name: Annotated[str, Field(pattern=r"^\S(.*\S)?$"), Accepted(NAME)] | None = None
+    name: Annotated[str, Field(pattern=r"^\S([\s\S]*\S)?$"), Accepted(NAME)] | None = None
     """Name of its results, `contacts` of the summary. Default: that of its part."""
     law: Literal["signorini", "compliance"] = "signorini"
     """`signorini`: rigid foundation; `compliance`: with a compliant layer in front."""

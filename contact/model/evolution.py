@@ -66,7 +66,7 @@ class Amplitude(Described):
                 if getattr(self, key) is not None:
                     raise fault(key, Words("given with file"), f"{key}, or file", "exclusive-keys")
             try:
-                _ = self.points
+                _ = self.points  # read now, so that messages name the key
             except InputError as error:
                 raise Fault(f"file: {error.words}", error.identifier) from None
             return self

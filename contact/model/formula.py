@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contact.arguments import Returned
+from contact.arguments import OfTime, Returned
 from contact.errors import InputError, clipped, counted, shown
 from forms import ops
 
@@ -209,6 +209,13 @@ class InTime(Expression):
 def is_zero(given: object) -> bool:
     """Tell whether a given value is a formula that is 0 everywhere at all times."""
     return isinstance(given, Expression) and given.is_constant and given.value == 0
+
+
+def as_number(given: Expression | OfTime) -> float | OfTime:
+    """Return a formula without coordinates as a number, or as a function of the time."""
+    if isinstance(given, OfTime):
+        return given
+    return given.value if given.is_constant else OfTime(given.number, str(given))
 
 
 @lru_cache(maxsize=1000)

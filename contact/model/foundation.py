@@ -18,7 +18,7 @@ from contact.mesh.domain import Domain
 from contact.mesh.geometry import area, volume
 from contact.model.body import ZERO
 from contact.model.fields import GivenAmplitude, GivenTimed, amplitude_of
-from contact.model.formula import Expression
+from contact.model.formula import as_number
 from contact.model.section import Described, FactorOfTime, Timed
 from contact.settings import NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
@@ -224,8 +224,9 @@ class Electric(Described):
             kind = {"shifted": laws.ShiftedConductivity, "ramp": laws.RampConductivity}[self.law]
             psi = kind(self.k_e, slope)
         truncation = laws.Truncation(np.inf if self.limit is None else self.limit)
-        if isinstance(self.phi_f, Expression) and self.phi_f.is_constant and not self.amplitude:
-            return Conductor(psi, self.phi_f.value, truncation, self.lagged)
+        phi_f = as_number(self.phi_f)
+        if isinstance(phi_f, float) and self.amplitude is None:
+            return Conductor(psi, phi_f, truncation, self.lagged)
         # A foundation has its potential from the beginning.
         factor, number = amplitude_of(self.amplitude, known=True), self.phi_f.number
 

@@ -17,7 +17,7 @@ from pydantic import (
 from contact.arguments import OfTime, expect
 from contact.model.body import ZERO
 from contact.model.fields import Factor, GivenAmplitude, GivenTimed, amplitude_of
-from contact.model.formula import Expression
+from contact.model.formula import Expression, as_number
 from contact.model.section import (
     IN_PYTHON,
     Described,
@@ -193,10 +193,10 @@ class Motion(Described):
         return (*(self.force or ()), *self.moments)
 
     @property
-    def values(self) -> tuple[Expression | OfTime | None, ...]:
+    def values(self) -> tuple[float | OfTime | None, ...]:
         """Displacement and rotation in radians, None for free components."""
         given = (*(self.displacement or ()), *self.turns)
-        return tuple(None if isinstance(value, str) else value for value in given)
+        return tuple(None if isinstance(value, str) else as_number(value) for value in given)
 
 
 class Rigid(Motion):
@@ -237,11 +237,14 @@ class Rigid(Motion):
 
 
 def numbers_at(
-    values: Sequence[OfTime | Expression | None], given: Factor | str | None, time: float
+    values: Sequence[float | OfTime | Expression | None], given: Factor | str | None, time: float
 ) -> Array:
     """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it."""
     known = any("t" in getattr(value, "names", ()) for value in values)
-    numbers = [0.0 if value is None else value.number(time) for value in values]
+    numbers = [
+        value.number(time) if isinstance(value, Expression | OfTime) else value or 0.0
+        for value in values
+    ]
     return amplitude_of(given, known)(time) * np.array(numbers)
 
 

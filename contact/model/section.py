@@ -279,8 +279,8 @@ def as_given(value: Any) -> Any:
     """Return a value of the case as a message shows it."""
     if isinstance(value, tuple):
         return [as_given(entry) for entry in value]
-    if isinstance(value, BaseModel):
-        return value.model_dump()
+    if table := entries(value):
+        return {key: as_given(entry) for key, entry in table.items() if entry is not None}
     return value.source if isinstance(value, Expression) else value
 
 

@@ -84,6 +84,10 @@ def test_messages_of_bad_cases(snapshot):
     snapshot("refused-cases", said)
 
 
+def test_a_text_is_no_case() -> None:
+    assert message_of(parse_case, "text") == 'case: given "text"; accepted: a table [value]'
+
+
 CASE = {
     "mesh": {"generator": "box", "size": [1.0, 1.0, 1.0], "cells": [1, 1, 1]},
     "material": {"young": 1.0, "poisson": 0.3},
