@@ -165,7 +165,7 @@ def test_numbers_that_are_0_in_any_units(length, young):
     ("key", "way"), [("contact.foundation.centre.1", 1), ("mesh.origin.1", -1)]
 )
 def test_bodies_that_touch_have_the_derivatives_of_the_side_on_which_they_are_apart(key, way):
-    """Overlaps of rounding are gaps of 0: the mean of both sides was half of it."""
+    """Overlaps of rounding are gaps of 0: the mean of both sides was given before."""
     case, names = parse_case(at_zero()), ["contact_force_y", "max_pressure"]
     run, begin, step = solve(case, comm=SELF), number_at(case, key), way * 1e-5
     found = sensitivity(run, names, [key])

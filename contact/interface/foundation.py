@@ -223,7 +223,7 @@ class FoundationLaw:
         return self.phi_scale * jump[:, -1] - phi_f
 
     def _past_rigid_part(self, jump: Array) -> Array:
-        """Return u_nu - rho at the nodes."""
+        """Return u_nu - g_0, of psi: with a layer of any depth too, where rho is infinite."""
         return self.nodes.normal_component(jump) - self.nodes.gap
 
     def pressure(self, jump: Array) -> Array:

@@ -65,9 +65,9 @@ class SlipHistory:
     Attributes
     ----------
     jump
-        j_tau at the end of the last step, shape (n, d) (length).
+        u_tau, the tangential part of T x, at the end of the last step, shape (n, d) (length).
     accumulated
-        Sum of |Delta j_tau| over all steps, shape (n,) (length).
+        Sum of |Delta u_tau| over all steps, shape (n,) (length).
     """
 
     jump: Array

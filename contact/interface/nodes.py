@@ -254,8 +254,7 @@ def joined_nodes(
 
 def _unknowns_by_jumps(nodes: ContactNodes, body: BodyEquilibrium) -> Array:
     """Return the nodal unknowns by their jumps, shape (n, block size, block size)."""
-    # Free components, the normal one of which is that of the unknowns, of which the
-    # `admissible_normal` stands for that of the components that supports hold.
+    # U = P + nu_a (x) (nu - P nu): u = U j moves in free directions P alone, and u . nu = j . nu.
     inclined, d = body.layout.inclined, nodes.dim
     there = None if inclined is None else inclined.at(nodes.nodes)
     unknowns = projectors(body.free[nodes.nodes], there)

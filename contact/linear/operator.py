@@ -1,7 +1,7 @@
 """Linear operators: a bulk matrix plus small dense blocks at contact nodes, and its solver.
 
-The blocks are the augmentation r I of Algorithm 2, a compliant layer, a charge, or Newton's
-linearised contact laws.
+The blocks are r (nu nu^T + tangential projector) of Step 1 in Algorithms 2, 5, 7 and 9, a compliant
+layer, a charge, or Newton's linearised contact laws.
 
 With a potential the operator [[K, E^T], [E, -L]] is indefinite. With L the permittivity's
 Laplacian, diag(K, L) is positive definite and bounds the preconditioned spectrum by

@@ -109,6 +109,7 @@ def solve_contact(
         if not _final(outcome) and newton.steps_left > 0:
             logger.info("%s; going on with the whole body", outcome.ended)
             state, outcome = newton.iterate(state, secant_at if state is begin else None)
+        # The condensed body has been tried, and its contact problem looks at the modes itself.
         condensed, unconstrained = None, False
     else:
         state, outcome = newton.iterate(begin, secant_at, give_up=True)

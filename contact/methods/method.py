@@ -61,8 +61,8 @@ class Method(Protocol):
         start
             Initial guess; zero by default.
         secant_at
-            Unknowns of the first secant of the material; those of the start by default. Prescribed
-            values that have changed strain the elements beside them alone.
+            Unknowns x* of the first secant modulus g(eps(x*)); those of the start by default, where
+            prescribed values that have changed strain the cells at the support alone: too soft.
 
         Raises
         ------

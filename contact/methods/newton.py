@@ -63,8 +63,8 @@ logger = logging.getLogger("contact.solver")
 #: Ratio of the tolerance of the condensed contact problem to the residual before the step.
 CONTACT_PART = 1e-3
 
-#: Ratio of the residual of the condensed contact problem to that before the step above which
-#: iterations go on with the whole body.
+#: Largest ratio of the residual of the condensed contact problem to that before the step; above
+#: it the whole body is solved.
 UNSOLVED = 0.05
 
 #: Notes of fallbacks on the condensed problem, repeated in the record of the whole one.

@@ -266,8 +266,8 @@ def linearised_layer(
 ) -> tuple[Array, Array]:
     """Linearise the layer; return its block, and the linearised pressure minus the pressure.
 
-    As for the active set, the point of linearisation is that of the law with the sum p + c u_nu:
-    about the displacement alone, a layer stiffer than the body cycles between its regimes.
+    About u* on the graph of the law with p(u*) + c u* = lambda_c + p_layer + c u_nu, as for the
+    active set: about u_nu itself, a layer stiffer than the body cycles between its regimes.
     """
     law, nodes, c = interface.foundation, interface.nodes, parameters.c
     graph = law.normal_graph(jump)

@@ -58,7 +58,7 @@ class FixedPointOptions(LoopOptions):
     method: Literal["uzawa"] = "uzawa"
     """Name of the method."""
     eps: Annotated[Tolerance, ReadWith("stopping", "thesis")] = 1e-5
-    """Tolerance of (3.45), inner loop."""
+    """Tolerance of (3.45), without friction (6.41): inner loop."""
     inner_tolerance: Annotated[Tolerance | None, ReadWith("stopping", "residual")] = None
     """Tolerance of the inner loop. Default: a tenth of `tolerance`."""
     r: Annotated[
@@ -85,7 +85,7 @@ class FixedPointOptions(LoopOptions):
         Accepted("a number between 0 and 2, both excluded"),
         ReadWith("acceleration", "none"),
     ] = 1.0
-    """Relaxation of the multiplier's step; above 1: over-relaxation."""
+    """Factor w: Steps 2 and 3 take w u + (1 - w) phi in place of u; above 1: over-relaxation."""
     single_loop: Switch = False
     """`true`: the friction bound is updated in the Uzawa block relaxation itself."""
 

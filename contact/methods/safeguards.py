@@ -71,9 +71,10 @@ def _power(friction: Array, slip: Array) -> Array:
 
 
 def bound_by_slip(interface: Interface, total: Array, length: Array, limit: float) -> Array:
-    """Return ds/d|u_tau| at pressures and |u_tau|, (n,), at least -limit: a faster fall snaps.
+    """Return max(ds/d|u_tau|, -limit) at pressures and |u_tau|, (n,).
 
-    The limit is the stiffness that a falling bound may take away (stress/length). Collective.
+    The limit is the part of a node's stiffness that a falling bound may take away (stress/length):
+    with one that falls faster than the stiffness, slip snaps. Collective.
     """
     return np.maximum(interface.friction.by_slip(total, length), -limit)
 

@@ -378,7 +378,9 @@ class Spatial(tuple[One, ...]):
     """A list of one entry a dimension."""
 
 
-#: A list of 2 or 3, of one or more; a single value, or a list; one, or a list of the same.
+#: Components of a vector, in 2-D or 3-D, given as a list; in Python a function of the time too
+#: (`FewTimed`). A list of one or more (`Some`). One value, or a list of another type (`Either`),
+#: or of the same one (`OneOrSome`: [contact] or [[contact]]).
 Few: TypeAlias = Annotated[
     tuple[One, ...], Bounds(min_length=2, max_length=3), as_tuple, AfterValidator(Spatial)
 ]

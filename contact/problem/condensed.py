@@ -113,7 +113,7 @@ class CondensedBody:
         return x
 
     def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
-        """Return S (x - x_0) + r_0: internal forces, the loads among them in r_0. Collective."""
+        """Return S (x - x_0) + r_0, r_0 the condensed F - f, which has the loads. Collective."""
         moved = np.concatenate(self.comm.allgather(state.x - self.x_0))
         return np.asarray(self.rows @ moved + self.residual[self.own])
 
@@ -274,7 +274,7 @@ class Condensation:
         acting = body.load_norms(state.time) + reactions + body.coupling_norms(state)
         restricted = self._constraint.restrict(-residual)
         self._rhs = body.layout.mask(restricted[: body.owned])
-        # With loads along those before, the extrapolated state is in equilibrium inside.
+        # With loads along those before, nothing but rounding is left at the eliminated unknowns.
         nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
         if body.comm.allreduce(bool(self._schur.exceeds(self._rhs, nothing)), op=MPI.LOR):
             retained = self._schur.condense(self._rhs)
@@ -319,7 +319,7 @@ class Condensation:
         body, schur = self.whole.body, self._schur
         self._rows = np.zeros((0, 0))
         self._stiffness = DenseStiffness(self._rows)  # room for a new one
-        # The symmetric part of a tangent converges linearly, as chord steps.
+        # LDL^T needs (K + K^T)/2, with which Newton's method converges linearly.
         part = "symmetric" if kind == "tangent" and not body.symmetric else kind
         self._bulk.assemble(self._matrix, part, state)
         balance(self._matrix, body.layout)

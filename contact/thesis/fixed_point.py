@@ -247,17 +247,17 @@ class FixedPoint(OuterLoop):
         outcome = self._iterate(first)
         return self.state, outcome
 
-    def _initial_z(self, z: Array | float, friction: bool) -> Array:
-        """Return z = lambda + r (u - u_0) of lambda + r u, with u_0 of the iterate."""
+    def _initial_z(self, q: Array | float, friction: bool) -> Array:
+        """Return z = q - r u_n of q = lambda + r u."""
         jump = self.problem.interface.nodes.jump(self.state.x)
-        return z - self.r * displacement_and_slip(self.problem.interface, jump, friction)
+        return q - self.r * displacement_and_slip(self.problem.interface, jump, friction)
 
     def _step(self, iteration: int) -> tuple[int, str]:
         """Freeze, and solve by the Uzawa block relaxation."""
         problem, interface = self.problem, self.problem.interface
         friction, body = interface.friction.acts and iteration > 0, problem.body
         if friction and self._first == 0 and iteration == 1:
-            # Slip and contact without friction are a bad initial guess.
+            # Slip without friction is a bad guess: phi = lambda = 0 instead.
             self._z = self._initial_z(0.0, friction)
         if self._stalled and self._fitted is None:
             self._fit_to_softest_mode(friction)

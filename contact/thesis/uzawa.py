@@ -1,17 +1,18 @@
 """Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
 
 The augmented Lagrangian of (3.32), (3.33) has the auxiliary variables phi = (phi_c, phi_f) for
-u_nu and the slip, and their multipliers lambda. Unknowns are du = u - u_0 with u_0 of the outer
-iterate, and z = lambda + r du: against rounding of a small lambda beside a large slip. An iteration
-is
+u_nu and the slip, and their multipliers lambda. With u_n and s_n of the outer iterate, unknowns are
+du = u - u_n and z = lambda + r du: against rounding of a small lambda beside a large slip. With
+q = lambda + r u = z + r u_n an iteration is
 
-- Step 1, (3.34): du of K du + r du = f - F(u_0) + r (phi - u_0) - lambda
+- Step 1, (3.34): du of (K + r) du = f - F(u_n) + r (phi - u_n) - lambda
   (`FrozenProblem.displacement_load`),
-- Step 2, (3.44): phi = (z + r u_0 - P(z + r u_0))/r (`FrozenProblem.auxiliary`),
-- Step 3, (3.36): lambda + r (u - phi) = P(z + r u_0) (`FrozenProblem.project`),
+- Step 2, (3.35), (3.44): phi = (q - P(q))/r (`FrozenProblem.auxiliary`),
+- Step 3, (3.36): lambda + r (u - phi) = P(q) (`FrozenProblem.project`),
 
-P the projections of (3.43) and onto the disc of radius s: a fixed-point map of z. It is accelerated
-(`contact.thesis.acceleration`). Numbers of equations are those of the thesis.
+P(q) = ((q_c - r rho)^+, q_f projected onto the disc of radius s_n), (3.43) and section 3.5.2: a
+fixed-point map of z. It is accelerated (`contact.thesis.acceleration`). Numbers of equations are
+those of the thesis.
 
 References
 ----------
@@ -95,7 +96,7 @@ class RelaxationResult:
     increment
         dx on the owned unknowns.
     forces
-        Multipliers in equilibrium with the iterate.
+        Contact stress lambda + r (u - phi) of the last Step 1, in equilibrium with its u.
     z
         Variable of the next relaxation, about the new iterate, shape (n, 1 + d).
     iterations
@@ -135,7 +136,7 @@ class FrozenProblem:
     Parameters
     ----------
     problem, state
-        The problem, and the iterate u_0 at which layer, charge and geometry are frozen.
+        The problem, and the iterate u_n at which layer, charge and geometry are frozen.
     secant_at
         Unknowns of the secant modulus.
     friction
@@ -162,7 +163,7 @@ class FrozenProblem:
 
     @cached_property
     def jump_0(self) -> Array:
-        """u_0 at the contact nodes, shape (n, block size)."""
+        """u_n at the contact nodes, shape (n, block size)."""
         return self.nodes.jump(self.state.x)
 
     @cached_property
@@ -172,12 +173,12 @@ class FrozenProblem:
 
     @cached_property
     def origin(self) -> Array:
-        """Augmentation r u_0, tangentially that of the slip, shape (n, 1 + d)."""
+        """Augmentation r u_n, tangentially that of the slip, shape (n, 1 + d)."""
         return self.r * displacement_and_slip(self.interface, self.jump_0, self.friction)
 
     @cached_property
     def _load(self) -> Array:
-        """Loads minus internal forces at u_0, on the owned unknowns. Collective."""
+        """Loads minus internal forces at u_n, on the owned unknowns. Collective."""
         residual = residual_forces(self.problem, self.state, self.secant_at)
         contact = self.state.forces.vectors(self.nodes)
         if self.layer is not None:
@@ -190,17 +191,17 @@ class FrozenProblem:
         self.nodes.add_jump_transposed(self.nodes.weight[:, None] * forces, to)
 
     def displacement_load(self, multipliers: Array, z: Array) -> Array:
-        """Return the right-hand side of Step 1, f + r phi - lambda: r (phi - u_0) = z - lambda."""
+        """Return the right-hand side of Step 1, f - F(u_n) - (2 lambda - z), of (3.34)."""
         forces, load = 2 * multipliers - z, self._load.copy()
         self._add(-(forces[:, :1] * self.nodes.normal + forces[:, 1:]), load)
         return load
 
     def augmented(self, moved: Array) -> Array:
-        """Return r (u - u_0) of jumps u - u_0, shape (n, block size)."""
+        """Return r (u - u_n) of jumps u - u_n, shape (n, block size)."""
         return self.r * normal_and_tangential(self.nodes, moved, self.friction)
 
     def project(self, z: Array, bound: Array) -> Array:
-        """Return lambda of Step 3, (3.43) and its like in the disc, of z, (..., n, 1 + d).
+        """Return P(q) at q = z + r u_n: lambda of Step 3, (3.36); z has shape (..., n, 1 + d).
 
         With a layer the normal one is the total pressure -sigma_nu.
         """
@@ -251,7 +252,7 @@ class FrozenProblem:
 
 @dataclass
 class ThesisCriterion:
-    """The thesis's criterion (3.45), (5.38): relative change of unknowns and auxiliary variables.
+    """The thesis's criterion (3.45), (5.38), (6.41): relative change of unknowns and of phi.
 
     `domain_norm` is that of L2(Omega) of owned unknowns, `eps` the tolerance.
     """
@@ -289,7 +290,7 @@ def uzawa_block_relaxation(
     frozen, operator
         The problem, and its factorised operator with `augmentation(nodes, r, friction)`.
     z, bound
-        Initial lambda + r (u - u_0), shape (n, 1 + d), and friction bound s_n, shape (n,).
+        Initial lambda + r (u - u_n), shape (n, 1 + d), and friction bound s_n, shape (n,).
     domain_norm
         L2(Omega) norm of owned unknowns, for the thesis's criterion; None for residuals.
     poll
@@ -317,7 +318,7 @@ def uzawa_block_relaxation(
         increment = operator.solve(load, rtol if rtol < TOLERANCE else None, increment)
         moved = nodes.jump(increment)
         jump, r_u = frozen.jump_0 + moved, frozen.augmented(moved)
-        # The contact stress of this solve, in equilibrium with u.
+        # lambda + r (u - phi) of Step 1, in equilibrium with u; not yet lambda of (3.36).
         stress = 2 * multipliers - z + r_u
         if iteration == 1:
             stress_unit = interface.component_norms(stress)
