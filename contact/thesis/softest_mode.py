@@ -91,7 +91,7 @@ def softest_mode(problem: ContactProblem, operator: Operator, state: State, shif
         return summed(nodes.comm, a.T @ (nodes.weight[:, None] * b))
 
     def displacement(traction: Array) -> Array:
-        load = np.zeros(problem.body.owned)
+        load = np.zeros_like(problem.body.owned_part(state.x))
         nodes.add_jump_transposed((nodes.weight * traction)[:, None] * nodes.normal, load)
         return nodes.normal_component(nodes.jump(operator.solve(load)))
 

@@ -302,7 +302,7 @@ def uzawa_block_relaxation(
     stress_unit: Array = np.ones_like(nodes.weight)
     criterion = None if domain_norm is None else ThesisCriterion(frozen, domain_norm, options.eps)
     rtol = max(SHARE * options.inner, ROUNDING)
-    increment: Array = np.zeros(frozen.problem.body.owned)
+    increment: Array = np.zeros_like(frozen.problem.body.owned_part(frozen.state.x))
     stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
 
     def current_bound() -> Array:

@@ -369,6 +369,30 @@ def test_the_softest_mode_of_a_cantilever_is_its_first_bending_mode():
     assert found == pytest.approx(1.8751**4 / 40.0**4 * problem.scales.plane_modulus / 12, rel=5e-3)
 
 
+@pytest.mark.core
+def test_the_softest_mode_is_the_same_over_a_foundation_with_a_given_motion():
+    """Forces on the motion of a foundation stand behind those on the nodes."""
+    found = []
+    for rigid in ({}, {"rigid": {"displacement": [0.0, 0.1]}}):
+        case = beam(10.0, [40, 2], TIP, 0.5)
+        case["contact"] |= rigid
+        problem = build_problem(parse_case(case), comm=SELF)
+        operator = FixedPoint(problem, FixedPointOptions()).operator
+        shift = 1e-12 * problem.scales.c
+        found.append(softest_mode(problem, operator, problem.start(), shift))
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
+def test_the_block_relaxation_solves_iteratively_over_a_foundation_with_a_given_motion():
+    case = beam(2.0, [20, 10], {"on": "top", "traction": [0.0, -1e-2]}, 0.0, 0.3)
+    case["contact"]["rigid"] = {"displacement": [0.0, 1e-3]}
+    newton = solve(parse_case(case), comm=SELF)
+    solution = solve(parse_case(case), FixedPointOptions(linear="iterative"), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    size = np.abs(newton.contact_force).max()
+    assert np.allclose(solution.contact_force, newton.contact_force, rtol=0, atol=1e-6 * size)
+
+
 @pytest.mark.parametrize(("poisson", "far"), [(0.3, False), (0.4999, True)])
 def test_what_clamps_bear_does_not_hide_what_is_left_of_the_loads(poisson, far):
     """Two methods were 4e-4 apart, and said nothing: clamps bear 5000 times the loads."""
