@@ -218,7 +218,10 @@ WRONG = {
         r"elastic\.0\.normal.*\[negative-stiffness\]",
     ),
     "three": ([{"on": "bottom", "stiffness": [1.0] * 3}], r"\[value\]"),
-    "in time": ([{"on": "bottom", "normal": "t"}], r"\[value\]"),
+    "in time": (
+        [{"on": "bottom", "normal": "t"}],
+        r"elastic\.0\.normal: \"t\" depends on the time.*\[formula-variable\]",
+    ),
     "no part": ([{"on": "base", "normal": 1.0}], r"elastic\.0\.on.*\[part-name\]"),
     "the contact part": (
         [{"on": "right", "normal": 1.0}],
