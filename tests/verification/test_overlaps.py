@@ -226,7 +226,6 @@ def test_rigid_shapes_within_a_facet(cell, degree):
                     Problem(domain, given, contact, degree=degree)
 
 
-@pytest.mark.parallel
 def test_a_press_within_a_facet_is_refused_before_the_solve():
     """Unless the mesh is to be adapted: then on the last mesh, where it is still between nodes."""
     # The centre of a small ball within the body is beside all nodes: it was said to lie behind.
