@@ -79,7 +79,14 @@ class Fixed(Described):
         normal: Scalar | None = None,
         symmetry: Literal["x", "y", "z"] | None = None,
     ) -> None:
-        self._set(locals())
+        super().__init__(
+            on=on,
+            displacement=displacement,
+            symmetry=symmetry,
+            normal=normal,
+            potential=potential,
+            amplitude=amplitude,
+        )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -142,7 +149,7 @@ class Elastic(Described):
         stiffness: Vector | None = None,
         normal: Static | None = None,
     ) -> None:
-        self._set(locals())
+        super().__init__(on=on, stiffness=stiffness, normal=normal)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -207,7 +214,17 @@ class Load(Described):
             charge, body_charge = None, one_of("Load", charge=charge, body_charge=body_charge)
         else:
             traction = one_of("Load", density=density, traction=traction)
-        self._set(locals() | {"everywhere": on is None})
+        super().__init__(
+            on=on,
+            everywhere=on is None,
+            traction=traction,
+            force=force,
+            pressure=pressure,
+            charge=charge,
+            body_force=body_force,
+            body_charge=body_charge,
+            amplitude=amplitude,
+        )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -270,7 +287,7 @@ class Electrode(Described):
         charge: GivenTimed = 0.0,
         amplitude: GivenAmplitude | None = None,
     ) -> None:
-        self._set(locals())
+        super().__init__(on=on, charge=charge, amplitude=amplitude)
 
     @property
     def forces(self) -> tuple[Expression | OfTime | None, ...]:
@@ -301,7 +318,7 @@ class Bolt(Described):
         shortening: GivenTimed | None = None,
         amplitude: GivenAmplitude | None = None,
     ) -> None:
-        self._set(locals())
+        super().__init__(on=on, force=force, shortening=shortening, amplitude=amplitude)
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -168,10 +168,26 @@ class Contact(Described):
             gap, foundation = one_of("Contact", foundation=foundation, gap=gap), None
         if isinstance(gap, float) and np.isinf(gap):  # which is no value of a field
             gap, foundation = None, GapFunction.of(gap)
-        law = law or ("signorini" if layer is None else "compliance")
-        overlap = "press" if press else overlap
-        layer = 0.0 if layer is None else layer
-        self._set(locals())
+        super().__init__(
+            on=on,
+            name=name,
+            law=law or ("signorini" if layer is None else "compliance"),
+            against=against,
+            gap=gap,
+            foundation=foundation,
+            direction=direction,
+            axis=axis,
+            overlap="press" if press else overlap,
+            rigid=rigid,
+            layer=0.0 if layer is None else layer,
+            stiffness=stiffness,
+            limit=limit,
+            potential_factor=potential_factor,
+            potential_range=potential_range,
+            lagged=lagged,
+            friction=friction,
+            electric=electric,
+        )
 
     @model_validator(mode="before")
     @classmethod

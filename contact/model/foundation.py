@@ -212,7 +212,15 @@ class Electric(Described):
         lagged: bool = False,
         amplitude: GivenAmplitude | None = None,
     ) -> None:
-        self._set(locals())
+        super().__init__(
+            law=law,
+            k_e=k_e,
+            phi_f=phi_f,
+            amplitude=amplitude,
+            delta=delta,
+            limit=limit,
+            lagged=lagged,
+        )
 
     def conductor(self, domain: Domain, part: str) -> Conductor:
         """Return the law in front of a part of a mesh. Collective."""

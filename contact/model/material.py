@@ -301,15 +301,20 @@ class Material(Described):
         hardening: float | Mapping[str, float] | Sequence[Sequence[float]] | None = None,
         kinematic: float | Sequence[Mapping[str, float]] | None = None,
     ) -> None:
-        keys = {key: value for key, value in locals().items() if value is not None}
+        every: dict[str, Any] = {"name": name, "units": units, "library": library, "young": young}
+        every |= {"poisson": poisson, "stiffness": stiffness, "poling": poling}
+        every |= {"c11": c11, "c12": c12, "c13": c13, "c33": c33, "c44": c44}
+        every |= {"yield_strain": yield_strain, "argument": argument, "g_min": g_min}
+        every |= {"yield_stress": yield_stress, "hardening": hardening, "kinematic": kinematic}
+        keys = {key: value for key, value in every.items() if value is not None}
         fits = isinstance(law, str) or is_law(law)
         by_keys = law is None and {*keys} & {"name", "young", "poisson", "stiffness", "c11"}
         expect("law", law, OWN_LAW, fits or by_keys)
         fits = isinstance(piezo, PiezoTensors | Mapping | None)
         expect("piezo", piezo, "Piezo(...), a table of constants, or None", fits)
         names = several("on", on, str, "the name of a region, or a list of names")
-        keys["factor"] = factor.copy() if isinstance(factor, Function) else factor
-        self._set(keys | {"on": names or None})
+        own = factor.copy() if isinstance(factor, Function) else factor
+        super().__init__(law=law, piezo=piezo, on=names or None, factor=own, **keys)
         fits = factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
         expect("factor", factor, "a material without coupling and internal variables", fits)
 

@@ -119,13 +119,19 @@ class Motion(Described):
         centre: Sequence[float] | Array = (),
         amplitude: GivenAmplitude | None = None,
     ) -> None:
-        keys = locals() | {"rotation": "free" if rotation is None else rotation}
+        keys: dict[str, Any] = {
+            "displacement": displacement,
+            "rotation": "free" if rotation is None else rotation,
+            "force": force,
+            "moment": moment,
+            "centre": centre,
+        }
         lists = list | tuple | np.ndarray
         given = {k: v for k, v in keys.items() if not isinstance(v, lists) or len(v)}
         for key in {"rotation", "moment"} & {*given}:  # in 2-D of one component
             value = given[key]
             given[key] = value[0] if isinstance(value, lists) and len(value) == 1 else value
-        self._set(given)
+        super().__init__(**given, amplitude=amplitude)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -233,7 +239,7 @@ class Rigid(Motion):
         if motion is None:
             motion = Motion(displacement, rotation, force, moment, centre, amplitude)
         expect("Rigid: motion", motion, "Motion(...)", isinstance(motion, Motion))
-        self._set({**dict(motion), "on": on, "foundation": foundation})
+        Described.__init__(self, on=on, foundation=foundation, **dict(motion))
 
 
 def numbers_at(

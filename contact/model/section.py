@@ -164,12 +164,6 @@ class Described(Section):
         except ValidationError as error:
             raise describe(error, called(type(self).__name__, given.get("on"))) from None
 
-    def _set(self, given: Mapping[str, Any]) -> None:
-        """Check and set those of the local variables of an `__init__` that are keys."""
-        fields = type(self).model_fields.items()
-        names = {name for key, field in fields for name in (key, field.alias)}
-        Described.__init__(self, **{key: given[key] for key in given if key in names})
-
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Bounds, field))
 def described(**options: Any) -> Callable[[type[Kind]], type[Kind]]:
