@@ -33,18 +33,30 @@ PAGES = {
 }
 
 PARTS = (
-    Part("setups", "Set-ups and constants: Figures 1.1, 1.2, 7.1, 7.3, 8.1, 8.8, Table 8.1",
-         page="thesis-mechanics"),
+    Part(
+        "setups",
+        "Set-ups and constants: Figures 1.1, 1.2, 7.1, 7.3, 8.1, 8.8, Table 8.1",
+        page="thesis-mechanics",
+    ),
     Part("hertz", "Example 7.1: Hertz's cylinder, and a sphere", page="thesis-mechanics"),
     Part("table_7_1", "Example 7.2: Table 7.1, Algorithms 1 and 2", page="thesis-mechanics"),
-    Part("figures_mechanics", "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8",
-         page="thesis-mechanics"),
-    Part("table_7_2", "Example 7.2: Table 7.2, the penalty method, Theorem 4.2",
-         page="thesis-mechanics"),
-    Part("convergence_mechanics", "Figure 7.6 and Theorems 3.2, 4.3 and 4.5", package="studies",
-         page="thesis-mechanics"),
-    Part("corner", "The singular corner of Example 7.2", package="studies",
-         page="thesis-mechanics"),
+    Part(
+        "figures_mechanics", "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8", page="thesis-mechanics"
+    ),
+    Part(
+        "table_7_2",
+        "Example 7.2: Table 7.2, the penalty method, Theorem 4.2",
+        page="thesis-mechanics",
+    ),
+    Part(
+        "convergence_mechanics",
+        "Figure 7.6 and Theorems 3.2, 4.3 and 4.5",
+        package="studies",
+        page="thesis-mechanics",
+    ),
+    Part(
+        "corner", "The singular corner of Example 7.2", package="studies", page="thesis-mechanics"
+    ),
     Part("curved_foundations", "Curved foundations", package="studies"),
     Part("pressure_on_axis", "Pressure on the axis", package="studies"),
     Part("nonlocal_friction", "Non-local friction at work", package="studies"),
@@ -53,9 +65,13 @@ PARTS = (
     Part("tables_compliance", "Examples 8.3 and 8.4: Table 8.4", page="thesis-compliance"),
     Part("stopping_8_3", "Example 8.3: the thesis's two iterations", page="thesis-compliance"),
     Part("figures_compliance", "Examples 8.3 and 8.4: figures", page="thesis-compliance"),
-    Part("limit_theorem", "Theorems 6.3 to 6.5: limits of the compliant foundation",
-         package="studies", page="thesis-compliance"),
+    Part(
+        "limit_theorem",
+        "Theorems 6.3 to 6.5: limits of the compliant foundation",
+        package="studies",
+        page="thesis-compliance",
+    ),
     Part("refinement_8", "Chapter 8 on finer meshes", package="studies"),
     Part("sensitivity", "Parameters that the thesis does not print", package="studies"),
     Part("agreement", "Agreement of the methods", package="studies"),
-)  # fmt: skip
+)
