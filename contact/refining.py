@@ -42,7 +42,6 @@ from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 logger = logging.getLogger("contact.adapt")
-solver_logger = logging.getLogger("contact.solver")
 
 #: Tolerance on the coarser levels: their discretisation error is larger by far.
 COARSE_TOLERANCE = 1e-3
@@ -102,16 +101,16 @@ def default_start(
     try:
         return nested_start(case, problem)
     except InputError as error:  # the user does not know of the coarser mesh
-        solver_logger.info("no start from a coarser mesh: %s", error)
+        logging.getLogger("contact.solver").info("no start from a coarser mesh: %s", error)
         return None
 
 
 def nested_start(
     case: Case, problem: ContactProblem, **replacements: Unpack[Replacements]
-) -> State | None:
-    """Solve on the coarser meshes, each from the one before, and carry that to a problem's.
+) -> State:
+    """Solve on all coarser meshes, each from the one before, and carry that to a problem's.
 
-    Those that do not fit the case are left out, and there may be none. Collective.
+    Collective.
     """
     layout, solver = problem.body.layout, case.solver
     newton = solver if isinstance(solver, NewtonOptions) else NewtonOptions()
@@ -125,14 +124,11 @@ def nested_start(
     options = NewtonOptions(tolerance=max(COARSE_TOLERANCE, solver.tolerance), linear=linear)
     last: tuple[ContactProblem, State] | None = None
     for level in coarser_cases(case, levels):
-        try:
-            coarse = build_problem(level, problem.comm, **replacements)
-        except InputError as error:  # such as a press that coarse facets do not resolve
-            solver_logger.info("no start from a coarser mesh: %s", error)
-            continue
+        coarse = build_problem(level, problem.comm, refined=True, **replacements)
         start = None if last is None else prolong(*last, coarse)
         last = coarse, Newton(coarse, options).solve(start)[0]
-    return None if last is None else prolong(*last, problem)
+    assert last is not None
+    return prolong(*last, problem)
 
 
 def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State:

@@ -53,6 +53,7 @@ def build_problem(
     friction: FrictionLaw | None = None,
     foundation: Obstacle | None = None,
     layer: Layer | None = None,
+    refined: bool = False,
 ) -> ContactProblem:
     """Build the problem that a case describes. Collective.
 
@@ -65,6 +66,9 @@ def build_problem(
     domain, law, coefficient, friction, foundation, layer
         Objects that replace the case's mesh, material law, Coulomb's mu(|u_tau|) or the whole
         friction law, foundation and compliant layer (own p_nu and h_nu).
+    refined
+        Whether a finer mesh is to follow, as with `[mesh.adapt]`: a press of a shape within a facet
+        is not refused then.
 
     Returns
     -------
@@ -99,7 +103,7 @@ def build_problem(
             domain, body, contacts, degree=case.space.degree, element=case.space.element
         )
         for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:
-            check_problem(problem.at(time), refined=case.adapt is not None)
+            check_problem(problem.at(time), refined=refined or case.adapt is not None)
         for time in () if case.evolution is None else case.evolution.ends:
             check_supports(problem.at(time))
     return problem

@@ -256,7 +256,7 @@ def test_a_press_within_a_facet_is_refused_before_the_solve():
     case["mesh"]["adapt"]["max_unknowns"] = 2000
     solution = solve(parse_case(case))
     assert solution.converged and solution.contact_force[1] < 0
-    # A coarser level, of 4 by 4 cells, that does not resolve it is left out.
+    # A coarser level, of 4 by 4 cells, does not resolve it.
     case["mesh"] = {"generator": "rectangle", "size": [4.0, 4.0], "cells": [8, 8]}
     solution = solve(parse_case(case), NewtonOptions(nested=True))
     assert solution.converged and solution.contact_force[1] < 0
