@@ -4,7 +4,7 @@ SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py scripts/*/*/[a-z]*.py) scrip
 	scripts/golden.py scripts/pictures.py
 NAMES := $(notdir $(basename $(SCRIPTS)))
 # a test that hangs on some ranks is ended, and fails
-MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
+MPI_TESTS = timeout --foreground $(LIMIT) $(FX) mpirun -n $(1) \
 	python3 -m mpi4py -m pytest $(TESTS) $(SHORT) -m 'parallel and $(MARKS)' -q --color=no -p no:cacheprovider
 
 .PHONY: help demo test test-rest test-all test-serial messages lint format docs release clean robustness tables figures $(NAMES)
@@ -34,6 +34,9 @@ test test-rest: SHORT := --short
 test: MARKS := core
 test-rest: MARKS := not core and not release
 test-all: MARKS := not release
+# seconds
+test test-rest: LIMIT := 1200
+test-all: LIMIT := 7200
 # Other files need not be imported.
 test: TESTS = $(shell grep -rl --include='test_*.py' 'mark\.core' tests)
 test-rest test-all: TESTS := tests

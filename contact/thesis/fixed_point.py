@@ -333,5 +333,6 @@ class FixedPoint(OuterLoop):
     def _advice(self, residual: float | None = None) -> str:
         if self._stalled:
             words = f": the Uzawa block relaxation with r = {self.r:.3g} stalls"
-            return words + (conditioning(self.problem.scales, self.r) if self._fitted else "")
+            why = conditioning(self.problem.scales, self.r) if self._fitted else ""
+            return f"{words}{why}; accepted: method newton"
         return FROZEN if residual is not None and residual > NEAR else ""

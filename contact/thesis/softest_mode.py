@@ -65,8 +65,7 @@ def conditioning(scales: Scales, r: float) -> str:
     steps = math.log(10) * math.sqrt(ratio)
     return (
         f": the modes of its contact surface differ by a factor of {ratio:.1e} in stiffness, as of "
-        f"slender bodies and soft layers: a digit takes {steps:.1e} solves without acceleration; "
-        "accepted: method newton"
+        f"slender bodies and soft layers: a digit takes {steps:.1e} solves without acceleration"
     )
 
 
