@@ -362,7 +362,7 @@ def _take_steps(
 def _prescribed(problem: ContactProblem, start: State) -> State:
     """Return an initial guess with the values that the problem prescribes. Collective."""
     zero, nodes = problem.start(), problem.nodes.nodes.size
-    fits = start.x.shape == zero.x.shape and start.forces.pressure.shape == (nodes,)
+    fits = start.x.shape == zero.x.shape and start.forces.contact.shape == (nodes,)
     if not problem.comm.allreduce(fits, op=MPI.LAND):
         raise InputError(
             "start: given a state of another problem; accepted: one with the same mesh, elements "

@@ -247,7 +247,7 @@ def test_a_node_at_its_bound_is_named_and_the_derivative_is_one_sided():
     # all stick at mu = 3; with mu the largest ratio of friction to pressure one node is at its
     # bound, and the solution is the same
     forces = solve(parse_case(pushed(3.0)), comm=SELF).state.forces
-    ratio = np.linalg.norm(forces.friction, axis=1) / forces.pressure
+    ratio = np.linalg.norm(forces.friction, axis=1) / forces.contact
     case, name = parse_case(pushed(float(ratio.max()))), "contact_force_x"
     run = solve(case, comm=SELF)
     found = sensitivity(run, [name], ["friction.mu"])

@@ -2,13 +2,13 @@
 
 With projections onto the admissible forces, a half line and a disc, the laws are equations,
 
-    p - max(0, p + c (u_nu - rho)) = 0,     lambda_f - proj_s(lambda_f + c u_tau) = 0,
+    lambda_c - max(0, lambda_c + c (u_nu - rho)) = 0,     lambda_f - proj_s(lambda_f + c u_tau) = 0,
 
 (17) of docs/algorithms.md, with the gap rho of the constraint (`Interface.gap`) and the normal gap
 g_N = rho - u_nu. Their pieces are those of the active set (18) (`ActiveSet`). `interface_residuals`
 evaluates them. `linearise` linearises them node by node for a step of the semismooth Newton method:
 
-    p+ = p + gamma (u_nu+ - rho)               closed, (19a); 0 where open
+    lambda_c+ = lambda_c + gamma (u_nu+ - rho) closed, (19a); 0 where open
     lambda_f+ = lambda_f + gamma u_tau+        stick, (19b)
     lambda_f+ = s+ e + theta Q u_tau+          slip, (19c), with the linearised bound s+ (19d)
 
@@ -68,8 +68,9 @@ def interface_residuals(
 ) -> tuple[Array, Array]:
     """Return the contact and friction residuals (16) and their floors, (2,). Collective.
 
-    The `worst` of the connected components, each relative to max(|p|, 1e-4 c_0 |g|), norms in
-    L2(Gamma_3): g is |g_N|, at most the displacement of the node and the size.
+    The `worst` of the connected components, each relative to max(|p|, 1e-4 c_0 |g|) with
+    p = -sigma_nu, norms in L2(Gamma_3): g is |g_N|, at most the displacement of the node and the
+    size.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def interface_residuals(
         Rounding of the pressures of each component, in L2(Gamma_3).
     """
     c_r, normal_gap = interface.c_r, interface.normal_gap(jump)
-    contact = multipliers.pressure - project_half_line(multipliers.pressure - c_r * normal_gap)
+    contact = multipliers.contact - project_half_line(multipliers.contact - c_r * normal_gap)
     # Friction along the normal violates the law wherever a node sticks or slips.
     trial = interface.nodes.tangential_component(multipliers.friction) + c_r * interface.slip(jump)
     friction = multipliers.friction - project_disc(trial, bound)
@@ -180,27 +181,27 @@ def linearise(
     """
     nodes, normal_gap, gamma = interface.nodes, interface.normal_gap(jump), parameters.gamma
     n, d = nodes.normal, nodes.dim
-    # (19a): p+ = p + gamma (u_nu+ - rho) where closed, 0 where open.
-    pressure = np.where(active.closed, multipliers.pressure - gamma * normal_gap, 0.0)
+    # (19a): lambda_c+ = lambda_c + gamma (u_nu+ - rho) where closed, 0 where open.
+    contact = np.where(active.closed, multipliers.contact - gamma * normal_gap, 0.0)
     slope = np.where(active.closed, gamma, 0.0)[:, None] * n
-    blocks = np.zeros((pressure.size, nodes.block_size, nodes.block_size))
+    blocks = np.zeros((contact.size, nodes.block_size, nodes.block_size))
     blocks[:, :d, :d] = n[:, :, None] * slope[:, None, :]
     if not interface.friction.acts:
-        return Multipliers(pressure, np.zeros_like(n)), blocks
+        return Multipliers(contact, np.zeros_like(n)), blocks
 
-    # (19d): s+ = s + ds/dp (p+ - p) + ds/d|u_tau| e_u.(u_tau+ - u_tau), with p+ - p of (19a) where
-    # closed, and of the layer by its tangent at the iterate u_nu: not at the place on its graph
-    # about which the layer itself is linearised.
+    # (19d): s+ = s + ds/dp (p+ - p) + ds/d|u_tau| e_u.(u_tau+ - u_tau), with p+ - p = lambda_c+ -
+    # lambda_c + dp_l: (19a) where closed, and the layer by its tangent at the iterate u_nu, not at
+    # the place on its graph about which the layer itself is linearised.
     slip, s, by_pressure = interface.slip(jump), bound.s, bound.by_pressure
     s_plus = s - by_pressure * gamma * np.where(active.closed, normal_gap, 0.0)
-    gradient = by_pressure[:, None] * interface.foundation.pressure_gradient(jump)
+    gradient = by_pressure[:, None] * interface.foundation.layer_gradient(jump)
     gradient[:, :d] += by_pressure[:, None] * slope + bound.by_slip[:, None] * unit_vectors(slip)
 
     friction, sticks, slips = np.zeros_like(n), active.sticks, active.slips
-    # (19b): lambda+ = lambda + gamma u_tau+ where it sticks.
+    # (19b): lambda_f+ = lambda_f + gamma u_tau+ where it sticks.
     friction[sticks] = (multipliers.friction + gamma * slip)[sticks]
     blocks[sticks, :d, :d] += gamma * nodes.tangent[sticks]
-    # (19c): lambda+ = s+ e + theta Q u_tau+ where it slips, e = z/|z|, z = lambda + c u_tau.
+    # (19c): lambda_f+ = s+ e + theta Q u_tau+ where it slips, e = z/|z|, z = lambda_f + c u_tau.
     z = multipliers.friction + parameters.c * slip
     size = np.linalg.norm(z, axis=1)
     e = z / np.maximum(size, 1e-300)[:, None]
@@ -211,4 +212,4 @@ def linearise(
     friction[slips] = slipping[slips]
     blocks[slips, :d, :] += e[slips, :, None] * gradient[slips, None, :]
     blocks[slips, :d, :d] += across[slips]
-    return Multipliers(pressure, friction), blocks
+    return Multipliers(contact, friction), blocks

@@ -2,7 +2,7 @@
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
-node by node. Newton's method takes the whole of `pressure_block` and `charge_block`.
+node by node. Newton's method takes the whole of `layer_block` and `charge_block`.
 
 Algorithms 4 and 6 of the thesis freeze the charge l, Algorithms 6 and 8 the layer's force j_1: all
 of each is on the right-hand side; so it is here where they are `lagged`. The variants of the code
@@ -54,22 +54,22 @@ class NormalGraph:
     rho_0: Array
     gap: Array
 
-    def layer(self, u_n: Array) -> Array:
-        """Return the pressure of the layer, by its law also where an iterate exceeds rho."""
+    def layer_pressure(self, u_n: Array) -> Array:
+        """Return p_l at u_nu, by its law also where an iterate exceeds rho."""
         return self.stiffness * self.p_nu(u_n - self.rho_0)
 
     def layer_slope(self, u_n: Array) -> Array:
-        """Return the derivative of `layer`; at the first touch that of the pressed layer."""
+        """Return the derivative of p_l by u_nu; at the first touch that of the pressed layer."""
         s = u_n - self.rho_0
         return self.stiffness * self.p_nu.derivative(np.where(s == 0, TINY, s))
 
     def pressure(self, z: Array, r: float) -> Array:
-        """Return the resolvent of the maximal monotone graph: p(u_nu) with p + r u_nu = z.
+        """Return the resolvent of the maximal monotone graph: p = -sigma_nu with p + r u_nu = z.
 
         It is (3.43) with a layer, and unique for any r > 0 above the slope of a falling p_nu.
         """
         low, high = self.rho_0, np.minimum(self.gap, z / r)
-        u_n, layer, steep = high, self.layer(high), self.layer_slope(high)
+        u_n, layer, steep = high, self.layer_pressure(high), self.layer_slope(high)
         free, rigid = z <= r * low, z - r * self.gap >= layer
         done = free | rigid
         # Newton's method in a bracket; every third sweep halves it, should Newton not.
@@ -84,7 +84,7 @@ class NormalGraph:
             newton = u_n - excess / np.where(slope > 0, slope, r)
             inside = (newton > low) & (newton < high) & (sweep % 3 < 2)
             u_n = np.where(done, u_n, np.where(inside, newton, 0.5 * (low + high)))
-            layer, steep = self.layer(u_n), self.layer_slope(u_n)
+            layer, steep = self.layer_pressure(u_n), self.layer_slope(u_n)
         # The layer's pressure is exact where it is small, the remainder where it is stiff.
         pressed = np.where(steep < r, layer, z - r * u_n)
         return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
@@ -96,7 +96,7 @@ class NormalGraph:
     def pressure_slope(self, z: Array, r: float) -> Array:
         """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
         high = np.minimum(self.gap, z / r)
-        free, rigid = z <= r * self.rho_0, z - r * self.gap >= self.layer(high)
+        free, rigid = z <= r * self.rho_0, z - r * self.gap >= self.layer_pressure(high)
         slope = self.layer_slope(self.displacement(z, r))
         return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))
 
@@ -226,15 +226,15 @@ class FoundationLaw:
         """Return u_nu - g_0, of psi: with a layer of any depth too, where rho is infinite."""
         return self.nodes.normal_component(jump) - self.nodes.gap
 
-    def pressure(self, jump: Array) -> Array:
-        """Return the pressure of the layer at jumps of shape (n, block size)."""
+    def layer_pressure(self, jump: Array) -> Array:
+        """Return p_l at jumps of shape (n, block size), shape (n,)."""
         if self.layer is None:
             return np.zeros(jump.shape[0])
         stiffness = self.layer.h_nu(self._difference(jump))
         return np.asarray(stiffness * self.layer.p_nu(self._layer_penetration(jump)), dtype=float)
 
     def largest_pressure(self, size: float) -> Array:
-        """Return bounds of the normal contact pressure, shape (n,): finite on saturating layers.
+        """Return bounds of the contact pressure p, shape (n,): finite on saturating layers.
 
         Infinite with a rigid part, and where p_nu falls anywhere, or still grows at a thousand
         times the size of the bodies (length). h_nu is the largest of any potential.
@@ -267,7 +267,7 @@ class FoundationLaw:
         assert self.conductor is not None
         pressed = self._pressed(jump, pressure)
         # A multiplier of the size of rounding on an open node is no pressure.
-        loaded = pressed | (self.pressure(jump) > 0)
+        loaded = pressed | (self.layer_pressure(jump) > 0)
         psi = self.conductor.psi.at(self._past_rigid_part(jump), pressed, loaded)
         return np.asarray(self.conductor.share * psi)
 
@@ -281,12 +281,12 @@ class FoundationLaw:
         # u_nu = rho holds to the tolerance of the inner loop, which a steep ramp makes a thousand
         # times larger; so large a multiplier at an open node is no pressure.
         normal_gap = self.signorini_gap - self.nodes.normal_component(jump)
-        return constraint_active(pressure - self.pressure(jump), normal_gap, self.c_0)
+        return constraint_active(pressure - self.layer_pressure(jump), normal_gap, self.c_0)
 
     def force(self, jump: Array, pressure: Array) -> Array:
         """Return the residual density on Gamma_3, shape (n, block size), in scaled unknowns."""
         total = np.zeros((jump.shape[0], self.nodes.block_size))
-        total[:, : self.nodes.dim] = self.pressure(jump)[:, None] * self.nodes.normal
+        total[:, : self.nodes.dim] = self.layer_pressure(jump)[:, None] * self.nodes.normal
         if self.conductor is not None:
             total[:, -1] -= self.phi_scale * self.charge(jump, pressure)
         return total
@@ -302,8 +302,8 @@ class FoundationLaw:
         least = np.maximum(KINK * np.maximum(before, after), SOFTEST * self.c_0)
         return np.asarray(np.abs(after - before) > least)
 
-    def pressure_gradient(self, jump: Array) -> Array:
-        """Return the derivative of `pressure` by the jumps, shape (n, block size)."""
+    def layer_gradient(self, jump: Array) -> Array:
+        """Return the derivative of `layer_pressure` by the jumps, shape (n, block size)."""
         total = np.zeros((jump.shape[0], self.nodes.block_size))
         if self.layer is None:
             return total
@@ -316,12 +316,12 @@ class FoundationLaw:
             total[:, -1] = self.phi_scale * growth
         return total
 
-    def pressure_block(self, jump: Array, full: bool) -> Array:
+    def layer_block(self, jump: Array, full: bool) -> Array:
         """Return the derivative of the layer's force, shape (n, block size, block size).
 
         Without that of h_nu, which is not symmetric, unless `full`.
         """
-        gradient = self.pressure_gradient(jump)
+        gradient = self.layer_gradient(jump)
         if not full:
             gradient[:, self.nodes.dim :] = 0.0
         total = np.zeros((*gradient.shape, self.nodes.block_size))
@@ -363,5 +363,5 @@ class FoundationLaw:
         """
         total = self.charge_block(jump, pressure, full)
         if self.layer is not None and (full or not self.layer.lagged):
-            total += self.pressure_block(jump, full)
+            total += self.layer_block(jump, full)
         return total

@@ -157,8 +157,8 @@ class Interface:
         return np.linalg.norm(self.slip(jump), axis=1)
 
     def pressure(self, jump: Array, multipliers: Multipliers) -> Array:
-        """Return -sigma_nu = lambda_c + p_l, p_l the layer's pressure, shape (n,)."""
-        return multipliers.pressure + self.foundation.pressure(jump)
+        """Return the contact pressure p = -sigma_nu = lambda_c + p_l, shape (n,)."""
+        return multipliers.contact + self.foundation.layer_pressure(jump)
 
     @property
     def largest_pressure(self) -> Array:
@@ -177,8 +177,9 @@ class Interface:
 
     def stress(self, jump: Array, multipliers: Multipliers) -> Array:
         """Return -sigma nu, layer included, shape (n, d)."""
-        pressure = self.pressure(jump, multipliers)
-        return Multipliers(pressure, multipliers.friction).vectors(self.nodes)
+        nodes, pressure = self.nodes, self.pressure(jump, multipliers)
+        tangential = nodes.tangential_component(multipliers.friction)
+        return pressure[:, None] * nodes.normal + tangential
 
     def active_set(
         self,
@@ -198,14 +199,14 @@ class Interface:
             As in `constraint_active`; c_0 by default.
         """
         c = self.c_0 if c is None else c
-        closed = constraint_active(multipliers.pressure, self.normal_gap(jump), c, rounding)
+        closed = constraint_active(multipliers.contact, self.normal_gap(jump), c, rounding)
         if not self.friction.acts:
             return ActiveSet.without_slip(closed, False)
         return ActiveSet.of(closed, multipliers.friction, self.slip(jump), bound, c, rounding)
 
     def node_counts(self, jump: Array, active: ActiveSet) -> tuple[int, int, int]:
         """Return the numbers of open, stick and slip nodes; layer contact is closed. Collective."""
-        closed = active.closed | (self.foundation.pressure(jump) > 0)
+        closed = active.closed | (self.foundation.layer_pressure(jump) > 0)
         sticks = closed & active.sticks
         local = [np.count_nonzero(nodes) for nodes in (~closed, sticks, closed & ~sticks)]
         opened, stick, slip = (int(count) for count in summed(self.comm, local))

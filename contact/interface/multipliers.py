@@ -5,9 +5,9 @@ the last step of an evolution, and the accumulated slip: friction acts against t
 and a coefficient mu(slip) depends on the accumulated one. A static problem is one step from zero.
 
 The active set says which contact nodes are open, stick or slip. A node is in contact where
-p - c (rho - u_nu) > 0 and sticks where |lambda_f + c u_tau| <= s: the pieces of the complementarity
-functions (`contact.interface.complementarity`). Newton's method, the residuals and the status have
-a c each: the sets agree at the solution.
+lambda_c - c (rho - u_nu) > 0 and sticks where |lambda_f + c u_tau| <= s: the pieces of the
+complementarity functions (`contact.interface.complementarity`). Newton's method, the residuals and
+the status have a c each: the sets agree at the solution.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ class Multipliers:
 
     Attributes
     ----------
-    pressure
-        lambda_c of the unilateral constraint, shape (n,): with a layer of pressure p_l
-        lambda_c + p_l = -sigma_nu (`Interface.pressure`).
+    contact
+        lambda_c of the unilateral constraint, shape (n,); the contact pressure is
+        p = -sigma_nu = lambda_c + p_l with that of the layer (`Interface.pressure`).
     friction
         lambda_f = -sigma_tau, tangential vectors, shape (n, d).
     """
 
-    pressure: Array
+    contact: Array
     friction: Array
 
     @staticmethod
@@ -46,13 +46,13 @@ class Multipliers:
         return Multipliers(np.zeros(nodes.weight.size), np.zeros(nodes.normal.shape))
 
     @staticmethod
-    def of(nodes: ContactNodes, pressure: Array, friction: Array) -> Multipliers:
+    def of(nodes: ContactNodes, contact: Array, friction: Array) -> Multipliers:
         """Return multipliers, with the tangential part of vectors of shape (n, d) as friction."""
-        return Multipliers(pressure, nodes.tangential_component(friction))
+        return Multipliers(contact, nodes.tangential_component(friction))
 
     def vectors(self, nodes: ContactNodes) -> Array:
         """Return lambda_c nu + lambda_f, shape (n, d); of lambda_f the tangential part acts."""
-        return self.pressure[:, None] * nodes.normal + nodes.tangential_component(self.friction)
+        return self.contact[:, None] * nodes.normal + nodes.tangential_component(self.friction)
 
 
 @dataclass(frozen=True)
@@ -98,18 +98,18 @@ class SlipHistory:
 
 
 def constraint_active(
-    pressure: Array, normal_gap: Array, c: float, rounding: float = 0.0
+    lambda_c: Array, normal_gap: Array, c: float, rounding: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Return where the non-penetration constraint is active, p - c g_N > 0: shape (n,).
+    """Return where the non-penetration constraint is active, lambda_c - c g_N > 0: shape (n,).
 
     Parameters
     ----------
-    pressure, normal_gap
+    lambda_c, normal_gap
         Multiplier of the unilateral constraint, and g_N = gap - u_nu, shape (n,).
     c, rounding
         Complementarity parameter (stress/length), and tolerance (stress).
     """
-    return np.greater(pressure - c * normal_gap, rounding)
+    return np.greater(lambda_c - c * normal_gap, rounding)
 
 
 @dataclass(frozen=True)

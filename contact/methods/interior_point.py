@@ -435,10 +435,10 @@ class InteriorPoint:
     def state(self) -> State:
         """The iterate."""
         cones, nodes = self.cones, self.problem.interface.nodes
-        pressure, friction = np.zeros(nodes.weight.size), np.zeros(nodes.normal.shape)
-        pressure[self._rigid] = cones.force / nodes.weight[self._rigid]
+        contact, friction = np.zeros(nodes.weight.size), np.zeros(nodes.normal.shape)
+        contact[self._rigid] = cones.force / nodes.weight[self._rigid]
         friction[self._frictional] = -cones.friction / nodes.weight[self._frictional, None]
-        return replace(self._state, forces=Multipliers.of(nodes, pressure, friction))
+        return replace(self._state, forces=Multipliers.of(nodes, contact, friction))
 
     def relative_gap(self) -> float:
         """Return the duality gap over the work of loads and contact. Collective."""

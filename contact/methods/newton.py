@@ -2,10 +2,10 @@
 
 1. A step linearises material, contact, friction, layer and charge together (`newton_step`), and
    eliminates the multipliers node by node (`contact.interface.complementarity`). The function of a
-   closed node, -c (u_nu - rho), has no derivative in p: it is perturbed to (c/gamma) dp =
-   c (u_nu+ - rho), one augmented-Lagrangian update; gamma -> infinity is the primal-dual active set
-   strategy. Steps are taken whole, without a line search: the residuals may rise while the active
-   set changes, and the stagnation limit bounds how long.
+   closed node, -c (u_nu - rho), has no derivative in lambda_c: it is perturbed to
+   (c/gamma) dlambda_c = c (u_nu+ - rho), one augmented-Lagrangian update; gamma -> infinity is the
+   primal-dual active set strategy. Steps are taken whole, without a line search: the residuals may
+   rise while the active set changes, and the stagnation limit bounds how long.
 2. Where the contact nodes are few, the body is condensed onto them (static condensation): a loop
    linearises the material (`Newton._condensed_steps`), and the same method solves contact on the
    Schur complement, in small dense steps (`semismooth`).

@@ -251,7 +251,7 @@ def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: A
     vectors = laws.multipliers.vectors(nodes) + change[:, : interface.dim]
     forces = Multipliers.of(nodes, nodes.normal_component(vectors), vectors)
     pressed = nodes.normal_component(np.einsum("nij,nj->ni", laws.layer, moved))
-    layer = interface.foundation.pressure(nodes.jump(state.x)) + laws.layer_shift + pressed
+    layer = interface.foundation.layer_pressure(nodes.jump(state.x)) + laws.layer_shift + pressed
     # Far motions leave nodes of a rigid part off it by rounding.
     x = body.prescribe(body.updated(state.x, increment), state.time)
     return replace(state, x=x, forces=forces, active_set=laws.active_set, layer_pressure=layer)
@@ -266,18 +266,18 @@ def linearised_layer(
 ) -> tuple[Array, Array]:
     """Linearise the layer; return its block, and the linearised pressure minus the pressure.
 
-    About u* on the graph of the law with p(u*) + c u* = lambda_c + p_layer + c u_nu, as for the
+    About u* on the graph of the law with p(u*) + c u* = lambda_c + p_l + c u_nu, as for the
     active set: about u_nu itself, a layer stiffer than the body cycles between its regimes.
     """
     law, nodes, c = interface.foundation, interface.nodes, parameters.c
     graph = law.normal_graph(jump)
     if graph is None:
-        return law.pressure_block(jump, full), np.zeros(jump.shape[0])
-    u_n, layer = nodes.normal_component(jump), law.pressure(jump)
+        return law.layer_block(jump, full), np.zeros(jump.shape[0])
+    u_n, layer = nodes.normal_component(jump), law.layer_pressure(jump)
     last = layer if state.layer_pressure is None else state.layer_pressure
-    place = graph.displacement(state.forces.pressure + last + c * u_n, c)
+    place = graph.displacement(state.forces.contact + last + c * u_n, c)
     on_graph = jump.copy()
     on_graph[:, : interface.dim] += (place - u_n)[:, None] * nodes.normal
-    block = law.pressure_block(on_graph, full)
+    block = law.layer_block(on_graph, full)
     back = nodes.normal_component(np.einsum("nij,nj->ni", block, jump - on_graph))
-    return block, law.pressure(on_graph) + back - layer
+    return block, law.layer_pressure(on_graph) + back - layer

@@ -70,10 +70,10 @@ class SemismoothNewton:
         """Return an initial guess with its active set."""
         interface, c = self.problem.interface, self.step.parameters.c
         jump = interface.nodes.jump(start.x)
-        # Rounding of the pressure at an open node would be a friction bound, and make it stick.
-        closed = constraint_active(start.forces.pressure, interface.normal_gap(jump), c)
-        pressure = np.where(closed, start.forces.pressure, 0.0)
-        forces = Multipliers.of(interface.nodes, pressure, start.forces.friction)
+        # Rounding of lambda_c at an open node would be a friction bound, and make it stick.
+        closed = constraint_active(start.forces.contact, interface.normal_gap(jump), c)
+        contact = np.where(closed, start.forces.contact, 0.0)
+        forces = Multipliers.of(interface.nodes, contact, start.forces.friction)
         bound = interface.bound(jump, forces)
         active_set = interface.active_set(jump, forces, bound, c)
         return replace(start, forces=forces, active_set=active_set, layer_pressure=None)

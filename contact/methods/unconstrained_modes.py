@@ -253,7 +253,7 @@ def with_least_displacements(
         residuals = evaluate(problem, least)
         if not residuals.excess(outcome.allowed):
             outcome = replace(outcome, residuals=residuals)
-            pressed = problem.interface.nodes.maximum(state.forces.pressure) > 0
+            pressed = problem.interface.nodes.maximum(state.forces.contact) > 0
             if pressed and forces is not state.forces:
                 # Pressures that were rounding have constrained other modes.
                 return with_least_displacements(modes, least, outcome)

@@ -111,7 +111,7 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     moved = c * np.linalg.norm(jump[:, : problem.dim], axis=1)
     small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(jump, forces), moved))
     normal_gap, length = np.abs(interface.normal_gap(jump)), interface.slip_length(jump)
-    weak = np.where(active.closed, np.abs(forces.pressure) <= small, c * normal_gap <= small)
+    weak = np.where(active.closed, np.abs(forces.contact) <= small, c * normal_gap <= small)
     if interface.friction.acts:
         bound = interface.bound(jump, forces)
         left = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
@@ -187,7 +187,7 @@ class Linearised:
             total, smooth = friction.history.accumulated + length, friction.smooth(self._pressure)
             rate = np.asarray(friction.law.by_pressure(total, smooth), dtype=float)
             self._rate = np.broadcast_to(rate, length.shape) * (smooth > 0)
-        self._layer = interface.foundation.pressure_gradient(jump)
+        self._layer = interface.foundation.layer_gradient(jump)
         local = self._rate * friction.local
         self._by_jump = np.zeros((length.size, d, nodes.block_size))
         self._by_jump[:, :, :d] = np.where(closed, interface.c_0 * normal, 0.0)

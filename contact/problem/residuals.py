@@ -208,7 +208,7 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
     Multipliers at open nodes, and pressures that are rounding, do not count as contact.
     """
-    jump, own = interface.nodes.jump(state.x), state.forces.pressure
+    jump, own = interface.nodes.jump(state.x), state.forces.contact
     rounding = interface.rounding_pressure(jump)
     on = constraint_active(own, interface.normal_gap(jump), interface.c_0, rounding)
     pressed = interface.norms(interface.pressure(jump, state.forces) - own * ~on)

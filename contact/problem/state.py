@@ -40,7 +40,7 @@ class State:
 
     def __post_init__(self) -> None:
         """Mark the arrays as read-only."""
-        for array in (self.x, self.forces.pressure, self.forces.friction):
+        for array in (self.x, self.forces.contact, self.forces.friction):
             array.flags.writeable = False
 
 

@@ -130,7 +130,7 @@ class Solved:
         interface, jump = self.problem.interface, self.nodal
         rounding = interface.negligible(jump, self.pressure)
         active = interface.active_set(jump, self.forces, self.friction_bound, rounding=rounding)
-        layer = interface.foundation.pressure(jump) > rounding
+        layer = interface.foundation.layer_pressure(jump) > rounding
         touches = active.closed | layer
         sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")

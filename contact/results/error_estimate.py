@@ -326,7 +326,7 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     normal_gap = interface.normal_gap(jump)
     values[interface.nodes.nodes] = np.column_stack(
         [
-            state.forces.pressure,
+            state.forces.contact,
             np.where(np.isfinite(normal_gap), normal_gap, 0.0),  # no rigid part: no pressure on it
             interface.bound(jump, state.forces),
             interface.slip(jump),
@@ -336,10 +336,10 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     vector.scatter_forward()
     at, weights = rule(shape.facet, 4)
     found = shape.facet.lagrange(body.degree, at) @ values[nodes]
-    pressure, normal_gap, bound = (found[..., i] for i in range(3))
+    contact, normal_gap, bound = (found[..., i] for i in range(3))
     slip, friction = found[..., 3 : 3 + d], found[..., 3 + d :]
-    # Next to a single node the quadratic function of its pressure is negative.
-    density = np.maximum(pressure, 0.0) * np.abs(normal_gap) + np.abs(
+    # Next to a single node the quadratic function of its lambda_c is negative.
+    density = np.maximum(contact, 0.0) * np.abs(normal_gap) + np.abs(
         bound * np.linalg.norm(slip, axis=-1) - np.sum(slip * friction, axis=-1)
     )
     behind = geometry_nodes(domain, cells)
@@ -349,10 +349,10 @@ def _at_contact(problem: ContactProblem, state: State, modulus: Array) -> Array:
     products = np.sum(areas * density, axis=1)
     size = integration_weights(False, shape.facet, of_facet, at, weights).sum(axis=1)
     share = size ** (1 / shape.facet.dim) / np.pi * _compliance(problem, cells, modulus)
-    moved = share * np.sum(areas * (pressure**2 + np.sum(friction**2, axis=-1)), axis=1)
+    moved = share * np.sum(areas * (contact**2 + np.sum(friction**2, axis=-1)), axis=1)
     ratio = np.divide(products, moved, out=np.ones_like(moved), where=moved > 0)
     # Beside a facet that touches with all of its nodes there is room, and b is h.
-    touches = values[nodes, 0] > interface.negligible(jump, state.forces.pressure)
+    touches = values[nodes, 0] > interface.negligible(jump, state.forces.contact)
     within = la.vector(index_map)
     within.array[nodes[touches.all(axis=1)]] = 1.0
     within.scatter_reverse(la.InsertMode.add)

@@ -139,7 +139,7 @@ class ContactForce:
         share = np.where(_of_contact(problem, self.contact), self._share(problem), 0.0)
         by_force = np.zeros_like(nodes.normal)
         by_force[:, self.axis] = share * nodes.weight
-        layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
+        layer = problem.interface.foundation.layer_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.body.owned_part(state.x))
         nodes.add_jump_transposed(
             (share * nodes.weight * nodes.normal[:, self.axis])[:, None] * layer, by_x
@@ -188,7 +188,7 @@ class MaxPressure(Largest):
         """Return the derivatives. Collective."""
         nodes = problem.nodes
         at = _largest(problem, self.values(problem, state))
-        layer = problem.interface.foundation.pressure_gradient(problem.nodal(state))
+        layer = problem.interface.foundation.layer_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.body.owned_part(state.x))
         nodes.add_jump_transposed(at[:, None] * layer, by_x)
         return by_x, at[:, None] * nodes.normal

@@ -492,7 +492,7 @@ def _straight_edges(solution: Solution, closed: NDArray[np.bool_]) -> Iterator[R
     relative error of about h/R (docs/discretisation.md).
     """
     problem, nodes = solution.problem, solution.problem.nodes
-    turn, pressed = _turn(solution, closed), nodes.maximum(solution.forces.pressure)
+    turn, pressed = _turn(solution, closed), nodes.maximum(solution.forces.contact)
     unknown = nodes.maximum(np.where(closed, nodes.deviation, 0.0))
     waves = np.pi * problem.scales.plane_modulus * unknown / (8 * problem.scales.spacing)
     if pressed > 0 and waves > DEVIATION * pressed:

@@ -238,7 +238,7 @@ class FixedPoint(OuterLoop):
         else:
             self.state, first = start, 1
             self._secant_at = start.x if secant_at is None else secant_at
-            jump, pressure = interface.nodes.jump(start.x), start.forces.pressure
+            jump, pressure = interface.nodes.jump(start.x), start.forces.contact
             if interface.foundation.normal_graph(jump) is not None:
                 pressure = interface.pressure(jump, start.forces)
             self._z = np.column_stack([pressure, start.forces.friction])

@@ -79,11 +79,11 @@ class PenalisedLaw:
         self._modulus = np.full(self._interface.gap.shape, 1 / self._eps.contact)
 
     def _pressed(self, jump: Array) -> tuple[Multipliers, Array]:
-        """Return the pressures, and their derivative in u_nu: 1/eps also at first touch."""
+        """Return lambda_c, and their derivative in u_nu: 1/eps also at first touch."""
         interface, nodes = self._interface, self._interface.nodes
         normal = nodes.normal_component(jump)
-        pressure = np.asarray(penalty_pressure(normal, interface.gap, self._eps.contact))
-        multipliers = Multipliers(pressure, np.zeros(nodes.normal.shape))
+        contact = np.asarray(penalty_pressure(normal, interface.gap, self._eps.contact))
+        multipliers = Multipliers(contact, np.zeros(nodes.normal.shape))
         return multipliers, (normal >= interface.gap) / self._eps.contact
 
     def _modulus_at(self, jump: Array) -> Array:
@@ -98,7 +98,7 @@ class PenalisedLaw:
         """Return the forces. Collective."""
         modulus = self._modulus_at(jump) if self._modulus is None else self._modulus
         tangential = self._interface.slip(jump)
-        return Multipliers(self._pressed(jump)[0].pressure, modulus[:, None] * tangential)
+        return Multipliers(self._pressed(jump)[0].contact, modulus[:, None] * tangential)
 
     def block(self, jump: Array) -> Array:
         """Return their derivative, shape (n, d, d). Collective."""
@@ -289,7 +289,7 @@ class PenalisedProblem:
         change = np.einsum("nij,nj->ni", self._current_block, jump - self._jump)
         if self._layer is not None:
             u_n = np.minimum(nodes.normal_component(jump), self._interface.gap)
-            change[:, : nodes.dim] += self._layer.layer(u_n)[:, None] * nodes.normal
+            change[:, : nodes.dim] += self._layer.layer_pressure(u_n)[:, None] * nodes.normal
         nodes.add_jump_transposed(nodes.weight[:, None] * (self._response + change), values)
         residual.array[:] = self._packed(body.unbalanced(values) / self._units)
 

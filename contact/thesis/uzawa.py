@@ -182,7 +182,8 @@ class FrozenProblem:
         residual = residual_forces(self.problem, self.state, self.secant_at)
         contact = self.state.forces.vectors(self.nodes)
         if self.layer is not None:
-            contact += self.interface.foundation.pressure(self.jump_0)[:, None] * self.nodes.normal
+            pressure = self.interface.foundation.layer_pressure(self.jump_0)
+            contact += pressure[:, None] * self.nodes.normal
         self._add(-contact, residual)
         return -residual
 
@@ -324,7 +325,7 @@ def uzawa_block_relaxation(
             stress_unit = interface.component_norms(stress)
         layer: Array | float = 0.0
         if frozen.layer is not None:
-            layer = frozen.layer.layer(nodes.normal_component(jump))
+            layer = frozen.layer.layer_pressure(nodes.normal_component(jump))
         forces = Multipliers.of(nodes, stress[:, 0] - layer, stress[:, 1:])
         if options.single_loop and frozen.friction:
             bound = interface.bound(jump, forces)

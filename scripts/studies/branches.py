@@ -179,7 +179,7 @@ class Branches:
         x = found.state.x.copy()
         self._nodal(x)[:] *= wave[:, None]  # global unknowns, behind the nodes, stay
         factor, forces = wave[problem.nodes.nodes], found.forces
-        disturbed = Multipliers(forces.pressure * factor, forces.friction / factor[:, None])
+        disturbed = Multipliers(forces.contact * factor, forces.friction / factor[:, None])
         return State(body.prescribe(x), disturbed)
 
     def _nodal(self, x: Array) -> Array:

@@ -89,7 +89,7 @@ def sheared(case: dict[str, Any], ways: Sequence[float]) -> Solution:
 def stick(problem: ContactProblem, state: State) -> float:
     """Return |q|/p at the contact node nearest the middle, mu (1 - c/a) of the closed form."""
     at = int(np.argmin(np.linalg.norm(problem.nodes.points[:, :-1], axis=1)))
-    return float(np.linalg.norm(state.forces.friction[at]) / state.forces.pressure[at])
+    return float(np.linalg.norm(state.forces.friction[at]) / state.forces.contact[at])
 
 
 def run(

@@ -174,7 +174,7 @@ def _squares(
     problem = solution.on(domain, degree)
     state, nodes = solved(problem), problem.nodes
     exact = pressure(nodes.points)
-    error, dual = state.forces.pressure - exact, DualNorm(problem)
+    error, dual = state.forces.contact - exact, DualNorm(problem)
     off = nodes.norm(error) / nodes.norm(exact), dual.pressure(error) / dual.pressure(exact)
     return l2_error(problem, state.x, displacement, above) ** 2, off[0] ** 2, off[1] ** 2
 

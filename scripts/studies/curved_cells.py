@@ -81,7 +81,7 @@ def solved(problem: ContactProblem) -> tuple[float, Array]:
     """Return the error of the displacements in L2, and the pressures of all ranks."""
     state = cell_orders.solved(problem, 1e-11)
     size = error(problem.body.space, state.x, LAME)
-    return size, problem.nodes.gather(state.forces.pressure)
+    return size, problem.nodes.gather(state.forces.contact)
 
 
 def problem_of(kind: str, cell: str, order: int, degree: int, n: int) -> ContactProblem:

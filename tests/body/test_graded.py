@@ -57,7 +57,7 @@ def results(solution):
     fields = DerivedFields(solution.problem.body, solution.state)
     error = estimated(solution.problem, solution.state)
     return [
-        forces.pressure,
+        forces.contact,
         forces.friction,
         fields.cells()["von_mises"].x.array,
         np.array([error.relative, error.energy]),
@@ -89,7 +89,7 @@ def test_a_factor_by_cell_is_a_region_by_itself():
     ]
     graded = Material(Linear(1.0, 0.3), on=["left half", "right half"], factor=factor)
     one, other = (pressed(domain, given) for given in (plain, graded))
-    assert one.state.forces.pressure == pytest.approx(other.state.forces.pressure, abs=1e-12)
+    assert one.state.forces.contact == pytest.approx(other.state.forces.contact, abs=1e-12)
     assert one.state.x == pytest.approx(other.state.x, abs=1e-12)
 
 

@@ -110,11 +110,11 @@ def test_penalty_forms(problem, x):
     laws = PenalisedLaw(problem.interface, Regularisation(EPS, EPS), nodal)
     forces = laws.forces(nodal)
     gap = field(problem, nodes.gap)
-    assert 0 < np.count_nonzero(forces.pressure) < nodes.size
+    assert 0 < np.count_nonzero(forces.contact) < nodes.size
     normal = forms.penalty(u, v, nu, gap, EPS) * ds
-    expected = lumped(problem, forces.pressure[:, None] * nodes.normal)
+    expected = lumped(problem, forces.contact[:, None] * nodes.normal)
     assert assembled(normal) == pytest.approx(expected, abs=1e-14)
-    pressure = forces.pressure
+    pressure = forces.contact
     bound = field(problem, problem.interface.friction.bound(pressure, pressure))
     friction = forms.penalty_friction(u, u, v, nu, bound, EPS) * ds
     assert assembled(friction) == pytest.approx(lumped(problem, forces.friction), abs=1e-14)

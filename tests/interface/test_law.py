@@ -79,7 +79,7 @@ def test_jacobian_is_the_derivative_of_the_force(dim, psi):
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 2.0, 3.0))
     law = FoundationLaw(nodes, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
     x = rng.standard_normal((200, dim + 1))
-    pressure = law.pressure(x) - 100.0  # no node presses on the rigid part
+    pressure = law.layer_pressure(x) - 100.0  # no node presses on the rigid part
     jacobian = law.block(x, pressure, full=True)
     assert np.count_nonzero(jacobian[:, 0, -1]) > 20  # layer reached, h_nu rising
     assert np.count_nonzero(jacobian[:, -1, 0]) > 20
@@ -117,7 +117,7 @@ def test_what_rounding_leaves_of_a_multiplier_conducts_nothing():
     assert charge == pytest.approx([0.0, -0.7 * 1.5, -0.7 * 1.5], abs=0)
     layered = replace(law, layer=Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0)))
     x = np.column_stack([(nodes.gap - 0.1)[:, None] * nodes.normal, np.zeros(3)])
-    assert layered.charge(x, layered.pressure(x)) == pytest.approx([-0.7 * 1.5] * 3)
+    assert layered.charge(x, layered.layer_pressure(x)) == pytest.approx([-0.7 * 1.5] * 3)
 
 
 @pytest.mark.core
@@ -133,7 +133,7 @@ def test_the_forms_j_1_and_l_are_the_nodal_force_and_charge():
     psi, phi_l = ShiftedConductivity(column.k_e, column.delta), Truncation(np.inf)
     current = electric_contact(u, phi, xi, nu, psi, phi_l, column.gap, column.phi_f)
     nodes, law, nodal = problem.nodes, problem.interface.foundation, problem.nodal(state)
-    pressure = law.pressure(nodal)
+    pressure = law.layer_pressure(nodal)
     at_nodes = np.zeros((2, *nodal.shape))
     at_nodes[0, :, :2] = pressure[:, None] * nodes.normal
     at_nodes[1, :, 2] = body.phi_scale * law.charge(nodal, pressure)

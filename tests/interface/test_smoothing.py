@@ -112,9 +112,9 @@ def test_the_bound_is_mu_times_the_pressure_under_the_printed_kernel():
     square = ((x[:, None] - x) / 0.9) ** 2
     inside = square < 1
     kernel = problem.nodes.weight * inside * np.exp(1 / np.where(inside, square - 1, -1.0))
-    bound = 0.4 * kernel @ forces.pressure / kernel.sum(axis=1)
+    bound = 0.4 * kernel @ forces.contact / kernel.sum(axis=1)
     assert problem.interface.bound(nodal, forces) == pytest.approx(bound, rel=1e-12)
-    assert np.abs(bound - 0.4 * forces.pressure).max() > 1e-4
+    assert np.abs(bound - 0.4 * forces.contact).max() > 1e-4
     slides = problem.interface.slip_length(nodal) > 1e-6
     assert slides.any()
     friction = np.linalg.norm(forces.friction, axis=1)

@@ -30,13 +30,13 @@ RING = Path(meshes.__file__).parent / "fixtures" / "ring.msh"
 def along_normal(problem, forces) -> float:
     """Return the largest normal component of friction over the largest pressure. Collective."""
     largest = problem.nodes.maximum(np.abs(problem.nodes.normal_component(forces.friction)))
-    return largest / problem.nodes.maximum(forces.pressure)
+    return largest / problem.nodes.maximum(forces.contact)
 
 
 def forces_of(solution) -> np.ndarray:
     """Return what each contact exerts, shape (contacts, d). Collective."""
     problem, nodes = solution.problem, solution.problem.nodes
-    vectors = solution.forces.pressure[:, None] * nodes.normal + solution.forces.friction
+    vectors = solution.forces.contact[:, None] * nodes.normal + solution.forces.friction
     sizes = [own.nodes.nodes.size for own in problem.geometries]
     groups = np.split(nodes.weight[:, None] * vectors, np.cumsum(sizes)[:-1])
     return problem.comm.allreduce(np.array([group.sum(axis=0) for group in groups]), op=MPI.SUM)
@@ -78,7 +78,7 @@ def test_pressures_balance_the_reaction(method):
     if solution.converged:
         check(solution)
         for side in (nodes.normal[:, 1] > 0, nodes.normal[:, 1] < 0):
-            pressed = nodes.sum(solution.forces.pressure * side)
+            pressed = nodes.sum(solution.forces.contact * side)
             assert pressed == pytest.approx(2.3788e-5, rel=2e-4)
 
 
@@ -91,10 +91,10 @@ def test_residual_sees_friction_along_the_normal(share):
     assert evaluate(problem, state).largest < 1e-10
     closed = solution.status != "open"
     for there in (closed, ~closed):
-        size = share * state.forces.pressure.max() * there
+        size = share * state.forces.contact.max() * there
         friction = state.forces.friction + size[:, None] * nodes.normal
-        pressure = state.forces.pressure - size * closed
-        for taken in (state.forces.pressure, pressure):
+        pressure = state.forces.contact - size * closed
+        for taken in (state.forces.contact, pressure):
             wrong = replace(state, forces=Multipliers(taken, friction))
             assert evaluate(problem, wrong).friction > 1e-5
 

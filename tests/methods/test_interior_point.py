@@ -151,11 +151,11 @@ def test_an_interior_point_with_friction_on_a_layer(kind, rigid):
     state, outcome = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
     assert outcome.converged, outcome.reason
     interface, nodal = problem.interface, problem.nodal(state)
-    layer = interface.foundation.pressure(nodal)
+    layer = interface.foundation.layer_pressure(nodal)
     bound = interface.bound(nodal, state.forces)
     slips = interface.slip_length(nodal) > 1e-6
     assert (slips & (layer > 0)).any()
-    assert (problem.nodes.maximum(state.forces.pressure) > 0) == rigid
+    assert (problem.nodes.maximum(state.forces.contact) > 0) == rigid
     newton = Newton(problem, NewtonOptions(condense=False)).whole
     begin = newton.step.without_contact(problem, problem.start())
     method = InteriorPoint(newton, bound, begin)
@@ -240,7 +240,7 @@ def test_no_friction_is_solved_like_none(law):
     assert outcome.converged, outcome.reason
     # The upper half rolls on the lower one at next to no force: two runs whose residuals are 2e-12
     # differ by 5e-6, and pressures, which are up to 27, by 1e-6 with it; by elastic strains less.
-    assert np.allclose(state.forces.pressure, found.forces.pressure, rtol=0, atol=1e-5)
+    assert np.allclose(state.forces.contact, found.forces.contact, rtol=0, atol=1e-5)
     body = method.problem.body
     points, component = body.layout.points, body.components[0]
     upper = component == component[points[:, 1].argmax()]

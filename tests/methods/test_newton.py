@@ -51,13 +51,13 @@ def compare(one: ContactProblem, other: ContactProblem, tolerance: float) -> Non
     slow, outcome = FixedPoint(other, FixedPointOptions(tolerance=1e-10)).solve()
     assert outcome.converged
     size = np.abs(slow.x).max()
-    atol = tolerance * slow.forces.pressure.max()
+    atol = tolerance * slow.forces.contact.max()
     for condense in (True, False):
         fast = newton(one, condense=condense)
         assert (fast.counters.contact_solves > 0) == condense
         found = fast.state
         assert np.allclose(found.x, slow.x, rtol=0, atol=tolerance * size)
-        assert np.allclose(found.forces.pressure, slow.forces.pressure, rtol=0, atol=atol)
+        assert np.allclose(found.forces.contact, slow.forces.contact, rtol=0, atol=atol)
         assert np.allclose(found.forces.friction, slow.forces.friction, rtol=0, atol=atol)
 
 
@@ -99,10 +99,10 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
     assert outcome.converged
     x, forces = slow.x, slow.forces
     slip = problem.nodes.tangential_component(problem.nodal(slow))
-    rounding = 1e-11 * forces.pressure.max()
-    is_open = forces.pressure < 1e3 * rounding
+    rounding = 1e-11 * forces.contact.max()
+    is_open = forces.contact < 1e3 * rounding
     assert is_open.any()
-    pressure = np.where(is_open, rounding, forces.pressure)
+    pressure = np.where(is_open, rounding, forces.contact)
     against = np.where(is_open[:, None], -rounding * np.sign(slip), 0.0)
     fast = Newton(problem, NewtonOptions(tolerance=1e-9))
     state, outcome = fast.solve(State(x, Multipliers(pressure, forces.friction + against)))
@@ -125,7 +125,7 @@ def test_the_last_steps_square_the_residual():
 def test_a_body_that_only_contact_holds_is_solved():
     problem = mechanics.pressed_block(SELF, 3, gap=0.01)
     method = newton(problem)
-    assert np.allclose(method.state.forces.pressure, 0.02, rtol=1e-9)
+    assert np.allclose(method.state.forces.contact, 0.02, rtol=1e-9)
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def test_nested_meshes_change_nothing():
     plain = solve(bar_case(32), comm=SELF)
     nested = solve(bar_case(32, "solver.nested=true"), comm=SELF)
     assert plain.outcome.converged and nested.outcome.converged
-    assert np.allclose(plain.forces.pressure, nested.forces.pressure, rtol=0, atol=1e-8)
+    assert np.allclose(plain.forces.contact, nested.forces.contact, rtol=0, atol=1e-8)
 
 
 def test_nested_levels_halve_the_cells():
@@ -219,7 +219,7 @@ def test_more_than_friction_can_hold_is_refused():
 def test_ranks_agree():
     def quantities(method):
         forces, nodes = method.state.forces, method.problem.nodes
-        return {"p": nodes.maximum(forces.pressure), "friction": nodes.norm(forces.friction)}
+        return {"p": nodes.maximum(forces.contact), "friction": nodes.norm(forces.friction)}
 
     agree(lambda comm: newton(mechanics.leaning_block(comm)), quantities, 1e-9)
 

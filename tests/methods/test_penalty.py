@@ -52,8 +52,8 @@ def test_error_and_pressure_fall_like_eps(load):
         assert outcome.converged, outcome.reason
         assert outcome.residuals.equilibrium <= 1e-8
         errors.append(relative(problem, state.x[:owned], x))
-        pressure = reference.forces.pressure
-        difference = problem.nodes.norm(state.forces.pressure - pressure)
+        pressure = reference.forces.contact
+        difference = problem.nodes.norm(state.forces.contact - pressure)
         pressures.append(difference / problem.nodes.norm(pressure))
     assert np.log10(errors[1] / errors[2]) == pytest.approx(1.0, abs=0.1)
     assert np.log10(pressures[1] / pressures[2]) == pytest.approx(1.0, abs=0.1)
@@ -69,8 +69,8 @@ def test_without_friction_the_penetration_is_eps_times_the_pressure():
     assert outcome.converged
     assert len(penalty.history) == 1
     normal_gap = problem.interface.normal_gap(problem.nodal(state))
-    touching = state.forces.pressure > 0
-    assert np.allclose(normal_gap[touching], -1e-5 * state.forces.pressure[touching])
+    touching = state.forces.contact > 0
+    assert np.allclose(normal_gap[touching], -1e-5 * state.forces.contact[touching])
     # The Signorini residual is the penetration: c eps with c = E/size = 1/4.
     assert outcome.residuals.contact == pytest.approx(0.25e-5, rel=1e-6)
 
@@ -199,7 +199,7 @@ def test_a_body_that_only_the_foundation_holds(gap):
     penalty = Penalty(problem, PenaltyOptions(eps_contact=1e-6))
     state, outcome = penalty.solve()
     assert outcome.converged, outcome.reason
-    assert np.allclose(state.forces.pressure, 0.1)
+    assert np.allclose(state.forces.contact, 0.1)
 
 
 def test_a_body_that_nothing_holds_does_not_converge():

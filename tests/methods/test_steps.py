@@ -63,7 +63,7 @@ def test_stepped_block(name, dim, degree, method):
         nodal = problem.nodal(found)
         assert np.abs(nodal[:, 0] - exact.slip).max() < 1e-10
         assert np.abs(found.forces.friction[:, 0] - exact.stress).max() < 1e-10
-        assert np.abs(found.forces.pressure - exact.pressure).max() < 1e-10
+        assert np.abs(found.forces.contact - exact.pressure).max() < 1e-10
         history = problem.commit(found)[SLIP]
         assert np.abs(history.accumulated - way).max() < 1e-10
 
@@ -110,7 +110,7 @@ def test_methods_agree_at_every_step(law):
     kinds = set()
     for one, two in zip(newton, uzawa, strict=True):
         assert np.abs(one.x - two.x).max() < 1e-7 * np.abs(one.x).max()
-        size = np.abs(one.forces.pressure).max()
+        size = np.abs(one.forces.contact).max()
         difference = one.forces.friction - two.forces.friction
         assert np.abs(difference).max() < 1e-7 * size
         problem = shaken(law).at(one.time, one.history)

@@ -46,7 +46,7 @@ def test_a_body_beside_one_that_is_pressed_far_more(method, linear):
     beside = solve(pressed(blocks(COMM), 0.01, 0.01 * LITTLE), options, comm=COMM)
     exact = solve(pressed(blocks(COMM), 0.01, 0.01), NewtonOptions(tolerance=1e-12), comm=COMM)
     assert beside.converged, beside.outcome.reason
-    found, known = (of_second(one, one.state.forces.pressure) for one in (beside, exact))
+    found, known = (of_second(one, one.state.forces.contact) for one in (beside, exact))
     assert np.linalg.norm(found / LITTLE - known) < 1e-8 * np.linalg.norm(known)
 
 
@@ -73,7 +73,7 @@ def test_where_nothing_touches_is_no_solution(beside):
     pressed_nodes = problem.nodes.points[:, 0] < 1.5
     forces = replace(
         state.forces,
-        pressure=np.where(pressed_nodes, state.forces.pressure, 0.0),
+        pressure=np.where(pressed_nodes, state.forces.contact, 0.0),
         friction=state.forces.friction * pressed_nodes[:, None],
     )
     assert evaluate(problem, state).largest < 1e-8
@@ -86,12 +86,12 @@ def test_the_laws_hold_on_each_body(beside, name):
     """A pressure of another sign, and a friction far beyond its bound."""
     problem, state = beside.problem, beside.state
     second = problem.nodes.points[:, 0] > 1.5
-    pressure, friction = state.forces.pressure.copy(), state.forces.friction.copy()
+    pressure, friction = state.forces.contact.copy(), state.forces.friction.copy()
     if name == "contact":
         pressure[second] *= -1
     else:
         friction[second] *= 100
-    spoilt = State(state.x, replace(state.forces, pressure=pressure, friction=friction))
+    spoilt = State(state.x, replace(state.forces, contact=pressure, friction=friction))
     assert getattr(evaluate(problem, spoilt), name) > 0.1
 
 
@@ -129,7 +129,7 @@ def test_what_is_left_of_a_body_that_is_no_longer_loaded(method, linear):
     problem = ContactProblem(given.domain, body, given.contacts)
     found = solve_steps(problem, [1.0, 2.0], METHODS[method](linear=linear))
     assert found.converged, found.outcome.reason
-    assert np.abs(of_second(found, found.state.forces.pressure)).max() < 1e-14
+    assert np.abs(of_second(found, found.state.forces.contact)).max() < 1e-14
 
 
 def test_forces_that_are_rounding_do_not_press():
@@ -147,7 +147,7 @@ def test_forces_that_are_rounding_do_not_press():
     body[loaded] = 1e-29 * rng.standard_normal(body[loaded].shape)
     body[~found.problem.body.free] = 0.0
     pressure = np.where(on_second, 6e-30 * rng.random(on_second.size), 0.0)
-    found.state = replace(found.state, x=x, forces=replace(forces, pressure=pressure))
+    found.state = replace(found.state, x=x, forces=replace(forces, contact=pressure))
     assert np.abs(found.displacement.x.array).max() > 1e-3
     assert set(found.status) == {"open"}
     assert not [*rounding(found)]

@@ -36,11 +36,11 @@ class Solved:
         self.base = self.residuals()
         self.nodal = problem.nodal(self.state)
         self.bound = problem.interface.bound(self.nodal, self.forces)
-        self.pressed = self.forces.pressure > 1e-3 * self.forces.pressure.max()
+        self.pressed = self.forces.contact > 1e-3 * self.forces.contact.max()
         size = np.linalg.norm(self.forces.friction, axis=1)
         self.sticks = self.pressed & (size < 0.95 * self.bound)
         self.slides = self.pressed & ~self.sticks & (size > 0.999 * self.bound)
-        self.open = self.forces.pressure < 1e-9 * self.forces.pressure.max()
+        self.open = self.forces.contact < 1e-9 * self.forces.contact.max()
 
     def residuals(self, nodal=None, forces=None):
         """Return the residuals with a displacement added at the contact nodes, or new forces."""
@@ -152,16 +152,16 @@ def test_penetration_and_gaps_under_pressure_break_the_contact_law(solved):
 @pytest.mark.core
 def test_a_wrong_pressure(solved):
     forces = solved.forces
-    pressure = forces.pressure * np.where(solved.pressed, 1.01, 1.0)
-    found = solved.residuals(forces=replace(forces, pressure=pressure))
+    pressure = forces.contact * np.where(solved.pressed, 1.01, 1.0)
+    found = solved.residuals(forces=replace(forces, contact=pressure))
     assert found.equilibrium > 1e-4
     assert found.contact <= SMALL  # any pressure will do where the gap is closed
     if solved.slides.any():
         assert found.friction > 1e-4
-    glued = forces.pressure - 1e-3 * forces.pressure.max() * solved.open
+    glued = forces.contact - 1e-3 * forces.contact.max() * solved.open
     if solved.open.any():
-        assert solved.residuals(forces=replace(forces, pressure=glued)).contact > 1e-5
-    pulled = replace(forces, pressure=-forces.pressure)
+        assert solved.residuals(forces=replace(forces, contact=glued)).contact > 1e-5
+    pulled = replace(forces, contact=-forces.contact)
     assert solved.residuals(forces=pulled).contact > 0.5
 
 

@@ -124,7 +124,7 @@ def test_residuals_see_an_indenter_out_of_balance():
     problem = build_problem(case, SELF)
     state, outcome = Newton(problem, NewtonOptions()).solve()
     assert outcome.converged
-    less = Multipliers(0.9 * state.forces.pressure, 0.9 * state.forces.friction)
+    less = Multipliers(0.9 * state.forces.contact, 0.9 * state.forces.friction)
     residual = residual_forces(problem, State(state.x, less))
     q = problem.body.motion(problem.body.unbalanced(residual))
     # A tenth of the force is missing, and what is given bears its reaction.

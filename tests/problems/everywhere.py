@@ -34,7 +34,7 @@ def displacements(loop):
 def pressures(loop):
     """Return the pressures of all contact nodes, shape (nodes,), on every rank. Collective."""
     nodes = loop.problem.nodes
-    return at_all(nodes.comm, nodes.points, loop.state.forces.pressure)
+    return at_all(nodes.comm, nodes.points, loop.state.forces.contact)
 
 
 def at_all(comm, points, values):

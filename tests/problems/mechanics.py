@@ -33,7 +33,7 @@ def close(one: State, two: State, rtol: float = 0.0, atol: float = 0.0) -> bool:
     """Tell whether two states have the same values on this rank."""
     pairs = (
         (one.x, two.x),
-        (one.forces.pressure, two.forces.pressure),
+        (one.forces.contact, two.forces.contact),
         (one.forces.friction, two.forces.friction),
     )
     return (
@@ -237,16 +237,16 @@ def contact_data(loop: FixedPoint) -> dict[str, Array]:
     problem, nodes, forces = loop.problem, loop.problem.nodes, loop.state.forces
     nodal = problem.nodal(loop.state)
     slip = nodes.tangential_component(nodal)
-    bound = problem.interface.friction.bound(forces.pressure, np.linalg.norm(slip, axis=1))
+    bound = problem.interface.friction.bound(forces.contact, np.linalg.norm(slip, axis=1))
     size = np.linalg.norm(forces.friction, axis=1)
     local = {
         "points": nodes.points,
         "u_n": nodes.normal_component(nodal),
         "u_t": slip,
-        "pressure": forces.pressure,
+        "pressure": forces.contact,
         "friction": forces.friction,
         "bound": np.asarray(bound, dtype=float),
-        "open": forces.pressure <= 1e-6 * nodes.maximum(forces.pressure),
+        "open": forces.contact <= 1e-6 * nodes.maximum(forces.contact),
         "sticks": size < 0.9999 * bound,
     }
     data = {name: nodes.gather(values) for name, values in local.items()}

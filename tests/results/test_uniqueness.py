@@ -358,7 +358,7 @@ def test_a_coarse_state_is_linear_between_its_nodes_on_any_ranks():
     x = coarse.nodes.points[:, 0]
     ends = -coarse.nodes.maximum(-x, -np.inf), coarse.nodes.maximum(x)
     forces = Multipliers.of(coarse.nodes, 1 + x, np.zeros((x.size, 2)))
-    found = prolong(coarse, replace(coarse.start(), forces=forces), fine).forces.pressure
+    found = prolong(coarse, replace(coarse.start(), forces=forces), fine).forces.contact
     at = fine.nodes.points[:, 0]
     between = (at >= ends[0]) & (at <= ends[1])
     assert fine.comm.allreduce(int(between.sum())) > 50

@@ -189,8 +189,8 @@ def test_other_friction_laws_on_a_layer(law):
     slips = solution.status == "slip"
     assert np.any(slips)
     # The bound holds the layer's part of the pressure too.
-    layer = problem.interface.foundation.pressure(solution.nodal)
-    total = solution.forces.pressure + layer
+    layer = problem.interface.foundation.layer_pressure(solution.nodal)
+    total = solution.forces.contact + layer
     slip = np.linalg.norm(solution.slip, axis=1)
     bound = 0.5 if law == "tresca" else laws[law].mu(slip) * total
     assert np.allclose(size[slips], np.broadcast_to(bound, slip.shape)[slips], rtol=1e-6)

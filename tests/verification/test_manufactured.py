@@ -53,10 +53,10 @@ def test_signorini_pressure():
     problem = solution.problem(64)
     loop = solve(problem)
     nodes = problem.nodes
-    error = loop.state.forces.pressure - solution.pressure(nodes.points[:, 0])
+    error = loop.state.forces.contact - solution.pressure(nodes.points[:, 0])
     # The pressure is one of a corner, where Dirichlet data meet contact, and is left out there.
     inner = nodes.points[:, 0] < 0.9
-    assert nodes.norm(error * inner) < 0.05 * nodes.norm(loop.state.forces.pressure)
+    assert nodes.norm(error * inner) < 0.05 * nodes.norm(loop.state.forces.contact)
 
 
 ONE, OTHER = Linear(1.0, 0.3), Linear(3.0, 0.2)
@@ -106,7 +106,7 @@ def test_pressures_friction_and_slip(dim, cells, most, order, laws):
         found = [
             nodes.norm(value - given) / nodes.norm(given)
             for given, value in (
-                (block.pressure(x), state.forces.pressure),
+                (block.pressure(x), state.forces.contact),
                 (block.friction(x), state.forces.friction @ along),
                 (block.slip(x), slip @ along),
             )
@@ -123,7 +123,7 @@ def test_layers_with_current():
     for n in (8, 16):
         problem = layers.problem(n, 1)
         state = solved(problem)
-        pressure = state.forces.pressure[1:-1]
+        pressure = state.forces.contact[1:-1]
         assert pressure == pytest.approx(layers.PRESSURE * layers.law.young, rel=0.02)
         assert problem.interface.slip_length(problem.nodal(state)) == pytest.approx(layers.SLIP)
         e = errors(problem.body, state.x, layers.fields)

@@ -95,7 +95,7 @@ def check_constant_pressure(
     body = Body(materials, fixed, [load])
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
     state = state_of(problem, condense=dense)
-    np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
+    np.testing.assert_allclose(state.forces.contact, 0.01, rtol=1e-12)
     stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     k = 4 * (dim - 1)
     np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
@@ -160,7 +160,7 @@ def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
     body = Body(materials, fixed, [load])
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
     state = state_of(problem)
-    np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-11)
+    np.testing.assert_allclose(state.forces.contact, 0.01, rtol=1e-11)
     assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
     stress = DerivedFields(problem.body, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(stress[:, 4], -0.01, rtol=1e-9)
@@ -259,7 +259,7 @@ def test_matching_meshes_are_one_body(dim: int, degree: int, cell: str) -> None:
         given.domain(MPI.COMM_SELF), body, contact("under", "over", 50.0), degree=degree
     )
     state = state_of(two, 1e-12)
-    assert (state.forces.pressure > 0).all()
+    assert (state.forces.contact > 0).all()
     joined = given.joined(MPI.COMM_SELF)
     far = GapFunction(lambda points: np.full(len(points), 1e3))
     one = ContactProblem(joined, body, Contact("top", far), degree=degree)
@@ -286,7 +286,7 @@ def test_a_chain_of_bodies(degree: int, condense: bool) -> None:
     body = Body(materials, fixed, [Load("top2", pressure=constant(0.01, 2))])
     pairs = [contact("bottom1", "top0"), contact("bottom2", "top1")]
     state = state_of(ContactProblem(domain, body, pairs, degree=degree), condense=condense)
-    np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
+    np.testing.assert_allclose(state.forces.contact, 0.01, rtol=1e-12)
 
 
 @pytest.mark.core
@@ -305,4 +305,4 @@ def test_a_corner_that_is_on_one_body_and_against_another(degree: int, condense:
     problem = ContactProblem(domain, body, pairs, degree=degree)
     state = state_of(problem, condense=condense)
     expected = np.where(np.abs(problem.nodes.normal[:, 0]) > 0.5, 0.02, 0.01)
-    np.testing.assert_allclose(state.forces.pressure, expected, rtol=1e-12)
+    np.testing.assert_allclose(state.forces.contact, expected, rtol=1e-12)

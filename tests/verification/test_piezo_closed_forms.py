@@ -66,7 +66,7 @@ def test_column(name, dim, units):
     problem = column.problem(COMM, dim, units)
     solver = solve(problem)
     assert max(errors(solver, column, units)) < 1e-10
-    pressure = solver.state.forces.pressure / units.stress
+    pressure = solver.state.forces.contact / units.stress
     assert np.allclose(pressure, column.pressure, rtol=1e-10)
 
 
