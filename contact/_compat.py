@@ -120,6 +120,43 @@ def keeps_inverted_blocks() -> bool:
     return bool(PETSc.Sys.getVersion() >= (3, 25))
 
 
+# petsc4py to 3.25 has no Schur complements of factorisations: they are PETSc's own, by ctypes.
+_petsc = ctypes.CDLL(PETSc.__file__)
+
+#: PETSc's MAT_FACTOR_SCHUR_INVERTED.
+INVERTED = 2
+
+
+def _check(code: int) -> None:
+    if code != 0:
+        raise PETSc.Error(code)
+
+
+def set_schur_unknowns(factor: PETSc.Mat, unknowns: PETSc.IS) -> None:
+    """Tell a matrix to be factorised the unknowns of its Schur complement. Collective."""
+    handles = (factor.handle, unknowns.handle)
+    _check(_petsc.MatFactorSetSchurIS(*map(ctypes.c_void_p, handles)))
+
+
+def take_schur_complement(factor: PETSc.Mat, size: int) -> npt.NDArray[np.float64]:
+    """Copy the Schur complement out of a factorisation, as MUMPS stores it: by columns.
+
+    PETSc multiplies reduced right-hand sides by the inverse of its own one: the identity is left.
+    """
+    handle, values, status = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_int()
+    held = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
+    _check(_petsc.MatFactorGetSchurComplement(*held, ctypes.byref(status)))
+    _check(_petsc.MatDenseGetArray(handle, ctypes.byref(values)))
+    pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
+    there = np.ctypeslib.as_array(pointer, (size, size))
+    matrix = there.copy().T
+    there[:] = 0.0
+    np.fill_diagonal(there, 1.0)
+    _check(_petsc.MatDenseRestoreArray(handle, ctypes.byref(values)))
+    _check(_petsc.MatFactorRestoreSchurComplement(*held, INVERTED))
+    return matrix
+
+
 def lasting(comm: MPI.Intracomm) -> MPI.Intracomm:
     """Return a communicator of the same ranks that lives as long as the program, if there is one.
 

@@ -5,7 +5,6 @@ MUMPS makes it on the first rank. In 2-D it has about as many entries as the mes
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 
 import numpy as np
@@ -15,7 +14,7 @@ from petsc4py import PETSc
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
 
-from contact._compat import lasting
+from contact import _compat
 from contact.history import LinearisationPoint
 from contact.linear.layout import Inclined, masked, masked_blocks, times
 from contact.linear.operator import Counters
@@ -30,42 +29,18 @@ INTERIOR_SOLVE, REDUCE = (26, 0), (26, 1)
 #: MUMPS's ICNTL(7): order by minimum degree. METIS, the choice of some builds, doubles the time.
 ORDERING = (7, 0)
 
-#: PETSc's MAT_FACTOR_SCHUR_INVERTED.
-INVERTED = 2
-
 #: MUMPS's ICNTL(19): form of the Schur complement; 0 for none.
 SCHUR = 19
 
 #: Columns that are copied at a time.
 COLUMNS = 128
 
-# petsc4py has no Schur complements of factorisations.
-_petsc = ctypes.CDLL(PETSc.__file__)
-
-
-def _check(code: int) -> None:
-    if code != 0:
-        raise PETSc.Error(code)
-
 
 def _complement(factor: PETSc.Mat, size: int) -> Array:
-    """Copy the Schur complement, stored by columns, out of a factorisation.
-
-    PETSc multiplies reduced right-hand sides by the inverse of its own one: the identity is left.
-    """
+    """Take the Schur complement, stored by columns, out of a factorisation."""
     if size == 0:
         return np.zeros((0, 0))
-    handle, values, status = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_int()
-    held = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
-    _check(_petsc.MatFactorGetSchurComplement(*held, ctypes.byref(status)))
-    _check(_petsc.MatDenseGetArray(handle, ctypes.byref(values)))
-    pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
-    there = np.ctypeslib.as_array(pointer, (size, size))
-    matrix = there.copy().T
-    there[:] = 0.0
-    np.fill_diagonal(there, 1.0)
-    _check(_petsc.MatDenseRestoreArray(handle, ctypes.byref(values)))
-    _check(_petsc.MatFactorRestoreSchurComplement(*held, INVERTED))
+    matrix = _compat.take_schur_complement(factor, size)
     _mirror(matrix)
     return matrix
 
@@ -98,7 +73,7 @@ class SchurComplement:
     """
 
     def __init__(self, matrix: PETSc.Mat, retained: NDArray[np.int32], prefix: str) -> None:
-        self._retained, self.comm = retained, lasting(matrix.getComm().tompi4py())
+        self._retained, self.comm = retained, _compat.lasting(matrix.getComm().tompi4py())
         begin, end = matrix.getOwnershipRange()
         own_retained = (begin + retained).astype(PETSc.IntType)
         # MUMPS orders by minimum degree, with ties by the given order: backwards along the fronts
@@ -163,8 +138,7 @@ class SchurComplement:
         pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
         if self.size > 0:
             pc.getFactorMatrix().setMumpsIcntl(*ORDERING)
-            handles = (pc.getFactorMatrix().handle, self._numbers.handle)
-            _check(_petsc.MatFactorSetSchurIS(*map(ctypes.c_void_p, handles)))
+            _compat.set_schur_unknowns(pc.getFactorMatrix(), self._numbers)
 
     def exceeds(self, rhs: Array, rounding: Array) -> bool:
         """Tell whether a right-hand side exceeds rounding at eliminated unknowns."""
@@ -215,12 +189,7 @@ class DenseStiffness:
     """A dense matrix on the first rank, and the factors of its last sum with nodal blocks.
 
     Unknowns without a block so far are eliminated once for all sums: tangential ones without
-    friction, and those of open nodes.
-
-    Parameters
-    ----------
-    matrix
-        The matrix, in rank order.
+    friction, and those of open nodes. The matrix is in rank order.
     """
 
     def __init__(self, matrix: Array) -> None:
