@@ -21,7 +21,7 @@ from contact.model.friction import Friction
 from contact.model.messages import either, shown
 from contact.model.obstacle import SHAPES, GapFunction, Obstacle, Shape
 from contact.model.rigid import Motion
-from contact.model.section import Described, Direction, FromTable, Part, StaticValue
+from contact.model.section import Described, Direction, Part, StaticValue
 from contact.settings import (
     Accepted,
     NonNegative,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 else:
     Foundation = Annotated[
         Annotated[
-            reduce(or_, (Annotated[kind, FromTable, Tag(f":{kind.shape}")] for kind in SHAPES)),
+            reduce(or_, (Annotated[kind, Tag(f":{kind.shape}")] for kind in SHAPES)),
             Discriminator(lambda given: isinstance(given, Mapping) and f":{given.get('shape')}"),
         ]
         | Obstacle,

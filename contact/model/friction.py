@@ -11,7 +11,7 @@ from pydantic import Discriminator, Tag
 from contact.arguments import expect
 from contact.errors import InputError
 from contact.model.fields import Scalar
-from contact.model.section import Described, FromTable, NonNegativeValue, described
+from contact.model.section import Described, NonNegativeValue, described
 from contact.settings import Accepted, NonNegative, OrOwn, ReadWith
 from forms.laws import FrictionCoefficient, FrictionLaw, SlipCoefficient
 
@@ -48,7 +48,7 @@ def _is_own(given: object) -> bool:
 #: A coefficient of friction. A further law is a class like `SlipLaw`, and a line here.
 Mu: TypeAlias = Annotated[
     Annotated[
-        Annotated[NonNegativeValue, Tag(":formula")] | Annotated[SlipLaw, FromTable, Tag(":slip")],
+        Annotated[NonNegativeValue, Tag(":formula")] | Annotated[SlipLaw, Tag(":slip")],
         Discriminator(lambda x: f":{x.get('law')}" if isinstance(x, Mapping) else ":formula"),
     ]
     | FrictionCoefficient

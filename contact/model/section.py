@@ -146,10 +146,15 @@ class Section(BaseModel):
 class Described(Section):
     """A section that is made in Python too: its `__init__` has the arguments of Python."""
 
-    def __init_subclass__(cls, **options: Any) -> None:
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> core_schema.CoreSchema:
         """Let tables be read without `__init__`, so that messages name their keys."""
-        super().__init_subclass__(**options)
-        cls.__init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+        schema = handler(source)
+        model = handler.resolve_ref_schema(schema)
+        while model["type"] != "model":  # within its validators
+            model = model["schema"]
+        model["custom_init"] = False
+        return schema
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -173,9 +178,8 @@ def described(**options: Any) -> Callable[[type[Kind]], type[Kind]]:
     """
 
     def decorate(cls: type[Kind]) -> type[Kind]:
+        cls.__get_pydantic_core_schema__ = classmethod(_read_table)  # type: ignore[attr-defined]
         made: Any = pydantic_dataclass(frozen=True, config=CONFIG, **options)(cls)
-        # Else pydantic 2.14 takes the strict validator of the class for that of `FromTable`.
-        made.__pydantic_complete__ = False
         init = made.__init__
         names = [field.name for field in fields(made) if not field.kw_only]
 
@@ -194,16 +198,10 @@ def described(**options: Any) -> Callable[[type[Kind]], type[Kind]]:
     return decorate
 
 
-class FromTable:
-    """Lets pydantic read such a dataclass from a table, with the keys of the case file alone."""
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> core_schema.CoreSchema:
-        """Check the keys; strictness, which the fields have, would take instances alone here."""
-        schema = handler.resolve_ref_schema(handler(source)) | {"strict": False}
-        return core_schema.no_info_before_validator_function(
-            partial(with_known_keys, source), schema
-        )
+def _read_table(cls: type, source: Any, handler: Any) -> core_schema.CoreSchema:
+    """Check the keys of a table; strictness, which the fields have, would take instances alone."""
+    schema = handler(source) | {"strict": False}
+    return core_schema.no_info_before_validator_function(partial(with_known_keys, source), schema)
 
 
 def document(cls: Any) -> None:
