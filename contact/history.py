@@ -86,6 +86,10 @@ class LinearisationPoint(Protocol):
     def history(self) -> History:
         """The history at the beginning of the step."""
 
+    @property
+    def secant_at(self) -> Array | None:
+        """Local unknowns of the secant modulus; None for x."""
+
 
 @dataclass(frozen=True)
 class BodyState:
@@ -93,3 +97,4 @@ class BodyState:
 
     x: Array
     history: History = field(default_factory=History)
+    secant_at: Array | None = None

@@ -440,5 +440,5 @@ def _checked_times(
         )
     for end in ends:
         check_supports(problem.at(end))
-    check_problem(problem.at(ends[-1]))
+    check_problem(problem, ends[-1:])
     return ends

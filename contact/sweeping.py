@@ -341,10 +341,8 @@ class _Runner:
 
     def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:
         counted, ends = replace(method.counters), self._ends
-        start = secant_at = None
-        if ends:
-            start, secant_at = predicted(problem, ends)
-        state, outcome = solve_step(problem, method, start, secant_at)
+        start = predicted(problem, ends) if ends else None
+        state, outcome = solve_step(problem, method, start)
         if start is not None and not outcome.converged and not outcome.signal:
             state, outcome = solve_step(problem, method, None)
         self._ends = [*ends[-1:], (problem, state)] if outcome.converged else []

@@ -604,7 +604,7 @@ def test_multigrid_converges_for_two_bodies_as_for_one(held, monkeypatch):
     )
     state, outcome = method.solve()
     assert outcome.converged
-    assert method.whole.step.operator._inner.ksp.getPC().getMGLevels() > 1
+    assert method.semismooth.step.operator._inner.ksp.getPC().getMGLevels() > 1
     assert counters.linear_iterations <= 6.5 * counters.linear_solves
     direct, exact = Newton(problem, NewtonOptions(tolerance=1e-8)).solve()
     assert exact.converged

@@ -206,14 +206,14 @@ class BodyEquilibrium:
             domain, self.space, self.global_unknowns, self.components
         )
         self.layout = Layout(
-            domain.comm,
-            index_map,
-            self.space.tabulate_dof_coordinates()[: index_map.size_local, : self.dim],
-            self.unsupported & ~self.global_unknowns.tied,
-            domain.size,
-            float(body.law.young),
-            domain.revolved,
-            self.rollers.inclined,
+            comm=domain.comm,
+            index_map=index_map,
+            points=self.space.tabulate_dof_coordinates()[: index_map.size_local, : self.dim],
+            free=self.unsupported & ~self.global_unknowns.tied,
+            size=domain.size,
+            stiffness=float(body.law.young),
+            revolved=domain.revolved,
+            inclined=self.rollers.inclined,
         )
         self.rollers.check_apart(self.global_unknowns.tied)
         #: The jumps across cuts of bolts; None without any.
@@ -318,12 +318,9 @@ class BodyEquilibrium:
     def forces_of_laws(self) -> Array:
         """Return the forces of the stresses in the laws with history. Collective."""
         self.forms.at.x.array[:] = 0.0  # no other material has stresses
-        return self._assembled()
-
-    def _assembled(self) -> Array:
-        """Return the owned nodal forces at `forms.at`, by laws with history as they stand."""
-        forces = sum(assembled(form, self.owned) for form in self.forms.law_forces)
-        return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
+        forces = self._forces(self.forms.law_forces)
+        forces[self.owned :] = 0.0
+        return forces
 
     def tangent_transposed(self, state: LinearisationPoint, weights: Array) -> Array:
         """Return K^T w, owned values, with the tangent K without supports. Collective."""
@@ -338,32 +335,31 @@ class BodyEquilibrium:
         """Return the owned nodal forces of all materials without internal variables. Collective."""
         self.laws.silence()
         self.forms.put(self.nodal(state.x), self.motion(state.x))
-        forces = self._assembled()
-        forces[self.owned :] += self.forms.on_global(self.global_unknowns.size)
-        return forces
+        return self._forces(self.forms.law_forces)
 
-    def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
-        """Return the owned internal forces at a state. Collective.
-
-        Parameters
-        ----------
-        state
-            The unknowns, and the history at the beginning of their step.
-        secant_at
-            Unknowns of the secant modulus; those of the state by default: the material law itself.
-        """
+    def internal_forces(self, state: LinearisationPoint) -> Array:
+        """Return the owned internal forces F(x) at a state, by the material law. Collective."""
         destroy_unused(self.comm, self.domain.mesh.comm)
-        forms, secant = self.forms, secant_at is not None and not self.linear
-        forms.put(self.nodal(state.x), self.motion(state.x))
-        if secant:
-            assert secant_at is not None
-            forms.put(self.nodal(secant_at), self.motion(secant_at), secant=True)
-            self.laws.set(BodyState(secant_at, state.history), "secant")
-        else:
-            self.laws.set(state)
-        chosen = forms.secant_forces if secant else forms.law_forces
-        forces = sum(assembled(form, self.owned) for form in chosen)
-        return np.concatenate([forces, forms.on_global(self.global_unknowns.size, secant)])
+        self.forms.put(self.nodal(state.x), self.motion(state.x))
+        self.laws.set(state)
+        return self._forces(self.forms.law_forces)
+
+    def secant_forces(self, state: LinearisationPoint) -> Array:
+        """Return F(x) with the secant modulus at `state.secant_at`, if given. Collective."""
+        at = state.secant_at
+        if at is None or self.linear:
+            return self.internal_forces(state)
+        destroy_unused(self.comm, self.domain.mesh.comm)
+        self.forms.put(self.nodal(state.x), self.motion(state.x))
+        self.forms.put(self.nodal(at), self.motion(at), secant=True)
+        self.laws.set(BodyState(at, state.history), "secant")
+        return self._forces(self.forms.secant_forces, secant=True)
+
+    def _forces(self, forms: Sequence[fem.Form], secant: bool = False) -> Array:
+        """Return the owned forces of compiled forms, those on the global unknowns behind."""
+        forces = sum(assembled(form, self.owned) for form in forms)
+        on_q = self.forms.on_global(self.global_unknowns.size, secant)
+        return np.concatenate([forces, on_q])
 
     def elastic_forces(self, x: Array) -> list[Array]:
         """Return the owned nodal forces of each elastic support at local unknowns. Collective."""
@@ -421,8 +417,11 @@ class BodyEquilibrium:
     ) -> None:
         """Assemble Kacanov's "secant", Newton's "tangent" or its "symmetric" part. Collective.
 
-        Rows and columns of supported unknowns are those of the identity if these are constrained.
+        The secant is that at `state.secant_at`, if given. Rows and columns of supported unknowns
+        are those of the identity if these are constrained.
         """
+        if kind == "secant" and state.secant_at is not None:
+            state = BodyState(state.secant_at, state.history)
         forms, conditions = self.forms, [s.condition for s in self.supports] if constrained else []
         for secant in (False, True):
             forms.put(self.nodal(state.x), self.motion(state.x), secant)

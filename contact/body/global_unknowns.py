@@ -390,13 +390,13 @@ class Cuts:
         labels, count = distributed_components(space, cells, keys)
         normals = np.stack([self._ends[k][1] for k in self._free], axis=1)
         return Pieces(
-            [self.places[k] for k in self._free],
-            labels[: index_map.size_local],
-            count,
-            space.tabulate_dof_coordinates()[nodes, : len(normals)],
-            labels[nodes],
-            labels[size:],
-            moved[:, None, :] * normals,
+            places=[self.places[k] for k in self._free],
+            component=labels[: index_map.size_local],
+            count=count,
+            points=space.tabulate_dof_coordinates()[nodes, : len(normals)],
+            below=labels[nodes],
+            above=labels[size:],
+            normals=moved[:, None, :] * normals,
         )
 
     def check(self, nodes: NDArray[np.int32], along: Array, text: str) -> None:

@@ -45,29 +45,27 @@ class Support:
     ----------
     condition
         The Dirichlet condition, with values without the amplitude.
-    amplitude
-        Factor as a function of time.
-    field
-        The prescribed function; None for zero.
     values, dofs, points
         The function of the condition's values, its dofs, shape (n,), their coordinates, (n, d).
-    scale
-        Unit of the component in the unknowns.
-    name, comm
-        Name in messages, and communicator.
+    comm
+        Communicator.
+    field, amplitude
+        The prescribed function, None for zero, and its factor as a function of time.
+    scale, name
+        Unit of the component in the unknowns, and name in messages.
     check
         Check of the values, collective; None for any values.
     """
 
     condition: fem.DirichletBC
-    amplitude: Factor
-    field: Field | Moving | None
     values: fem.Function
     dofs: NDArray[np.int32]
     points: Array
-    scale: float
-    name: str
     comm: MPI.Intracomm
+    field: Field | Moving | None = None
+    amplitude: Factor = steady
+    scale: float = 1.0
+    name: str = ""
     check: Callable[[Array], None] | None = None
 
     def evaluate(self, time: float) -> None:
@@ -206,7 +204,7 @@ def _nothing(
     """Return the homogeneous condition on a component at some of its dofs."""
     condition = fem.dirichletbc(zero, dofs, subspace)
     none, comm = np.zeros((dofs[1].size, 0)), lasting(subspace.mesh.comm)
-    return Support(condition, steady, None, zero, dofs[1], none, 1.0, "", comm)
+    return Support(condition, zero, dofs[1], none, comm)
 
 
 def _off_axis(domain: Domain, part: str, points: Array) -> Callable[[Array], None]:
@@ -248,7 +246,16 @@ def _support(
     condition = fem.dirichletbc(data, dofs, subspace)
     check = _off_axis(domain, part, points) if domain.revolved and component == 0 else None
     made = Support(
-        condition, amplitude, value, data, dofs[1], points, scale, name, domain.comm, check
+        condition,
+        data,
+        dofs[1],
+        points,
+        domain.comm,
+        field=value,
+        amplitude=amplitude,
+        scale=scale,
+        name=name,
+        check=check,
     )
     made.evaluate(0.0)
     return made

@@ -102,8 +102,8 @@ def build_problem(
         problem = ContactProblem(
             domain, body, contacts, degree=case.space.degree, element=case.space.element
         )
-        for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:
-            check_problem(problem.at(time), refined=refined or case.adapt is not None)
+        times = (1.0,) if case.evolution is None else case.evolution.times[1:]
+        check_problem(problem, times, refined=refined or case.adapt is not None)
         for time in () if case.evolution is None else case.evolution.ends:
             check_supports(problem.at(time))
     return problem

@@ -207,20 +207,20 @@ def identify(
             ", ".join(undetermined),
         )
     return Identified(
-        dict(zip(parameters, found.x.tolist(), strict=True)),
-        {
+        parameters=dict(zip(parameters, found.x.tolist(), strict=True)),
+        intervals={
             key: (float(value - way), float(value + way))
             for key, value, way in zip(parameters, found.x, half, strict=True)
         },
-        level,
-        covariance,
-        covariance / np.outer(size, size),
-        undetermined,
-        tuple(key for key, on in zip(parameters, found.active_mask, strict=True) if on),
-        tuple(model.fit for model in models),
-        float(np.sqrt(np.mean(left**2))),
-        tuple(model.solution for model in models),
-        found.nfev,
+        level=level,
+        covariance=covariance,
+        correlation=covariance / np.outer(size, size),
+        undetermined=undetermined,
+        at_bound=tuple(key for key, on in zip(parameters, found.active_mask, strict=True) if on),
+        fits=tuple(model.fit for model in models),
+        misfit=float(np.sqrt(np.mean(left**2))),
+        solutions=tuple(model.solution for model in models),
+        evaluations=found.nfev,
     )
 
 

@@ -13,9 +13,10 @@ evaluates them. `linearise` linearises them node by node for a step of the semis
     lambda_f+ = s+ e + theta Q u_tau+          slip, (19c), with the linearised bound s+ (19d)
 
 These are lambda+ = lambda^0 + B T dx (19) with the increment dx of the step. With gamma far above
-the stiffness of the body (19a) and (19b) are nearly u_nu = rho and u_tau = 0, and their residuals
-fall by that ratio in every step. The active set and the derivative of the bound by the slip are
-given: safeguards against cycling belong to the method (`contact.methods.safeguards`).
+the stiffness of the body (19a) and (19b) are nearly u_nu = rho and u_tau = 0, the conditions of the
+primal-dual active set strategy, and their residuals fall by that ratio in every step. The active
+set and the derivative of the bound by the slip are given: safeguards against cycling belong to the
+method (`contact.methods.safeguards`).
 
 References
 ----------
@@ -42,15 +43,7 @@ def project_half_line(z: Array) -> Array:
 
 
 def project_disc(z: Array, radius: Array) -> Array:
-    """Return the projection of tangential vectors onto discs |.| <= radius.
-
-    Parameters
-    ----------
-    z
-        Vectors, shape (..., n, d).
-    radius
-        Friction bounds s >= 0, shape (n,).
-    """
+    """Return the projection of tangential vectors, (..., n, d), onto discs of radius s, (n,)."""
     length = np.linalg.norm(z, axis=-1)
     bound = np.broadcast_to(radius, length.shape)
     beyond = length > bound

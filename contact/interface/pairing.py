@@ -88,19 +88,21 @@ class PairPlacement:
         )
         movable = body.movable(local)
         given = _given(body, found, slave.owners, movable)
+        admissible, tangent = contact_directions(normal, movable, given)
         nodes = ContactNodes(
-            body.comm,
-            local,
-            points,
-            found.weight,
-            normal,
-            *contact_directions(normal, movable, given),
-            gap + self.added,
-            np.full(local.size, unknown),
-            body.block_size,
-            cut,
-            body.domain.revolved,
-            body.global_unknowns.of_foundation(points, body.block_size),
+            comm=body.comm,
+            nodes=local,
+            points=points,
+            weight=found.weight,
+            normal=normal,
+            admissible_normal=admissible,
+            tangent=tangent,
+            gap=gap + self.added,
+            deviation=np.full(local.size, unknown),
+            block_size=body.block_size,
+            cut=cut,
+            revolved=body.domain.revolved,
+            motion=body.global_unknowns.of_foundation(points, body.block_size),
         )
         return Geometry(nodes, found, found.covered)
 

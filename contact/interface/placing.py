@@ -136,18 +136,19 @@ def candidates(
         most = comm.allreduce(0.0 if exact else facets.unknown_deviation, op=MPI.MAX)
         curved, unknown = _from_curve(facets, lumped.nodes, gap, most)
     return Candidates(
-        nodes,
-        weight,
-        points,
-        np.einsum("ni,ni->n", direction, normal),
-        front,
-        ROUNDED * body.domain.size + 1.1 * chord_penetration,  # the direction may be a little aside
-        direction,
-        gap,
-        curved,
-        unknown,
-        facets.owners,
-        lumped.jumps,
+        nodes=nodes,
+        weight=weight,
+        places=points,
+        facing=np.einsum("ni,ni->n", direction, normal),
+        front=front,
+        # The direction may be a little aside.
+        chord_penetration=ROUNDED * body.domain.size + 1.1 * chord_penetration,
+        direction=direction,
+        measured=gap,
+        gap=curved,
+        unknown=unknown,
+        owners=facets.owners,
+        jumps=lumped.jumps,
     )
 
 
@@ -218,19 +219,21 @@ class FoundationPlacement:
             chord = (found.facing > 0) & (gap < 0) & (-gap <= found.chord_penetration)
             cut = body.comm.allreduce(float(np.max(-gap[chord], initial=0.0)), op=MPI.MAX)
             gap = np.where(chord, 0.0, gap)
+        admissible, tangent = contact_directions(direction, body.movable(of))
         nodes = ContactNodes(
-            body.comm,
-            of,
-            points,
-            found.weight[self.contact],
-            direction,
-            *contact_directions(direction, body.movable(of)),
-            found.of_jumps(gap)[self.contact],
-            found.unknown[self.contact],
-            body.block_size,
-            cut if cut > ROUNDED * body.domain.size else 0.0,
-            body.domain.revolved,
-            body.global_unknowns.of_foundation(
+            comm=body.comm,
+            nodes=of,
+            points=points,
+            weight=found.weight[self.contact],
+            normal=direction,
+            admissible_normal=admissible,
+            tangent=tangent,
+            gap=found.of_jumps(gap)[self.contact],
+            deviation=found.unknown[self.contact],
+            block_size=body.block_size,
+            cut=cut if cut > ROUNDED * body.domain.size else 0.0,
+            revolved=body.domain.revolved,
+            motion=body.global_unknowns.of_foundation(
                 found.places[self.contact], body.block_size, self.part
             ),
         )

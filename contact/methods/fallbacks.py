@@ -50,14 +50,12 @@ from contact.problem.condensed import CondensedProblem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
-from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
 
-#: Last iterate and outcome of a stage, and a stage from an initial guess and the unknowns of the
-#: first secant.
+#: Last iterate and outcome of a stage, and a stage from an initial guess.
 End: TypeAlias = tuple[State, Outcome]
-Solver: TypeAlias = Callable[[State, Array | None], End]
+Stage: TypeAlias = Callable[[State], End]
 
 #: Notes of steps in the history.
 WORKING_SET, CONTINUATION, PROXIMAL_POINT = "working set", "continuation", "proximal point"
@@ -90,33 +88,32 @@ NEARLY_BALANCED = 0.03
 def solve_contact(
     newton: SemismoothNewton,
     begin: State,
-    secant_at: Array | None = None,
-    condensed: Solver | None = None,
+    condensed_steps: Stage | None = None,
     condensation_pays: bool = False,
 ) -> End:
     """Solve by Newton's method and its fallbacks, stage by stage. Collective.
 
     Parameters
     ----------
-    newton, begin, secant_at
-        The method on the problem, the initial guess, and unknowns of the first secant.
-    condensed, condensation_pays
-        Solver of the same problem on the condensed body, if any, and whether that is the first
-        stage, or the last one.
+    newton, begin
+        The method on the problem, and the initial guess.
+    condensed_steps, condensation_pays
+        Steps on the condensed body, if it can be condensed, and whether these are the first stage,
+        or the last one.
     """
-    if condensed is not None and condensation_pays:
-        state, outcome = condensed(begin, secant_at)
+    if condensed_steps is not None and condensation_pays:
+        state, outcome = condensed_steps(begin)
         if not _final(outcome) and newton.steps_left > 0:
             logger.info("%s; going on with the whole body", outcome.ended)
-            state, outcome = newton.iterate(state, secant_at if state is begin else None)
+            state, outcome = newton.iterate(state)
         # The condensed body has been tried, and its contact problem looks at the modes itself.
-        condensed, unconstrained = None, False
+        condensed_steps, unconstrained = None, False
     else:
-        state, outcome = newton.iterate(begin, secant_at, give_up=True)
+        state, outcome = newton.iterate(begin, give_up=True)
         unconstrained = outcome.converged and newton.modes.unconstrained_at(newton.problem, state)
     if _final(outcome) and not unconstrained:
         return state, outcome
-    found = fall_back(newton, state, outcome, condensed)
+    found = fall_back(newton, state, outcome, condensed_steps)
     if unconstrained:  # another solution, if there is one
         return found if found[1].converged else (state, outcome)
     if not _final(found[1]) and newton.best.found is not None:
@@ -131,7 +128,7 @@ def _final(outcome: Outcome) -> bool:
 
 
 def fall_back(
-    newton: SemismoothNewton, state: State, outcome: Outcome, condensed: Solver | None = None
+    newton: SemismoothNewton, state: State, outcome: Outcome, condensed_steps: Stage | None = None
 ) -> End:
     """Try the fallbacks in turn until one converges. Collective."""
     logger.info(
@@ -145,8 +142,8 @@ def fall_back(
         partial(layer_secants, newton),
         partial(rigid_motion, newton, outcome),
         partial(proximal_points, newton),
-        partial(interior_points, newton, without_contact, condensed is not None),
-        partial(condensed_body, newton, condensed),
+        partial(interior_points, newton, without_contact, condensed_steps is not None),
+        partial(on_condensed_body, newton, condensed_steps),
     ):
         try:
             found = fallback()
@@ -208,11 +205,11 @@ def interior_points(
     return interior_point(newton, without_contact, steps // 2 if condensable else steps)
 
 
-def condensed_body(newton: SemismoothNewton, condensed: Solver | None) -> End | None:
-    """Return the end of steps on the condensed body, which has too many nodes for these to pay."""
-    if condensed is None or newton.steps_left <= 0:
+def on_condensed_body(newton: SemismoothNewton, condensed_steps: Stage | None) -> End | None:
+    """Return the end of steps on the condensed body, where they do not pay as the first stage."""
+    if condensed_steps is None or newton.steps_left <= 0:
         return None
-    found = condensed(newton.problem.start(), None)
+    found = condensed_steps(newton.problem.start())
     # The reason of the interior point says more, unless no steps are left.
     return found if found[1].converged or newton.steps_left <= 0 else None
 
@@ -326,8 +323,7 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     p_nu(s)/s of the last iterate (it is positive). Newton's method takes the last steps, where the
     forces nearly balance, and once where a secant leaves the regimes (open, below saturation,
     saturated) unchanged: supports that bear little bring the load to balance slowly. Proximal
-    points solve the bed's problem where friction alone holds the body along it. After a failure
-    that is not the layer's, the first problems are not solved either.
+    points solve the bed's problem where friction alone constrains a mode along it.
     """
     problem, interface = newton.problem, newton.problem.interface
     foundation, near = interface.foundation, NEARLY_BALANCED
@@ -341,10 +337,10 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
         method = newton.on(problem.with_interface(replace(interface, foundation=bed)))
         state, outcome = method.iterate(state, note=SECANT)
         if not outcome.converged:
-            held = proximal_points(method)
-            if held is None:
+            found = proximal_points(method)
+            if found is None:
                 return None
-            state = held[0]
+            state = found[0]
         jump = interface.nodes.jump(state.x)
         before, regimes = regimes, foundation.regimes(jump)
         changed = float(summed(interface.comm, not np.array_equal(regimes, before))) > 0

@@ -304,13 +304,8 @@ def interior_point(
 ) -> tuple[State, Outcome]:
     """Solve by the interior point, Newton's last steps and updates of the bound. Collective.
 
-    Parameters
-    ----------
-    newton, steps
-        Newton's method on the problem, and most steps; those left of the limit by default.
-    begin
-        State without contact, whose gaps are the first slacks; None where contact has to constrain
-        a rigid-body mode or the potential.
+    `begin` is a state without contact, whose gaps are the first slacks; None where contact has to
+    constrain a rigid-body mode or the potential. At most as many `steps`, those left by default.
     """
     problem, modes, interface = newton.problem, newton.modes, newton.problem.interface
     last_step = len(newton.recorder.records) + (newton.steps_left if steps is None else steps)

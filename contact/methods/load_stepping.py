@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from contact.methods.method import UNKNOWN, Method, evaluated, solve_step
 from contact.methods.report import Outcome
 from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.problem import ContactProblem
-from contact.problem.rigid_modes import released, unilateral_supports
+from contact.problem.rigid_modes import release_message, unilateral_supports
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -68,7 +69,7 @@ class LoadStepping:
         sizes = [whole / 2**k for k in range(HALVINGS + 1)]
         for size in [size for size in sizes if size <= left * (1 + 1e-9)] or [left]:
             time = end if size >= left * (1 - 1e-9) else now + size
-            state, outcome = self._solve(time, released(self._unilateral, now, time))
+            state, outcome = self._solve(time, release_message(self._unilateral, now, time))
             if outcome.converged or outcome.signal:
                 break
             logger.info("no step to %g: %s", time, outcome.reason)
@@ -85,25 +86,21 @@ class LoadStepping:
             outcome = Outcome(UNKNOWN, self.method.options.allowed, released)
             return evaluated(problem, problem.start() if last is None else last, outcome)
         self.method.set_load_step(problem)
-        start = secant_at = None
-        if last is not None:
-            ends = [(problem, state) for state in (before, last) if state is not None]
-            start, secant_at = predicted(problem, ends)
+        ends = [(problem, state) for state in (before, last) if state is not None]
+        start = predicted(problem, ends) if ends else None
         self._modes.problem = problem
-        return solve_step(problem, self.method, start, secant_at, self._modes)
+        return solve_step(problem, self.method, start, self._modes)
 
 
 #: Largest ratio of the predicted increment of the solution to that of the last step.
 FARTHEST = 2.0
 
 
-def predicted(
-    problem: ContactProblem, ends: Sequence[tuple[ContactProblem, State]]
-) -> tuple[State, Array | None]:
-    """Extrapolate the last two solutions: initial guess, place of the first secant. Collective.
+def predicted(problem: ContactProblem, ends: Sequence[tuple[ContactProblem, State]]) -> State:
+    """Return the initial guess by extrapolation of the last two solutions. Collective.
 
-    Where the loads turn round the last solution is taken. The material is then linearised there,
-    with the change of the prescribed values as an increment: set at once, they would strain the
+    Where the loads turn round it is the last solution. The first secant is then that there, with
+    the change of the prescribed values as an increment: set at once, they would strain the
     elements beside them alone. `ends`: the last solution, behind the one before it if there is one,
     with their problems.
     """
@@ -113,7 +110,7 @@ def predicted(
         factor = _extrapolation(problem, ends)
         x = x + factor * (x - ends[-2][1].x)
     start = State(body.prescribe(x, problem.time), last.forces, problem.time, problem.history)
-    return start, None if factor > 0 else x
+    return start if factor > 0 else replace(start, secant_at=x)
 
 
 def _extrapolation(problem: ContactProblem, ends: Sequence[tuple[ContactProblem, State]]) -> float:

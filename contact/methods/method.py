@@ -18,7 +18,6 @@ from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
 from contact.thesis.fixed_point import FixedPoint
 from contact.thesis.penalty import Penalty
-from contact.typing import Array
 
 #: Placeholder of residuals that `evaluated` replaces.
 UNKNOWN = Residuals(np.inf, np.inf, np.inf)
@@ -51,18 +50,8 @@ class Method(Protocol):
     def set_load_step(self, problem: ContactProblem) -> None:
         """Take another load step of the same problem; factorisations remain, records start anew."""
 
-    def solve(
-        self, start: State | None = None, secant_at: Array | None = None
-    ) -> tuple[State, Outcome]:
-        """Iterate until convergence or a limit. Collective.
-
-        Parameters
-        ----------
-        start
-            Initial guess; zero by default.
-        secant_at
-            Unknowns x* of the first secant modulus g(eps(x*)); those of the start by default, where
-            prescribed values that have changed strain the cells at the support alone: too soft.
+    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
+        """Iterate from a guess, zero by default, until convergence or a limit. Collective.
 
         Raises
         ------
@@ -83,7 +72,6 @@ def solve_step(
     problem: ContactProblem,
     method: Method,
     start: State | None,
-    secant_at: Array | None = None,
     modes: UnconstrainedModes | None = None,
 ) -> tuple[State, Outcome]:
     """Solve by a method, and evaluate the residuals from scratch. Collective.
@@ -92,7 +80,7 @@ def solve_step(
     """
     counted = replace(method.counters)
     try:
-        state, outcome = method.solve(start, secant_at)
+        state, outcome = method.solve(start)
     except Interrupted as interrupt:
         state = method.state
         outcome = Outcome(UNKNOWN, UNKNOWN, str(interrupt), interrupt.number)
@@ -109,5 +97,5 @@ def solve_step(
 def evaluated(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:
     """Evaluate the residuals of a state at the time and history of a problem. Collective."""
     x = problem.body.prescribe(state.x, problem.time)
-    state = replace(state, x=x, time=problem.time, history=problem.history)
+    state = replace(state, x=x, time=problem.time, history=problem.history, secant_at=None)
     return state, replace(outcome, residuals=evaluate(problem, state))

@@ -1,11 +1,9 @@
 """Semismooth Newton method, a primal-dual active set strategy: the default solver.
 
 1. A step linearises material, contact, friction, layer and charge together (`newton_step`), and
-   eliminates the multipliers node by node (`contact.interface.complementarity`). The function of a
-   closed node, -c (u_nu - rho), has no derivative in lambda_c: it is perturbed to
-   (c/gamma) dlambda_c = c (u_nu+ - rho), one augmented-Lagrangian update; gamma -> infinity is the
-   primal-dual active set strategy. Steps are taken whole, without a line search: the residuals may
-   rise while the active set changes, and the stagnation limit bounds how long.
+   eliminates the multipliers node by node (`contact.interface.complementarity`). Steps are taken
+   whole, without a line search: the residuals may rise while the active set changes, and the
+   stagnation limit bounds how long.
 2. Where the contact nodes are few, the body is condensed onto them (static condensation): a loop
    linearises the material (`Newton._condensed_steps`), and the same method solves contact on the
    Schur complement, in small dense steps (`semismooth`).
@@ -56,7 +54,6 @@ from contact.problem.condensed import (
 )
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
 
@@ -83,7 +80,7 @@ RADIUS = 0.05
 class Chord:
     """Choice between a Newton step and a chord step, by the rate of convergence to a tolerance.
 
-    `most_steps`: most chord steps to it; 0 for none at all.
+    `most_steps` is the largest predicted number of chord steps; with 0 all are Newton steps.
     """
 
     def __init__(self, goal: float, most_steps: float) -> None:
@@ -100,24 +97,17 @@ class Chord:
         self._before: State | None = None
         self._reached = np.inf
 
-    def choose(
-        self, state: State, reached: float, secant_at: Array | None = None
-    ) -> tuple[State, bool]:
+    def choose(self, state: State, reached: float) -> tuple[State, bool]:
         """Return the iterate to step from, and whether the step is a chord step.
 
-        Parameters
-        ----------
-        state, reached
-            Last iterate and its residual. Where a chord step has raised it, the one before is
-            taken.
-        secant_at
-            Unknowns of the secant; None for those of the state.
+        Given the last iterate and its residual; where a chord step has raised it, the iterate
+        before is taken.
         """
         before, last = self._before, self._reached
         if not self._factorised or self._most_steps <= 0:
             reuse = False
         elif before is None:
-            reuse = state.active_set is not None and secant_at is None
+            reuse = state.near
         elif reached >= last and self._reused:
             state, reached, reuse = before, last, False
         else:
@@ -159,7 +149,10 @@ class Newton:
         self.recorder = Recorder(self.monitor)
         if self.condensation is not None:
             self.condensation.set_load_step(problem)
-        self.whole = SemismoothNewton(problem, self.options, self._step, self._modes, self.recorder)
+        #: The method on the whole body.
+        self.semismooth = SemismoothNewton(
+            problem, self.options, self._step, self._modes, self.recorder
+        )
 
     def _newton_step(
         self, problem: AnyProblem, options: NewtonOptions, counters: Counters
@@ -175,64 +168,61 @@ class Newton:
     @property
     def state(self) -> State:
         """The state after the last step."""
-        return self.whole.last
+        return self.semismooth.last
 
-    def solve(
-        self, start: State | None = None, secant_at: Array | None = None
-    ) -> tuple[State, Outcome]:
+    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate until convergence or the limit; the best iterate on failure; see `Method`."""
-        whole, problem, body = self.whole, self.problem, self.problem.body
+        semismooth, problem, body = self.semismooth, self.problem, self.problem.body
         self.recorder.begin = time.perf_counter()
         if self.options.reuse != "across":
             self._chord.drop()
-        begin = problem.start() if start is None else whole.started(start)
+        if start is None:
+            begin = replace(problem.start(), secant_at=body.zero_displacement())
+        else:
+            begin = semismooth.started(start)
         if body.linear:
-            secant_at = None
-        elif start is None:
-            secant_at = body.zero_displacement()
-        whole.begin(begin)
-        condensed = self._condensed_steps if self._condenses else None
-        state, outcome = solve_contact(whole, begin, secant_at, condensed, self._pays)
-        whole.last = state
+            begin = replace(begin, secant_at=None)
+        semismooth.begin(begin)
+        condensed_steps = self._condensed_steps if self._condenses else None
+        state, outcome = solve_contact(semismooth, begin, condensed_steps, self._pays)
+        semismooth.last = state
         return state, outcome
 
-    def _condensed_steps(
-        self, state: State, secant_at: Array | None = None
-    ) -> tuple[State, Outcome]:
+    def _condensed_steps(self, state: State) -> tuple[State, Outcome]:
         """Iterate over the material; contact is solved on the Schur complement. Collective."""
         if self.condensation is None:
             self.condensation = Condensation(self.problem, self.counters)
         options, body = self.options, self.problem.body
-        monitor, chord = ConvergenceMonitor(self.whole, state), self._chord
+        monitor, chord = ConvergenceMonitor(self.semismooth, state), self._chord
         if monitor.starts_converged:
             return state, monitor.outcome()
         chord.begin()
-        tangent = state.active_set is not None and secant_at is None and not body.linear
-        for _ in range(min(options.max_iterations, self.whole.steps_left)):
+        tangent = state.near and not body.linear
+        for _ in range(min(options.max_iterations, self.semismooth.steps_left)):
             previous, last = state, monitor.iterate
             largest = last.residuals.significant
-            state, reuse = chord.choose(state, largest, secant_at)
-            internal = last.internal if state is previous and secant_at is None else None
+            state, reuse = chord.choose(state, largest)
+            internal = last.internal if state is previous and state.secant_at is None else None
             kind = "tangent" if tangent else "secant"
-            condensed = self.condensation.linearise(kind, state, reuse, secant_at, internal)
-            if condensed is None:
+            condensed_problem = self.condensation.linearise(kind, state, reuse, internal)
+            if condensed_problem is None:
                 chord.drop()
                 return previous, monitor.outcome(UNSOLVED_ON_CONTACT_NODES)
             # Inexact Newton: no more digits than the linearised material has.
             enough = 0.1 * options.tolerance
             if not body.linear and not reuse:
                 enough = max(enough, CONTACT_PART * min(largest, 1.0))
-            method = self._on_contact_nodes(condensed, enough)
-            end, outcome = solve_contact(method, replace(state, x=condensed.body.x_0))
+            method = self._on_contact_nodes(condensed_problem, enough)
+            begin = replace(state, x=condensed_problem.body.x_0, secant_at=None)
+            end, outcome = solve_contact(method, begin)
             records = tuple(method.recorder.records)
             self.counters.contact_solves += sum(record.inner for record in records)
             overloaded = outcome.overloaded and body.linear
             unsolved = outcome.residuals.significant > max(enough, UNSOLVED * largest)
             if unsolved and not overloaded:
                 return previous, monitor.outcome(UNSOLVED_ON_CONTACT_NODES)
-            increment = self.condensation.expand(condensed, end.x)
+            increment = self.condensation.expand(condensed_problem, end.x)
             state = replace(end, x=body.updated(state.x, increment), history=state.history)
-            secant_at = None
             monitor.evaluate(state)
             taken = [word for word in FALLBACKS if any(word in r.note for r in records)]
             note = ", ".join([*["chord step"] * reuse, *taken])

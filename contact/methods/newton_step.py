@@ -105,9 +105,16 @@ class NewtonStep:
 
     def begin(self) -> None:
         """Begin another iteration: forcing term and conductivity derivative anew."""
-        self.conductivity_derivative = ConductivityDerivative()
+        self._conductivity_derivative = ConductivityDerivative()
         self._assembled = False
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
+
+    def rejected(self, residual: float) -> bool:
+        """Tell whether the last step raised the residual by a derivative that may be left out.
+
+        It is then to be taken again, without the derivative of psi by the gap.
+        """
+        return self._conductivity_derivative.worsened(residual)
 
     def _forcing_term(self, residual: float) -> float:
         """Return the forcing term of a step from the residual before it."""
@@ -156,13 +163,12 @@ class NewtonStep:
         problem: AnyProblem,
         iterate: EvaluatedState,
         tangent: bool,
-        secant_at: Array | None = None,
         exact: bool = False,
     ) -> State | None:
         """Return the next iterate; None if the matrix is singular there. Collective.
 
-        The material is linearised by its tangent, or by its secant (Kacanov) at given unknowns,
-        those of the iterate by default. `exact`: iterative solvers go to their own tolerance.
+        The material is linearised by its tangent, or by its secant (Kacanov). `exact`: iterative
+        solvers go to their own tolerance.
 
         Raises
         ------
@@ -172,8 +178,8 @@ class NewtonStep:
         """
         body, state, largest = problem.body, iterate.state, iterate.residuals.significant
         laws = self._linearise(problem.interface, state, largest)
-        self._update(problem, iterate, laws, tangent, secant_at)
-        residual = _residual(problem, iterate, laws, secant_at)
+        self._update(problem, iterate, laws, tangent)
+        residual = _residual(problem, iterate, laws)
         forcing = None if exact else self._forcing_term(largest)
         try:
             increment = self.operator.solve(-residual, forcing)
@@ -205,17 +211,12 @@ class NewtonStep:
             # With the derivative of psi(u_nu - rho), or psi frozen.
             follow = unchanged
             if law.follows_gap:
-                follow = self.conductivity_derivative(residual, unchanged)
+                follow = self._conductivity_derivative(residual, unchanged)
             charge = law.charge_block(jump, interface.pressure(jump, multipliers), follow)
         return LinearisedLaws(active, unchanged, multipliers, contact, layer, shift, charge)
 
     def _update(
-        self,
-        problem: AnyProblem,
-        iterate: EvaluatedState,
-        laws: LinearisedLaws,
-        tangent: bool,
-        secant_at: Array | None,
+        self, problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws, tangent: bool
     ) -> None:
         """Assemble and factorise the operator. Collective."""
         interface, body = problem.interface, problem.body
@@ -226,19 +227,17 @@ class NewtonStep:
                 interface, residuals.significant, self.parameters.nodal_stiffness
             )
         reuse = self._assembled and residuals.equilibrium < SMALL * residuals.significant
-        at = state if secant_at is None else replace(state, x=secant_at)
         weighted = interface.weighted(blocks, state.x)
-        self.operator.update("tangent" if tangent else "secant", at, weighted, reuse=reuse)
+        self.operator.update("tangent" if tangent else "secant", state, weighted, reuse=reuse)
         self._assembled = True
 
 
-def _residual(
-    problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws, secant_at: Array | None
-) -> Array:
+def _residual(problem: AnyProblem, iterate: EvaluatedState, laws: LinearisedLaws) -> Array:
     """Return G(x, lambda^0), with the linearised pressure of the layer. Collective."""
     here, nodes = replace(iterate.state, forces=laws.multipliers), problem.interface.nodes
-    internal = iterate.internal if secant_at is None else None
-    residual = residual_forces(problem, here, secant_at, internal)
+    at = iterate.state.secant_at
+    internal = iterate.internal if at is None else problem.body.secant_forces(iterate.state)
+    residual = residual_forces(problem, here, internal)
     nodes.add_jump_transposed((nodes.weight * laws.layer_shift)[:, None] * nodes.normal, residual)
     return residual
 
@@ -254,7 +253,14 @@ def _moved(problem: AnyProblem, state: State, laws: LinearisedLaws, increment: A
     layer = interface.foundation.layer_pressure(nodes.jump(state.x)) + laws.layer_shift + pressed
     # Far motions leave nodes of a rigid part off it by rounding.
     x = body.prescribe(body.updated(state.x, increment), state.time)
-    return replace(state, x=x, forces=forces, active_set=laws.active_set, layer_pressure=layer)
+    return replace(
+        state,
+        x=x,
+        forces=forces,
+        active_set=laws.active_set,
+        layer_pressure=layer,
+        secant_at=None,
+    )
 
 
 def linearised_layer(

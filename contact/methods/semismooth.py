@@ -18,7 +18,6 @@ from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
 from contact.problem.condensed import AnyProblem
 from contact.problem.residuals import Residuals, evaluate_state, undeformed_equilibrium
 from contact.problem.state import State
-from contact.typing import Array
 
 #: Ratio of c times the penetration of the first step to all loads above which c overestimates the
 #: stiffness of the body: for a block, whose stiffness c estimates, it is about sqrt(H/h).
@@ -81,7 +80,6 @@ class SemismoothNewton:
     def iterate(
         self,
         state: State,
-        secant_at: Array | None = None,
         note: str = "",
         stagnation_limit: int | None = None,
         give_up: bool = False,
@@ -92,8 +90,8 @@ class SemismoothNewton:
 
         Parameters
         ----------
-        state, secant_at
-            Initial guess, and unknowns of the first secant; those of the state by default.
+        state
+            Initial guess.
         note
             Note of the steps in their records.
         stagnation_limit, steps
@@ -109,19 +107,19 @@ class SemismoothNewton:
         if monitor.starts_converged:
             return state, monitor.outcome()
         step.begin()
-        # At zero strain the secant is the tangent; an initial guess with an active set is near.
-        tangent = state.active_set is not None and secant_at is None and not linear
+        # At zero strain the secant is the tangent.
+        tangent = state.near and not linear
         for _ in range(min(options.max_iterations, self.steps_left if steps is None else steps)):
             previous = monitor.iterate
-            taken = step(problem, previous, tangent, secant_at, exact)
+            taken = step(problem, previous, tangent, exact)
             if taken is None:
                 return state, monitor.outcome(step.fault)
-            state, secant_at = taken, None
+            state = taken
             monitor.evaluate(state)
-            worse = step.conductivity_derivative.worsened(monitor.residuals.significant)
-            monitor.record("tangent" * tangent, "rejected" * worse)
-            if worse:
-                state = previous.state
+            rejected = step.rejected(monitor.residuals.significant)
+            monitor.record("tangent" * tangent, "rejected" * rejected)
+            if rejected:
+                state = replace(previous.state, secant_at=None)
                 monitor.evaluate(state)
             if (found := monitor.ended()) is not None:
                 return found
@@ -193,7 +191,10 @@ class ConvergenceMonitor:
         return None
 
     def next_is_tangent(self, tangent: bool, previous: Residuals) -> bool:
-        """Whether the tangent is next: the secant (Kacanov) is after a tangent that overshoots."""
+        """Tell whether the next step takes the tangent.
+
+        The secant (Kacanov) follows a tangent that has not reduced the equilibrium residual.
+        """
         reference = max(previous.equilibrium, self._options.tolerance)
         return self.residuals.equilibrium < reference or not tangent
 

@@ -25,7 +25,7 @@ from contact.mesh.cells import rule, shape_of
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.methods.newton_step import NewtonStep
 from contact.methods.report import Outcome
-from contact.problem.condensed import AnyProblem, CondensedBody, CondensedProblem
+from contact.problem.condensed import AnyProblem, CondensedEquilibrium, CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.rigid_modes import (
@@ -89,7 +89,7 @@ class UnconstrainedModes:
 
     @cached_property
     def constrained_undeformed(self) -> bool:
-        """Whether the supports and the contact of the reference configuration do."""
+        """Whether they do together with the contact of the reference configuration."""
         return self._constrained_undeformed(self.problem.frictional)
 
     @cached_property
@@ -209,7 +209,7 @@ class UnconstrainedModes:
 def _by_volume(problem: ContactProblem, vectors: Sequence[Array]) -> tuple[Array, Array]:
     """Return displacements at quadrature points, (n, k), of local unknowns, and the weights (n,).
 
-    A foundation that moves counts as the whole body. Some weights are negative.
+    Motions of a foundation have the volume of the bodies as weight. Some weights are negative.
     """
     body, domain = problem.body, problem.domain
     shape, nodes = shape_of(domain.mesh), geometry_nodes(domain)
@@ -282,7 +282,7 @@ def all_loads(problem: AnyProblem) -> float:
     return sum_of_forces(body, body.unbalanced(residual_forces(problem, problem.start())))
 
 
-def sum_of_forces(body: BodyEquilibrium | CondensedBody, forces: Array) -> float:
+def sum_of_forces(body: BodyEquilibrium | CondensedEquilibrium, forces: Array) -> float:
     """Return the sum of |force| over the unknowns, of owned values. Collective."""
     on_nodes, on_global = np.split(np.abs(forces) * body.component_norms.mechanical, [body.owned])
     return float(summed(body.comm, on_nodes.sum())) + float(on_global.sum())

@@ -22,9 +22,9 @@ from contact.problem.rigid_modes import (
     PUSHED_THROUGH,
     Group,
     UnilateralSupport,
-    described,
     groups,
     middle,
+    mode_names,
     null_space,
 )
 from contact.problem.state import State
@@ -51,13 +51,15 @@ def expected_displacements(
     return float(force / scales.area / scales.young * scales.size), largest
 
 
-def check_problem(problem: ContactProblem, refined: bool = False) -> None:
-    """Check presses, loads, supports and rigid-body modes, at the time of a problem. Collective.
+def check_problem(
+    problem: ContactProblem, times: Sequence[float] = (), refined: bool = False
+) -> None:
+    """Check presses, loads, supports and rigid-body modes of a problem. Collective.
 
     Parameters
     ----------
-    problem
-        The problem.
+    problem, times
+        The problem, and when its loads and supports are checked: at its own time by default.
     refined
         Whether its mesh is to be refined, which may show a press of a shape within a facet.
 
@@ -70,9 +72,11 @@ def check_problem(problem: ContactProblem, refined: bool = False) -> None:
     if not refined:
         check_presses(problem)
     _check_plane_stress(problem)
-    _check_loads(problem)
-    check_supports(problem)
-    check_rigid_modes(problem)
+    _check_loaded_parts(problem)
+    for there in [problem.at(time) for time in times] or [problem]:
+        _check_sizes(there)
+        check_supports(there)
+        check_rigid_modes(there)
 
 
 def check_presses(problem: ContactProblem) -> None:
@@ -104,8 +108,8 @@ def _shared(problem: ContactProblem, one: str, other: str) -> tuple[NDArray[np.i
     return shared, domain.comm.allreduce(shared.size > 0, op=MPI.LOR)
 
 
-def _check_loads(problem: ContactProblem) -> None:
-    """Refuse loads and elastic supports on Gamma_3."""
+def _check_loaded_parts(problem: ContactProblem) -> None:
+    """Refuse loads and elastic supports on Gamma_3. Collective."""
     for contact, (i, load) in product(problem.contacts, enumerate(problem.description.loads)):
         if load.on is not None and _shared(problem, load.on, contact.on)[1]:
             raise InputError(
@@ -121,7 +125,6 @@ def _check_loads(problem: ContactProblem) -> None:
                 "accepted: parts beside it",
                 "load-on-contact",
             )
-    _check_sizes(problem)
 
 
 def _check_sizes(problem: ContactProblem) -> None:
@@ -248,7 +251,7 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
             "on, or more displacement components fixed",
             "pulled-off",
         )
-    words, along = described(found.motion[:, None], group.names), group.translation(found.motion)
+    words, along = mode_names(found.motion[:, None], group.names), group.translation(found.motion)
     if along is None:
         sums = f"{_told_apart(found.power / found.resisted, 1.0)[0]} times its resistance"
     else:
@@ -276,7 +279,7 @@ def _unconstrained(group: Group, unconstrained: Array) -> str:
         about = f" about {places(group.centres[moves])}"
     if group.cut:  # shortenings only follow
         motions = linalg.orth(np.concatenate(group.of_components(unconstrained)))
-    modes = described(motions, group.names[: len(motions)])
+    modes = mode_names(motions, group.names[: len(motions)])
     return (
         f"the body{about} is not held: it can move as a rigid body ({modes}); accepted: "
         "displacement components fixed so that it cannot"

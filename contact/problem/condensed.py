@@ -46,8 +46,12 @@ DENSE_IS_FASTER = 50.0
 
 
 @dataclass(frozen=True)
-class CondensedBody:
-    """Equilibrium of a linear body at its retained nodes: S (x - x_0) + r_0.
+class CondensedEquilibrium:
+    """Equilibrium of a linear body at its retained nodes, S (x - x_0) + r_0 = 0 without contact.
+
+    It has the members of `BodyEquilibrium` that methods use, of unknowns (`zero_displacement`,
+    `prescribe`, `updated`, `owned_part`), of forces on them (`internal_forces`, `external`,
+    `unbalanced`, `reactions`) and of their norms; no mesh, no space and no stresses.
 
     Attributes
     ----------
@@ -112,10 +116,13 @@ class CondensedBody:
         """Return all unknowns: there are no ghosts."""
         return x
 
-    def internal_forces(self, state: LinearisationPoint, secant_at: Array | None = None) -> Array:
+    def internal_forces(self, state: LinearisationPoint) -> Array:
         """Return S (x - x_0) + r_0, r_0 the condensed F - f, which has the loads. Collective."""
         moved = np.concatenate(self.comm.allgather(state.x - self.x_0))
         return np.asarray(self.rows @ moved + self.residual[self.own])
+
+    #: A linear body is its own secant.
+    secant_forces = internal_forces
 
     def external(self, time: float = 1.0) -> Array:
         """Return zero: loads are part of r_0."""
@@ -150,7 +157,7 @@ class CondensedBody:
 class CondensedProblem:
     """A contact problem of a condensed body."""
 
-    body: CondensedBody
+    body: CondensedEquilibrium
     interface: Interface
     scales: Scales
     time: float = 1.0
@@ -198,19 +205,19 @@ class Condensation:
 
     Parameters
     ----------
-    whole
-        The whole problem.
+    problem
+        The problem of the whole body.
     counters
         Counters of sparse factorisations and solves.
     """
 
-    def __init__(self, whole: ContactProblem, counters: Counters) -> None:
+    def __init__(self, problem: ContactProblem, counters: Counters) -> None:
         self.counters = counters
-        self.nodes = whole.interface.coupled
-        self.set_load_step(whole)
-        body = whole.body
+        self.nodes = problem.interface.coupled
+        self.set_load_step(problem)
+        body = problem.body
         none = Constraint(body.layout, None, body.global_unknowns.ties, body.global_unknowns.free)
-        self._constraint = whole.constraint or none
+        self._constraint = problem.constraint or none
         self._bulk = ConstrainedBulk(body, self._constraint, BodyState(body.zero_displacement()))
         self._free = np.flatnonzero(self._constraint.free)
         self._matrix = self._bulk.create_matrix()
@@ -223,55 +230,66 @@ class Condensation:
         self._rows: Array = np.zeros((0, 0))
         self._stiffness = DenseStiffness(self._rows)
 
-    def set_load_step(self, whole: ContactProblem) -> None:
+    def set_load_step(self, problem: ContactProblem) -> None:
         """Take another load step of the same problem; factorisations remain."""
-        self.whole = whole
-        self._interface = at_retained_nodes(whole.interface)
+        self.whole_problem = problem
+        self._interface = at_retained_nodes(problem.interface)
 
     def linearise(
         self,
         kind: str,
         state: State,
         reuse: bool = False,
-        secant_at: Array | None = None,
         internal_forces: Array | None = None,
     ) -> CondensedProblem | None:
         """Linearise at a state of the whole problem, and condense. Collective.
 
-        Parameters
-        ----------
-        kind, state
-            "secant" or "tangent", and the state.
-        reuse
-            Whether to reuse the last factorisation (chord step).
-        secant_at
-            Unknowns at which the secant modulus is taken; those of the state by default.
-        internal_forces
-            F_int of the state, if computed before.
-
-        Returns
-        -------
-        The condensed problem; None with too many retained unknowns, or if the eliminated block is
-        singular.
-
-        Raises
-        ------
-        InputError
-            If numbers overflow.
+        By the "secant" or the "tangent", or by the last factorisation in a chord step (`reuse`);
+        `internal_forces` is F(x), if computed before. None with too many retained unknowns, or if
+        the eliminated block is singular; InputError if numbers overflow.
         """
-        body = self.whole.body
+        body = self.whole_problem.body
         if not 0 < self._schur.size <= min(LARGEST, body.layout.unknowns - 1):
             return None
         if not self._kind or not (reuse or (body.linear and kind == self._kind)):
-            self._factorise(kind, state if secant_at is None else replace(state, x=secant_at))
+            self._factorise(kind, state)
         if internal_forces is None:
-            internal_forces = body.internal_forces(state, secant_at)
+            internal_forces = body.secant_forces(state)
         residual = internal_forces - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
         if not self._regular:
             return None
         reactions = body.norms(body.reactions(residual))
         acting = body.load_norms(state.time) + reactions + body.coupling_norms(state)
+        forces = self._condense(residual, acting)
+        if not np.isfinite(forces).all():
+            return None
+        free, inclined = body.layout.at(self.nodes)
+        nodes = self.whole_problem.interface.nodes
+        others = body.nodal(state.x)[self.nodes[nodes.nodes.size :]]
+        condensed_body = CondensedEquilibrium(
+            comm=body.comm,
+            dim=body.dim,
+            free=free,
+            rows=self._rows,
+            stiffness=self._stiffness,
+            residual=forces,
+            x_0=np.concatenate([nodes.jump(state.x), others]).ravel(),
+            own=self._own,
+            acting=acting,
+            component_norms=body.component_norms.at(self.nodes),
+            inclined=inclined,
+        )
+        return CondensedProblem(
+            condensed_body, self._interface, self.whole_problem.scales, state.time
+        )
+
+    def _condense(self, residual: Array, acting: Array) -> Array:
+        """Return the residual condensed onto the retained unknowns, `acting` its scale. Collective.
+
+        The right-hand sides of the eliminated unknowns and of q are kept for `expand`.
+        """
+        body = self.whole_problem.body
         restricted = self._constraint.restrict(-residual)
         self._rhs = body.layout.mask(restricted[: body.owned])
         # With loads along those before, nothing but rounding is left at the eliminated unknowns.
@@ -282,33 +300,14 @@ class Condensation:
             retained = self._schur.condense(self._rhs, np.zeros(body.owned))
         inside = summed(body.comm, self._bordered.responses.T @ self._rhs)
         self._on_q = restricted[body.owned :][self._free] - inside
-        forces = self._border.T @ (self._bordered.inverse @ self._on_q) - retained
-        if not np.isfinite(forces).all():
-            return None
-        free, inclined = body.layout.at(self.nodes)
-        nodes = self.whole.interface.nodes
-        others = body.nodal(state.x)[self.nodes[nodes.nodes.size :]]
-        condensed = CondensedBody(
-            body.comm,
-            body.dim,
-            free,
-            self._rows,
-            self._stiffness,
-            forces,
-            np.concatenate([nodes.jump(state.x), others]).ravel(),
-            self._own,
-            acting,
-            body.component_norms.at(self.nodes),
-            inclined,
-        )
-        return CondensedProblem(condensed, self._interface, self.whole.scales, state.time)
+        return np.asarray(self._border.T @ (self._bordered.inverse @ self._on_q) - retained)
 
     def stiffness(self, state: State) -> Array | None:
         """Return the Schur complement, on the first rank; None with too many rows, or if singular.
 
         Of the last linearisation, or else the tangent at a state. Collective.
         """
-        if not 0 < self._schur.size <= min(LARGEST, self.whole.body.layout.unknowns - 1):
+        if not 0 < self._schur.size <= min(LARGEST, self.whole_problem.body.layout.unknowns - 1):
             return None
         if not self._kind:
             self._factorise("tangent", state)
@@ -316,7 +315,7 @@ class Condensation:
 
     def _factorise(self, kind: str, state: State) -> None:
         """Factorise at a state, and eliminate q from the Schur complement. Collective."""
-        body, schur = self.whole.body, self._schur
+        body, schur = self.whole_problem.body, self._schur
         self._rows = np.zeros((0, 0))
         self._stiffness = DenseStiffness(self._rows)  # room for a new one
         # LDL^T needs (K + K^T)/2, with which Newton's method converges linearly.
@@ -347,7 +346,7 @@ class Condensation:
 
     def _scattered(self, stiffness: Array) -> Array:
         """Scatter the rows of a matrix on the first rank. Collective."""
-        comm, own = self.whole.comm, self._own
+        comm, own = self.whole_problem.comm, self._own
         every = comm.gather(own)
         if comm.rank > 0:
             rows = np.empty((own.stop - own.start, self._schur.size))
@@ -357,14 +356,14 @@ class Condensation:
             comm.Send(np.ascontiguousarray(stiffness[other]), rank)
         return stiffness[own]
 
-    def expand(self, condensed: CondensedProblem, x: Array) -> Array:
+    def expand(self, condensed_problem: CondensedProblem, x: Array) -> Array:
         """Return the increment of the whole body's owned unknowns. Collective.
 
         Given the solution x of the condensed problem that `linearise` returned last.
         """
         self.counters.linear_solves += 1
         self.counters.linear_iterations += 1
-        retained = np.concatenate(self.whole.comm.allgather(x - condensed.body.x_0))
+        retained = np.concatenate(self.whole_problem.comm.allgather(x - condensed_problem.body.x_0))
         q = np.zeros(self._constraint.free.size)
         q[self._free] = self._bordered.inverse @ (self._on_q - self._border @ retained)
         rhs = self._rhs - self._bulk.columns @ q

@@ -346,14 +346,8 @@ def before_transposed(
 ) -> History:
     """Return (dH/dh)^T g - (dG/dh)^T w. Collective.
 
-    Parameters
-    ----------
-    linearised
-        The equations of the step.
-    along, conditions
-        Derivatives by the internal forces on the owned unknowns, and adjoint of the conditions.
-    after
-        g, the derivatives by h'; None for the last step.
+    w is given as `along`, by the internal forces on the owned unknowns, and `conditions`; g are the
+    derivatives by h' `after` the step, None for the last one.
     """
     problem, state = linearised.problem, linearised.state
     jump = np.einsum("nji,nj->ni", linearised.by_slip, conditions)

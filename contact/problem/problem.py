@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -54,18 +53,7 @@ def approached(
     """Return unknowns with each free foundation moved by its force to where it first touches.
 
     Where it touches nothing, nothing resists its force: the first linear system would be singular.
-    Collective.
-
-    Parameters
-    ----------
-    interface
-        The contact nodes with their gaps.
-    x
-        Local unknowns, the global ones behind them.
-    global_unknowns
-        The global unknowns.
-    time
-        When: forces are those of this time.
+    Given local unknowns, and the time of the forces. Collective.
     """
     nodes, forces = interface.nodes, global_unknowns.forces(time)
     for member in global_unknowns.members:
@@ -210,11 +198,9 @@ class ContactProblem:
         -------
         The problem of the step; its forms and its interface's nodes are shared.
         """
-        step = copy(self)
-        step.time, step.since = time, since
-        step.history = (history or self.initial) if history is not None else self.history
-        step.interface = self.interface.at(time, step.slip_history)
-        return step
+        history = self.history if history is None else history or self.initial
+        step = self._with(time=time, since=since, history=history)
+        return step.with_interface(self.interface.at(time, step.slip_history))
 
     @property
     def slip_history(self) -> SlipHistory:
@@ -228,16 +214,19 @@ class ContactProblem:
 
         The contact nodes, the history and the time are the same. Collective.
         """
-        other = copy(self)
-        other.geometries = tuple(geometries)
+        other = self._with(geometries=tuple(geometries))
         return other.with_interface(other._interface().at(self.time, self.slip_history))
 
     def with_interface(self, interface: Interface) -> ContactProblem:
         """Return the problem with another interface; its constraint is that of its nodes."""
-        other = copy(self)
-        if interface.nodes is not self.nodes:
-            other.__dict__.pop("constraint", None)
-        other.interface = interface
+        return self._with(interface=interface)
+
+    def _with(self, **changes: object) -> ContactProblem:
+        """Return the problem with other attributes, and none of the cached properties."""
+        of = type(self)
+        cached = {name for name, value in vars(of).items() if isinstance(value, cached_property)}
+        other = object.__new__(of)
+        vars(other).update({k: v for k, v in vars(self).items() if k not in cached} | changes)
         return other
 
     def commit(self, state: State) -> History:
@@ -288,27 +277,27 @@ class ContactProblem:
         stiffness = young / self.domain.size
         conductors = [contact.conductor for contact in self.contacts]
         law = FoundationLaw(
-            nodes,
-            joined_layers([contact.compliant_layer for contact in self.contacts], geometries),
-            joined_conductors(conductors, [geometry.nodes for geometry in geometries]),
-            body.phi_scale,
-            stiffness,
+            nodes=nodes,
+            layer=joined_layers([contact.compliant_layer for contact in self.contacts], geometries),
+            conductor=joined_conductors(conductors, [geometry.nodes for geometry in geometries]),
+            phi_scale=body.phi_scale,
+            c_0=stiffness,
         )
         frictions = [contact.friction or Friction() for contact in self.contacts]
         facets = [self.domain.facets(contact.on) for contact in self.contacts]
         return Interface(
-            nodes,
-            law.signorini_gap,
-            law,
-            joined_friction(frictions, geometries, nodes),
-            joined_fixed_conducting(
+            nodes=nodes,
+            gap=law.signorini_gap,
+            foundation=law,
+            friction=joined_friction(frictions, geometries, nodes),
+            fixed_conducting=joined_fixed_conducting(
                 conductors, geometries, law, body.layout.index_map.local_range[0]
             ),
-            stiffness,
-            self.domain.size,
-            max(elongation(self.domain.mesh, own) for own in facets),
-            body.component_norms.component[nodes.nodes],
-            body.component_norms.count,
+            c_0=stiffness,
+            size=self.domain.size,
+            elongation=max(elongation(self.domain.mesh, own) for own in facets),
+            component=body.component_norms.component[nodes.nodes],
+            components=body.component_norms.count,
         )
 
     def _check_cuts(self) -> None:

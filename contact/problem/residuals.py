@@ -127,12 +127,7 @@ class EvaluatedState:
     internal: Array
 
 
-def residual_forces(
-    problem: AnyProblem,
-    state: State,
-    secant_at: Array | None = None,
-    internal: Array | None = None,
-) -> Array:
+def residual_forces(problem: AnyProblem, state: State, internal: Array | None = None) -> Array:
     """Return G(x, lambda) = F(x) - f + T^T W lambda on the owned unknowns. Collective.
 
     The residual r of the body with contact: lambda includes layer and charge, as in (15) of
@@ -142,14 +137,12 @@ def residual_forces(
     ----------
     problem, state
         The problem and its state.
-    secant_at
-        Unknowns of the secant modulus; those of the state by default.
     internal
-        Internal forces F(x), if known.
+        Internal forces F(x); those of the material law by default.
     """
     body = problem.body
     if internal is None:
-        internal = body.internal_forces(state, secant_at)
+        internal = body.internal_forces(state)
     residual = internal - body.external(state.time)
     problem.interface.add_forces(residual, state.x, state.forces)
     return residual
@@ -313,7 +306,17 @@ class Balance:
         """Return the balance of the reference configuration."""
         x = problem.body.zero_displacement()
         zero = np.zeros_like(problem.body.owned_part(x))
-        return Balance(0.0, 0.0, 0.0, None, 0.0, 0.0, x, zero, zero)
+        return Balance(
+            work=0.0,
+            energy=0.0,
+            dissipation=0.0,
+            plastic=None,
+            enthalpy=0.0,
+            stated=0.0,
+            x=x,
+            given=zero,
+            internal=zero,
+        )
 
 
 def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]:
@@ -388,12 +391,17 @@ def balance(problem: ContactProblem, state: State, before: Balance) -> Balance:
         0.5 * (given + before.given) * (x - x_before),
         -0.5 * (x + x_before) * (given - before.given),
     )
-    charged = body.product(np.where(mechanical, 0.0, x), internal)
-    dissipation = dissipated(problem, state)
-    done = body.product(work, np.ones_like(work))
-    flow = plastic if body.laws.initial is not None else None
-    energies = done, enthalpy - charged, dissipation, flow, enthalpy, stored or 0.0
-    return Balance(*energies, state.x, given, internal)
+    return Balance(
+        work=body.product(work, np.ones_like(work)),
+        energy=enthalpy - body.product(np.where(mechanical, 0.0, x), internal),
+        dissipation=dissipated(problem, state),
+        plastic=plastic if body.laws.initial is not None else None,
+        enthalpy=enthalpy,
+        stated=stored or 0.0,
+        x=state.x,
+        given=given,
+        internal=internal,
+    )
 
 
 def undeformed_equilibrium(problem: AnyProblem, tolerance: float) -> EvaluatedState | None:

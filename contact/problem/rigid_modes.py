@@ -234,24 +234,32 @@ def _group(
             joints[:, :, len(names)] = pieces.normals[:, :, pieces.places.index(k)]
         names.append(name)
         axes.append(axis)
-    # Relative to supports, to rigid parts that nodes follow, and to the other side of a cut.
-    nodes = body.layout.restrained
-    dofs = nodes[:, None] * body.block_size + np.arange(d)
-    follows = global_unknowns.ties[dofs.ravel()] @ moved[body.owned :]
-    nodal = motions[nodes, :d] - follows.reshape(nodes.size, d, many)
-    fixed = nodal - np.einsum("nij,njk->nik", body.movable(nodes), nodal)
+    supports = _gram(problem, _at_supports(problem, moved))
     return Group(
-        problem,
-        component,
-        count,
-        components,
-        moved,
-        names,
-        np.array(axes),
-        np.array(centres),
-        _gram(problem, fixed) + _elastic_gram(problem, moved) + _gram(problem, joints),
-        pieces is not None,
+        problem=problem,
+        component=component,
+        count=count,
+        components=components,
+        moved=moved,
+        names=names,
+        axes=np.array(axes),
+        centres=np.array(centres),
+        supports=supports + _elastic_gram(problem, moved) + _gram(problem, joints),
+        cut=pieces is not None,
     )
+
+
+def _at_supports(problem: ContactProblem, moved: Array) -> Array:
+    """Return the modes at the nodes of supports, along fixed directions, shape (n, d, m).
+
+    Relative to the rigid parts that nodes follow.
+    """
+    body, nodes, m = problem.body, problem.body.layout.restrained, moved.shape[1]
+    motions = moved[: body.owned].reshape(*body.free.shape, m)[nodes, : body.dim]
+    dofs = nodes[:, None] * body.block_size + np.arange(body.dim)
+    follows = body.global_unknowns.ties[dofs.ravel()] @ moved[body.owned :]
+    nodal = motions - follows.reshape(motions.shape)
+    return nodal - np.einsum("nij,njk->nik", body.movable(nodes), nodal)
 
 
 def _elastic_gram(problem: ContactProblem, moved: Array) -> Array:
@@ -273,7 +281,7 @@ def _elastic_gram(problem: ContactProblem, moved: Array) -> Array:
     return np.asarray(gram / max(float(np.diag(gram).max()), np.finfo(float).tiny))
 
 
-def described(motions: Array, names: list[str]) -> str:
+def mode_names(motions: Array, names: list[str]) -> str:
     """Name the modes that a space of rigid motions contains, else those that it combines."""
     share = np.linalg.norm(motions, axis=1)
     contained, combined = (
@@ -419,7 +427,7 @@ class UnilateralSupport:
         from scipy.optimize import linprog  # takes a while to load
         from scipy.sparse import block_array, eye_array
 
-        def released(bound: Array, margin: float) -> tuple[Array, Array] | None:
+        def most_powerful(bound: Array, margin: float) -> tuple[Array, Array] | None:
             """Return mode and resistance of each node; None where all is balanced."""
             finite = np.isfinite(bound)
             rigid, yielding = self.cone[:, ~finite].reshape(-1, work.size), self.cone[:, finite]
@@ -435,11 +443,11 @@ class UnilateralSupport:
             return found.x[: work.size], resisted
 
         # On rigid parts in place of the layers first: no larger limit helps there.
-        found = released(np.where(self.normal, np.inf, self.bound), 0.0)
+        found = most_powerful(np.where(self.normal, np.inf, self.bound), 0.0)
         saturated = found is None and bool(np.isfinite(self.bound[self.normal]).any())
         if saturated:
             # With the whole layer at its limit the position of a body is undetermined.
-            found = released(self.bound, 2 * BALANCED)
+            found = most_powerful(self.bound, 2 * BALANCED)
         if found is None:
             return None
         motion, resisted = found
@@ -455,17 +463,10 @@ def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
     return [support for support in found if support is not None]
 
 
-def released(supports: Sequence[UnilateralSupport], begin: float, end: float) -> str:
+def release_message(supports: Sequence[UnilateralSupport], begin: float, end: float) -> str:
     """Say when and how loads up to a time release the first body; "" if they do not. Collective.
 
-    The time is found by bisection: a release that passes before the end is not seen.
-
-    Parameters
-    ----------
-    supports
-        The unilateral supports.
-    begin, end
-        A time of equilibrium, and the time of the loads.
+    From a time of equilibrium on, by bisection: a release that passes before the end is not seen.
     """
     earliest = None
     for support in supports:
@@ -486,14 +487,7 @@ def released(supports: Sequence[UnilateralSupport], begin: float, end: float) ->
 def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
     """Return the mode, shape (m,), by which the loads of a time slide a group; None if balanced.
 
-    Collective.
-
-    Parameters
-    ----------
-    group, time
-        The bodies, and the time.
-    friction
-        Bounds of the friction forces at the nodes of this rank, shape (n,) (force).
+    By bounds of the friction forces at the nodes of this rank, shape (n,) (force). Collective.
     """
     problem, free = group.problem, null_space(group.supports)
     if free.shape[1] == 0:
@@ -518,16 +512,9 @@ def sliding_mode(group: Group, time: float, friction: Array) -> Array | None:
 
 
 def missing_pressure(group: Group, time: float, pressing: Array) -> float:
-    """Return the share by which contact forces miss the loads of a time without slip. Collective.
+    """Return the relative imbalance of loads and contact forces on rigid motions without slip.
 
-    On rigid motions that no friction resists.
-
-    Parameters
-    ----------
-    group, time
-        The bodies, and the time.
-    pressing
-        Contact forces at the nodes of this rank, shape (n,) (force).
+    `pressing`: normal contact forces at the nodes of this rank, shape (n,) (force). Collective.
     """
     problem, free = group.problem, null_space(group.supports)
     work, scale = _work(group, free, time)

@@ -29,6 +29,9 @@ class State:
         Active set of the last Newton step; None without one.
     layer_pressure
         Pressure of the linearised layer after that step, shape (n,); None for the law's.
+    secant_at
+        Of an initial guess: unknowns x* of the first secant modulus g(eps(x*)). None for x, where
+        prescribed values that have changed strain the cells at the support alone: too soft.
     """
 
     x: Array
@@ -37,11 +40,17 @@ class State:
     history: History = field(default_factory=History)
     active_set: ActiveSet | None = None
     layer_pressure: Array | None = None
+    secant_at: Array | None = None
 
     def __post_init__(self) -> None:
         """Mark the arrays as read-only."""
         for array in (self.x, self.forces.contact, self.forces.friction):
             array.flags.writeable = False
+
+    @property
+    def near(self) -> bool:
+        """Whether the solution is taken to be near: the first linearisation is the tangent."""
+        return self.active_set is not None and self.secant_at is None
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
     Group,
     UnilateralSupport,
-    described,
     groups,
     middle,
+    mode_names,
     null_space,
     sliding_mode,
 )
@@ -189,7 +189,7 @@ def unresisted_motions(solution: Solution) -> Iterator[Remark]:
         share, motion = shares[0], motions[:, 0]
         # All that cost nothing, or the one that costs least.
         motions = linalg.orth(motions[:, : max(1, np.count_nonzero(shares < EPS))])
-        words, name = described(motions, group.names), _named(group, motions)
+        words, name = mode_names(motions, group.names), _named(group, motions)
         if share < EPS:
             yield (
                 f"nothing holds {name} against rigid motions ({words}): of all places the one with "

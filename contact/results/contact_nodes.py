@@ -349,17 +349,17 @@ def contact_shares(
         stick, slides = (nodes.sum(own & (status == name)) for name in ("stick", "slip"))
         area = stick + slides
         found[contact.name or contact.on] = ContactShare(
-            problem,
-            state,
-            own,
-            total.force,
-            total.moment,
-            area,
-            nodes.maximum(np.where(own, pressure, 0.0)),
-            nodes.sum(np.where(own, pressure, 0.0)) / area if area > 0 else 0.0,
-            stick / area if area > 0 else 0.0,
-            slides / area if area > 0 else 0.0,
-            dissipated(problem, state, own),
+            problem=problem,
+            state=state,
+            own=own,
+            force=total.force,
+            moment=total.moment,
+            area=area,
+            max_pressure=nodes.maximum(np.where(own, pressure, 0.0)),
+            mean_pressure=nodes.sum(np.where(own, pressure, 0.0)) / area if area > 0 else 0.0,
+            stick=stick / area if area > 0 else 0.0,
+            slip=slides / area if area > 0 else 0.0,
+            dissipation=dissipated(problem, state, own),
         )
     return found
 

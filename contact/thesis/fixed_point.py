@@ -216,9 +216,7 @@ class FixedPoint(OuterLoop):
         solver = "many" if self.options.linear == "auto" else self.options.linear
         return self.problem.operator(symmetric=symmetric, counters=self.counters, solver=solver)
 
-    def solve(
-        self, start: State | None = None, secant_at: Array | None = None
-    ) -> tuple[State, Outcome]:
+    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit; see `Method`. Collective."""
         self._stalled, self._residual = False, np.inf
         self._gap_derivative = ConductivityDerivative(NEAR)
@@ -228,7 +226,7 @@ class FixedPoint(OuterLoop):
         frictional = interface.friction.acts
         if start is None:
             # Secant at zero strain: prescribed values so far strain only the elements beside them.
-            self.state, self._secant_at = problem.start(), problem.body.zero_displacement()
+            self.state = replace(problem.start(), secant_at=problem.body.zero_displacement())
             stuck = sticking_bound(problem)
             # Iteration 0 is the frictionless problem of the thesis: not with single_loop, nor where
             # friction alone constrains a rigid-body mode.
@@ -237,7 +235,6 @@ class FixedPoint(OuterLoop):
             self.bound = np.zeros(interface.nodes.gap.size) if stuck is None else stuck
         else:
             self.state, first = start, 1
-            self._secant_at = start.x if secant_at is None else secant_at
             jump, pressure = interface.nodes.jump(start.x), start.forces.contact
             if interface.foundation.normal_graph(jump) is not None:
                 pressure = interface.pressure(jump, start.forces)
@@ -267,10 +264,9 @@ class FixedPoint(OuterLoop):
             blocks = blocks + self._charge_block(jump, interface.pressure(jump, state.forces))
         # At zero strain the tangent is the secant.
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
-        linearised_at = self._secant_at if kind == "secant" else state.x
         weighted = interface.weighted(blocks, state.x)
-        self.operator.update(kind, replace(state, x=linearised_at), weighted)
-        frozen = FrozenProblem(problem, state, self._secant_at, friction, self.r)
+        self.operator.update(kind, state, weighted)
+        frozen = FrozenProblem(problem, state, friction, self.r)
         result = uzawa_block_relaxation(
             frozen,
             self.operator,
@@ -282,8 +278,8 @@ class FixedPoint(OuterLoop):
         )
         self._stalled = result.stalled and not self._gap_derivative.included
         x = body.updated(state.x, result.increment)
-        self.state, self._z = replace(state, x=x, forces=result.forces), result.z
-        self._secant_at = x
+        self.state = replace(state, x=x, forces=result.forces, secant_at=None)
+        self._z = result.z
         return result.iterations, "tangent" if kind == "tangent" else ""
 
     def _fit_to_softest_mode(self, friction: bool) -> None:
@@ -294,7 +290,8 @@ class FixedPoint(OuterLoop):
         r = fitted_augmentation(problem, self._new_operator(symmetric=True), start)
         self._fitted = r is not None
         if r is not None:
-            self.r, self.state, self._secant_at = r, start, problem.body.zero_displacement()
+            self.r = r
+            self.state = replace(start, secant_at=problem.body.zero_displacement())
             self.bound = self._first_bound
             self._z = self._initial_z(0.0, friction)
 

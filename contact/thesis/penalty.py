@@ -281,7 +281,7 @@ class PenalisedProblem:
         body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
         jump = nodes.jump(x)
         secant_at = None if self._implicit else self._state.x
-        values = body.internal_forces(replace(self._state, x=x), secant_at)
+        values = body.secant_forces(replace(self._state, x=x, secant_at=secant_at))
         values = values - body.external(self._state.time)
         nodes.add_jump_transposed(
             nodes.weight[:, None] * self._law.forces(jump).vectors(nodes), values
@@ -362,14 +362,12 @@ class Penalty(OuterLoop):
         for solver in self._solvers.values():
             solver.set_load_step(problem, self._eps)
 
-    def solve(
-        self, start: State | None = None, secant_at: Array | None = None
-    ) -> tuple[State, Outcome]:
+    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit; see `Method`. Collective.
 
         Small eps may need the solution of a larger one as initial guess.
         """
-        self.state = self.problem.start() if start is None else start
+        self.state = replace(start or self.problem.start(), secant_at=None)
         self.bound = np.zeros_like(self.bound)
         self._implicit = start is not None and self.options.material_step != "secant"
         self._failed = False

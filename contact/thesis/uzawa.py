@@ -137,8 +137,6 @@ class FrozenProblem:
     ----------
     problem, state
         The problem, and the iterate u_n at which layer, charge and geometry are frozen.
-    secant_at
-        Unknowns of the secant modulus.
     friction
         Whether there is friction.
     r
@@ -147,7 +145,6 @@ class FrozenProblem:
 
     problem: ContactProblem
     state: State
-    secant_at: Array
     friction: bool
     r: float
 
@@ -179,7 +176,8 @@ class FrozenProblem:
     @cached_property
     def _load(self) -> Array:
         """Loads minus internal forces at u_n, on the owned unknowns. Collective."""
-        residual = residual_forces(self.problem, self.state, self.secant_at)
+        internal = self.problem.body.secant_forces(self.state)
+        residual = residual_forces(self.problem, self.state, internal)
         contact = self.state.forces.vectors(self.nodes)
         if self.layer is not None:
             pressure = self.interface.foundation.layer_pressure(self.jump_0)
@@ -226,6 +224,13 @@ class FrozenProblem:
         normal = slope[:, None, None] * directions[:, :1]
         tangential = disc_derivative(z[:, 1:], bound, directions[:, 1:])
         return np.concatenate([normal, tangential], axis=1)
+
+    def multipliers(self, jump: Array, stress: Array) -> Multipliers:
+        """Return lambda_c and lambda_f of a contact stress: without the pressure of the layer."""
+        contact = stress[:, 0]
+        if self.layer is not None:
+            contact = contact - self.layer.layer_pressure(self.nodes.normal_component(jump))
+        return Multipliers.of(self.nodes, contact, stress[:, 1:])
 
     def auxiliary(self, z: Array, bound: Array) -> Array:
         """Return phi of Step 2, (3.44)."""
@@ -323,10 +328,7 @@ def uzawa_block_relaxation(
         stress = 2 * multipliers - z + r_u
         if iteration == 1:
             stress_unit = interface.component_norms(stress)
-        layer: Array | float = 0.0
-        if frozen.layer is not None:
-            layer = frozen.layer.layer_pressure(nodes.normal_component(jump))
-        forces = Multipliers.of(nodes, stress[:, 0] - layer, stress[:, 1:])
+        forces = frozen.multipliers(jump, stress)
         if options.single_loop and frozen.friction:
             bound = interface.bound(jump, forces)
         residual = float(interface_residuals(interface, jump, forces, bound)[0].max())

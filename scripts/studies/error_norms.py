@@ -199,7 +199,7 @@ class DualNorm:
     def displacement(self, x: Array, other: Array) -> float:
         """Return |u - v|_V of local unknowns, the energy of the linear body. Collective."""
         body = self.problem.body
-        forces = (body.internal_forces(BodyState(y), self._rest) for y in (x, other))
+        forces = (body.secant_forces(BodyState(y, secant_at=self._rest)) for y in (x, other))
         difference = (x - other)[: body.owned]
         free = np.where(body.free.ravel(), np.subtract(*forces), 0.0)
         return self._root(free, difference)

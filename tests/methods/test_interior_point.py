@@ -60,7 +60,7 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     state, outcome = Newton(problem, NewtonOptions()).solve()
     assert outcome.converged
     method = Newton(problem, NewtonOptions(condense=False))
-    found, outcome = interior_point(method.whole)
+    found, outcome = interior_point(method.semismooth)
     assert outcome.converged, outcome.reason
     assert close(found, state, rtol=1e-6, atol=1e-9)
 
@@ -68,7 +68,7 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
 def test_a_singular_matrix_in_the_last_steps_leaves_another_bound():
     """It ended the solve, though with the next friction bound there is a solution."""
     problem = mechanics.bar(SELF, 8, -0.05, friction=COULOMB)
-    newton = Newton(problem, NewtonOptions(condense=False)).whole
+    newton = Newton(problem, NewtonOptions(condense=False)).semismooth
     iterate, failed = newton.iterate, []
 
     def finish(state, **given):
@@ -86,7 +86,7 @@ def test_a_singular_matrix_in_the_last_steps_leaves_another_bound():
 def test_too_little_memory_in_an_interior_point_is_said(monkeypatch):
     """It counted as the end of its digits."""
     problem = mechanics.bar(SELF, 8, -0.05, friction=COULOMB)
-    newton = Newton(problem, NewtonOptions(condense=False)).whole
+    newton = Newton(problem, NewtonOptions(condense=False)).semismooth
     begin = newton.step.without_contact(problem, problem.start())
 
     def exhausted(self):
@@ -121,7 +121,7 @@ def interior(
     """Solve by the interior point; tell also whether Newton's method finds the same."""
     problem = build_problem(parse_case(case), SELF)
     state, _ = Newton(problem, NewtonOptions()).solve()
-    newton = Newton(problem, NewtonOptions(condense=False, linear=linear)).whole
+    newton = Newton(problem, NewtonOptions(condense=False, linear=linear)).semismooth
     supported = newton.modes.constrained_by_supports
     begin = newton.step.without_contact(problem, problem.start()) if supported else None
     found, outcome = interior_point(newton, begin)
@@ -156,7 +156,7 @@ def test_an_interior_point_with_friction_on_a_layer(kind, rigid):
     slips = interface.slip_length(nodal) > 1e-6
     assert (slips & (layer > 0)).any()
     assert (problem.nodes.maximum(state.forces.contact) > 0) == rigid
-    newton = Newton(problem, NewtonOptions(condense=False)).whole
+    newton = Newton(problem, NewtonOptions(condense=False)).semismooth
     begin = newton.step.without_contact(problem, problem.start())
     method = InteriorPoint(newton, bound, begin)
     ended = method.iterate().ended

@@ -168,7 +168,7 @@ def test_the_iterative_solver_finds_the_same_solution():
     direct, iterative = mechanics.leaning_block(SELF, 4), mechanics.leaning_block(SELF, 4)
     exact = newton(direct, linear="lu")
     method = newton(iterative, linear="iterative")
-    assert method.whole.step.operator.iterative
+    assert method.semismooth.step.operator.iterative
     assert np.allclose(exact.state.x, method.state.x, rtol=0, atol=1e-9)
 
 

@@ -158,16 +158,16 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
         entries.append(_master_entries(points, phi, basis.nodes, master))
     rows, columns, values = (np.concatenate(part) for part in zip(*entries, strict=True))
     return Parts(
-        slave.nodes,
-        basis.nodes,
-        d_matrix,
-        whole,
-        basis.functions @ normal,
-        whole[:, :, None] * slave.normal[:, None, :],
-        gap[:, :, :, None] * direction[:, None, None, :],
-        rows,
-        columns,
-        values,
+        nodes=slave.nodes,
+        dual_nodes=basis.nodes,
+        D=d_matrix,
+        whole=whole,
+        normal=basis.functions @ normal,
+        open_normal=whole[:, :, None] * slave.normal[:, None, :],
+        gap=gap[:, :, :, None] * direction[:, None, None, :],
+        rows=rows,
+        columns=columns,
+        values=values,
         depths=np.max([np.full(slave.count, -np.inf), *(p.depth for p in found)], axis=0),
     )
 

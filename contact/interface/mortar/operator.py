@@ -135,7 +135,16 @@ def coupling_operator(
     none = np.zeros(0, dtype=np.intp)
     between = comm.allreduce(any(rows.masters.size for rows in given), op=MPI.LOR)
     taken = np.flatnonzero(halo.reverse(taking)[:, 0])
-    operator = CouplingOperator(halo, jumps, change, numbers, between, taken, none, none)
+    operator = CouplingOperator(
+        halo=halo,
+        jumps=jumps,
+        change=change,
+        numbers=numbers,
+        between=between,
+        local=taken,
+        places=none,
+        own=none,
+    )
     return operator.at(named)
 
 

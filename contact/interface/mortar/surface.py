@@ -395,7 +395,15 @@ def straight_surface(domain: Domain, space: fem.FunctionSpace, facets: Indices) 
     normal = unit_normals(shape.facet, points, x.mean(axis=1))
     owners, none = Owners.of(space.dofmap.index_map, domain.comm), np.zeros((len(facets), 0))
     return Surface(
-        names, points, normal, none, none, degree, domain.revolved, domain.levels, owners
+        nodes=names,
+        points=points,
+        normal=normal,
+        deviation=none,
+        unknown=none,
+        degree=degree,
+        revolved=domain.revolved,
+        levels=domain.levels,
+        owners=owners,
     )
 
 

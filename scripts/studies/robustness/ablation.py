@@ -194,7 +194,7 @@ DEVICES = {
     "limit analysis of the friction bound": _off(UnconstrainedModes, "overloaded", _never, "wall"),
     "rigid motion to a state without contact": _off(fallbacks, "rigid_motion", own="pads"),
     # Guyan 1965
-    "steps on the condensed body at last": _off(fallbacks, "condensed_body"),
+    "steps on the condensed body at last": _off(fallbacks, "on_condensed_body"),
     "secants of a layer": _off(fallbacks, "layer_secants", own="layer"),
     "proximal points": _off(fallbacks, "proximal_points", own="belt"),
     "continuation in the conductivity": _off(fallbacks, "conductivity_continuation"),
