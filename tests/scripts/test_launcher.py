@@ -54,9 +54,10 @@ def test_ranks_of_mpich_that_wait_give_way(launcher):
     launcher.fake("python3")
     launcher.fake("mpirun", "echo 'HYDRA build details:'")
     count = "MPIR_CVAR_CH4_PROGRESS_THROTTLE_NO_PROGRESS_COUNT"
-    words = ["sh", "-c", f"echo $MPIR_CVAR_CH4_PROGRESS_THROTTLE ${count}"]
-    assert launcher.run(*words)[1] == "1 1\n"
-    assert launcher.run(*words, **{count: "9"})[1] == "1 9\n"
+    variables = f"$MPIR_CVAR_CH4_PROGRESS_THROTTLE ${count} $MPIR_CVAR_ENABLE_HEAVY_YIELD"
+    words = ["sh", "-c", f"echo {variables}"]
+    assert launcher.run(*words)[1] == "1 100 1\n"
+    assert launcher.run(*words, **{count: "9"})[1] == "1 9 1\n"
 
 
 @pytest.mark.parametrize(
