@@ -73,7 +73,7 @@ def test_where_nothing_touches_is_no_solution(beside):
     pressed_nodes = problem.nodes.points[:, 0] < 1.5
     forces = replace(
         state.forces,
-        pressure=np.where(pressed_nodes, state.forces.contact, 0.0),
+        contact=np.where(pressed_nodes, state.forces.contact, 0.0),
         friction=state.forces.friction * pressed_nodes[:, None],
     )
     assert evaluate(problem, state).largest < 1e-8
