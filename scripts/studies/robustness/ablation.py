@@ -118,8 +118,8 @@ OWN: dict[str, Callable[[], Problem | Case | Tables]] = {
     "layer": layer,
     # A belt that friction alone holds.
     "belt": partial(drawn, "held", "belt-1"),
-    # A wedge between two planes, whose bounds by interior points alone take far longer.
-    "wedge": partial(drawn, "bodies", "wedges-21"),
+    # A ring on planes, whose friction bounds by interior points alone take longer.
+    "ring": partial(drawn, "bodies", "rings-26"),
     "finer block-33": partial(drawn, "plain", "block-33", cells=[24, 12, 12]),
     "finer bar-67": partial(drawn, "plain", "bar-67", cells=[640, 160]),
     "wall": partial(wall, 2, 1.01),
@@ -190,7 +190,7 @@ def _never(*_: Any) -> bool:
 DEVICES = {
     "interior point": _off(fallbacks, "interior_point", _no_fallback),
     "updates of the friction bound": _off(interior_point, "UPDATES", 1),
-    "friction bound of Newton's last steps": _off(interior_point, "PROGRESS", 0.0, "wedge"),
+    "friction bound of Newton's last steps": _off(interior_point, "PROGRESS", 0.0, "ring"),
     "limit analysis of the friction bound": _off(UnconstrainedModes, "overloaded", _never, "wall"),
     "rigid motion to a state without contact": _off(fallbacks, "rigid_motion", own="pads"),
     # Guyan 1965
