@@ -35,7 +35,6 @@ from scripts.studies.robustness.one_body import Tables, case, clamp, elastic, gr
 from scripts.studies.robustness.problems import Problem, problems
 from scripts.thesis.tables_compliance import case_of
 from tests.methods.test_belt import wall
-from tests.methods.test_free_body import pads
 from tests.methods.test_nothing_touches import unloaded
 from tests.methods.test_slender import TIP, UNIFORM, beam
 
@@ -118,12 +117,9 @@ OWN: dict[str, Callable[[], Problem | Case | Tables]] = {
     "layer": layer,
     # A belt that friction alone holds.
     "belt": partial(drawn, "held", "belt-1"),
-    # A ring on planes, whose friction bounds by interior points alone take longer.
-    "ring": partial(drawn, "bodies", "rings-26"),
     "finer block-33": partial(drawn, "plain", "block-33", cells=[24, 12, 12]),
     "finer bar-67": partial(drawn, "plain", "bar-67", cells=[640, 160]),
     "wall": partial(wall, 2, 1.01),
-    "pads": lambda: pads(Path(tempfile.mkdtemp()), 1),
     "unloaded": partial(unloaded, "supports"),
     "conducting": partial(steep, (48, 8), "6.0", "8.3333"),
     "block-16": partial(bench_one.block, 16),
@@ -190,9 +186,7 @@ def _never(*_: Any) -> bool:
 DEVICES = {
     "interior point": _off(fallbacks, "interior_point", _no_fallback),
     "updates of the friction bound": _off(interior_point, "UPDATES", 1),
-    "friction bound of Newton's last steps": _off(interior_point, "PROGRESS", 0.0, "ring"),
     "limit analysis of the friction bound": _off(UnconstrainedModes, "overloaded", _never, "wall"),
-    "rigid motion to a state without contact": _off(fallbacks, "rigid_motion", own="pads"),
     # Guyan 1965
     "steps on the condensed body at last": _off(fallbacks, "on_condensed_body"),
     "secants of a layer": _off(fallbacks, "layer_secants", own="layer"),
