@@ -222,11 +222,11 @@ class ContactProblem:
         return self._with(interface=interface)
 
     def _with(self, **changes: object) -> ContactProblem:
-        """Return the problem with other attributes, and none of the cached properties."""
-        of = type(self)
-        cached = {name for name, value in vars(of).items() if isinstance(value, cached_property)}
-        other = object.__new__(of)
-        vars(other).update({k: v for k, v in vars(self).items() if k not in cached} | changes)
+        """Return the problem with other attributes; the constraint remains while its nodes do."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self) | changes)
+        if other.nodes is not self.nodes:
+            vars(other).pop("constraint", None)
         return other
 
     def commit(self, state: State) -> History:
