@@ -7,6 +7,7 @@
    - continuation in psi of the charge, of a condensed problem alone, from the initial guess
      `problem.start()`;
    - secants of a layer that saturates, from that guess;
+   - a rigid motion that separates the bodies, of a condensed problem alone;
    - proximal points, from that guess;
    - the interior point from that guess, its first slacks from the gaps of the linear solve;
    - steps on the condensed body, of a whole problem alone, from that guess.
@@ -44,8 +45,9 @@ from contact.interface.interface import Interface, Proximal
 from contact.methods.interior_point import interior_point
 from contact.methods.report import PROGRESS, Outcome
 from contact.methods.semismooth import SemismoothNewton
+from contact.methods.unconstrained_modes import RIGID_MOTION
 from contact.problem.condensed import CondensedProblem
-from contact.problem.residuals import evaluate
+from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
 from contact.ranks import summed
 
@@ -138,6 +140,7 @@ def fall_back(
         partial(working_set, newton, without_contact),
         partial(conductivity_continuation, newton),
         partial(layer_secants, newton),
+        partial(rigid_motion, newton, outcome),
         partial(proximal_points, newton),
         partial(interior_points, newton, without_contact, condensed_steps is not None),
         partial(on_condensed_body, newton, condensed_steps),
@@ -209,6 +212,29 @@ def on_condensed_body(newton: SemismoothNewton, condensed_steps: Stage | None) -
     found = condensed_steps(newton.problem.start())
     # The reason of the interior point says more, unless no steps are left.
     return found if found[1].converged or newton.steps_left <= 0 else None
+
+
+def rigid_motion(newton: SemismoothNewton, outcome: Outcome) -> End | None:
+    """Return a solution of a condensed body with all nodes open after a rigid motion, if any."""
+    problem = newton.problem
+    if outcome.converged or newton.modes.constrained_by_supports:
+        return None
+    if not isinstance(problem, CondensedProblem):
+        return None
+    state = newton.modes.separated(problem, newton.step)
+    if state is None:
+        return None
+    # No force acts there: relative to the forces at zero displacement.
+    body = problem.body
+    left, first = (
+        body.norm(body.unbalanced(residual_forces(problem, at))) for at in (state, problem.start())
+    )
+    equilibrium = left / first if first > 0 else 0.0
+    residuals = replace(evaluate(problem, state), equilibrium=equilibrium)
+    newton.recorder.record(residuals, RIGID_MOTION, inner=2)
+    newton.see(state, residuals)
+    outcome = Outcome(residuals, newton.options.allowed)
+    return (state, outcome) if outcome.converged else None
 
 
 def dual_active_set(newton: SemismoothNewton, state: State) -> State | None:

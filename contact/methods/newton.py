@@ -34,6 +34,7 @@ from contact.linear.operator import Counters
 from contact.methods.fallbacks import (
     CONTINUATION,
     PROXIMAL_POINT,
+    RIGID_MOTION,
     SECANT,
     WORKING_SET,
     solve_contact,
@@ -64,7 +65,7 @@ CONTACT_PART = 1e-3
 UNSOLVED = 0.05
 
 #: Notes of fallbacks on the condensed problem, repeated in the record of the whole one.
-FALLBACKS = WORKING_SET, CONTINUATION, SECANT, INTERIOR_POINT, PROXIMAL_POINT
+FALLBACKS = WORKING_SET, CONTINUATION, SECANT, RIGID_MOTION, INTERIOR_POINT, PROXIMAL_POINT
 
 #: Reason of an end without solution of a condensed contact problem.
 UNSOLVED_ON_CONTACT_NODES = "the condensed contact problem is not solved"

@@ -23,8 +23,9 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.multipliers import Multipliers
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.geometry import geometry_nodes, integration_weights
+from contact.methods.newton_step import NewtonStep
 from contact.methods.report import Outcome
-from contact.problem.condensed import AnyProblem, CondensedEquilibrium
+from contact.problem.condensed import AnyProblem, CondensedEquilibrium, CondensedProblem
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.rigid_modes import (
@@ -39,6 +40,9 @@ from contact.problem.state import State
 from contact.ranks import summed
 from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
+
+#: Note of a rigid motion to a state with all nodes open.
+RIGID_MOTION = "rigid motion"
 
 
 @dataclass(frozen=True)
@@ -122,6 +126,32 @@ class UnconstrainedModes:
     def _unsupported(self) -> list[Group]:
         """Groups of bodies with modes that their supports do not constrain."""
         return [group for group in groups(self.problem) if null_space(group.supports).size > 0]
+
+    def separated(self, problem: CondensedProblem, step: NewtonStep) -> State | None:
+        """Return a state with all nodes open after a rigid motion; None without one. Collective.
+
+        None too where the motion is more than 45 degrees off the normal: out of a wedge, in which
+        friction might constrain the body. A proximal term of sqrt(EPS) times the stiffness of a
+        node makes the system regular; a second step removes its forces.
+        """
+        nodes, start = problem.interface.nodes, problem.start()
+        blocks = np.zeros((nodes.nodes.size, nodes.block_size, nodes.block_size))
+        blocks[:] = np.sqrt(EPS) * step.parameters.nodal_stiffness * np.eye(nodes.block_size)
+        step.operator.update("secant", start, problem.interface.weighted(blocks, start.x))
+        state = start
+        for _ in range(2):  # each leaves an error of sqrt(EPS)
+            increment = step.operator.solve(-residual_forces(problem, state))
+            state = replace(state, x=problem.body.updated(state.x, increment))
+        found = self.free_motion(problem, state)
+        if found is None:
+            return None
+        further = found.columns @ (found.amounts - found.wanted)
+        way = nodes.maximum(np.linalg.norm(further, axis=1))
+        if not way**2 <= 2 * found.depth**2:  # more than 45 degrees off the normal
+            return None
+        moved = np.zeros((state.x.size // nodes.block_size, nodes.block_size))
+        moved[nodes.nodes, : nodes.dim] = found.columns @ found.amounts
+        return replace(state, x=state.x - moved.ravel())
 
     def free_motion(self, problem: AnyProblem, state: State) -> RigidMotion | None:
         """Return the unconstrained modes at a solution, of the whole or condensed problem.

@@ -120,6 +120,8 @@ OWN: dict[str, Callable[[], Problem | Case | Tables]] = {
     "finer block-33": partial(drawn, "plain", "block-33", cells=[24, 12, 12]),
     "finer bar-67": partial(drawn, "plain", "bar-67", cells=[640, 160]),
     "wall": partial(wall, 2, 1.01),
+    # Rings between plates, out of whose loads they roll.
+    "rings": partial(drawn, "bodies", "rings-23"),
     "unloaded": partial(unloaded, "supports"),
     "conducting": partial(steep, (48, 8), "6.0", "8.3333"),
     "block-16": partial(bench_one.block, 16),
@@ -187,6 +189,7 @@ DEVICES = {
     "interior point": _off(fallbacks, "interior_point", _no_fallback),
     "updates of the friction bound": _off(interior_point, "UPDATES", 1),
     "limit analysis of the friction bound": _off(UnconstrainedModes, "overloaded", _never, "wall"),
+    "rigid motion to a state without contact": _off(fallbacks, "rigid_motion", own="rings"),
     # Guyan 1965
     "steps on the condensed body at last": _off(fallbacks, "on_condensed_body"),
     "secants of a layer": _off(fallbacks, "layer_secants", own="layer"),
