@@ -92,11 +92,10 @@ def test_tells_which_fenicsx_is_supported(launcher, version, scalar, reason):
 
 @pytest.fixture(params=["wheels", "trixie"])
 def place(request: pytest.FixtureRequest, launcher: Launcher) -> str:
-    """Return the kind of place that is made."""
+    """Return the kind of place that is made: wheels where they can be used."""
     launcher.bootstrap_tools()
     if request.param == "wheels":
         launcher.python_for_wheels()
-        launcher.env["FENICSX"] = "wheels"
     return request.param
 
 
