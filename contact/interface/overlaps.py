@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -31,10 +32,6 @@ from contact.typing import Array
 
 #: Distance along a further axis, over the size of the mesh, by which searches keep bodies apart.
 ASIDE = 10.0
-
-#: Multiple of the heights of curved surfaces above their facets that is taken off a depth: they are
-#: known from the corners alone, and extrapolated at the ends of arcs.
-CURVES = 2.0
 
 #: Indices of points, bodies or facets.
 Numbers = NDArray[np.intp]
@@ -67,9 +64,13 @@ def overlap_depths(
     if body.components[1] == 1:
         return [(0.0, 0.0)] * len(pairs), {}
     bodies = _Boundaries.of(body, [pair[:2] for pair in pairs])
-    facet, place, other = bodies.inside()
+    number, other = bodies.inside(*bodies.points())
+    facet, place = np.divmod(number, len(bodies.places))
     depth, on_sides = bodies.depths(facet, place, other)
     own, rounding = bodies.component[facet], TOUCHING * body.domain.size
+    twins = bodies.twins()
+    own, other, depth = (np.append(a, b) for a, b in zip((own, other, depth), twins, strict=True))
+    on_sides = np.pad(on_sides, ((0, len(own) - len(on_sides)), (0, 0)))
     between = bodies.between(own, other)
     press = np.array([press for *_, press in pairs], dtype=bool)
     elsewhere = (on_sides & press).any(axis=1, keepdims=True) & ~press
@@ -159,12 +160,56 @@ class _Boundaries:
             found[:, :corners, pair] |= np.isin(nodes[:, :corners], own)
         return found
 
-    def inside(self) -> tuple[Numbers, Numbers, Numbers]:
-        """Return facet, number among `places` and other body of points within that. Collective."""
-        domain, surface, comm, d = self.body.domain, self.surface, self.body.comm, self.body.dim
-        shape, mesh, places = surface.shape, domain.mesh, self.places
-        x = (shape.lagrange(surface.order, places) @ surface.points).reshape(-1, d)
-        of = np.repeat(self.component, len(places))
+    def points(self) -> tuple[Array, Numbers]:
+        """Return the `places` of all facets, shape (f k, d), and their components."""
+        surface, places, d = self.surface, self.places, self.body.dim
+        x = surface.shape.lagrange(surface.order, places) @ surface.points
+        return x.reshape(-1, d), np.repeat(self.component, len(places))
+
+    @cached_property
+    def boxes(self) -> tuple[Array, Array]:
+        """Lower and upper corners of the boxes of bodies, shapes (components, d). Collective."""
+        x, of = self.points()
+        low = np.full((self.body.components[1], x.shape[1]), np.inf)
+        high = -low
+        np.minimum.at(low, of, x)
+        np.maximum.at(high, of, x)
+        self.body.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+        self.body.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+        return low, high
+
+    @cached_property
+    def of_cells(self) -> Numbers:
+        """The components of the owned cells. Collective."""
+        dofmap = self.body.space.dofmap
+        first = dofmap.list[: self.body.domain.mesh.topology.index_map(self.body.dim).size_local, 0]
+        named = dofmap.index_map.local_to_global(first.copy()).astype(np.int64)
+        return _components(self.body, self.surface.owners, named)
+
+    def twins(self) -> tuple[Numbers, Numbers, Array]:
+        """Return bodies that coincide, the other ones, and the depths of both. Collective."""
+        # No point of the boundary of either is within the other, but any other point is.
+        low, high = self.boxes
+        off = np.maximum(*(np.abs(x[:, None] - x).max(axis=2) for x in (low, high)))
+        alike = np.count_nonzero(off <= TOUCHING * self.body.domain.size, axis=1) > 1
+        cells = np.flatnonzero(alike[self.of_cells])
+        comm, of, far = self.body.comm, self.of_cells[cells], ASIDE * self.body.domain.size
+        x = geometry_nodes(self.body.domain)[cells].mean(axis=1)
+        boundary, own = self.points()
+        depth = nearest(
+            comm, np.column_stack([x, far * of]), np.column_stack([boundary, far * own])
+        )
+        deepest = np.zeros(len(alike))
+        np.maximum.at(deepest, of, depth)
+        comm.Allreduce(MPI.IN_PLACE, deepest, op=MPI.MAX)
+        middle = np.flatnonzero(depth >= deepest[of])
+        number, other = self.inside(x[middle], of[middle])
+        return of[middle][number], other, depth[middle][number]
+
+    def inside(self, x: Array, of: Numbers) -> tuple[Numbers, Numbers]:
+        """Return the numbers of points of bodies that are in another, and that. Collective."""
+        domain, comm, d = self.body.domain, self.body.comm, self.body.dim
+        mesh = domain.mesh
         cells = geometry_nodes(domain)
         # Points beyond the boxes of all other bodies are in none of these.
         near = np.flatnonzero(self._near(x, of))
@@ -181,9 +226,7 @@ class _Boundaries:
             found = geometry.compute_collisions_points(tree, padded)
             point = np.repeat(np.arange(len(there)), np.diff(found.offsets))
             cell = found.array.astype(np.intp)
-        dofmap = self.body.space.dofmap
-        first = dofmap.index_map.local_to_global(dofmap.list[: len(cells), 0].copy())
-        component = _components(self.body, surface.owners, first.astype(np.int64))
+        component = self.of_cells
         apart = component[cell] != of[point]
         point, cell = point[apart], cell[apart]
         of_cells = shape_of(mesh)
@@ -199,20 +242,13 @@ class _Boundaries:
         point, other = point[held], component[cell[held]]
         _, number, other = exchanged(comm, source[point], number[point], other)
         number, other = np.unique(np.column_stack([number, other]), axis=0).T
-        return number // len(places), number % len(places), other
+        return number, other
 
     def _near(self, x: Array, of: Numbers) -> NDArray[np.bool_]:
         """Return which points of bodies are in boxes of other ones. Collective."""
-        count, rounding = self.body.components[1], TOUCHING * self.body.domain.size
-        low = np.full((count, x.shape[1]), np.inf)
-        high = -low
-        np.minimum.at(low, of, x)
-        np.maximum.at(high, of, x)
-        self.body.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
-        self.body.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
-        near = np.zeros(len(x), dtype=bool)
-        for body in range(count):
-            held = np.all((x > low[body] + rounding) & (x < high[body] - rounding), axis=1)
+        rounding, near = TOUCHING * self.body.domain.size, np.zeros(len(x), dtype=bool)
+        for body, (low, high) in enumerate(zip(*self.boxes, strict=True)):
+            held = np.all((x > low + rounding) & (x < high - rounding), axis=1)
             near |= held & (of != body)
         return near
 
@@ -238,14 +274,14 @@ class _Boundaries:
         surface = self._curved(np.union1d(near, facet))
         opposite = surface.sent(near, ranks)
         # A foot aside, where facets turn, has a height in another direction: none adds to depths.
-        own = CURVES * np.minimum(surface.height_bounds(facet, at)[0], 0.0)
+        own = np.minimum(surface.height_bounds(facet, at)[0], 0.0)
         sides = np.asarray(self.sides.any(axis=2))
         _, theirs, centres = exchanged(comm, ranks, sides[near], centres[near])
         depth = np.full(len(x), np.inf)
         rounding = NEGLIGIBLE * self.body.domain.size
         for i, j in in_balls(centres, points, radius, CHUNK):
             distance, there = _from_facets(opposite, j, x[i])
-            behind = CURVES * np.minimum(opposite.height_bounds(j, there)[0], 0.0)
+            behind = np.minimum(opposite.height_bounds(j, there)[0], 0.0)
             np.minimum.at(depth, i, distance + own[i] + behind - _bow(opposite)[j])
             np.minimum.at(least, i, distance)
             nearest_ones = distance <= least[i] + rounding
@@ -269,6 +305,7 @@ class _Boundaries:
             there, row = there[larger], row[larger]
             curved.deviation[there] = alone.deviation[row]
             curved.unknown[there] = alone.unknown[row]
+            curved.change[there] = alone.change[row]
         return curved
 
 
@@ -295,10 +332,13 @@ def _from_facets(facets: Surface, of: Numbers, x: Array) -> tuple[Array, Array]:
 
 
 def _bow(facets: Surface) -> Array:
-    """Return the largest distance of curved facets from their straight pieces, shape (f,)."""
-    if facets.order == 1:
-        return np.zeros(facets.count)
+    """Return the largest distance of curved or warped facets from their pieces, shape (f,)."""
     shape = facets.shape
+    if facets.order == 1:
+        if shape.simplex:
+            return np.zeros(facets.count)
+        twist = np.einsum("k,fkd,fd->f", [1, -1, -1, 1], facets.corners, facets.normal)
+        return np.asarray(np.abs(twist) / 4)
     first, second = np.array(shape.edges).T
     middle = facets.points[:, shape.corners : shape.corners + first.size]
     bow = middle - (facets.points[:, first] + facets.points[:, second]) / 2

@@ -32,10 +32,11 @@ from contact.mesh.owners import ALONE, Owners
 from contact.ranks import exchanged
 from contact.typing import Array
 
-#: Least cosine between the normals at a vertex and of the facets around it, on a smooth surface.
+#: Least cosine between the normals of facets that meet, and their mean, on a smooth surface.
 SMOOTH = 0.9
 
-#: Least cosine between the normals at both ends of an edge: of twice the angle.
+#: Least cosine between the normals at both ends of an edge, and of the facets around a vertex and
+#: their mean: of twice the angle.
 ALIKE_NORMALS = 2 * SMOOTH**2 - 1
 
 #: Weight in a fit of vertices two edges away, for vertices with too few neighbours.
@@ -55,12 +56,13 @@ def deviations(
     owners: Owners = ALONE,
     levels: int = 0,
     values: Array | None = None,
-) -> tuple[Array, Array]:
-    """Return c of the edges of each facet, positive outwards, and its uncertainty. Collective.
+) -> tuple[Array, Array, Array]:
+    """Return c of the edges of each facet, its uncertainty, and its largest change. Collective.
 
-    The uncertainty is the spread of c among the fits at the corners, large where the curvature
-    jumps, plus a quarter of the change of c from one edge to the next; it is zero on circles.
-    Both have the shape (f, edges).
+    c is positive outwards. The uncertainty is the spread of c among the fits at the corners, large
+    where the curvature jumps, plus a quarter of the change of c from one edge to the next. The
+    largest change is that to the corners and to the vertices beyond them; both are zero on circles.
+    All have the shape (f, edges).
 
     Parameters
     ----------
@@ -79,8 +81,8 @@ def deviations(
     """
     count = len(names)
     arrays = (names, corners, normal, *([] if values is None else [values]))
-    found, uncertain = _deviations(levels, *_with_rings(owners, *arrays))
-    return found[:count], uncertain[:count]
+    found, uncertain, change = _deviations(levels, *_with_rings(owners, *arrays))
+    return found[:count], uncertain[:count], change[:count]
 
 
 def _with_rings(owners: Owners, *arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
@@ -129,8 +131,8 @@ def _deviations(
     corners: Array,
     normal: Array,
     values: Array | None = None,
-) -> tuple[Array, Array]:
-    """Return c and its uncertainty, given all facets on which they depend."""
+) -> tuple[Array, Array, Array]:
+    """Return c, its uncertainty and its change, given all facets on which they depend."""
     vertices, place = np.unique(names, return_inverse=True)
     place = place.reshape(names.shape)
     points = np.zeros((vertices.size, normal.shape[1]))
@@ -140,7 +142,9 @@ def _deviations(
     own /= np.linalg.norm(own, axis=1)[:, None]
     # No normal at edges and corners of the body.
     known = np.ones(vertices.size, dtype=bool)
-    np.logical_and.at(known, place, np.einsum("fcd,fd->fc", own[place], normal) > SMOOTH)
+    alike = np.einsum("fcd,fd->fc", own[place], normal) > ALIKE_NORMALS
+    np.logical_and.at(known, place, alike)
+    known[_at_edges(place, normal)] = False
     heights = None
     if values is not None:
         heights = np.zeros(vertices.size)
@@ -153,14 +157,16 @@ def _deviations(
     curvature = _curvatures(points, own, pairs, np.where(near, 1.0, FAR), heights)
     pairs = pairs[:, near & known[pairs[1]]]
     edges = facet_with(points.shape[1] - 1, names.shape[1]).edges
-    found, uncertain = np.zeros((2, len(names), len(edges)))
+    found, uncertain, change = np.zeros((3, len(names), len(edges)))
     for k, (i, j) in enumerate(edges):
         others = [c for c in range(names.shape[1]) if c not in (i, j)]
         around = place[:, [i, j, *others]]
         edge = points[around[:, 1]] - points[around[:, 0]]
         value = np.where(known[around], _sagitta(edge[:, None], curvature[around]), 0.0)
         if levels == 0:
-            flat, uncertain[:, k] = _between(points, curvature, pairs, around, known, edge, value)
+            flat, uncertain[:, k], change[:, k] = _between(
+                points, curvature, pairs, around, known, edge, value
+            )
             if values is not None:
                 found[:, k] = flat
                 continue
@@ -171,7 +177,19 @@ def _deviations(
             # The polygon turns at the ends of the first edges alone.
             larger = np.argmax(np.abs(value), axis=1)[:, None]
             found[:, k] = 2.0**levels * np.take_along_axis(value, larger, axis=1)[:, 0]
-    return found, uncertain
+    return found, uncertain, change
+
+
+def _at_edges(place: Numbers, normal: Array) -> Numbers:
+    """Return the vertices of edges of the body, at which neighbouring facets turn."""
+    d = normal.shape[1]
+    ends = np.array(facet_with(d - 1, place.shape[1]).topology[d - 2])
+    edges, of = np.unique(np.sort(place[:, ends].reshape(-1, d - 1)), axis=0, return_inverse=True)
+    mean, of = np.zeros((len(edges), d)), of.reshape(-1, len(ends))
+    np.add.at(mean, of, normal[:, None])
+    size = np.linalg.norm(mean, axis=1)[of]
+    turned = np.einsum("fed,fd->fe", mean[of], normal) <= SMOOTH * size
+    return np.unique(edges[of[turned]])
 
 
 def _weights(corners: Array) -> Array:
@@ -269,8 +287,8 @@ def _between(
     known: NDArray[np.bool_],
     edge: Array,
     value: Array,
-) -> tuple[Array, Array]:
-    """Return c of one edge of each facet from `value` by each corner, and its uncertainty, (f,)."""
+) -> tuple[Array, Array, Array]:
+    """Return c of one edge of each facet from `value` by each corner, as `deviations`, (f,)."""
     # Where the curvature jumps, as from a side to a fillet, corners on the near side of the jump
     # have nearly all of the weight: those beyond which the curvature does not change.
     largest = np.abs(value).max(axis=1)
@@ -309,7 +327,8 @@ def _between(
         # With no vertex beyond it, the fit at the end of a side is that of half an edge away.
         last = (totals[:, end] == 0) & (totals[:, k] > 0) & (jumps[:, k] < ALIKE * largest)
         found -= np.where(last, 0.5 * changes[:, k], 0.0)
-    return found, uncertain
+    away = np.maximum(np.abs(value - found[:, None]), np.where(totals > 0, jumps, 0.0))
+    return found, uncertain, np.where(known[corners], away, 0.0).max(axis=1)
 
 
 def _sagitta(edge: Array, curvature: Array) -> Array:

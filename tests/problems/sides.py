@@ -54,7 +54,7 @@ def flat(kind, n, height, up, seed, first=0, turn=None, size=1.0):
     normal = normal if turn is None else turn @ normal
     out = np.tile(normal, (len(corners), 1))
     none = np.zeros((len(corners), len(shape.edges)))
-    side = Surface(nodes + first, x[corners], out, none, none, degree)
+    side = Surface(nodes + first, x[corners], out, none, none, none, degree)
     return side, every.reshape(-1, dim)[first_of]
 
 

@@ -115,6 +115,64 @@ def test_ellipses_that_touch_are_accepted(cell, counts):
 
 
 @pytest.mark.parallel
+@pytest.mark.parametrize("cell", PLANE)
+def test_waves_that_touch_are_accepted(cell):
+    """Their curvature changes by its own size from facet to facet; deeper is an overlap."""
+    for counts in ((6, 4), (4, 7)):
+        for height, periods, order in ((0.05, 1, 1), (0.1, 0.75, 1), (0.05, 1, 2), (0.1, 0.75, 2)):
+            for depth in (0.0, 0.3 / min(counts)):
+                domain = layers(COMM, cell, order, "flat", depth, counts=counts)
+                x = domain.mesh.geometry.x
+                x[:, 0] += height * np.sin(2 * np.pi * periods * x[:, 1])
+                check_refused(domain, depth)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("cell", SPACE)
+def test_irregular_bowls_that_touch_are_accepted(cell):
+    """Facets of a third of the radius whose normals are up to half a right angle apart."""
+    for counts, turn in (((8, 6), 1.6), ((6, 8), 1.5)):
+        for depth in (0.0, 0.3 * 1.5 * turn / min(counts)):
+            domain = layers(COMM, cell, 1, "flat", depth, counts=counts)
+            x = domain.mesh.geometry.x
+            within = (np.abs(x[:, 1:] - 0.5) < 0.5 - 1e-9).all(axis=1)
+            aside = np.where(within, np.sin(1e3 * (x @ [1.0, 8.0, 6.0])), 0.0)
+            angle = turn * (x[:, 1:] - 0.5 + 0.3 / max(counts) * aside[:, None])
+            way = np.column_stack([np.ones(len(x)), np.tan(angle)])
+            x[:] = x[:, :1] * way / np.linalg.norm(way, axis=1)[:, None]
+            check_refused(domain, depth)
+
+
+def check_refused(domain, depth):
+    """Two layers are refused as a pair, and said to overlap without it, if there is a depth."""
+    given = Body(Linear(YOUNG, POISSON), [])
+    for on, against in (("outer0", "inner1"), ("inner1", "outer0")):
+        if depth == 0:
+            assert Problem(domain, given, Contact(on, against=against)).nodes.size > 0
+            continue
+        with pytest.raises(InputError, match=r"\[overlap\]") as raised:
+            Problem(domain, given, Contact(on, against=against))
+        told = float(re.search(r"by up to (\S+) more", str(raised.value))[1])
+        assert 0.3 * depth < told < 1.2 * depth
+    assert bool(Problem(domain, given, Contact("outer1", 0.1)).unpaired) == (depth > 0)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("cell", [*PLANE, *SPACE])
+def test_a_body_that_is_drawn_twice_is_refused(cell, order):
+    """No point of either boundary is within the other body, whatever the two meshes are."""
+    for form in forms(cell):
+        for counts in ((3, 3), (3, 4)):
+            domain = layers(COMM, cell, order, form, 0.5, counts=counts)
+            given = Body(Linear(YOUNG, POISSON), [])
+            with pytest.raises(InputError, match=r"\[overlap\]"):
+                Problem(domain, given, Contact("outer0", against="inner1", press=True))
+            (found,) = Problem(domain, given, Contact("inner0", 0.1)).unpaired.values()
+            assert 0.1 < found < 0.3
+
+
+@pytest.mark.parallel
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize("cell", PLANE)
 def test_overlaps_are_pressed_out(cell, element):
@@ -461,7 +519,7 @@ def side_of(points, first):
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     nodes = first + np.column_stack([np.arange(len(normal)), np.arange(1, len(points))])
     none = np.zeros((len(normal), 0))
-    return Surface(nodes, corners, normal, none, none, 1).with_deviations()
+    return Surface(nodes, corners, normal, none, none, none, 1).with_deviations()
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -50,10 +50,6 @@ def dual_basis_transformation(shape: Shape, degree: int) -> Array:
     return change
 
 
-#: Unknown parts of deviations by which a surface may be off (ellipsoids of few facets have 2), and
-#: its error of third order over the deviation (spheres of facets of a fifth of the radius: .006).
-DOUBT, THIRD_ORDER = 3.0, 0.01
-
 #: Exponent of the unknown parts in the weights of two ways to know the same.
 SHARP = 4
 
@@ -75,6 +71,9 @@ class Surface:
         (f, edges).
     unknown
         Its uncertainty, shape (f, edges); of curved facets that of the surface between the nodes.
+    change
+        The largest part by which it is taken to be off: its change to the next vertices, shape
+        (f, edges).
     degree
         Of the space.
     revolved
@@ -90,6 +89,7 @@ class Surface:
     normal: Array
     deviation: Array
     unknown: Array
+    change: Array
     degree: int
     revolved: bool = False
     levels: int = 0
@@ -111,13 +111,14 @@ class Surface:
     def with_deviations(self) -> Surface:
         """Return the surface with its deviations from straight facets. Collective."""
         corners = self.nodes[:, : self.shape.corners]
-        deviation, unknown = deviations(
+        deviation, unknown, change = deviations(
             corners, self.corners, self.normal, self.owners, self.levels
         )
         if self.order > 1:
+            arcs = _of_arcs(self.shape, self.points, self.normal)
             deviation = np.zeros_like(deviation)
-            unknown = 0.5 * unknown + 2 * _of_arcs(self.shape, self.points, self.normal)
-        return replace(self, deviation=deviation, unknown=unknown)
+            unknown, change = 0.5 * unknown + 2 * arcs, 0.5 * change + 6 * arcs
+        return replace(self, deviation=deviation, unknown=unknown, change=change)
 
     @property
     def refined(self) -> bool:
@@ -178,12 +179,11 @@ class Surface:
 
     def sent(self, facets: NDArray[np.intp], ranks: NDArray[np.intp]) -> Surface:
         """Send facets of this rank to ranks, and return those that it is sent. Collective."""
-        arrays = (self.nodes, self.points, self.normal, self.deviation, self.unknown)
-        _, *found = exchanged(self.owners.comm, ranks, *(array[facets] for array in arrays))
-        nodes, points, normal, deviation, unknown = found
-        return replace(
-            self, nodes=nodes, points=points, normal=normal, deviation=deviation, unknown=unknown
-        )
+        every = self.nodes, self.points, self.normal, self.deviation, self.unknown, self.change
+        _, *found = exchanged(self.owners.comm, ranks, *(array[facets] for array in every))
+        nodes, points, normal, deviation, unknown, change = found
+        moved = replace(self, nodes=nodes, points=points, normal=normal)
+        return replace(moved, deviation=deviation, unknown=unknown, change=change)
 
     @property
     def largest_deviation(self) -> float:
@@ -248,8 +248,9 @@ class Surface:
             least, most = 1.1 * np.maximum(inside, edge)[:, facets]
             return -least, most
         along, products = self._bubbles(at)
-        known, unknown = self.height(facets, at), along * products * self.unknown[facets]
-        slack = DOUBT * unknown.sum(axis=1) + THIRD_ORDER * np.abs(known)
+        known, off = self.height(facets, at), along * products * self.change[facets]
+        # The sum of the arcs over the edges of a facet in a sphere is off by less than that.
+        slack = off.sum(axis=1) + self.turns[facets] ** 2 / 8 * np.abs(known)
         return known - slack, known + slack
 
     def _bubbles(self, at: Array) -> tuple[Array, Array]:
@@ -281,7 +282,7 @@ class Surface:
         surface, from 0 to 1, and the unknown part; shape (n, 3).
         """
         corners, places = self.nodes[:, : self.shape.corners], self.shape.nodes(self.degree)
-        rise, other = deviations(corners, self.points, self.normal, self.owners, values=values)
+        rise, other, _ = deviations(corners, self.points, self.normal, self.owners, values=values)
         along, products = self._bubbles(places)
         bubbles, finite = (along * products).T, np.all(np.isfinite(values), axis=1)
         there = np.where(finite[:, None], values, 0.0) @ self.shape.lagrange(1, places).T
@@ -333,7 +334,7 @@ class Surface:
         if self.order == 1:
             # An error of third order is largest beside the middle, up to four times the bubble;
             # spheres have one.
-            most = DOUBT * self.unknown[facets].sum(axis=1) / np.abs(rise)
+            most = self.change[facets].sum(axis=1) / np.abs(rise)
             slack = np.maximum(self.shape.dim * slack, np.minimum(4 * slack, most))
         return known - slack, known + slack
 
@@ -400,6 +401,7 @@ def straight_surface(domain: Domain, space: fem.FunctionSpace, facets: Indices) 
         normal=normal,
         deviation=none,
         unknown=none,
+        change=none,
         degree=degree,
         revolved=domain.revolved,
         levels=domain.levels,
