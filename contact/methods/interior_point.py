@@ -35,7 +35,7 @@ from mpi4py import MPI
 from contact.errors import InputError, SingularError
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import unit_vectors
-from contact.methods.report import Outcome
+from contact.methods.report import PROGRESS, Outcome
 from contact.methods.semismooth import SemismoothNewton
 from contact.methods.unconstrained_modes import all_loads
 from contact.problem.residuals import evaluate, evaluate_state, residual_forces
@@ -315,6 +315,7 @@ def interior_point(
 
     bound: Array = np.zeros(interface.nodes.weight.size)
     aside: tuple[State, Outcome] | None = None
+    best = 1.0
     for _ in range(UPDATES):
         method = InteriorPoint(newton, bound, begin)
         outcome, state = method.iterate(min(LIMIT, steps_left())), method.state
@@ -331,6 +332,10 @@ def interior_point(
             return last, outcome
         if steps_left() <= 0:
             break
+        # Pressures of Newton's last steps if these have made progress, else of the interior point.
+        if aside is None and outcome.residuals.significant < PROGRESS * best:
+            state = last
+        best = min(best, outcome.residuals.significant)
         jump = interface.nodes.jump(state.x)
         bound = interface.bound(jump, state.forces)
         # With all nodes open the next bound is zero, and the solution the same.

@@ -262,6 +262,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         "is [10⁻⁴] f b²/d": interior_point.SHARE == 1e-4,
         f"is [{interior_point.SHARE_UNSUPPORTED}] of that of the loads": True,
         "below\n   [10⁻⁴]": interior_point.FORCING == 1e-4,
+        "below [half] of the least": interior_point.PROGRESS == 0.5,
         f"stagnation limit [{fallbacks.CONTINUATION_LIMIT}]": True,
         f"after [{uzawa.STAGNATION_LIMIT}] iterations": True,
         "by [1 %]": uzawa.PROGRESS == 0.99,

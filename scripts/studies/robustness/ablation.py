@@ -45,9 +45,9 @@ SLOW, NOTICED = 1.5, 0.1
 SLOW_LINEAR = 1.1
 
 
-def drawn(kind: str, name: str, **mesh: Any) -> Problem:
+def drawn(kind: str, name: str, seed: int | None = None, **mesh: Any) -> Problem:
     """Return a random problem, on another mesh if need be."""
-    found = next(problems(kind, name, folder=Path(tempfile.mkdtemp())))
+    found = next(problems(kind, name, folder=Path(tempfile.mkdtemp()), seed=seed))
     if not mesh:
         return found
     tables = {**found.tables, "mesh": found.tables["mesh"] | mesh}
@@ -120,6 +120,8 @@ OWN: dict[str, Callable[[], Problem | Case | Tables]] = {
     "finer block-33": partial(drawn, "plain", "block-33", cells=[24, 12, 12]),
     "finer bar-67": partial(drawn, "plain", "bar-67", cells=[640, 160]),
     "wall": partial(wall, 2, 1.01),
+    # A wedge between two planes, which bounds by interior points alone do not solve.
+    "wedge": partial(drawn, "bodies", "wedges-16", 211),
     # A block on a layer that is stiffer.
     "soft block": partial(drawn, "bodies", "layers-8"),
     # Rings between plates, out of whose loads they roll.
@@ -190,6 +192,7 @@ def _never(*_: Any) -> bool:
 DEVICES = {
     "interior point": _off(fallbacks, "interior_point", _no_fallback),
     "updates of the friction bound": _off(interior_point, "UPDATES", 1),
+    "friction bound of Newton's last steps": _off(interior_point, "PROGRESS", 0.0, "wedge"),
     "limit analysis of the friction bound": _off(UnconstrainedModes, "overloaded", _never, "wall"),
     "rigid motion to a state without contact": _off(fallbacks, "rigid_motion", own="rings"),
     # Guyan 1965
