@@ -64,7 +64,7 @@ def overlap_depths(
     if body.components[1] == 1:
         return [(0.0, 0.0)] * len(pairs), {}
     bodies = _Boundaries.of(body, [pair[:2] for pair in pairs])
-    number, other = bodies.inside(*bodies.points())
+    number, other = bodies.inside(*bodies.points)
     facet, place = np.divmod(number, len(bodies.places))
     depth, on_sides = bodies.depths(facet, place, other)
     own, rounding = bodies.component[facet], TOUCHING * body.domain.size
@@ -160,8 +160,9 @@ class _Boundaries:
             found[:, :corners, pair] |= np.isin(nodes[:, :corners], own)
         return found
 
+    @cached_property
     def points(self) -> tuple[Array, Numbers]:
-        """Return the `places` of all facets, shape (f k, d), and their components."""
+        """The `places` of all facets, shape (f k, d), and their components."""
         surface, places, d = self.surface, self.places, self.body.dim
         x = surface.shape.lagrange(surface.order, places) @ surface.points
         return x.reshape(-1, d), np.repeat(self.component, len(places))
@@ -169,7 +170,7 @@ class _Boundaries:
     @cached_property
     def boxes(self) -> tuple[Array, Array]:
         """Lower and upper corners of the boxes of bodies, shapes (components, d). Collective."""
-        x, of = self.points()
+        x, of = self.points
         low = np.full((self.body.components[1], x.shape[1]), np.inf)
         high = -low
         np.minimum.at(low, of, x)
@@ -192,10 +193,13 @@ class _Boundaries:
         low, high = self.boxes
         off = np.maximum(*(np.abs(x[:, None] - x).max(axis=2) for x in (low, high)))
         alike = np.count_nonzero(off <= TOUCHING * self.body.domain.size, axis=1) > 1
+        if not alike.any():
+            none = np.zeros(0, dtype=np.intp)
+            return none, none, np.zeros(0)
         cells = np.flatnonzero(alike[self.of_cells])
         comm, of, far = self.body.comm, self.of_cells[cells], ASIDE * self.body.domain.size
         x = geometry_nodes(self.body.domain)[cells].mean(axis=1)
-        boundary, own = self.points()
+        boundary, own = self.points
         depth = nearest(
             comm, np.column_stack([x, far * of]), np.column_stack([boundary, far * own])
         )

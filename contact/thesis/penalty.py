@@ -277,11 +277,14 @@ class PenalisedProblem:
         """Return the local unknowns of an iterate of SNES. Collective."""
         return self._body.local(self._unpacked(iterate.array_r))
 
+    def _state_of(self, x: Array) -> State:
+        """Return the state of local unknowns, with the frozen secant unless it is implicit."""
+        return replace(self._state, x=x, secant_at=None if self._implicit else self._state.x)
+
     def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
         body, nodes, x = self._body, self._interface.nodes, self._unknowns(iterate)
         jump = nodes.jump(x)
-        secant_at = None if self._implicit else self._state.x
-        values = body.secant_forces(replace(self._state, x=x, secant_at=secant_at))
+        values = body.secant_forces(self._state_of(x))
         values = values - body.external(self._state.time)
         nodes.add_jump_transposed(
             nodes.weight[:, None] * self._law.forces(jump).vectors(nodes), values
@@ -304,9 +307,8 @@ class PenalisedProblem:
             u_n = nodes.normal_component(jump)
             slope = np.where(u_n < self._interface.gap, self._layer.layer_slope(u_n), 0.0)
             blocks[:, :d, :d] += slope[:, None, None] * outer(nodes.normal, nodes.normal)
-        kind, linearised_at = ("tangent", x) if self._implicit else ("secant", self._state.x)
+        kind, at = "tangent" if self._implicit else "secant", self._state_of(x)
         blocks = self._interface.weighted(blocks, x)
-        at = replace(self._state, x=linearised_at)
         reuse = self._assembled and not self._implicit  # SNES asks again at each iterate
         self.operator.update(kind, at, blocks, reuse=reuse)
         self._assembled = True

@@ -182,8 +182,15 @@ class Surface:
         every = self.nodes, self.points, self.normal, self.deviation, self.unknown, self.change
         _, *found = exchanged(self.owners.comm, ranks, *(array[facets] for array in every))
         nodes, points, normal, deviation, unknown, change = found
-        moved = replace(self, nodes=nodes, points=points, normal=normal)
-        return replace(moved, deviation=deviation, unknown=unknown, change=change)
+        return replace(
+            self,
+            nodes=nodes,
+            points=points,
+            normal=normal,
+            deviation=deviation,
+            unknown=unknown,
+            change=change,
+        )
 
     @property
     def largest_deviation(self) -> float:
