@@ -48,6 +48,8 @@ class Assembly:
         The unknowns, and those of the secant modulus where these differ.
     laws, weak_form
         Laws with internal variables, and the weak form.
+    time
+        The time of the loads in the weak form.
     """
 
     def __init__(
@@ -64,7 +66,7 @@ class Assembly:
         self.at, self.secant_at = fem.Function(space), fem.Function(space)
         self._phi_scale = None if body.piezo is None else constant(domain.mesh, body.phi_scale)
         self._test = self.split(ufl.TestFunction(space))
-        self._time = constant(domain.mesh, 0.0)
+        self.time = constant(domain.mesh, 0.0)
         degree = space.ufl_element().embedded_superdegree
         exact = quadrature_degree(domain, body.materials, degree)
         seen = kinematics_of(domain, element)
@@ -76,7 +78,7 @@ class Assembly:
             ufl.FacetNormal(domain.mesh),
             solids_of(domain, body.materials, cells, rules, self.laws),
             elastic_supports_of(domain, body),
-            given_loads(domain, body, self._time),
+            given_loads(domain, body, self.time),
         )
 
     def split(self, x: Expr) -> Fields:
@@ -112,7 +114,7 @@ class Assembly:
         terms = self.residual(z)
         if on is not None:
             terms = [term for term in terms if term.load is not None and term.load.on in on]
-        return Loads(terms, owned, self._time)
+        return Loads(terms, owned, self.time)
 
     def work(self, along: fem.Function, functions: ufl.Argument) -> list[fem.Form]:
         """Compile the internal forces' work along unknowns, divided among functions of sum 1."""

@@ -22,16 +22,16 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import ufl
 from dolfinx import fem, la
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
+from ufl.classes import Constant, ConstantValue, MultiIndex
+from ufl.corealg.traversal import traverse_unique_terminals
 
 from contact import _compat
 from contact.body.elements import MEAN_DILATATION, in_chunks
-from contact.body.loads import expression
 from contact.body.materials import factor_of
 from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain, Indices, members, part_name
@@ -39,7 +39,6 @@ from contact.mesh.entities import cell_facets, cells_at
 from contact.mesh.geometry import geometry_nodes, integration_weights
 from contact.mesh.owners import Owners
 from contact.model.body import Bolt
-from contact.model.fields import constant
 from contact.model.material import Material
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -56,6 +55,9 @@ from forms.plane_stress import without_stress_across
 
 #: Degrees of the rules for loads on facets, far above their own, and in cells, which are many.
 ON_FACETS, IN_CELLS = 9, 4
+
+#: Parts of loads in UFL that are the same everywhere.
+UNIFORM = Constant, ConstantValue, MultiIndex
 
 #: Factors of the components of a tensor in the basis of Mandel.
 MANDEL = np.array([1.0] * 3 + [np.sqrt(2.0)] * 3)
@@ -383,25 +385,20 @@ def oscillation(problem: ContactProblem, time: float) -> Array:
 
     That of the loads that the linear functions of a mesh do not see: sum over facets of
     h |t - t_h|^2 and over cells of h^2 |f - f_h|^2 (Verfürth, A Posteriori Error Estimation
-    Techniques for Finite Element Methods, 2013, section 1.4), with t_h and f_h of the mean loads at
-    the nodes. Over a modulus it is an energy. The constants are those of Poincaré's inequality,
-    h/pi; of several loads on a part the squares are added. Charges do not count.
+    Techniques for Finite Element Methods, 2013, section 1.4), with t and f of the weak form, and
+    t_h and f_h of the mean loads at the nodes. Over a modulus it is an energy. The constants are
+    those of Poincaré's inequality, h/pi; of several loads on a part the squares are added. Charges
+    do not count.
     """
     domain = problem.domain
     mesh, d = domain.mesh, domain.dim
     squares = np.zeros(mesh.topology.index_map(d).size_local)
-    whole = shape_of(mesh)
-    facets, x, now = whole.facet_corners, ufl.SpatialCoordinate(mesh), constant(mesh, time)
+    whole, forms = shape_of(mesh), problem.body.forms
+    facets, forms.time.value = whole.facet_corners, time
     vertices = _compat.geometry_dofmap(mesh)[:, : whole.corners]
-    for number, load in enumerate(problem.body.description.loads):
-        varying = {
-            name: field
-            for name, field in load.named.items()
-            if not (
-                getattr(field, "is_constant", False) or name.startswith("force") or "charge" in name
-            )
-        }
-        if not varying:
+    given = forms.weak_form.loads.items()
+    for load in (one for key, loads in given if "charge" not in key for one in loads):
+        if all(isinstance(part, UNIFORM) for part in traverse_unique_terminals(load.value)):
             continue
         shape = whole
         cells: Indices = np.arange(len(squares), dtype=np.int32)
@@ -414,12 +411,9 @@ def oscillation(problem: ContactProblem, time: float) -> Array:
         points = at
         if load.on is not None:
             points = np.concatenate([whole.on_facet(k, at) for k in range(len(facets))])
-        key = f"load.{number}"
-        given = [expression(domain, f, x, now, f"{key}.{name}") for name, f in varying.items()]
-        made = fem.Expression(ufl.as_vector(given), points)
-        shown = len(cells), len(points) // len(at), len(at), len(given)
-        values = np.asarray(made.eval(mesh, cells)).reshape(shown)
-        found = load.factor(time) * values[np.arange(len(cells)), place]
+        shown = len(cells), len(points) // len(at), len(at), *(load.value.ufl_shape or (1,))
+        values = np.asarray(fem.Expression(load.value, points).eval(mesh, cells)).reshape(shown)
+        found = load.amplitude(time) * values[np.arange(len(cells)), place]
         if load.on is not None:
             nodes = whole.facet_nodes(domain.order)[place]
             of = np.take_along_axis(of, nodes[..., None], axis=1)

@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
 from contact.body.description import Body
+from contact.body.weak_form import Given
 from contact.case.build import build_problem
 from contact.cli.check import expectations
 from contact.cli.solve import _results
@@ -271,6 +272,23 @@ def test_no_oscillation_of_linear_loads():
     middles = geometry_nodes(problem.domain).mean(axis=1)
     within = (np.abs(middles - [2.0, 0.5]) < [1.7, 0.2]).all(axis=1)
     assert squares[within].max() < 1e-9 * squares.max()
+
+
+def test_a_load_of_a_new_kind_oscillates_as_the_weak_form_has_it(monkeypatch):
+    """A number of a load may stand for a density that varies: rho omega^2 r of a rotation."""
+
+    def spinning(domain, body, time):
+        x = ufl.SpatialCoordinate(domain.mesh)
+        turns = fem.Constant(domain.mesh, 2.0) * ufl.as_vector([x[0] ** 2, 0.0])
+        return {"body_force": [Given(turns, domain.dx, None, lambda t: t / 2, False)]}
+
+    plain = changed(load=[{"everywhere": True, "body_force": ["x**2", 0.0]}])
+    expected = oscillation(build_problem(parse_case(plain)), 1.0)
+    monkeypatch.setattr("contact.body.assembly.given_loads", spinning)
+    plain["load"] = [{"everywhere": True, "body_force": [2.0, 0.0]}]
+    found = oscillation(build_problem(parse_case(plain)), 1.0)
+    assert expected.min() > 0
+    assert found == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
