@@ -1,6 +1,12 @@
 """Solve a case or a problem: one step, or one load step after the other.
 
-Both are `solve_problem`: it takes `solve_step` once, or `LoadStepping` for several steps.
+    solve > build_problem                       a case becomes a `ContactProblem`
+          > solve_problem                       `solve_step` once, or `LoadStepping`
+            > solve_step > Method.solve         by `contact.methods` or `contact.thesis`
+                         > evaluated            all residuals from scratch
+          > reviewed                            warnings
+
+The calls from there to the sparse linear solve are in docs/architecture.md, Data flow.
 """
 
 from __future__ import annotations

@@ -36,10 +36,10 @@ from contact.body.loads import Loads, assembled
 from contact.body.materials import cells_of, factor_of
 from contact.body.supports import Rollers, free_components, supports_of, without_field
 from contact.history import BodyState, LinearisationPoint
-from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout, congruent, masked, projectors, times
 from contact.linear.operator import Counters, SparseOperator
 from contact.linear.petsc import Subsystems
+from contact.linear.transformation import Transformation, TransformedBulk, TransformedOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import component_sums, connected_components, graph_components
@@ -446,28 +446,28 @@ class BodyEquilibrium:
     def operator(
         self,
         nodes: NDArray[np.int32],
-        constraint: Constraint | None = None,
+        transformation: Transformation | None = None,
         *,
         symmetric: bool,
         counters: Counters,
         solver: str,
-    ) -> SparseOperator | ConstrainedOperator:
+    ) -> SparseOperator | TransformedOperator:
         """Return the operator of the body with blocks at nodes.
 
         Parameters
         ----------
         nodes
             Contact nodes, then others with blocks, local numbers.
-        constraint
-            The constraint after which blocks belong to single nodes; None if they do without.
+        transformation
+            The transformation after which blocks belong to single nodes; None if they do without.
         symmetric, counters, solver
             As of `SparseOperator`.
         """
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "solver": solver}
-        if constraint is None:
+        if transformation is None:
             return SparseOperator(self, nodes, subsystems=self.component_norms.apart, **options)
-        bulk = ConstrainedBulk(self, constraint, BodyState(self.zero_displacement()))
-        return ConstrainedOperator(bulk, nodes, **options)
+        bulk = TransformedBulk(self, transformation, BodyState(self.zero_displacement()))
+        return TransformedOperator(bulk, nodes, **options)
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""

@@ -7,8 +7,8 @@ that vanish where displacements and potentials are prescribed,
               = -int_Gamma_3 ((lambda_c + p_l) v_nu + lambda_f . v_tau - (D.nu) xi),
 
 with the pressure p_l of a layer. The first line is of this module, the second of
-`contact.interface`. That is (10) of docs/theory.md; with (11) it is [T 5.26], without
-a potential [T 3.9]; [T n] is equation (n) of the thesis. The test function of the potential is
+`contact.interface`. That is (10) of docs/theory.md; with (11) it is (5.26) of the thesis,
+without a potential (3.9). The test function of the potential is
 negated, so that the derivative of G_0 is symmetric.
 Loads are negative terms: G_0 = <F(x), z> - <f, z>. Stresses are those of `forms`.
 
@@ -120,7 +120,7 @@ class WeakForm:
     def internal_forces(
         self, x: Fields, z: Fields, secant_at: Expr | None, history_at: Expr | None
     ) -> list[Term]:
-        """Return int_Omega sigma : eps(v) + D . grad(xi) dx, [T 3.10, 5.27].
+        """Return int_Omega sigma : eps(v) + D . grad(xi) dx, (3.10), (5.27).
 
         With the laws (1) and (4) of docs/theory.md.
         """
@@ -147,12 +147,12 @@ class WeakForm:
         return terms
 
     def body_forces(self, z: Fields) -> list[Term]:
-        """Return - int_Omega f_0 . v dx, [T 3.8]."""
+        """Return - int_Omega f_0 . v dx, (3.8)."""
         given = self.loads.get("body_force", ())
         return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in given]
 
     def tractions(self, z: Fields) -> list[Term]:
-        """Return - int_Gamma_2 f_2 . v da, [T 3.8]; of a resultant force F, f_2 = F/|Gamma_2|."""
+        """Return - int_Gamma_2 f_2 . v da, (3.8); of a resultant force F, f_2 = F/|Gamma_2|."""
         given = self.loads.get("traction", ())
         return [Term(-ufl.dot(f.value, z.u) * f.over, f) for f in given]
 
@@ -162,7 +162,7 @@ class WeakForm:
         return [Term(p.value * ufl.dot(self.nu, z.u) * p.over, p) for p in given]
 
     def charges(self, z: Fields) -> list[Term]:
-        """Return int_Omega q_0 xi dx - int_Gamma_b q_2 xi da, [T 5.29]."""
+        """Return int_Omega q_0 xi dx - int_Gamma_b q_2 xi da, (5.29)."""
         volume, surface = (self.loads.get(key, ()) for key in ("body_charge", "charge"))
         return [
             *(Term(q.value * z.phi * q.over, q) for q in volume),

@@ -200,7 +200,10 @@ class ContactNodes:
 
 @dataclass(frozen=True)
 class Geometry:
-    """The geometry of one contact at a place of the bodies: a function of positions alone.
+    """Gaps, normals, areas, D and M of one contact in one configuration x_0 of the bodies.
+
+    Unknowns are increments from x_0. `nodes` also has the directions that supports leave free, and
+    the motion of the foundation.
 
     Attributes
     ----------

@@ -109,8 +109,8 @@ class PairPlacement:
 
 def _without_sagittas(body: BodyEquilibrium, found: Coupling) -> tuple[Array, float]:
     """Return the gaps of sides that touch, and the largest depth that is left out. Collective."""
-    # Chords of two curved sides in contact cut each other by their sagittas. A negative mean of a
-    # gap that touches 0 within a facet stays.
+    # Chords of two curved sides that touch cut each other by their sagittas, which are no overlap:
+    # g_j = max(g_j, min(w_j^-1 int Phi_j max(g, 0), 0)), below 0 where Phi_j alone is negative.
     least = np.minimum(found.gap_positive_part, 0.0)
     cut = body.comm.allreduce(float(np.max(least - found.gap, initial=0.0)), op=MPI.MAX)
     return np.maximum(found.gap, least), cut if cut > TOUCHING * body.domain.size else 0.0
@@ -224,18 +224,20 @@ def _refuse_shared(slave: Surface, master: Surface, label: str) -> None:
 
 
 def _without_multiplier(
-    body: BodyEquilibrium, slave: Surface, coupling: Coupling, label: str, rough: str | None
+    body: BodyEquilibrium, slave: Surface, coupling: Coupling, label: str, friction_part: str | None
 ) -> NDArray[np.int64]:
     """Return the slave nodes of this rank and its facets that carry no multiplier. Collective."""
     owners = slave.owners
     on_axis = owners.requested(pairs_at_axis(slave, slave.nodes)[:, 0])
-    stuck = np.union1d(_stuck(body, coupling), on_axis)
-    if rough is not None:
+    prescribed = np.union1d(_with_prescribed_normal(body, coupling), on_axis)
+    if friction_part is not None:
         one_sided = _one_sided(body, coupling, owners)
-        one_sided[np.isin(coupling.nodes, stuck)] = False
-        _check_rim(body, slave, rough, [coupling.nodes[lost] for lost in one_sided.T], label)
-        stuck = np.union1d(stuck, coupling.nodes[one_sided.any(axis=1)])
-    return owners.among(stuck, slave.nodes.ravel())
+        one_sided[np.isin(coupling.nodes, prescribed)] = False
+        _check_rim(
+            body, slave, friction_part, [coupling.nodes[lost] for lost in one_sided.T], label
+        )
+        prescribed = np.union1d(prescribed, coupling.nodes[one_sided.any(axis=1)])
+    return owners.among(prescribed, slave.nodes.ravel())
 
 
 def _beyond_rim(slave: Surface, coupling: Coupling) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -264,7 +266,7 @@ def _check_apart(body: BodyEquilibrium, coupling: Coupling, owners: Owners, labe
         )
 
 
-def _stuck(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
+def _with_prescribed_normal(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
     """Return the slave nodes of this rank whose normal is fixed."""
     _, local = owned_among(body.layout.index_map, coupling.nodes)
     moves = body.free[local, : body.dim]

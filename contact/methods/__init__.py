@@ -13,8 +13,8 @@ ends a solve by Ctrl-C.
 
 The methods share, and do not define: complementarity functions and active set
 (`contact.interface.complementarity`, `multipliers`), static condensation
-(`contact.problem.condensed`, `contact.linear.schur`), the constraint x = C y + d
-(`contact.linear.constraint`), the residuals (`contact.problem.residuals`).
+(`contact.problem.condensed`, `contact.linear.schur`), the transformation x = C y + d
+(`contact.linear.transformation`), the residuals (`contact.problem.residuals`).
 
 Imports: `contact.problem` and the packages below it.
 """

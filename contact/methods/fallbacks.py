@@ -1,6 +1,7 @@
-"""The strategy: stages of the semismooth Newton method, and its fallbacks (`solve_contact`).
+"""The strategy: stages of the semismooth Newton method, and its fallbacks.
 
-1. Steps on the condensed body where that pays, then on the whole one; else on the whole one alone.
+1. Steps on the condensed body where that pays, then on the whole one (`solve_condensed_first`);
+   else on the whole one alone (`solve_contact`).
 2. Fallbacks, where these end without convergence, in turn (`fall_back`):
 
    - all nodes open, by one linear solve from the best iterate, then a working set from there;
@@ -86,64 +87,65 @@ NEARLY_BALANCED = 0.03
 
 
 def solve_contact(
-    newton: SemismoothNewton,
-    begin: State,
-    condensed_steps: Stage | None = None,
-    condensation_pays: bool = False,
+    semismooth: SemismoothNewton, begin: State, condensed_steps: Stage | None = None
 ) -> End:
-    """Solve by Newton's method and its fallbacks, stage by stage. Collective.
+    """Solve one problem by Newton's steps, then by its fallbacks. Collective.
 
     Parameters
     ----------
-    newton, begin
-        The method on the problem, and the initial guess.
-    condensed_steps, condensation_pays
-        Steps on the condensed body, if it can be condensed, and whether these are the first stage,
-        or the last one.
+    semismooth, begin
+        The method on the problem, whole or condensed, and the initial guess.
+    condensed_steps
+        Steps on the condensed body, the last fallback of a whole problem that can be condensed.
     """
-    if condensed_steps is not None and condensation_pays:
-        state, outcome = condensed_steps(begin)
-        if not _final(outcome) and newton.steps_left > 0:
-            logger.info("%s; going on with the whole body", outcome.ended)
-            state, outcome = newton.iterate(state)
-        # The condensed body has been tried, and its contact problem looks at the modes itself.
-        condensed_steps, unconstrained = None, False
-    else:
-        state, outcome = newton.iterate(begin, give_up=True)
-        unconstrained = outcome.converged and newton.modes.unconstrained_at(newton.problem, state)
-    if _final(outcome) and not unconstrained:
-        return state, outcome
-    found = fall_back(newton, state, outcome, condensed_steps)
-    if unconstrained:  # another solution, if there is one
+    state, outcome = semismooth.iterate(begin, give_up=True)
+    if outcome.converged and semismooth.modes.unconstrained_at(semismooth.problem, state):
+        found = fall_back(semismooth, state, outcome, condensed_steps)
         return found if found[1].converged else (state, outcome)
-    if not _final(found[1]) and newton.best.found is not None:
-        state = newton.best.found
-        return state, replace(found[1], residuals=evaluate(newton.problem, state))
-    return found
+    if outcome.final:
+        return state, outcome
+    return fall_back(semismooth, state, outcome, condensed_steps)
 
 
-def _final(outcome: Outcome) -> bool:
-    """Tell whether no further stage is tried."""
-    return outcome.converged or outcome.overloaded
+def solve_condensed_first(
+    semismooth: SemismoothNewton, begin: State, condensed_steps: Stage
+) -> End:
+    """Solve by steps on the condensed body, then on the whole one, then by fallbacks. Collective.
+
+    Parameters
+    ----------
+    semismooth, begin
+        The method on the whole problem, and the initial guess.
+    condensed_steps
+        Steps on the condensed body; each solves its contact problem by `solve_contact`.
+    """
+    state, outcome = condensed_steps(begin)
+    if not outcome.final and semismooth.steps_left > 0:
+        logger.info("%s; going on with the whole body", outcome.ended)
+        state, outcome = semismooth.iterate(state)
+    return (state, outcome) if outcome.final else fall_back(semismooth, state, outcome)
 
 
 def fall_back(
-    newton: SemismoothNewton, state: State, outcome: Outcome, condensed_steps: Stage | None = None
+    semismooth: SemismoothNewton,
+    state: State,
+    outcome: Outcome,
+    condensed_steps: Stage | None = None,
 ) -> End:
-    """Try the fallbacks in turn until one converges. Collective."""
+    """Try the fallbacks in turn until one converges; else return the best iterate. Collective."""
     logger.info(
         "%s; going on with fallbacks", outcome.ended or "a rigid-body mode is unconstrained"
     )
     singular = None
-    without_contact = all_open(newton)
+    without_contact = all_open(semismooth)
     for fallback in (
-        partial(working_set, newton, without_contact),
-        partial(conductivity_continuation, newton),
-        partial(layer_secants, newton),
-        partial(rigid_motion, newton, outcome),
-        partial(proximal_points, newton),
-        partial(interior_points, newton, without_contact, condensed_steps is not None),
-        partial(on_condensed_body, newton, condensed_steps),
+        partial(working_set, semismooth, without_contact),
+        partial(conductivity_continuation, semismooth),
+        partial(layer_secants, semismooth),
+        partial(rigid_motion, semismooth, outcome),
+        partial(proximal_points, semismooth),
+        partial(interior_points, semismooth, without_contact, condensed_steps is not None),
+        partial(on_condensed_body, semismooth, condensed_steps),
     ):
         try:
             found = fallback()
@@ -152,76 +154,79 @@ def fall_back(
             continue
         if found is not None:
             state, outcome = found
-            if _final(outcome):
+            if outcome.final:
                 return found
     # A nonlinear material may be singular at the strains of a step alone.
-    if singular is not None and newton.problem.body.linear and not outcome.converged:
+    if singular is not None and semismooth.problem.body.linear and not outcome.converged:
         raise singular
-    return state, outcome
+    if outcome.converged or semismooth.best.found is None:
+        return state, outcome
+    best = semismooth.best.found
+    return best, replace(outcome, residuals=evaluate(semismooth.problem, best))
 
 
-def all_open(newton: SemismoothNewton) -> State | None:
+def all_open(semismooth: SemismoothNewton) -> State | None:
     """Return the state after one linear solve with all nodes open, from the best iterate.
 
     None where the supports do not constrain all rigid-body modes: friction may have another
     solution then. Collective.
     """
-    if not newton.modes.constrained_by_supports:
+    if not semismooth.modes.constrained_by_supports:
         return None
-    problem, best = newton.problem, newton.best.found
+    problem, best = semismooth.problem, semismooth.best.found
     try:
-        return newton.step.without_contact(problem, problem.start() if best is None else best)
+        return semismooth.step.without_contact(problem, problem.start() if best is None else best)
     except SingularError:  # the potential may be floating without contact
         return None
 
 
-def working_set(newton: SemismoothNewton, without_contact: State | None) -> End | None:
+def working_set(semismooth: SemismoothNewton, without_contact: State | None) -> End | None:
     """Return the solution with all nodes open, or that of `dual_active_set`, if any. Collective.
 
     Active sets may cycle on contact forces that are rounding.
     """
     if without_contact is None:
         return None
-    problem, allowed = newton.problem, newton.options.allowed
+    problem, allowed = semismooth.problem, semismooth.options.allowed
     residuals = evaluate(problem, without_contact)
     if not residuals.excess(allowed):
         return without_contact, Outcome(residuals, allowed)
-    found = dual_active_set(newton, without_contact)
+    found = dual_active_set(semismooth, without_contact)
     if found is None:
         return None
     residuals = evaluate(problem, found)
-    newton.see(found, residuals)
+    semismooth.see(found, residuals)
     return None if residuals.excess(allowed) else (found, Outcome(residuals, allowed))
 
 
 def interior_points(
-    newton: SemismoothNewton, without_contact: State | None, condensable: bool
+    semismooth: SemismoothNewton, without_contact: State | None, condensable: bool
 ) -> End | None:
     """Return the end of the interior-point method (`interior_point`) and Newton's last steps."""
-    steps = newton.steps_left
+    steps = semismooth.steps_left
     if steps <= 0:
         return None
     # Half of the steps are for the condensed body.
-    return interior_point(newton, without_contact, steps // 2 if condensable else steps)
+    return interior_point(semismooth, without_contact, steps // 2 if condensable else steps)
 
 
-def on_condensed_body(newton: SemismoothNewton, condensed_steps: Stage | None) -> End | None:
+def on_condensed_body(semismooth: SemismoothNewton, condensed_steps: Stage | None) -> End | None:
     """Return the end of steps on the condensed body, where they do not pay as the first stage."""
-    if condensed_steps is None or newton.steps_left <= 0:
+    if condensed_steps is None or semismooth.steps_left <= 0:
         return None
-    found = condensed_steps(newton.problem.start())
+    found = condensed_steps(semismooth.problem.start())
     # The reason of the interior point says more, unless no steps are left.
-    return found if found[1].converged or newton.steps_left <= 0 else None
+    return found if found[1].converged or semismooth.steps_left <= 0 else None
 
 
-def rigid_motion(newton: SemismoothNewton, outcome: Outcome) -> End | None:
+def rigid_motion(semismooth: SemismoothNewton, outcome: Outcome) -> End | None:
     """Return a solution of a condensed body with all nodes open after a rigid motion, if any."""
-    problem = newton.problem
-    if outcome.converged or newton.modes.constrained_by_supports:
+    problem = semismooth.problem
+    if outcome.converged or semismooth.modes.constrained_by_supports:
         return None
     if not isinstance(problem, CondensedProblem):
         return None
-    state = newton.modes.separated(problem, newton.step)
+    state = semismooth.modes.separated(problem, semismooth.step)
     if state is None:
         return None
     # No force acts there: relative to the forces at zero displacement.
@@ -231,13 +236,13 @@ def rigid_motion(newton: SemismoothNewton, outcome: Outcome) -> End | None:
     )
     equilibrium = left / first if first > 0 else 0.0
     residuals = replace(evaluate(problem, state), equilibrium=equilibrium)
-    newton.recorder.record(residuals, RIGID_MOTION, inner=2)
-    newton.see(state, residuals)
-    outcome = Outcome(residuals, newton.options.allowed)
+    semismooth.recorder.record(residuals, RIGID_MOTION, inner=2)
+    semismooth.see(state, residuals)
+    outcome = Outcome(residuals, semismooth.options.allowed)
     return (state, outcome) if outcome.converged else None
 
 
-def dual_active_set(newton: SemismoothNewton, state: State) -> State | None:
+def dual_active_set(semismooth: SemismoothNewton, state: State) -> State | None:
     """Return a solution by a working set of contact nodes (dual active set method). Collective.
 
     For bodies that touch at one node or two: stops, tips, corners. Without contact most of their
@@ -245,7 +250,7 @@ def dual_active_set(newton: SemismoothNewton, state: State) -> State | None:
     working set, then one more in turn. None where a node more does not halve the number of those
     that penetrate: an interior point then takes fewer steps.
     """
-    problem, interface = newton.problem, newton.problem.interface
+    problem, interface = semismooth.problem, semismooth.problem.interface
     nodes = interface.nodes
     inside = np.zeros(nodes.weight.shape, dtype=bool)
     deepest, count = _penetrating(interface, state, inside)
@@ -255,7 +260,7 @@ def dual_active_set(newton: SemismoothNewton, state: State) -> State | None:
         gap = np.where(inside, interface.gap, np.inf)
         less = problem.with_interface(replace(interface, gap=gap))
         # At one stiff node of a soft body a forcing term leaves pressures of any sign.
-        state, outcome = newton.on(less).iterate(state, note=WORKING_SET, exact=True)
+        state, outcome = semismooth.on(less).iterate(state, note=WORKING_SET, exact=True)
         before = count
         deepest, count = _penetrating(interface, state, inside)
         if not outcome.converged or count > PROGRESS * before:
@@ -297,25 +302,25 @@ def continuation(solve: Callable[[float, State], End], start: State) -> End | No
     return None
 
 
-def conductivity_continuation(newton: SemismoothNewton) -> End | None:
+def conductivity_continuation(semismooth: SemismoothNewton) -> End | None:
     """Solve a condensed body by continuation in k_e of a conductive foundation, if any.
 
     With a large k_e the foundation fixes the potential of a node that comes near, and releases it
     where the node leaves: the active set cycles. With a small one contact is nearly uncoupled.
     """
-    problem, interface = newton.problem, newton.problem.interface
+    problem, interface = semismooth.problem, semismooth.problem.interface
     if not isinstance(problem, CondensedProblem) or interface.foundation.conductor is None:
         return None
 
     def solve(part: float, state: State) -> End:
         less = replace(interface, foundation=interface.foundation.conducting(part))
-        method = newton if part == 1.0 else newton.on(problem.with_interface(less))
+        method = semismooth if part == 1.0 else semismooth.on(problem.with_interface(less))
         return method.iterate(state, note=CONTINUATION, stagnation_limit=CONTINUATION_LIMIT)
 
     return continuation(solve, problem.start())
 
 
-def layer_secants(newton: SemismoothNewton) -> End | None:
+def layer_secants(semismooth: SemismoothNewton) -> End | None:
     """Solve by secants of a layer that saturates, if any.
 
     The tangent of the layer is zero where it is saturated, and before its first touch: Newton's
@@ -325,7 +330,7 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     saturated) unchanged: supports that bear little bring the load to balance slowly. Proximal
     points solve the bed's problem where friction alone constrains a mode along it.
     """
-    problem, interface = newton.problem, newton.problem.interface
+    problem, interface = semismooth.problem, semismooth.problem.interface
     foundation, near = interface.foundation, NEARLY_BALANCED
     if interface.nodes.maximum(foundation.saturates(interface.size).astype(float)) == 0:
         return None
@@ -334,7 +339,7 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     regimes: NDArray[np.int8] = np.full(largest.size, -1, dtype=np.int8)
     for _ in range(SECANTS):
         bed = foundation.elastic_bed(np.maximum(secant, SOFTEST * largest))
-        method = newton.on(problem.with_interface(replace(interface, foundation=bed)))
+        method = semismooth.on(problem.with_interface(replace(interface, foundation=bed)))
         state, outcome = method.iterate(state, note=SECANT)
         if not outcome.converged:
             found = proximal_points(method)
@@ -347,7 +352,7 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
         unchanged = 0 if changed else unchanged + 1
         balanced = evaluate(problem, state).significant <= near
         if balanced or unchanged == 1:
-            found = newton.iterate(newton.started(state), note=SECANT)
+            found = semismooth.iterate(semismooth.started(state), note=SECANT)
             if found[1].converged:
                 return found
         near = NEARER_BY * near if balanced else near
@@ -355,7 +360,7 @@ def layer_secants(newton: SemismoothNewton) -> End | None:
     return None
 
 
-def proximal_points(newton: SemismoothNewton) -> End | None:
+def proximal_points(semismooth: SemismoothNewton) -> End | None:
     """Solve by a proximal-point method where friction has to constrain a rigid-body mode, if any.
 
     For belts, arched leaves, wedges: bodies with a mode that friction alone constrains. The
@@ -364,18 +369,18 @@ def proximal_points(newton: SemismoothNewton) -> End | None:
     k falls after each problem that is solved, and rises after one that is not. Where the bed
     bears little, Newton's method takes the last steps without it.
     """
-    problem, interface = newton.problem, newton.problem.interface
-    if not interface.friction.acts or newton.modes.constrained_by_supports:
+    problem, interface = semismooth.problem, semismooth.problem.interface
+    if not interface.friction.acts or semismooth.modes.constrained_by_supports:
         return None
-    if newton.steps_left <= 0:
+    if semismooth.steps_left <= 0:
         return None
     nodes, state = interface.nodes, problem.start()
-    stiffness = PROXIMAL_STIFFNESS * newton.step.parameters.c
+    stiffness = PROXIMAL_STIFFNESS * semismooth.step.parameters.c
     least, stagnant = np.inf, 0
     while stagnant < STAGNANT_PROBLEMS:
         stagnant += 1
         term = Proximal(stiffness, nodes.tangential_component(nodes.jump(state.x)))
-        method = newton.on(problem.with_interface(replace(interface, proximal=term)))
+        method = semismooth.on(problem.with_interface(replace(interface, proximal=term)))
         try:
             balanced, outcome = method.iterate(state, note=PROXIMAL_POINT)
         except SingularError:  # no contact: a normal motion is unconstrained
@@ -386,10 +391,10 @@ def proximal_points(newton: SemismoothNewton) -> End | None:
             if residual < NEARER * least:
                 least, stagnant = residual, 0
             if residual <= NEARLY_BALANCED:
-                found = newton.iterate(newton.started(state), note=PROXIMAL_POINT)
+                found = semismooth.iterate(semismooth.started(state), note=PROXIMAL_POINT)
                 if found[1].converged:
                     return found
-        elif least == np.inf or newton.steps_left <= 0:
+        elif least == np.inf or semismooth.steps_left <= 0:
             return None
         else:
             stiffness = STIFFER * stiffness

@@ -7,8 +7,8 @@
 2. Where the contact nodes are few, the body is condensed onto them (static condensation): a loop
    linearises the material (`Newton._condensed_steps`), and the same method solves contact on the
    Schur complement, in small dense steps (`semismooth`).
-3. `fallbacks.solve_contact` has the order of all stages: steps on the condensed body and on the
-   whole one, then the fallbacks.
+3. `fallbacks` has the order of all stages: steps on the condensed body and on the whole one, then
+   the fallbacks.
 
 References
 ----------
@@ -37,6 +37,7 @@ from contact.methods.fallbacks import (
     RIGID_MOTION,
     SECANT,
     WORKING_SET,
+    solve_condensed_first,
     solve_contact,
 )
 from contact.methods.interior_point import INTERIOR_POINT, OVERLOADED
@@ -183,8 +184,11 @@ class Newton:
         if body.linear:
             begin = replace(begin, secant_at=None)
         semismooth.begin(begin)
-        condensed_steps = self._condensed_steps if self._condenses else None
-        state, outcome = solve_contact(semismooth, begin, condensed_steps, self._pays)
+        if self._pays:
+            state, outcome = solve_condensed_first(semismooth, begin, self._condensed_steps)
+        else:
+            condensed_steps = self._condensed_steps if self._condenses else None
+            state, outcome = solve_contact(semismooth, begin, condensed_steps)
         semismooth.last = state
         return state, outcome
 

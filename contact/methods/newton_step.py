@@ -1,8 +1,9 @@
 """One step of Newton's method: material, contact, friction, layer and charge linearised together.
 
-Multipliers are eliminated node by node (`contact.interface.complementarity.linearise`): the linear
-systems keep the size and pattern of the elastic ones. Iterative solvers stop at a forcing term
-(inexact Newton). `safeguards` keep active sets from cycling.
+Active constraints enter by a penalty gamma far above the stiffness of the body, and the multipliers
+are updated, lambda+ = lambda + gamma (u_nu+ - rho), (19a): as gamma grows this is the primal-dual
+active set strategy. The linear systems keep the size and pattern of the elastic ones. Iterative
+solvers stop at a forcing term (inexact Newton). `safeguards` keep active sets from cycling.
 
 References
 ----------
@@ -59,7 +60,7 @@ class LinearisedLaws:
     active_set, unchanged
         Active set of the step, and whether it is that of the last one, on all ranks.
     multipliers, contact
-        lambda^0 and the blocks B of (19) of the algorithms page.
+        lambda^0 and the blocks B of (19) in docs/algorithms.md.
     layer, layer_shift
         Blocks of the layer, and its linearised pressure at dx = 0 less its pressure, shape (n,).
     charge

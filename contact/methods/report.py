@@ -153,6 +153,11 @@ class Outcome:
         return not self.signal and not self.residuals.excess(self.allowed)
 
     @property
+    def final(self) -> bool:
+        """Whether no further stage is tried: converged, or friction cannot balance the loads."""
+        return self.converged or self.overloaded
+
+    @property
     def reason(self) -> str:
         """Reason of the end, and the residuals, in words."""
         if self.signal:

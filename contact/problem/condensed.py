@@ -20,11 +20,11 @@ from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
-from contact.linear.constraint import BorderedSolve, ConstrainedBulk, Constraint
 from contact.linear.layout import Inclined, balance, masked
 from contact.linear.operator import PREFIX, Counters
 from contact.linear.petsc import check_overflow, petsc_options
 from contact.linear.schur import DenseOperator, DenseStiffness, SchurComplement
+from contact.linear.transformation import BorderedSolve, Transformation, TransformedBulk
 from contact.problem.problem import ContactProblem
 from contact.problem.state import Scales, State
 from contact.ranks import summed
@@ -200,7 +200,7 @@ def at_retained_nodes(interface: Interface) -> Interface:
 class Condensation:
     """Linearisation of the whole problem and condensation onto the contact nodes.
 
-    The constraint of the problem makes jumps the unknowns of these nodes (`linear.constraint`);
+    Jumps are the unknowns of these nodes (`contact.linear.transformation`);
     global unknowns q border the system, and are eliminated from the dense one.
 
     Parameters
@@ -216,10 +216,12 @@ class Condensation:
         self.nodes = problem.interface.coupled
         self.set_load_step(problem)
         body = problem.body
-        none = Constraint(body.layout, None, body.global_unknowns.ties, body.global_unknowns.free)
-        self._constraint = problem.constraint or none
-        self._bulk = ConstrainedBulk(body, self._constraint, BodyState(body.zero_displacement()))
-        self._free = np.flatnonzero(self._constraint.free)
+        unknowns = body.global_unknowns
+        none = Transformation(body.layout, None, unknowns.ties, unknowns.free)
+        self._transformation = problem.transformation or none
+        rest = BodyState(body.zero_displacement())
+        self._bulk = TransformedBulk(body, self._transformation, rest)
+        self._free = np.flatnonzero(self._transformation.free)
         self._matrix = self._bulk.create_matrix()
         size = body.block_size
         retained = (self.nodes[:, None] * size + np.arange(size)).astype(np.int32).ravel()
@@ -290,7 +292,7 @@ class Condensation:
         The right-hand sides of the eliminated unknowns and of q are kept for `expand`.
         """
         body = self.whole_problem.body
-        restricted = self._constraint.restrict(-residual)
+        restricted = self._transformation.restrict(-residual)
         self._rhs = body.layout.mask(restricted[: body.owned])
         # With loads along those before, nothing but rounding is left at the eliminated unknowns.
         nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
@@ -364,10 +366,10 @@ class Condensation:
         self.counters.linear_solves += 1
         self.counters.linear_iterations += 1
         retained = np.concatenate(self.whole_problem.comm.allgather(x - condensed_problem.body.x_0))
-        q = np.zeros(self._constraint.free.size)
+        q = np.zeros(self._transformation.free.size)
         q[self._free] = self._bordered.inverse @ (self._on_q - self._border @ retained)
         rhs = self._rhs - self._bulk.columns @ q
-        return self._constraint.expand(np.concatenate([self._schur.expand(rhs, retained), q]))
+        return self._transformation.expand(np.concatenate([self._schur.expand(rhs, retained), q]))
 
 
 def condensation_pays(problem: ContactProblem, solver: str) -> bool:

@@ -33,8 +33,8 @@ from contact.interface.nodes import (
 from contact.interface.overlaps import Depths, overlap_depths
 from contact.interface.pairing import PairPlacement, find_pair
 from contact.interface.placing import FoundationPlacement, find_nodes
-from contact.linear.constraint import ConstrainedOperator, Constraint
 from contact.linear.operator import Counters, SparseOperator
+from contact.linear.transformation import Transformation, TransformedOperator
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
 from contact.mesh.geometry import area, volume
@@ -218,15 +218,15 @@ class ContactProblem:
         return other.with_interface(other._interface().at(self.time, self.slip_history))
 
     def with_interface(self, interface: Interface) -> ContactProblem:
-        """Return the problem with another interface; its constraint is that of its nodes."""
+        """Return the problem with another interface; its transformation is that of its nodes."""
         return self._with(interface=interface)
 
     def _with(self, **changes: object) -> ContactProblem:
-        """Return the problem with other attributes; the constraint remains while its nodes do."""
+        """Return a copy with other attributes; the transformation remains while the nodes do."""
         other = object.__new__(type(self))
         vars(other).update(vars(self) | changes)
         if other.nodes is not self.nodes:
-            vars(other).pop("constraint", None)
+            vars(other).pop("transformation", None)
         return other
 
     def commit(self, state: State) -> History:
@@ -342,8 +342,8 @@ class ContactProblem:
         return np.repeat(np.arange(len(sizes)), sizes)
 
     @cached_property
-    def constraint(self) -> Constraint | None:
-        """The constraint of its linear systems; None where there is none. Collective."""
+    def transformation(self) -> Transformation | None:
+        """X = C y of its linear systems; None where jumps are nodal values. Collective."""
         body, nodes = self.body, self.nodes
         unknowns, motions = body.global_unknowns, body.global_unknowns.ties
         if nodes.coupling is None and unknowns.size == 0:
@@ -351,15 +351,15 @@ class ContactProblem:
         if nodes.motion is not None:
             motions = unknowns.with_foundations(nodes.nodes, motion_at_constant_jump(nodes, body))
         change = None if nodes.coupling is None else nodes.coupling.change
-        return Constraint(body.layout, change, motions, unknowns.free)
+        return Transformation(body.layout, change, motions, unknowns.free)
 
     def operator(
         self, *, symmetric: bool, counters: Counters, solver: str
-    ) -> SparseOperator | ConstrainedOperator:
+    ) -> SparseOperator | TransformedOperator:
         """Return the operator of its linear systems; see `BodyEquilibrium.operator`. Collective."""
         return self.body.operator(
             self.interface.coupled,
-            self.constraint,
+            self.transformation,
             symmetric=symmetric,
             counters=counters,
             solver=solver,

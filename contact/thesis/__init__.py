@@ -1,8 +1,8 @@
 """Algorithms 1 to 9 of the thesis: fixed points, Uzawa block relaxation, penalty.
 
 `fixed_point` over `uzawa`, and `penalty`; both are an `OuterLoop` (`fixed_point`). Newton's method
-does not fall back on them. Numbers such as (3.45) are those of equations of
-the thesis.
+does not fall back on them. By default they are accelerated and end by the residuals;
+docs/algorithms.md has the options for the algorithms as printed.
 
 References
 ----------

@@ -1,19 +1,26 @@
 """The outer loops of the thesis, and method `uzawa`: fixed point over Uzawa block relaxation.
 
-An outer iteration freezes nonlinear terms (Kacanov's secant modulus, the friction bound), solves
-the frozen problem by an inner iteration, and evaluates the residuals: `OuterLoop`, of `uzawa` and
-of `penalty`. A loop that fails ends with its best iterate, by the thesis's rules with the last.
+Algorithm 1 is the iteration (3.28): with the secant modulus and the friction of u_n, find u_{n+1}
+in K such that for all v in K
 
-Method `uzawa` has variants of Algorithms 1, 4, 6 and 8 (as printed with the options in
-docs/algorithms.md, Fixed points), which differ in the frozen terms:
+    B(u_n; u_{n+1}, v - u_{n+1}) + j(u_n, v) - j(u_n, u_{n+1}) >= (f, v - u_{n+1}),
 
-- Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
-- Algorithm 4, Problem (P~V): also psi, or all of the charge l where it is lagged.
-- Algorithm 6, Problem (PV2): also h_nu, or all of the layer's force j_1 where it is lagged.
-- Algorithm 8, Problem (PV1): as Algorithm 6 without friction and charge.
+the minimum (3.31) of J_n + j_n on K. With a potential it is one of x = (u, phi), with B-check,
+(5.32) and (6.33). The friction bound s_{n+1} = mu(|u_tau|) |R sigma_nu| (`_update_bound`) and, as
+printed, the load follow:
 
-Their inner Algorithms 2, 5, 7 and 9 are `uzawa.uzawa_block_relaxation`, with another
-`Interface.foundation` each.
+    f                                           Algorithm 1, Problem (PV)
+    f_n     = f_3 - l(x_n, .)                   Algorithm 4, Problem (P~V), with charge
+    f_{1,n} = f_3 - j_1(x_n, .) - l(x_n, .)     Algorithm 6, Problem (PV2), with a layer
+    f_{2,n} = f_3 - j_1(x_n, .)                 Algorithm 8, Problem (PV1), without friction
+
+These are loads of `FrozenProblem` where charge and layer are `lagged`. By default psi and h_nu
+alone are those of x_n, tangents follow near the solution, and residuals end the loop: the options
+for the algorithms as printed are in docs/algorithms.md, Fixed points. The inner Algorithms 2, 5, 7
+and 9 are `uzawa.uzawa_block_relaxation`, with another `Interface.foundation` each.
+
+`OuterLoop` is the loop of `uzawa` and `penalty`: freeze, solve, evaluate the residuals. One that
+fails ends with its best iterate, by the thesis's rules with the last.
 """
 
 from __future__ import annotations

@@ -10,9 +10,10 @@ q = lambda + r u = z + r u_n an iteration is
 - Step 2, (3.35), (3.44): phi = (q - P(q))/r (`FrozenProblem.auxiliary`),
 - Step 3, (3.36): lambda + r (u - phi) = P(q) (`FrozenProblem.project`),
 
-P(q) = ((q_c - r rho)^+, q_f projected onto the disc of radius s_n), (3.43) and section 3.5.2: a
-fixed-point map of z. It is accelerated (`contact.thesis.acceleration`). Numbers of equations are
-those of the thesis.
+P(q) = ((q_c - r rho)^+, q_f projected onto the disc of radius s_n), (3.43) and section 3.5.2. The
+loop begins with Steps 2 and 3: with lambda = P(q), phi = (q - lambda)/r, and the load of Step 1 is
+r (phi - u_n) - lambda = z - 2 lambda. This map of z to z is accelerated
+(`contact.thesis.acceleration`). Numbers of equations are those of the thesis.
 
 References
 ----------
@@ -175,7 +176,7 @@ class FrozenProblem:
 
     @cached_property
     def _load(self) -> Array:
-        """Loads minus internal forces at u_n, on the owned unknowns. Collective."""
+        """f_n - F(u_n) on the owned unknowns, f_n with lagged layer and charge. Collective."""
         internal = self.problem.body.secant_forces(self.state)
         residual = residual_forces(self.problem, self.state, internal)
         contact = self.state.forces.vectors(self.nodes)
@@ -190,7 +191,7 @@ class FrozenProblem:
         self.nodes.add_jump_transposed(self.nodes.weight[:, None] * forces, to)
 
     def displacement_load(self, multipliers: Array, z: Array) -> Array:
-        """Return the right-hand side of Step 1, f - F(u_n) - (2 lambda - z), of (3.34)."""
+        """Return the right-hand side of Step 1, (3.34): f_n - F(u_n) - (2 lambda - z)."""
         forces, load = 2 * multipliers - z, self._load.copy()
         self._add(-(forces[:, :1] * self.nodes.normal + forces[:, 1:]), load)
         return load

@@ -112,9 +112,9 @@ MUTANTS = (
         ("tests/verification/test_piezo_closed_forms.py",),
     ),
     Mutant(
-        "constraint-not-transposed",
+        "transformation-not-transposed",
         "C^T f, the forces on the jumps",
-        "contact/linear/constraint.py",
+        "contact/linear/transformation.py",
         "own = times(self.matrix, forces[: self.owned], transposed=True)",
         "own = times(self.matrix, forces[: self.owned])",
         ("tests/verification/test_patch_two_bodies.py",),

@@ -142,12 +142,12 @@ def test_moment_arms_on_a_moving_foundation_are_those_of_the_place(motion) -> No
 @pytest.mark.parallel
 @pytest.mark.parametrize("degree", [1, 2])
 def test_solutions_are_those_of_the_moved_mesh(degree) -> None:
-    """The body is the same but for the place of its upper block, and the constraint another one."""
+    """The upper block is at another place, with another transformation; the body is the same."""
     domain = Blocks(2, 4, 6, gap=APART).domain(COMM)
     problem = pair(domain, degree)
-    before = problem.constraint
+    before = problem.transformation
     moved = problem.with_geometry([displaced(problem, slid)])
-    assert problem.constraint is before and moved.constraint is not before
+    assert problem.transformation is before and moved.transformation is not before
     states = []
     for condense in (True, False):
         options = OPTIONS["newton"](tolerance=1e-12, condense=condense)

@@ -17,8 +17,8 @@ from petsc4py import PETSc
 from contact import build_problem, load_case, parse_case
 from contact.cli.setup import draw_setup
 from contact.history import BodyState
-from contact.linear.constraint import ConstrainedBulk
 from contact.linear.layout import times
+from contact.linear.transformation import TransformedBulk
 from scripts.benchmarks.weak import measure, problem_of
 from scripts.cases import CASES
 from tests.problems.bar import changed
@@ -70,11 +70,11 @@ def in_use() -> int:
 def test_the_matrix_of_jumps_is_kept_alone() -> None:
     """Beside K and Q^T K Q, 12 bytes an entry, PETSc's default keeps twice as much again."""
     problem = problem_of(COMM, 10, 2)
-    body, constraint = problem.body, problem.constraint
+    body, transformation = problem.body, problem.transformation
     rest = BodyState(body.zero_displacement())
     plain = body.create_matrix()
     body.assemble(plain, "secant", rest)
-    bulk = ConstrainedBulk(body, constraint, rest)
+    bulk = TransformedBulk(body, transformation, rest)
     before = in_use()
     made = bulk.create_matrix()
     kept, own = in_use() - before, PETSc.Mat.InfoType.LOCAL
@@ -82,9 +82,9 @@ def test_the_matrix_of_jumps_is_kept_alone() -> None:
     assert kept < 1.5 * 12 * entries
     made.zeroEntries()
     bulk.assemble(made, "secant", rest)
-    values = np.random.default_rng(COMM.rank).standard_normal(constraint.owned)
-    image = times(plain, times(constraint.matrix, values))
-    expected = times(constraint.matrix, image, transposed=True)
+    values = np.random.default_rng(COMM.rank).standard_normal(transformation.owned)
+    image = times(plain, times(transformation.matrix, values))
+    expected = times(transformation.matrix, image, transposed=True)
     assert np.abs(times(made, values) - expected).max() < 1e-13 * np.abs(expected).max()
 
 

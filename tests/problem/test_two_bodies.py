@@ -57,16 +57,16 @@ def test_another_geometry_or_interface_has_its_own_constraint():
         problem.domain, problem.description, Contact("over", NOTHING, against="under")
     )
     jumps = np.random.default_rng(1).standard_normal(problem.body.owned)
-    first = problem.constraint.expand(jumps)
+    first = problem.transformation.expand(jumps)
     for another in (
         problem.with_geometry(swapped.geometries),
         problem.with_interface(swapped.interface),
     ):
-        other = another.constraint.expand(jumps)
-        np.testing.assert_array_equal(other, swapped.constraint.expand(jumps))
+        other = another.transformation.expand(jumps)
+        np.testing.assert_array_equal(other, swapped.transformation.expand(jumps))
         assert np.abs(other - first).max() > 0.1
     laws = problem.with_interface(replace(problem.interface, gap=problem.interface.gap + 1.0))
-    assert laws.constraint is problem.constraint
+    assert laws.transformation is problem.transformation
 
 
 @pytest.mark.core

@@ -1,16 +1,15 @@
 """The dual mortar operator of two surfaces: jump, weights, normals and gaps at the slave nodes.
 
 The multiplier is sum_j lambda_j Phi_j with functions Phi_j that are dual to the slave's,
-int Phi_j N~_k = delta_jk int N~_k over the part of the slave that faces the master. The jump at
-the slave node j is then
+int Phi_j N~_k = delta_jk w_k, w_k = int N~_k over the part of the slave that faces the master. The
+rows of the jumps T = [D, -M] are divided by these areas (`JumpRows`),
 
-    j_j = (D u)_j - sum_l M_jl u_l,     M_jl = int Phi_j (N_l o Pi) / int N~_j,
+    j_j = sum_k D_jk u_k - sum_l M_jl u_l,   D_jk = w_j^-1 int Phi_j N_k,
+                                             M_jl = w_j^-1 int Phi_j (N_l o Pi),
 
-with D_jk = int Phi_j N_k / int N~_j: the identity; A^-T on quadratic triangles, where N~ = A N
-(`dual_basis_transformation`). Slave nodes without multiplier, as at crosspoints, leave their
-functions to other nodes (`ModifiedDualBasis`): the rows of D of these contain them too. Constants
-pass: rows of D and of M have the sum 1. (Popp and others have D and M without the division by
-int N~_j.)
+where Popp and others have D and M without w_j^-1. D is the identity; A^-T on quadratic triangles,
+where N~ = A N (`dual_basis_transformation`). Slave nodes without multiplier, as at crosspoints,
+leave their functions to other nodes (`ModifiedDualBasis`): the rows of D of these contain them too.
 
 `integrate` has these integrals over the facets of one rank, `couple` their sums at the rank of each
 node.
@@ -101,7 +100,7 @@ class Parts:
         Global numbers of the facets' nodes, shape (f, k).
     dual_nodes
         Those of the nodes whose functions Phi' these are, shape (f, k).
-    D
+    facet_mass
         int Phi_i N~_j over the part that faces the master, shape (f, k, k).
     whole
         int Phi_i over all of the facet, shape (f, k).
@@ -119,7 +118,7 @@ class Parts:
 
     nodes: NDArray[np.int64]
     dual_nodes: NDArray[np.int64]
-    D: Array
+    facet_mass: Array
     whole: Array
     normal: Array
     open_normal: Array
@@ -144,7 +143,7 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
     direction, found = _facing(slave, opposite)
     change = dual_basis_transformation(slave.shape, slave.degree)
     dual, weight = _dual(slave, found, change)
-    dual, d_matrix = basis.functions @ dual, basis.functions * weight[:, None, :]
+    dual, facet_mass = basis.functions @ dual, basis.functions * weight[:, None, :]
     whole = np.einsum("fij,fj->fi", basis.functions, integrals(slave))
     gap, normal = np.zeros((*weight.shape, 3)), np.zeros((*weight.shape, direction.shape[1]))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
@@ -160,7 +159,7 @@ def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> P
     return Parts(
         nodes=slave.nodes,
         dual_nodes=basis.nodes,
-        D=d_matrix,
+        facet_mass=facet_mass,
         whole=whole,
         normal=basis.functions @ normal,
         open_normal=whole[:, :, None] * slave.normal[:, None, :],
@@ -381,7 +380,7 @@ def _assembled(
     # The integral of a quadratic function on the axis of revolution is rounding.
     around = np.broadcast_to(parts.whole.sum(axis=1, keepdims=True), parts.whole.shape)
     shares = (
-        *(parts.D.sum(axis=2), parts.whole, around),
+        *(parts.facet_mass.sum(axis=2), parts.whole, around),
         *(parts.normal, parts.open_normal, parts.gap),
     )
     every, total = owners.sums(
@@ -411,7 +410,7 @@ def _assembled(
         return entries[0][there], entries[1][there], entries[2][there]
 
     rows, columns = np.broadcast_arrays(parts.dual_nodes[:, :, None], parts.nodes[:, None, :])
-    values = (parts.D @ back).ravel()
+    values = (parts.facet_mass @ back).ravel()
     row, column, value = of_facing(owners.entries(rows.ravel(), columns.ravel(), values))
     own = np.append(row, opened), np.append(column, opened), np.append(value, weight[~faces])
     slaves, D = sparse_rows(nodes, own)
@@ -422,5 +421,5 @@ def _assembled(
     depth = owners.comm.allreduce(float(parts.depths.max(initial=0.0)), op=MPI.MAX)
     state = weight, normal, gap, positive_part, curved_gap, covered[kept]
     whole_facets = parts.whole.sum(axis=1)
-    faces_master = parts.D.sum(axis=(1, 2)) / np.where(whole_facets > 0, whole_facets, 1.0)
+    faces_master = parts.facet_mass.sum(axis=(1, 2)) / np.where(whole_facets > 0, whole_facets, 1.0)
     return Coupling(*jumps, *state, depth, parts.dual_nodes, parts.depths, faces_master)

@@ -43,10 +43,9 @@ class JumpRows:
         D_jk = w_j^-1 int Phi_j N_k,    M_jl = w_j^-1 int Phi_j N_l o Pi,
 
     with the area w_j of the node and the dual functions Phi_j of the multiplier: rows of D and of M
-    have the sum 1. The literature has both without w_j^-1; with its diagonal D this M is D^-1 M.
-    D is A^-T on quadratic triangles, and the identity on other facets, but in the rows of nodes
-    that carry functions of neighbours without multiplier: of crosspoints (`ModifiedDualBasis`), or
-    of nodes on the axis of revolution (`Lumping.without_axis`).
+    have the sum 1. D is A^-T on quadratic triangles, and the identity on other facets, but in the
+    rows of nodes that carry functions of neighbours without multiplier: of crosspoints
+    (`ModifiedDualBasis`), or of nodes on the axis of revolution (`Lumping.without_axis`).
 
     Rows are nodes that this rank owns in ascending order of their global numbers.
 

@@ -19,7 +19,7 @@ from scipy import sparse
 
 from contact.errors import InputError
 from contact.interface.mortar.lumping import JumpRows
-from contact.linear.constraint import BasisChange
+from contact.linear.transformation import BasisChange
 from contact.mesh.owners import Halo, Owners
 from contact.typing import Array
 

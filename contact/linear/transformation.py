@@ -1,4 +1,6 @@
-"""The constraint of a linear system: unknowns x = C y + d, and the system C^T K C in y.
+"""Transformation of a linear system: unknowns x = C y + d, jumps among y, and C^T K C in y.
+
+Such relations are also called affine or multi-point constraints.
 
 In the increments of a solve d is 0: prescribed values are in x already. y has as many nodal
 unknowns as x, and m global ones q behind them,
@@ -138,8 +140,8 @@ def _matrix(
     return made
 
 
-class Constraint:
-    """The matrix C of a body.
+class Transformation:
+    """The matrix C of a body, x = C y.
 
     Parameters
     ----------
@@ -191,14 +193,14 @@ class Constraint:
         return np.concatenate([times(self._inverse, own, transposed=True), q])
 
 
-class ConstrainedBulk:
+class TransformedBulk:
     """The matrices C^T K C of a body.
 
     Parameters
     ----------
     bulk
         K.
-    constraint
+    transformation
         C.
     rest
         State of a first matrix, for its pattern.
@@ -211,17 +213,17 @@ class ConstrainedBulk:
     """
 
     def __init__(
-        self, bulk: BorderedBulk, constraint: Constraint, rest: LinearisationPoint
+        self, bulk: BorderedBulk, transformation: Transformation, rest: LinearisationPoint
     ) -> None:
-        self._bulk, self.constraint, self._rest = bulk, constraint, rest
+        self._bulk, self.transformation, self._rest = bulk, transformation, rest
         self._plain: PETSc.Mat | None = None
-        self.columns: Array = np.zeros(constraint.motions.shape)
-        self.corner: Array = np.zeros((constraint.free.size, constraint.free.size))
+        self.columns: Array = np.zeros(transformation.motions.shape)
+        self.corner: Array = np.zeros((transformation.free.size, transformation.free.size))
 
     @property
     def layout(self) -> Layout:
         """The unknowns; fixed ones are the same in x and y."""
-        return self.constraint.layout
+        return self.transformation.layout
 
     @property
     def linear(self) -> bool:
@@ -231,11 +233,11 @@ class ConstrainedBulk:
     def create_matrix(self) -> PETSc.Mat:
         """Return a matrix with the pattern of Q^T K Q. Collective."""
         made = self._bulk.create_matrix()
-        if self.constraint.matrix is None:
+        if self.transformation.matrix is None:
             return made
         self._plain = made
         self._bulk.assemble(made, "secant", self._rest)
-        product = congruent(made, self.constraint.matrix)
+        product = congruent(made, self.transformation.matrix)
         product.setLGMap(*made.getLGMap())
         return product
 
@@ -245,18 +247,18 @@ class ConstrainedBulk:
             self._bulk.assemble(matrix, kind, state)
         else:
             self._bulk.assemble(self._plain, kind, state)
-            congruent(self._plain, self.constraint.matrix, matrix)
-        if self.constraint.free.size == 0:
+            congruent(self._plain, self.transformation.matrix, matrix)
+        if self.transformation.free.size == 0:
             return
-        for k, column in enumerate(self.constraint.motions.T.toarray()):
+        for k, column in enumerate(self.transformation.motions.T.toarray()):
             self.columns[:, k] = times(matrix, column)
-        self.corner = self.constraint.gathered(self.columns)
+        self.corner = self.transformation.gathered(self.columns)
         border = self._bulk.border(kind)
         if border is not None:
             # Rows of tied nodes count by N_q alone.
-            own = [times(self.constraint.matrix, c, transposed=True) for c in border[0].T]
+            own = [times(self.transformation.matrix, c, transposed=True) for c in border[0].T]
             added = np.stack(own, axis=1)
-            across = self.constraint.gathered(added)
+            across = self.transformation.gathered(added)
             self.columns += added
             self.corner = self.corner + across + across.T + border[1]
         self.columns = np.stack([self.layout.mask(column) for column in self.columns.T], axis=1)
@@ -296,7 +298,7 @@ class BorderedSolve:
         return first - self.responses @ q, q
 
 
-class ConstrainedOperator:
+class TransformedOperator:
     """C^T K C plus blocks at nodes of y; as `operator.SparseOperator`, in x.
 
     Parameters
@@ -309,18 +311,18 @@ class ConstrainedOperator:
 
     def __init__(
         self,
-        bulk: ConstrainedBulk,
+        bulk: TransformedBulk,
         nodes: NDArray[np.int32],
         *,
         symmetric: bool,
         counters: Counters,
         solver: str,
     ) -> None:
-        self._bulk, self._constraint, self._nodes = bulk, bulk.constraint, nodes
+        self._bulk, self._transformation, self._nodes = bulk, bulk.transformation, nodes
         self._inner = SparseOperator(
             bulk, nodes, symmetric=symmetric, counters=counters, solver=solver
         )
-        self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.constraint.free)
+        self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.transformation.free)
         #: Elimination of q by a direct solver; None for an earlier matrix.
         self._bordered: BorderedSolve | None = None
         #: Inverses of the stiffness of body and blocks against q, for an iterative solver.
@@ -344,13 +346,13 @@ class ConstrainedOperator:
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns x and q; see `SparseOperator.solve`. Collective."""
-        constraint, free = self._constraint, self._free
-        restricted = constraint.restrict(rhs)
+        transformation, free = self._transformation, self._free
+        restricted = transformation.restrict(rhs)
         own, forces = restricted[: self._owned], restricted[self._owned :][free]
         columns = self._bulk.columns[:, free]
         if self._inner.iterative:
             if guess is not None:
-                guess = constraint.relative(guess)[: self._owned]
+                guess = transformation.relative(guess)[: self._owned]
             relative = self._inner.solve(own - columns @ (self._inverse @ forces), rtol, guess)
             moved = self._inverse @ (forces - self._on_q(columns, relative))
         elif free.size == 0:
@@ -374,18 +376,18 @@ class ConstrainedOperator:
         The border is symmetric: with a non-symmetric matrix no q is free.
         """
         bulk, layout = self._bulk, self._bulk.layout
-        relative = self._constraint.relative(values)
+        relative = self._transformation.relative(values)
         own, q = relative[: self._owned], relative[self._owned :]
         if q.size == 0:
-            return self._constraint.forces(self._inner.multiply(own, transposed))
+            return self._transformation.forces(self._inner.multiply(own, transposed))
         forces = layout.mask(self._inner.multiply(layout.mask(own), transposed) + bulk.columns @ q)
         on_q = self._on_q(bulk.columns, own) + bulk.corner @ q
-        return self._constraint.forces(np.concatenate([forces, on_q]))
+        return self._transformation.forces(np.concatenate([forces, on_q]))
 
     def solve_transposed(self, rhs: Array) -> Array:
         """Solve with the transposed operator; see `SparseOperator.solve_transposed`. Collective."""
-        constraint, free = self._constraint, self._free
-        restricted = constraint.restrict(rhs)
+        transformation, free = self._transformation, self._free
+        restricted = transformation.restrict(rhs)
         own, forces = restricted[: self._owned], restricted[self._owned :][free]
         columns = self._bulk.columns[:, free]
         first = self._inner.solve_transposed(own)
@@ -400,9 +402,9 @@ class ConstrainedOperator:
 
     def _expanded(self, relative: Array, moved: Array) -> Array:
         """Return x = C y of the free q. Collective."""
-        q = np.zeros(self._constraint.free.size)
+        q = np.zeros(self._transformation.free.size)
         q[self._free] = moved
-        return self._constraint.expand(np.concatenate([relative, q]))
+        return self._transformation.expand(np.concatenate([relative, q]))
 
     def _on_q(self, columns: Array, values: Array) -> Array:
         """Return columns^T times values. Collective."""
@@ -437,7 +439,7 @@ class ConstrainedOperator:
     def _pushed(self, blocks: Array) -> tuple[Array, Array]:
         """Return N_q at the nodes with blocks, and the blocks times it, (dofs, free) both."""
         n, size, free = self._nodes.size, self._bulk.layout.block_size, self._free
-        motion = self._constraint.motions[self._dofs][:, free].toarray()
+        motion = self._transformation.motions[self._dofs][:, free].toarray()
         nodal = motion.reshape(n, size, free.size)
         return motion, np.einsum("nij,njk->nik", blocks, nodal).reshape(-1, free.size)
 
@@ -447,11 +449,11 @@ class ConstrainedOperator:
         gram = bulk.layout.comm.allreduce(pushed.T @ pushed, op=MPI.SUM)
         other = np.ones(self._owned)
         other[self._dofs] = 0.0
-        tied = self._constraint.motions[:, free].multiply(other[:, None]).toarray()
+        tied = self._transformation.motions[:, free].multiply(other[:, None]).toarray()
         parts = bulk.layout.comm.allreduce(tied.T @ tied, op=MPI.SUM)
         # A q without tied nodes, but with stiffness, is a jump within the body.
         motions = bulk.layout.comm.allreduce(
-            abs(self._constraint.motions[:, free]).sum(axis=0), op=MPI.SUM
+            abs(self._transformation.motions[:, free]).sum(axis=0), op=MPI.SUM
         )
         own = np.diag(bulk.corner)[free] > 0
         jumps = np.diag((own & (np.asarray(motions).ravel() == 0)).astype(float))
