@@ -56,18 +56,9 @@ def check_problem(
 ) -> None:
     """Check presses, loads, supports and rigid-body modes of a problem. Collective.
 
-    Parameters
-    ----------
-    problem, times
-        The problem, and when its loads and supports are checked: at its own time by default.
-    refined
-        Whether its mesh is to be refined, which may show a press of a shape within a facet.
-
-    Raises
-    ------
-    InputError
-        If a shape presses within a facet, a load acts on a contact part or is not finite, two
-        supports contradict each other, or a rigid-body mode is unconstrained.
+    InputError if a shape presses within a facet (unless the mesh is to be `refined`, which may show
+    the press), a load acts on a contact part or is not finite, two supports contradict each other
+    at one of the `times` (by default the problem's own), or a rigid-body mode is unconstrained.
     """
     if not refined:
         check_presses(problem)
@@ -141,13 +132,7 @@ def _check_sizes(problem: ContactProblem) -> None:
 
 
 def check_supports(problem: ContactProblem) -> None:
-    """Refuse different values of two supports for one component on a common facet. Collective.
-
-    Raises
-    ------
-    InputError
-        If they differ at the time of the problem by more than rounding.
-    """
+    """Refuse different values of two supports for one component on a common facet. Collective."""
     space, time = problem.body.space, problem.time
     for i, j in combinations(range(len(problem.description.fixed)), 2):
         first, last = problem.description.fixed[i], problem.description.fixed[j]
@@ -197,10 +182,7 @@ def meeting_supports(problem: ContactProblem, times: Sequence[float]) -> Iterato
 def _differing(
     problem: ContactProblem, pair: tuple[int, int], name: str, nodes: NDArray[np.int32]
 ) -> Array | None:
-    """Return the values of two supports where they differ, and the point, (2 + d,); or None.
-
-    `pair`, `name`: numbers of the supports, and component. Collective.
-    """
+    """Return values of two supports where they differ, and the point, (2 + d,). Collective."""
     points = problem.body.space.tabulate_dof_coordinates()[nodes, : problem.dim]
     values = np.zeros((len(points), 2))
     for k, number in enumerate(pair):
@@ -221,12 +203,9 @@ def _differing(
 def check_rigid_modes(problem: ContactProblem) -> None:
     """Check rigid-body modes, unilateral supports and potential. Collective.
 
-    Raises
-    ------
-    InputError
-        If supports and contact leave a rigid-body mode unconstrained, loads pull the body off
-        contact that alone constrains it, or the potential would be floating with contact
-        everywhere.
+    InputError if supports and contact leave a rigid-body mode unconstrained, loads pull the body
+    off contact that alone constrains it, or the potential would be floating with contact
+    everywhere.
     """
     for group in groups(problem):
         _check_group(problem, group)
@@ -294,18 +273,9 @@ def places(points: Array) -> str:
 def check_potential(problem: ContactProblem, state: State | None = None) -> None:
     """Check that the potential of no connected component is floating. Collective.
 
-    Parameters
-    ----------
-    problem
-        The problem.
-    state
-        A solution; without one, contact and charge may be anywhere.
-
-    Raises
-    ------
-    InputError
-        If a potential is neither prescribed nor determined by the charge of a foundation or of
-        another component; electrodes join components.
+    InputError if one is neither prescribed nor determined by the charge of a foundation or of
+    another component; electrodes join components. Without a state, contact and charge may be
+    anywhere.
     """
     if not problem.piezoelectric:
         return

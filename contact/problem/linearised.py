@@ -124,19 +124,8 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
 class Linearised:
     """The linearised equations at a solution, factorised once.
 
-    Parameters
-    ----------
-    problem, state
-        The problem, and its solution: of a step of an evolution that of the step.
-    parameters
-        Complementarity parameters, for gamma.
-    counters
-        Counters of factorisation and back-substitutions.
-
-    Attributes
-    ----------
-    active
-        The active set of the solution.
+    The problem of a step of an evolution is that of the step, the complementarity parameters are
+    for gamma, and `active` is the active set of the solution.
     """
 
     def __init__(

@@ -131,14 +131,8 @@ def residual_forces(problem: AnyProblem, state: State, internal: Array | None = 
     """Return G(x, lambda) = F(x) - f + T^T W lambda on the owned unknowns. Collective.
 
     The residual r of the body with contact: lambda includes layer and charge, as in (15) of
-    docs/residuals.md. At fixed unknowns G is the reaction of the support on the body.
-
-    Parameters
-    ----------
-    problem, state
-        The problem and its state.
-    internal
-        Internal forces F(x); those of the material law by default.
+    docs/residuals.md. At fixed unknowns G is the reaction of the support on the body. The internal
+    forces F(x) are those of the material law by default.
     """
     body = problem.body
     if internal is None:
@@ -335,10 +329,7 @@ def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]
 def dissipated(
     problem: ContactProblem, state: State, nodes: NDArray[np.bool_] | None = None
 ) -> float:
-    """Return the dissipation by friction in the step of a state, at some nodes (n,) or all.
-
-    Collective.
-    """
+    """Return the dissipation by friction in a step, at some nodes (n,) or all. Collective."""
     interface = problem.interface
     slip = interface.slip(problem.nodal(state))
     work = np.einsum("ni,ni->n", state.forces.friction, slip)

@@ -250,10 +250,7 @@ def _group(
 
 
 def _at_supports(problem: ContactProblem, moved: Array) -> Array:
-    """Return the modes at the nodes of supports, along fixed directions, shape (n, d, m).
-
-    Relative to the rigid parts that nodes follow.
-    """
+    """Return modes at supports, relative to rigid parts, along fixed directions, (n, d, m)."""
     body, nodes, m = problem.body, problem.body.layout.restrained, moved.shape[1]
     motions = moved[: body.owned].reshape(*body.free.shape, m)[nodes, : body.dim]
     dofs = nodes[:, None] * body.block_size + np.arange(body.dim)
@@ -326,22 +323,12 @@ PULLED_OFF = "pull the body off the foundation, or along it by more than frictio
 
 @dataclass(frozen=True)
 class Release:
-    """A motion by which loads move bodies off their unilateral supports.
+    """A motion by which loads move bodies off their unilateral supports."""
 
-    Attributes
-    ----------
-    motion
-        The mode, shape (m,).
-    power, resisted
-        f . m of the loads, and the largest resistance of layers and friction, which is less.
-    saturated
-        Whether they would balance rigid parts in place of the layers.
-    """
-
-    motion: Array
-    power: float
-    resisted: float
-    saturated: bool
+    motion: Array  #: the mode, (m,)
+    power: float  #: f . m of the loads
+    resisted: float  #: largest resistance of layers and friction, less than the power
+    saturated: bool  #: whether they would balance rigid parts in place of the layers
 
 
 #: The motion of a body by loads beyond the pressure of a layer without a rigid part.
@@ -352,28 +339,16 @@ PUSHED_THROUGH = "push the body through the layer"
 class UnilateralSupport:
     """Contact as unilateral support of a group of bodies.
 
-    Attributes
-    ----------
-    group
-        The bodies, with their modes.
-    free
-        The modes that the supports do not constrain, shape (m, k).
-    cone
-        Rows of all ranks, shape (rows, n, k): a node resists a motion q with the power
-        `bound` max(0, largest row q) at most. n counts each node twice where friction is not
-        bounded by the pressure there: `normal`, then along the surface.
-    bound
-        Largest forces of the nodes, shape (n,) (force); infinite but on saturating layers, and for
-        the friction there.
-    normal
-        Which are contact forces, shape (n,).
+    A node resists a motion q with the power `bound` max(0, largest row q) at most. Each counts
+    twice where friction is not bounded by the pressure there: `normal`, then along the surface.
     """
 
-    group: Group
-    free: Array
-    cone: Array
+    group: Group  #: the bodies, with their modes
+    free: Array  #: modes that the supports do not constrain, (m, k)
+    cone: Array  #: rows of all ranks, (rows, n, k)
+    #: Largest forces, (n,) (force); infinite but on saturating layers and for that friction.
     bound: Array
-    normal: NDArray[np.bool_]
+    normal: NDArray[np.bool_]  #: which are contact forces, (n,)
 
     @staticmethod
     def of(group: Group) -> UnilateralSupport | None:
