@@ -253,10 +253,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Family:
-    """Problems beside a parameter, by the differences `ways` from it.
-
-    The difference quotient is sum factors * values / over.
-    """
+    """Problems at differences `ways` of a parameter; quotients are sum factors * values / over."""
 
     problems: tuple[ContactProblem, ...]
     ways: tuple[float, ...]
@@ -274,10 +271,8 @@ def family_of(
 ) -> Family:
     """Return the problems beside a parameter, for the steps of a solution. Collective.
 
-    Raises
-    ------
-    InputError
-        If no value beside it is accepted, or contact nodes, mesh or internal variables change.
+    InputError if no value beside it is accepted, or contact nodes, mesh or internal variables
+    change.
     """
     base, step, found, fault = steps[0][0], STEP * (abs(parameter.value) or 1.0), None, None
     for _ in range(TRIES):
@@ -384,13 +379,7 @@ def at(problem: ContactProblem, state: State) -> tuple[ContactProblem, State]:
 
 
 class LoadPath:
-    """The load steps of a solution.
-
-    Raises
-    ------
-    InputError
-        If it has not converged, or its equations have no derivatives here.
-    """
+    """The load steps of a solution; InputError if not converged, or if there are no derivatives."""
 
     def __init__(self, solution: Solution) -> None:
         expect("solution", solution, "a Solution", isinstance(solution, Solution))

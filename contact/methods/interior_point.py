@@ -68,38 +68,21 @@ def _mixed(x: Array, y: Array) -> Array:
 
 @dataclass
 class ConeStep:
-    """A search direction.
+    """A search direction: the changes of the variables in `Cones`."""
 
-    Attributes
-    ----------
-    slack, force
-        Changes in the half lines, shape (n,).
-    slip, friction
-        Changes of (t, a) and (h, -q) in the frame, shape (k, 2 + t).
-    tails
-        Changes of a and -q, shapes (k, t).
-    """
-
-    slack: Array
-    force: Array
-    slip: Array
-    friction: Array
-    tails: tuple[Array, Array]
+    slack: Array  #: in the half lines, (n,)
+    force: Array  #: in the half lines, (n,)
+    slip: Array  #: of (t, a), in the frame, (k, 2 + t)
+    friction: Array  #: of (h, -q), in the frame, (k, 2 + t)
+    tails: tuple[Array, Array]  #: of a and -q, (k, t)
 
 
 class Cones:
     """Slacks and multipliers strictly inside their cones, those of this rank.
 
-    Parameters
-    ----------
-    slack, force
-        Open gaps and contact forces, shape (n,), positive.
-    length, slip
-        t and a, shapes (k,) and (k, t), t > |a|.
-    bound, friction
-        h and -q, shapes (k,) and (k, t), h > |q|.
-    comm
-        Communicator of the cones.
+    In the half lines, open gaps `slack` and contact forces `force`, shape (n,), positive. In the
+    second-order cones, (t, a) = (`length`, `slip`) with t > |a|, and (h, -q) = (`bound`,
+    `friction`) with h > |q|, shapes (k,) and (k, t).
     """
 
     def __init__(

@@ -111,10 +111,7 @@ class NewtonStep:
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
     def rejected(self, residual: float) -> bool:
-        """Tell whether the last step raised the residual by a derivative that may be left out.
-
-        It is then to be taken again, without the derivative of psi by the gap.
-        """
+        """Tell whether the step is to be taken again without psi', which raised the residual."""
         return self._conductivity_derivative.worsened(residual)
 
     def _forcing_term(self, residual: float) -> float:
@@ -169,13 +166,8 @@ class NewtonStep:
         """Return the next iterate; None if the matrix is singular there. Collective.
 
         The material is linearised by its tangent, or by its secant (Kacanov). `exact`: iterative
-        solvers go to their own tolerance.
-
-        Raises
-        ------
-        SingularError
-            If the matrix is singular and another iterate does not help: with a linear body, or in
-            the first step of an underconstrained one.
+        solvers go to their own tolerance. SingularError if another iterate does not help: with a
+        linear body, or in the first step of an underconstrained one.
         """
         body, state, largest = problem.body, iterate.state, iterate.residuals.significant
         laws = self._linearise(problem.interface, state, largest)

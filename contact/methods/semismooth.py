@@ -88,18 +88,10 @@ class SemismoothNewton:
     ) -> tuple[State, Outcome]:
         """Iterate from an initial guess until the residuals converge or stagnate. Collective.
 
-        Parameters
-        ----------
-        state
-            Initial guess.
-        note
-            Note of the steps in their records.
-        stagnation_limit, steps
-            Stagnation limit, that of the options by default; most steps, those left by default.
-        give_up
-            Whether to end after a first step from zero that shows c to overestimate the stiffness.
-        exact
-            Whether iterative solvers go to their own tolerance, without a forcing term.
+        The records of the steps have the note. By default the stagnation limit is that of the
+        options, and the most `steps` are those left. `give_up`: end after a first step from zero
+        that shows c to overestimate the stiffness. `exact`: iterative solvers go to their own
+        tolerance, without a forcing term.
         """
         problem, options, step = self.problem, self.options, self.step
         linear = problem.body.linear

@@ -47,28 +47,14 @@ RIGID_MOTION = "rigid motion"
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """The m unconstrained modes of a solution, and the amounts to subtract.
+    """The m unconstrained modes of a solution, and the amounts to subtract."""
 
-    Attributes
-    ----------
-    motions, columns
-        Modes in the unknowns of the whole problem, shape (unknowns, m), and in the jumps,
-        (n, d, m).
-    wanted, amounts
-        Amounts for the displacements of least norm, without and with the constraint that nothing
-        penetrates, (m,).
-    depth
-        Penetration with `wanted` (length).
-    limited
-        Whether `depth` is more than rounding.
-    """
-
-    motions: Array
-    columns: Array
-    wanted: Array
-    amounts: Array
-    depth: float
-    limited: bool
+    motions: Array  #: modes in the unknowns of the whole problem, (unknowns, m)
+    columns: Array  #: modes in the jumps, (n, d, m)
+    wanted: Array  #: amounts for the displacements of least norm, (m,)
+    amounts: Array  #: the same where nothing may penetrate, (m,)
+    depth: float  #: penetration with `wanted` (length)
+    limited: bool  #: whether `depth` is more than rounding
 
     @property
     def motion(self) -> Array:
@@ -154,10 +140,7 @@ class UnconstrainedModes:
         return replace(state, x=state.x - moved.ravel())
 
     def free_motion(self, problem: AnyProblem, state: State) -> RigidMotion | None:
-        """Return the unconstrained modes at a solution, of the whole or condensed problem.
-
-        None without any. Collective.
-        """
+        """Return unconstrained modes at a whole or condensed solution; None without. Collective."""
         interface = problem.interface
         nodes, jump = interface.nodes, interface.nodes.jump(state.x)
         # Pressures that are rounding do not constrain.

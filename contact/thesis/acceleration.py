@@ -49,10 +49,7 @@ class ResidualMinimiser:
         self._best: Array | None = None
 
     def next(self, force: Array, z: Array, image: Array) -> Array:
-        """Return the next z, given lambda, lambda + r u, and the z of the plain relaxation, (m,).
-
-        Collective.
-        """
+        """Return the next z, (m,), by lambda, lambda + r u, and z of the relaxation. Collective."""
         new, old = np.stack([force, z]), self._best
         if old is None:
             self._best = new
