@@ -304,35 +304,19 @@ def _along_chain(
 
 @dataclass(frozen=True)
 class ContactShare:
-    """The results of one contact, as they stand in the summary.
-
-    Attributes
-    ----------
-    force, moment
-        Of the body on its foundation, or on the other body, see `Resultant`.
-    area
-        Tributary areas of the nodes that touch (length^(d - 1)).
-    max_pressure, mean_pressure
-        The largest contact pressure, and the mean over that area (stress).
-    stick, slip
-        Shares of that area.
-    dissipation
-        Of friction in the step (work).
-    problem, state, own
-        The problem and its solution, and which owned contact nodes are those of the contact.
-    """
+    """The results of one contact, as they stand in the summary."""
 
     problem: ContactProblem = field(repr=False)
     state: State = field(repr=False)
-    own: NDArray[np.bool_] = field(repr=False)
-    force: Array
-    moment: Array
-    area: float
-    max_pressure: float
-    mean_pressure: float
-    stick: float
-    slip: float
-    dissipation: float
+    own: NDArray[np.bool_] = field(repr=False)  #: which owned contact nodes are its
+    force: Array  #: of the body on its foundation, or on the other body, see `Resultant`
+    moment: Array  #: as the force
+    area: float  #: tributary areas of the nodes that touch (length^(d - 1))
+    max_pressure: float  #: (stress)
+    mean_pressure: float  #: over that area (stress)
+    stick: float  #: share of that area
+    slip: float  #: share of that area
+    dissipation: float  #: of friction in the step (work)
 
 
 def contact_shares(

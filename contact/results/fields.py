@@ -92,13 +92,7 @@ def unknowns(body: BodyEquilibrium, x: Array, family: str = "Lagrange") -> dict[
 
 
 def check_variables(body: BodyEquilibrium) -> None:
-    """Refuse internal variables whose names are those of other fields.
-
-    Raises
-    ------
-    InputError
-        On all ranks, with the law and the name.
-    """
+    """Refuse internal variables whose names are those of other fields, on all ranks."""
     taken = [*(each.name for each in quantities(BODY) if each.value is not of_law), ACROSS]
     words = f"{NAME} that is the name of no other field ({', '.join(taken)})"
     for law in (material.law for material in body.description.materials):
@@ -109,24 +103,14 @@ def check_variables(body: BodyEquilibrium) -> None:
 
 
 class Extremes(NamedTuple):
-    """The largest values in a material.
+    """The largest values in a material."""
 
-    Attributes
-    ----------
-    strain, von_mises
-        The largest |dev eps| and von Mises stress.
-    yielded, volume
-        Volume in the plastic range, |dev eps| above first yield or with plastic strain (None for a
-        law without), and that of all of it.
-    plastic
-        The largest equivalent plastic strain; None for a law without.
-    """
-
-    strain: float
-    von_mises: float
+    strain: float  #: |dev eps|
+    von_mises: float  #: (stress)
+    #: Volume with |dev eps| above first yield or plastic strain; None for a law without.
     yielded: float | None
-    volume: float
-    plastic: float | None
+    volume: float  #: all of it
+    plastic: float | None  #: equivalent plastic strain; None for a law without
 
 
 def fields_of(body: BodyEquilibrium, material: Material, at: fem.Function) -> dict[str, Any]:
@@ -175,12 +159,8 @@ class DerivedFields:
     """Fields derived from the unknowns of a body at a state. The methods are collective.
 
     The points are those of `_usual_points`, or others, at which `chunks` alone has a meaning.
-
-    Attributes
-    ----------
-    shapes
-        Name -> shape of the value, for instance (3, 3) of the stress, whose third axis is that of
-        theta in a body of revolution; then the internal variables of the materials.
+    `shapes` has the shape of each value by name, for instance (3, 3) of the stress, whose third
+    axis is that of theta in a body of revolution; then the internal variables of the materials.
     """
 
     def __init__(
@@ -296,10 +276,7 @@ class DerivedFields:
 
     @cached_property
     def groups(self) -> NDArray[np.int32]:
-        """The group of each owned cell: one for all cells that are in the same regions. Collective.
-
-        The same groups, counted in the same order, on all ranks.
-        """
+        """Groups of the owned cells, one per set of regions, the same on all ranks. Collective."""
         domain = self.body.domain
         count = domain.mesh.topology.index_map(domain.dim).size_local
         found = disjoint_pieces(domain.comm, count, domain.regions.values())
@@ -316,11 +293,8 @@ class DerivedFields:
     def means(self) -> Array:
         """Return the cells' values around nodes, averaged by volume in each group. Collective.
 
-        Principal stresses are those of the averaged stress.
-
-        Returns
-        -------
-        Shape (groups, local nodes, components); NaN at nodes of no cell of a group.
+        Shape (groups, local nodes, components), NaN at nodes of no cell of a group. Principal
+        stresses are those of the averaged stress.
         """
         space, volume, groups = self.body.space, volumes(self.body.domain), self.groups
         index_map, links = space.dofmap.index_map, space.dofmap.list
@@ -372,19 +346,11 @@ class DerivedFields:
 
 
 class Deformation(NamedTuple):
-    """Extremes over the middles of the cells.
+    """Extremes over the middles of the cells."""
 
-    Attributes
-    ----------
-    largest_strain
-        |eps|, the Frobenius norm.
-    least_volume, largest_volume
-        det(I + grad u), a deformed volume over the undeformed one.
-    """
-
-    largest_strain: float
-    least_volume: float
-    largest_volume: float
+    largest_strain: float  #: |eps|, the Frobenius norm
+    least_volume: float  #: det(I + grad u), a deformed volume over the undeformed one
+    largest_volume: float  #: the same
 
 
 def deformation(body: BodyEquilibrium, x: Array) -> Deformation:

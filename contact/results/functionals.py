@@ -51,10 +51,7 @@ class Differentiable(Functional, Protocol):
     """A functional that knows its derivatives, which the adjoint asks for."""
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
-        """Return them by the owned unknowns, and by the forces at the nodes, shape (n, d).
-
-        Collective.
-        """
+        """Return them by owned unknowns, and by forces at the nodes, shape (n, d). Collective."""
 
 
 #: Functionals by the names of their columns.
@@ -108,18 +105,10 @@ def _of_contact(problem: ContactProblem, number: int | None) -> NDArray[np.bool_
 
 @dataclass(frozen=True)
 class ContactForce:
-    """A component of the force of the body on the foundations, as ``contact_force_x``.
-
-    Attributes
-    ----------
-    axis
-        The component.
-    contact
-        Number of the contact; None for the sum of all.
-    """
+    """A component of the force of the body on the foundations, as ``contact_force_x``."""
 
     axis: int
-    contact: int | None = None
+    contact: int | None = None  #: number of the contact; None for the sum of all
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
@@ -219,14 +208,9 @@ class MaxDisplacement(Largest):
 
 @dataclass(frozen=True)
 class Weighted:
-    """A weighted sum of the unknowns: a mean displacement, a rigid motion, a potential.
+    """A weighted sum of the unknowns: a mean displacement, a rigid motion, a potential."""
 
-    Attributes
-    ----------
-    weights
-        Returns those of a problem, on the owned unknowns and the global ones. Collective.
-    """
-
+    #: On the owned unknowns and the global ones. Collective.
     weights: Callable[[ContactProblem], Array]
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
@@ -241,17 +225,10 @@ class Weighted:
 
 @dataclass(frozen=True)
 class Reaction:
-    """A weighted sum of residual forces: of a support, an electrode, or a rigid foundation.
+    """A weighted sum of residual forces: of a support, an electrode, or a rigid foundation."""
 
-    Attributes
-    ----------
-    weights
-        Returns those of the residual of a problem, on the owned unknowns and the global ones.
-    given
-        Returns a given force that the residual is without; None for none.
-    """
-
-    weights: Callable[[ContactProblem], Array]
+    weights: Callable[[ContactProblem], Array]  #: on the owned unknowns and the global ones
+    #: A given force that the residual is without; None for none.
     given: Callable[[ContactProblem, State], float] | None = None
 
     def __call__(self, problem: ContactProblem, state: State) -> float:

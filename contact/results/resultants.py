@@ -92,12 +92,8 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
 
 
 def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[np.int32], Array]]:
-    """Return where the residuals are reactions of a support, or charges of an electrode, by part.
+    """Return where residuals are reactions of supports, or charges of electrodes. Collective.
 
-    Collective.
-
-    Returns
-    -------
     Part -> its nodes, and the matrices from residuals there to its forces, shape (n, d, d), or
     charges, (n, 1, 1). A roller bears forces along its normal alone.
     """
@@ -134,24 +130,13 @@ def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
 
 @dataclass(frozen=True)
 class DrivenPart:
-    """The part that is moved or loaded in time: its way and its force make a loop.
-
-    Attributes
-    ----------
-    on
-        The part.
-    nodes
-        Its owned nodes.
-    held
-        Where residuals are reactions of its supports, and the matrices that make them; `holding`.
-    loads
-        The loads that act on it alone.
-    """
+    """The part that is moved or loaded in time: its way and its force make a loop."""
 
     on: str
-    nodes: NDArray[np.int32]
+    nodes: NDArray[np.int32]  #: owned ones of the part
+    #: Where residuals are reactions of its supports, and the matrices of these; `holding`.
     held: Sequence[tuple[NDArray[np.int32], Array]]
-    loads: Loads
+    loads: Loads  #: those on the part alone
 
     @staticmethod
     def of(problem: ContactProblem) -> DrivenPart | None:
@@ -199,25 +184,15 @@ def _driven(body: Body) -> str | None:
 class ChargeBalance:
     """Free charges of a body.
 
-    Attributes
-    ----------
-    electrodes
-        Part with a prescribed or one unknown potential -> its charge. A node of two parts with a
-        prescribed one counts for the one that is fixed first.
-    given, foundation
-        Part -> prescribed surface charge; the charge that passes through the contact part.
-    body
-        Prescribed volume charge: the sum of all the others, by Gauss's law.
-    magnitude
-        The sum of the absolute nodal charges: with an insulator and one electrode all parts
-        are neutral, though not free of charge everywhere.
+    A node of two electrodes with a prescribed potential counts for the one that is fixed first.
+    With an insulator and one electrode all parts are neutral, though not free of charge everywhere.
     """
 
-    electrodes: Mapping[str, float]
-    given: Mapping[str, float]
-    foundation: float
-    body: float
-    magnitude: float
+    electrodes: Mapping[str, float]  #: of parts with a prescribed or one unknown potential
+    given: Mapping[str, float]  #: prescribed surface charges of parts
+    foundation: float  #: charge that passes through the contact part
+    body: float  #: prescribed volume charge: the sum of all the others, by Gauss's law
+    magnitude: float  #: sum of the absolute nodal charges
 
     @property
     def total(self) -> float:
@@ -233,23 +208,14 @@ class ChargeBalance:
 
 @dataclass(frozen=True)
 class Reading:
-    """The reading of a sensor's electrode.
+    """The reading of a sensor's electrode."""
 
-    The free charge of the part, None where its potential is not prescribed, and its mean potential.
-    """
-
-    charge: float | None
-    potential: float
+    charge: float | None  #: free charge of the part; None if its potential is not prescribed
+    potential: float  #: mean over the part
 
 
 def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
-    """Return the charges by part at a state. Collective.
-
-    Raises
-    ------
-    InputError
-        If the body is not piezoelectric.
-    """
+    """Return the charges by part at a state; InputError without piezoelectricity. Collective."""
     _demand_potential(problem)
     body, time = problem.body, state.time
     d, bs = problem.dim, body.block_size
@@ -288,13 +254,7 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
 
 
 def mean_potential(problem: ContactProblem, state: State, part: str) -> float:
-    """Return the mean potential over a part of the boundary. Collective.
-
-    Raises
-    ------
-    InputError
-        If the body is not piezoelectric or has no such part.
-    """
+    """Return the mean potential over a part; InputError without potential or part. Collective."""
     _demand_potential(problem)
     body = problem.body
     _, phi = body.split(body.function(state.x))

@@ -74,10 +74,7 @@ class StepRecord:
 
 
 class StepRecorder:
-    """Makes the records of one step after the other, from the last of a run that goes on.
-
-    Collective.
-    """
+    """Makes the records of steps in turn, from the last one of an earlier run. Collective."""
 
     def __init__(self, problem: ContactProblem, last: StepRecord | None = None) -> None:
         self._problem, self._before = problem, Balance.rest(problem)
