@@ -82,13 +82,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
-    """Split a command line into our options and PETSc's.
-
-    Raises
-    ------
-    InputError
-        If it is not understood.
-    """
+    """Split a command line into our options and PETSc's; InputError if it is not understood."""
     given = [SHORT.get(argument, argument) for argument in arguments]
     options, rest = parser()[0].parse_known_args(given)
     known = [f"--{name}" for name in vars(options) if name not in POSITIONAL]

@@ -110,14 +110,7 @@ def solve_and_keep(
 ) -> Solution:
     """Solve a case; one with load steps leaves a checkpoint of each in a folder. Collective.
 
-    Parameters
-    ----------
-    case, monitor, comm
-        As `solve` takes them.
-    folder
-        Folder of the results.
-    restart
-        A folder with checkpoints of the same case, to continue from.
+    `restart` is a folder with checkpoints of the same case, to continue from.
     """
     if case.evolution is None or case.adapt is not None:
         return solve(case, monitor=monitor, comm=comm)

@@ -90,10 +90,7 @@ def _frames(solution: Solution) -> list[Frame]:
 
 
 def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> None:
-    """Write files of the main fields and of the contact part for each step, and of their names.
-
-    These are ``fields.pvd`` and ``contact.pvd``.
-    """
+    """Write main fields and contact part of each step, with ``fields.pvd`` and ``contact.pvd``."""
     problem = solution.problem
     derived = DerivedFields(problem.body, frames[0][1])
     names = (*SERIES, *problem.body.laws.names)
@@ -124,10 +121,7 @@ def body_share(
     names: Collection[str] | None = None,
     derived: DerivedFields | None = None,
 ) -> Grid:
-    """Return a body at a state with its fields of some names: this rank's share. Collective.
-
-    `derived` are the derived fields at the state, where they are at hand.
-    """
+    """Return this rank's share of a body at a state with its fields of some names. Collective."""
     body, d = problem.body, problem.dim
     space, derived = body.space, derived or DerivedFields(body, state)
     links, index_map = space.dofmap.list, space.dofmap.index_map

@@ -139,13 +139,7 @@ def _electric(table: Mapping[str, Any]) -> tuple[Array, Array]:
 
 @cache
 def library(path: Path = PACKAGED) -> Mapping[str, Entry]:
-    """Read a library: name -> entry, in the order of the file.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or an entry is none; the message names it.
-    """
+    """Read a library: name -> entry, in the order of the file; InputError names a wrong entry."""
     found = {}
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -173,13 +167,7 @@ def library(path: Path = PACKAGED) -> Mapping[str, Entry]:
 
 
 def find(name: str, path: Path = PACKAGED) -> Entry:
-    """Return a material by its name.
-
-    Raises
-    ------
-    InputError
-        As `library`, and if there is no such material: the message names the nearest one.
-    """
+    """Return a material by its name; an InputError names the nearest one."""
     known = library(path)
     if name in known:
         return known[name]
