@@ -63,10 +63,7 @@ def original_cells(mesh: Mesh) -> npt.NDArray[np.int64]:
 
 
 def facet_entities(mesh: Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """Exterior facets as pairs of a cell and a facet of it, to integrate over, flat.
-
-    The connectivities of facets to cells and back must be there.
-    """
+    """Return exterior facets as flat pairs (cell, local facet), of meshes with connectivities."""
     compute = fem.compute_integration_domains
     # The dimension of the entities is an argument up to 0.9 only.
     dim = (mesh.topology.dim - 1,) if "dim" in inspect.signature(compute).parameters else ()
@@ -234,10 +231,7 @@ ADVICE = (
 
 
 def blas_among(paths: Iterable[str]) -> tuple[str, str]:
-    """Return the name of the BLAS among the paths of loaded libraries, and its path.
-
-    The name is for instance "OpenBLAS", `REFERENCE` or "unknown"; the path of that is empty.
-    """
+    """Return name and path of the BLAS among loaded libraries; "unknown" and "" without one."""
     candidates = sorted({path for path in paths if not re.search(_PRIVATE, path)})
     for name, pattern in _LIBRARIES.items():
         for path in candidates:

@@ -102,10 +102,7 @@ class Returned(InputError):
 
 
 def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
-    """Return the value of a function as an array of a shape, by broadcasting, inside `naming`.
-
-    `each` has the accepted values in words: "one number ...".
-    """
+    """Return values, broadcast to a shape, inside `naming`; `each`: the accepted ones in words."""
     if type(values) is np.ndarray and values.dtype == float and values.shape == shape:
         return values.copy()
     try:
@@ -150,15 +147,7 @@ def naming(name: str) -> Iterator[None]:
 
 
 class OfTime:
-    """A user's function of time.
-
-    Attributes
-    ----------
-    function
-        The function.
-    name
-        Its name in messages.
-    """
+    """A user's function of time, and its name in messages."""
 
     names = frozenset({"t"})  # as of formulas
 
@@ -206,21 +195,9 @@ def check_slope(
     slope: Callable[[Array], Array | float],
     at: Array,
 ) -> None:
-    """Compare a derivative with central differences.
+    """Compare a derivative with central differences at arguments other than 0, shape (n,).
 
-    Parameters
-    ----------
-    name
-        Of the derivative, for messages.
-    function, slope
-        The function and its derivative, of arrays.
-    at
-        Arguments other than 0, shape (n,).
-
-    Raises
-    ------
-    InputError
-        If they differ at `SHARE` of the samples or more, or the object has no derivative.
+    InputError, with `name`, if they differ at `SHARE` of the samples or more, or there is none.
     """
     h = STEP * np.abs(at)
     every = sampled(

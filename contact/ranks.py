@@ -57,25 +57,13 @@ def collective(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[S
 
 
 def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
-    """Run an action on rank 0; broadcast its result, or raise its error on all. Collective.
-
-    Raises
-    ------
-    InputError
-        Also for an OSError: see `refused`.
-    """
+    """Run an action on rank 0; broadcast its result or raise its error (`refused`). Collective."""
     result = on_each(comm, lambda: action() if comm.rank == 0 else None)
     return comm.bcast(result)  # type: ignore[no-any-return]
 
 
 def on_each(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
-    """Run an action on each rank; raise the error of one on all. Collective.
-
-    Raises
-    ------
-    InputError
-        Also for an OSError: see `refused`.
-    """
+    """Run an action on each rank; raise the error of one (`refused`) on all. Collective."""
     result: Any = None
     with on_all_ranks(comm):
         try:
@@ -86,10 +74,7 @@ def on_each(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
 
 
 def summed(comm: MPI.Comm, values: ArrayLike) -> Array:
-    """Return the sums of an array over all ranks. Collective.
-
-    As a buffer: pickled, a number of NumPy takes twenty times as long.
-    """
+    """Sum an array over all ranks; by buffers, 20 times as fast as pickled. Collective."""
     sums = np.array(values, dtype=np.float64, order="C")
     comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
     return sums
@@ -107,19 +92,9 @@ def exchanged(
 ) -> tuple[NDArray[Any], ...]:
     """Send rows of arrays to ranks, and return the received rows. Collective.
 
-    Parameters
-    ----------
-    comm
-        Communicator.
-    ranks
-        Destination of each row, shape (n,).
-    arrays
-        Shapes (n, ...); types and shapes of the rows are the same on all ranks.
-
-    Returns
-    -------
-    The source of each row, ascending, shape (m,), and the rows in the order in which they were
-    sent, shapes (m, ...).
+    Given the destination of each row, shape (n,), and arrays (n, ...), of the same types and shapes
+    of rows on all ranks. Returned are the source of each row, ascending, shape (m,), and the rows
+    in the order in which they were sent, shapes (m, ...).
     """
     counts = np.bincount(ranks, minlength=comm.size)
     coming = np.empty_like(counts)
@@ -137,10 +112,7 @@ def exchanged(
 
 
 def bounding_boxes(comm: MPI.Comm, points: Array) -> Array:
-    """Return the lower and upper corners of the points of each rank, (ranks, 2, d). Collective.
-
-    Without points, upper corners are below lower ones.
-    """
+    """Return corners of each rank's points, (ranks, 2, d); upper < lower if none. Collective."""
     none = np.full(points.shape[1], np.inf)
     own = [points.min(axis=0), points.max(axis=0)] if len(points) else [none, -none]
     found = np.empty((comm.size, 2, points.shape[1]))
@@ -153,20 +125,9 @@ def neighbours(
 ) -> Array:
     """Return values at points of any rank in the bounding box of this one's. Collective.
 
-    Parameters
-    ----------
-    comm
-        Communicator.
-    points, values
-        Those of this rank, shapes (n, d) and (n, k).
-    reach
-        Width by which the box is enlarged (length).
-    asked
-        Points of this rank whose box it is; by default `points`.
-
-    Returns
-    -------
-    In the order of the ranks, shape (near, k).
+    Points (n, d) and values (n, k) are those of this rank; the box is that of the points `asked`
+    (by default all of them), enlarged by `reach` (length). Shape (near, k), in the order of the
+    ranks.
     """
     rows = [
         np.flatnonzero(np.all((points >= lower - reach) & (points <= upper + reach), axis=1))

@@ -108,10 +108,7 @@ def default_start(
 def nested_start(
     case: Case, problem: ContactProblem, **replacements: Unpack[Replacements]
 ) -> State:
-    """Solve on all coarser meshes, each from the one before, and carry that to a problem's.
-
-    Collective.
-    """
+    """Solve on coarser meshes, each from the one before, and transfer to a problem. Collective."""
     layout, solver = problem.body.layout, case.solver
     newton = solver if isinstance(solver, NewtonOptions) else NewtonOptions()
     levels, linear = newton.nested_levels, solver.linear
@@ -145,10 +142,7 @@ def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State
 
 
 def _interpolate(nodes: ContactNodes, values: Array, at: Array) -> Array:
-    """Interpolate between the d nearest nodes, weighted by the inverse of the distance. Collective.
-
-    On nested edges that is linear interpolation.
-    """
+    """Interpolate the d nearest nodes by inverse distance (linear on nested edges). Collective."""
     rows, d = np.column_stack([nodes.points, values]), nodes.dim
     nearest = np.arange(1, min(d, nodes.size) + 1)
     # No multiple of the spacing, at which rounding would choose the ranks that send a row of nodes.
@@ -324,10 +318,7 @@ def grown(
 
 
 def indicators(solution: Solution) -> tuple[Array, float]:
-    """Return eta_K^2 of the owned cells and the relative error, the largest of all steps.
-
-    Collective.
-    """
+    """Return eta_K^2 of owned cells and relative error, the largest of all steps. Collective."""
     assert solution.error is not None
     squares, error = solution.error.squares, solution.error.relative
     for record in solution.steps[:-1]:

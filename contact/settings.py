@@ -31,16 +31,10 @@ class Fault(InputError):
 def fault(key: str, given: Any, accepted: str, identifier: str = "") -> InputError:
     """Return an error for a validator to raise.
 
-    Parameters
-    ----------
-    key
-        Dotted path below the model that raises it; empty for the value of the model itself.
-    given
-        The given value of the case file, or words inside `Words`.
-    accepted
-        The accepted values, in words.
-    identifier
-        See `InputError`; by default that of a missing key, or of a wrong value.
+    `key` is the dotted path below the model that raises it, empty for the model's own value;
+    `given` the value of the case file, or words inside `Words`; `accepted` the accepted values in
+    words. By default the `identifier` of an `InputError` is that of a missing key, or of a wrong
+    value.
     """
     identifier = identifier or ("missing" if given is MISSING else "value")
     words = given if isinstance(given, Words) else f"given {shown(given)}"
@@ -58,18 +52,10 @@ def keys_in(location: tuple[int | str, ...]) -> list[str]:
 
 @dataclass(frozen=True)
 class Accepted:
-    """The accepted values of a type in words, which its errors then have.
-
-    Attributes
-    ----------
-    text
-        The words.
-    key
-        Of kinds of tables the key that tells them apart.
-    """
+    """The accepted values of a type in words, which its errors then have."""
 
     text: str
-    key: str = ""
+    key: str = ""  #: of kinds of tables: the key that tells them apart
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         """Wrap the validation of the type."""
@@ -90,14 +76,9 @@ class Accepted:
 
 @dataclass(frozen=True)
 class OrOwn:
-    """Marks a union of a kind that a table has, the first one, with objects of Python.
+    """Marks a union of a kind that a table has, the first one, with objects of Python."""
 
-    Attributes
-    ----------
-    own
-        The class of these objects, or a function that tells them; they are taken as they are.
-    """
-
+    #: Their class, or a function that tells them; these objects are taken as they are.
     own: Callable[[Any], object]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
@@ -112,21 +93,12 @@ class OrOwn:
 
 @dataclass(frozen=True)
 class ReadWith:
-    """Condition on another setting for this one to be read.
+    """Condition on another setting for this one to be read."""
 
-    Attributes
-    ----------
-    key
-        The other setting.
-    value
-        Its value, or several; None for any that is given.
-    required
-        Whether this setting is then required.
-    """
-
-    key: str
+    key: str  #: the other setting
+    #: Its value, or several; None for any that is given.
     value: str | bool | tuple[str, ...] | None = None
-    required: bool = False
+    required: bool = False  #: whether this setting is then required
 
     def met(self, value: object) -> bool:
         """Tell whether a value of the other setting meets the condition."""

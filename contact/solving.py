@@ -256,16 +256,9 @@ def solve_problem(
     """Solve a problem in one step or in several; `reviewed` gives the warnings. Collective.
 
     A signal or a step that fails ends the steps; all complete ones remain, with the outcome of the
-    one that has ended them.
-
-    Parameters
-    ----------
-    start, guess
-        Initial guess of a single step, None for zero, and its name in messages.
-    times
-        Begin and ends of the load steps; none for a single step to the problem's own time.
-    kept, keep
-        Records of the steps of an earlier run, to continue from; called with that of each step.
+    one that has ended them. `start` (None for zero), named by `guess`, is for a single step;
+    `times` are begin and ends of load steps. `kept` are the records of the steps of an earlier run,
+    to continue from, and `keep` is called with that of each step.
     """
     clock = time.perf_counter()
     check_variables(problem.body)
@@ -332,10 +325,8 @@ def _take_steps(
 ) -> tuple[ContactProblem, State, Outcome, list[Record]]:
     """Take load steps, and append the records of those that converge. Collective.
 
-    Returns
-    -------
-    The last step that is recorded, or the iterate of the first one if none is; the outcome of the
-    last one, with the time that was reached; and the outer iterations of all.
+    Returned are the last step that is recorded, or the iterate of the first one if none is, the
+    outcome of the last one, with the time that was reached, and the outer iterations of all.
     """
     recorder = StepRecorder(problem, records[-1] if records else None)
     history, outcome, begin, end = list[Record](), None, times[0], times[-1]
@@ -396,10 +387,7 @@ def _checked(
     start: State | None,
     replacements: Mapping[str, object],
 ) -> tuple[Case | ContactProblem, Options]:
-    """Return the case, read from its file, or the problem, and the options of its method.
-
-    Arguments of other types, and those that would be ignored, are refused. Collective.
-    """
+    """Return the case or problem, and options; refuse wrong or ignored arguments. Collective."""
     fits = isinstance(case, Case | ContactProblem | str | Path)
     expect("solve", case, "a case, the name of a case file, or a Problem", fits)
     _check_types(settings, monitor, start)
@@ -430,10 +418,7 @@ def _checked(
 def _checked_times(
     problem: ContactProblem, times: Sequence[float] | Array, begin: float
 ) -> tuple[float, ...]:
-    """Return the ends of steps; refuse times that do not increase, and contradictory supports.
-
-    Collective.
-    """
+    """Return the ends of steps; refuse decreasing ones, contradictory supports. Collective."""
     given = [*times] if isinstance(times, Iterable) and not isinstance(times, str) else []
     numbers = len(given) > 0 and all(isinstance(time, Real) for time in given)
     expect("times", times, "a list of times, the ends of the steps", numbers)

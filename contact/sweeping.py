@@ -155,26 +155,9 @@ def sweep(
 ) -> list[dict[str, Any]]:
     """Solve a case for all combinations of values; write a row of ``sweep.csv`` after each.
 
-    Parameters
-    ----------
-    path, overrides
-        The case file, and values that replace some of its own.
-    axes
-        The varied keys; the last one fastest.
-    folder
-        Folder of the table.
-    monitor
-        Called after every outer iteration.
-    comm
-        Communicator of the mesh.
-    warm
-        Whether each solve has the solution before it as warm start.
-    columns
-        Further columns, as `summary_columns` takes them.
-
-    Returns
-    -------
-    The rows. Collective.
+    The `overrides` replace values of the case file, the last one of the `axes` varies fastest,
+    `warm` solves have the solution before as warm start, and `columns` are further ones, as in
+    `summary_columns`. Returns the rows. Collective.
 
     Raises
     ------
