@@ -63,14 +63,7 @@ def interface_residuals(
 
     The `worst` of the connected components, each relative to max(|p|, 1e-4 c_0 |g|) with
     p = -sigma_nu, norms in L2(Gamma_3): g is |g_N|, at most the displacement of the node and the
-    size.
-
-    Parameters
-    ----------
-    interface, jump, multipliers, bound
-        The laws, jumps and multipliers at the nodes, and the friction bound, shape (n,).
-    rounding
-        Rounding of the pressures of each component, in L2(Gamma_3).
+    size. `rounding` is that of the pressures of each component, in L2(Gamma_3).
     """
     c_r, normal_gap = interface.c_r, interface.normal_gap(jump)
     contact = multipliers.contact - project_half_line(multipliers.contact - c_r * normal_gap)
@@ -155,22 +148,10 @@ def linearise(
     parameters: ComplementarityParameters,
     bound: LinearisedBound,
 ) -> tuple[Multipliers, Array]:
-    """Linearise the complementarity functions at an iterate, (19a)-(19d). Collective.
+    """Return lambda^0 and the blocks B of the linearised functions, (19a)-(19d). Collective.
 
-    Parameters
-    ----------
-    interface, jump, multipliers
-        The contact nodes with their laws, the jumps there, and the contact forces.
-    active
-        Active set: the pieces of the functions.
-    parameters
-        Of the complementarity functions.
-    bound
-        The friction bound with its derivatives.
-
-    Returns
-    -------
-    The multipliers lambda^0, and the blocks B, shape (n, block size, block size), without weights.
+    The active set selects the pieces of the complementarity functions. B has the shape
+    (n, block size, block size), without weights.
     """
     nodes, normal_gap, gamma = interface.nodes, interface.normal_gap(jump), parameters.gamma
     n, d = nodes.normal, nodes.dim

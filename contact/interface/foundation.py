@@ -331,13 +331,8 @@ class FoundationLaw:
     def charge_block(self, jump: Array, pressure: Array, full: bool = False) -> Array:
         """Return the derivative of the charge in `force`, shape (n, block size, block size).
 
-        Parameters
-        ----------
-        jump, pressure
-            Jumps T x (`ContactNodes.jump`) and pressures.
-        full
-            With the derivative of psi by the gap, not symmetric. Else psi is frozen, and a lagged
-            charge has no derivative, as in the fixed point.
+        With that of psi by the gap, not symmetric, if `full`. Else psi is frozen, and a lagged
+        charge has no derivative, as in the fixed point.
         """
         d, bs = self.nodes.dim, self.nodes.block_size
         total = np.zeros((jump.shape[0], bs, bs))

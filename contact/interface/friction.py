@@ -50,16 +50,10 @@ ANGLES = 32
 class Smoothing:
     """(R p)(x) = sum_j omega_r(|x - x_j|) w_j p_j / sum_j omega_r(|x - x_j|) w_j.
 
-    omega_r(s) = exp(r^2/(s^2 - r^2)) for s < r. The division makes R reproduce a constant
-    pressure exactly, at the ends of Gamma_3 too. On a body of revolution omega is averaged over
-    the rings of the nodes x_j.
-
-    Parameters
-    ----------
-    nodes
-        The contact nodes, those of other ranks within the radius included.
-    radius
-        The radius r >= 0 (length); 0 gives the identity.
+    omega_r(s) = exp(r^2/(s^2 - r^2)) for s < r, and x_j are the contact nodes of all ranks; the
+    radius r = 0 (length) gives the identity. The division makes R reproduce a constant pressure
+    exactly, at the ends of Gamma_3 too. On a body of revolution omega is averaged over the rings of
+    the nodes x_j.
     """
 
     def __init__(self, nodes: ContactNodes, radius: float) -> None:
@@ -144,11 +138,8 @@ def _ring_mean(points: Array, others: Array, radius: float) -> Array:
 def law_at(friction: Friction, nodes: ContactNodes) -> FrictionLaw | None:
     """Return the law at contact nodes; None without friction. Collective.
 
-    Raises
-    ------
-    InputError
-        If a bound or coefficient is negative or no number at a node, or without slip; or a wrong
-        derivative, maximum or Lipschitz constant.
+    Refuses bounds and coefficients that are negative or no number at a node, or without slip, and
+    wrong derivatives, maxima and Lipschitz constants.
     """
     given: Any = friction.mu
     if friction.law == "none":
@@ -237,20 +228,11 @@ class NodalFriction:
     """Friction at the owned contact nodes, in a step of an evolution.
 
     Its methods take slips of the step; the law depends on the accumulated slip.
-
-    Attributes
-    ----------
-    law
-        The friction bound, for all nodes at once; None without friction.
-    smoothing
-        The operator R (`Smoothing`) of each contact.
-    history
-        The slip before the step.
     """
 
-    law: FrictionLaw | None
-    smoothing: GroupedSmoothing
-    history: SlipHistory
+    law: FrictionLaw | None  #: the friction bound, for all nodes at once; None without friction
+    smoothing: GroupedSmoothing  #: the operator R (`Smoothing`) of each contact
+    history: SlipHistory  #: the slip before the step
 
     @property
     def acts(self) -> bool:

@@ -33,18 +33,10 @@ LawType = TypeVar("LawType")
 
 @dataclass(frozen=True)
 class Grouped(Generic[LawType]):
-    """Laws of groups of nodes; values are those of each law at its own nodes.
+    """Laws of groups of nodes; values are those of each law at its own nodes."""
 
-    Attributes
-    ----------
-    laws
-        The law of each group.
-    offsets
-        Where the groups begin on this rank, and the number of all nodes.
-    """
-
-    laws: tuple[LawType, ...]
-    offsets: tuple[int, ...]
+    laws: tuple[LawType, ...]  #: the law of each group
+    offsets: tuple[int, ...]  #: where the groups begin on this rank, and the number of all nodes
 
     @classmethod
     def of(cls, laws: Iterable[LawType], nodes: Sequence[ContactNodes]) -> Self:
@@ -187,12 +179,7 @@ def joined_fixed_conducting(
 ) -> FoundationLaw | None:
     """Return the law at the fixed conducting nodes of all contacts; None without conductors.
 
-    Parameters
-    ----------
-    given, geometries, law
-        The conductors, the geometries, and the law at contact nodes.
-    begin
-        Global number of the first node of this rank.
+    `law` is that at the contact nodes, `begin` the global number of the first node of this rank.
     """
     there = [
         (geometry.fixed_conducting, own)

@@ -191,12 +191,7 @@ class Interface:
     ) -> ActiveSet:
         """Return the active set: open, stick, slip.
 
-        Parameters
-        ----------
-        jump, multipliers, bound
-            Jumps, multipliers and friction bound.
-        c, rounding
-            As in `constraint_active`; c_0 by default.
+        `c` and `rounding` are those of `constraint_active`; c_0 by default.
         """
         c = self.c_0 if c is None else c
         closed = constraint_active(multipliers.contact, self.normal_gap(jump), c, rounding)
@@ -264,12 +259,8 @@ class Interface:
     def weighted(self, blocks: Array, x: Array) -> Array:
         """Return the blocks of the operator at `coupled`: those of the contact nodes, times weight.
 
-        Parameters
-        ----------
-        blocks
-            Derivatives of nodal forces, without weights, shape (n, block size, block size).
-        x
-            Local unknowns.
+        The given ones are derivatives of nodal forces, shape (n, block size, block size), without
+        weights.
         """
         if self.proximal is not None:
             blocks = blocks.copy()

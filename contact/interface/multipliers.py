@@ -102,12 +102,8 @@ def constraint_active(
 ) -> NDArray[np.bool_]:
     """Return where the non-penetration constraint is active, lambda_c - c g_N > 0: shape (n,).
 
-    Parameters
-    ----------
-    lambda_c, normal_gap
-        Multiplier of the unilateral constraint, and g_N = gap - u_nu, shape (n,).
-    c, rounding
-        Complementarity parameter (stress/length), and tolerance (stress).
+    g_N = gap - u_nu; c is the complementarity parameter (stress/length), and `rounding` a tolerance
+    of lambda_c - c g_N (stress).
     """
     return np.greater(lambda_c - c * normal_gap, rounding)
 
@@ -140,16 +136,8 @@ class ActiveSet:
     ) -> ActiveSet:
         """Return the states of nodes with friction: |lambda_f + c u_tau| <= s sticks.
 
-        Parameters
-        ----------
-        closed
-            Where the non-penetration constraint is active, shape (n,).
-        friction, slip
-            lambda_f and the slip of the step, shape (n, d).
-        bound
-            Friction bound s, shape (n,).
-        c, rounding
-            As in `constraint_active`.
+        lambda_f and u_tau, the slip of the step, have the shape (n, d), the friction bound s has
+        (n,); c and `rounding` are those of `constraint_active`.
         """
         # At the bound and without slip yet a node sticks, to rounding.
         allowed = bound * (1 + 100 * EPS) + rounding

@@ -34,21 +34,11 @@ def unit_vectors(vectors: Array) -> Array:
 def contact_directions(
     normal: Array, movable: Array, given: NDArray[np.bool_] | bool = True
 ) -> tuple[Array, Array]:
-    """Return the admissible normals, and the projectors onto the directions of friction.
+    """Return `admissible_normal` and `tangent` of `ContactNodes`, shapes (n, d) and (n, d, d).
 
-    Parameters
-    ----------
-    normal
-        Contact directions, with an unconstrained part each, shape (n, d).
-    movable
-        Projectors onto the unconstrained directions, shape (n, d, d).
-    given
-        Whether supports alone prescribe the jumps along constrained directions, shape (n,): in
-        front of a foundation they do.
-
-    Returns
-    -------
-    `ContactNodes.admissible_normal` and `ContactNodes.tangent`, shapes (n, d) and (n, d, d).
+    The contact directions, (n, d), have an unconstrained part each; `movable` are the projectors
+    onto the unconstrained directions, (n, d, d). `given` says whether supports alone prescribe the
+    jumps along constrained directions, (n,): in front of a foundation they do.
     """
     admissible = np.einsum("nij,nj->ni", movable, normal)
     length = np.linalg.norm(admissible, axis=1)[:, None]
@@ -228,18 +218,8 @@ def joined_nodes(
 ) -> ContactNodes:
     """Return the nodes of all contacts, one contact after the other. Collective.
 
-    Parameters
-    ----------
-    geometries, parts
-        Of each contact, and the names of the parts that the nodes are of.
-    body
-        The bodies.
-
-    Raises
-    ------
-    InputError
-        If two contacts share nodes, a node is on both sides of pairs of bodies, or one whose jump
-        is a sum is on a roller.
+    Refuses contacts that share nodes, nodes on both sides of pairs of bodies, and nodes on a roller
+    whose jump is a sum. `parts` are the names of the parts that the nodes are of.
     """
     _refuse_shared(geometries, parts)
     pieces = [geometry.nodes for geometry in geometries]

@@ -48,18 +48,10 @@ def overlap_depths(
 ) -> tuple[list[Depths], Unpaired]:
     """Return how deep bodies lie in each other. Collective.
 
-    Parameters
-    ----------
-    body
-        The bodies.
-    pairs
-        Both parts of each, and whether it presses overlaps apart.
-
-    Returns
-    -------
-    The largest depths that curvature does not explain (length), 0 for rounding, of the bodies of
-    each pair: at its sides, but where another pair presses, and where there is no side of any pair;
-    and those above rounding of bodies that no pair keeps apart.
+    `pairs` are both parts of each, and whether it presses overlaps apart. The first result are the
+    largest depths that curvature does not explain (length), 0 for rounding, of the bodies of each
+    pair: at its sides, but where another pair presses, and where there is no side of any pair; the
+    second are those above rounding of bodies that no pair keeps apart.
     """
     if body.components[1] == 1:
         return [(0.0, 0.0)] * len(pairs), {}
@@ -93,29 +85,15 @@ def overlap_depths(
 
 @dataclass(frozen=True)
 class _Boundaries:
-    """The boundaries of all bodies, which are the connected components of the mesh.
-
-    Attributes
-    ----------
-    body
-        The bodies.
-    facets, surface
-        Facets of the boundary that this rank owns, but on the axis of revolution, shape (f,).
-    component
-        Of each facet, shape (f,).
-    parts, sides
-        Both parts of each pair, and which facets are on either, shape (f, pairs, 2).
-    bodies
-        Which components each side is of, shape (pairs, 2, components).
-    """
+    """The boundaries of all bodies, which are the connected components of the mesh."""
 
     body: BodyEquilibrium
-    facets: NDArray[np.int32]
-    surface: Surface
-    component: Numbers
-    parts: Sequence[tuple[str, str]]
-    sides: NDArray[np.bool_]
-    bodies: NDArray[np.bool_]
+    facets: NDArray[np.int32]  #: of the boundary, owned, but on the axis of revolution, shape (f,)
+    surface: Surface  #: of these facets
+    component: Numbers  #: of each facet, shape (f,)
+    parts: Sequence[tuple[str, str]]  #: both parts of each pair
+    sides: NDArray[np.bool_]  #: which facets are on either, shape (f, pairs, 2)
+    bodies: NDArray[np.bool_]  #: which components each side is of, shape (pairs, 2, components)
 
     @staticmethod
     def of(body: BodyEquilibrium, parts: Sequence[tuple[str, str]]) -> _Boundaries:

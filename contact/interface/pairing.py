@@ -38,33 +38,16 @@ REACH = 0.25
 
 @dataclass(frozen=True)
 class PairPlacement:
-    """The contact of two bodies, its nodes chosen in the reference configuration.
+    """The contact of two bodies, its nodes chosen in the reference configuration."""
 
-    Attributes
-    ----------
-    body
-        Both bodies.
-    slave, master
-        The two sides in the reference configuration.
-    reach
-        Largest distance at which facets face each other (length).
-    no_multiplier, nodes
-        Global numbers of the slave nodes that carry no multiplier, and of those of this rank that
-        carry one (`couple`).
-    added
-        Gap that is added to that between the meshes, at these nodes, shape (n,) (length).
-    press
-        Whether overlaps in the reference configuration are interferences.
-    """
-
-    body: BodyEquilibrium
-    slave: Surface
-    master: Surface
-    reach: float
-    no_multiplier: NDArray[np.int64]
-    nodes: NDArray[np.int64]
-    added: Array
-    press: bool
+    body: BodyEquilibrium  #: both bodies
+    slave: Surface  #: the slave side in the reference configuration
+    master: Surface  #: the master side, likewise
+    reach: float  #: largest distance at which facets face each other (length)
+    no_multiplier: NDArray[np.int64]  #: global numbers of slave nodes without multiplier (`couple`)
+    nodes: NDArray[np.int64]  #: of those of this rank with one, shape (n,)
+    added: Array  #: added to the gap between the meshes, at these nodes, shape (n,) (length)
+    press: bool  #: whether overlaps in the reference configuration are interferences
 
     def at(self, displacement: Array) -> Geometry:
         """Return the geometry at a displacement of the owned nodes, shape (nodes, d). Collective.
@@ -128,36 +111,18 @@ def find_pair(
 ) -> tuple[PairPlacement, Geometry]:
     """Choose the nodes of a part that may touch another one, in the reference place. Collective.
 
-    A node whose normal is fixed by a Dirichlet condition is left out, and its multiplier is
-    handed over to its neighbours. With friction that is so too where a tangential component is
-    fixed, but not on the other side, on which it would act; where both are, or there is no
-    friction, it is removed from the tangent projector. Nodes that face nothing are left out.
+    A node whose normal is fixed by a Dirichlet condition is left out, and its multiplier is handed
+    over to its neighbours. With friction that is so too where a tangential component is fixed, but
+    not on the other side, on which it would act; where both are, or there is no friction, it is
+    removed from the tangent projector. Nodes that face nothing are left out.
 
-    Parameters
-    ----------
-    body, part, against
-        Whose nodes, and the part of the other body.
-    distance
-        Gap that is added to that between the meshes.
-    key
-        Name of the contact in messages.
-    press
-        Whether the bodies may overlap in the reference configuration, and press each other out.
-    friction
-        Whether there is friction between them.
-    overlap
-        Depths of the boundary of either body in the other, at the sides and beside those of all
-        pairs (`overlap_depths`) (length).
+    `distance` is added to the gap between the meshes; with `press` the bodies may overlap in the
+    reference configuration, and press each other out. `overlap` has the depths of the boundary of
+    either body in the other, at the sides and beside those of all pairs (`overlap_depths`)
+    (length). The geometry that is returned is that of the reference configuration.
 
-    Returns
-    -------
-    The placement, and its geometry in the reference configuration.
-
-    Raises
-    ------
-    InputError
-        If the parts share nodes or overlap, follow a rigid part, do not face each other, no
-        node can move, or supports along the part would take friction off the other side.
+    Refuses parts that share nodes or overlap, follow a rigid part or do not face each other, whose
+    nodes cannot move, and supports along the part that would take friction off the other side.
     """
     label = f"{key}.against: {part!r} and {against!r}"
     slave = surface_of(body.domain, body.space, part)

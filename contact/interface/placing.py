@@ -39,47 +39,26 @@ WITHIN = 20
 
 @dataclass(frozen=True)
 class Candidates:
-    """The owned nodes of a boundary part at a place, and the obstacle in front of them.
+    """The owned nodes of a boundary part at a place, and the obstacle in front of them."""
 
-    Attributes
-    ----------
-    nodes, weight
-        As in `ContactNodes`, whatever is fixed there.
-    places
-        Current positions of the nodes, shape (n, d) (length).
-    facing
-        Cosine between the contact direction and the body's normal, shape (n,).
-    front
-        Points from which gaps are measured, shape (n, d) (length): given gaps from the nodes, gaps
-        to a shape from the curved surface, as nodes in the middle of straight edges are on chords.
-    chord_penetration
-        Depth of the nodes, shape (n,) (length), in a shape that the curved surface, or the straight
-        facets, touch, and rounding.
-    direction, measured
-        The contact direction, shape (n, d), and the gap from `front`, shape (n,).
-    gap
-        From the curve through the corners, shape (n,).
-    unknown
-        The part of the deviation that gaps do not have, shape (n,); none at degree 1, whose nodes
-        are on the surface.
-    owners
-        The owners of the nodes.
-    jumps
-        Rows of the jumps; None where these are the nodal values.
-    """
-
-    nodes: NDArray[np.int32]
-    weight: Array
-    places: Array
-    facing: Array
+    nodes: NDArray[np.int32]  #: as in `ContactNodes`, whatever is fixed there
+    weight: Array  #: likewise
+    places: Array  #: current positions of the nodes, shape (n, d) (length)
+    facing: Array  #: cosine between the contact direction and the body's normal, shape (n,)
+    #: Points from which gaps are measured, shape (n, d) (length): given gaps from the nodes, gaps
+    #: to a shape from the curved surface, as nodes in the middle of straight edges are on chords.
     front: Array
+    #: Depth of the nodes, shape (n,) (length), in a shape that the curved surface, or the straight
+    #: facets, touch, and rounding.
     chord_penetration: Array
-    direction: Array
-    measured: Array
-    gap: Array
+    direction: Array  #: the contact direction, shape (n, d)
+    measured: Array  #: the gap from `front`, shape (n,)
+    gap: Array  #: from the curve through the corners, shape (n,)
+    #: The part of the deviation that gaps do not have, shape (n,); none at degree 1, whose nodes
+    #: are on the surface.
     unknown: Array
     owners: Owners
-    jumps: JumpRows | None
+    jumps: JumpRows | None  #: rows of the jumps; None where these are the nodal values
 
     def of_jumps(self, gap: Array) -> Array:
         """Return the gaps of the jumps, given those at the nodes. Collective.
@@ -98,14 +77,8 @@ def candidates(
 ) -> Candidates:
     """Return the nodes of a part at a place, and the obstacle as they see it. Collective.
 
-    Parameters
-    ----------
-    body, facets, obstacle
-        The body, the facets of the part at this place, and the obstacle.
-    displacement
-        Of the owned nodes, shape (nodes, d).
-    key
-        Name of the contact in messages.
+    The facets are those of the part at this place, the displacement is that of the owned nodes,
+    shape (nodes, d).
     """
     comm, lumped = body.comm, Lumping.of(facets).without_axis(facets)
     # Functions without a mean on Gamma_3 carry nothing: P2 vertices on the axis of revolution.
@@ -172,28 +145,16 @@ def _from_curve(
 
 @dataclass(frozen=True)
 class FoundationPlacement:
-    """The contact of a part with a rigid foundation, its nodes chosen in the reference place.
-
-    Attributes
-    ----------
-    body, part, facets, obstacle
-        Whose part, its facets in the reference configuration, and the obstacle.
-    key
-        Name of the contact in messages.
-    press
-        Whether overlaps in the reference configuration are interferences.
-    contact, fixed_conducting
-        Which nodes of the part are contact nodes, and which cannot move but conduct, shape (n,).
-    """
+    """The contact of a part with a rigid foundation, its nodes chosen in the reference place."""
 
     body: BodyEquilibrium
     part: str
-    facets: Surface
+    facets: Surface  #: of the part, in the reference configuration
     obstacle: Obstacle
-    key: str
-    press: bool
-    contact: NDArray[np.bool_]
-    fixed_conducting: NDArray[np.bool_] | None
+    key: str  #: name of the contact in messages
+    press: bool  #: whether overlaps in the reference configuration are interferences
+    contact: NDArray[np.bool_]  #: which nodes of the part are contact nodes, shape (n,)
+    fixed_conducting: NDArray[np.bool_] | None  #: which cannot move but conduct, shape (n,)
 
     def refuse_unresolved(self) -> None:
         """Refuse a shape that cuts facets between their nodes. Collective."""
@@ -271,27 +232,12 @@ def find_nodes(
     that are held is borne by the supports. Friction acts along the directions of
     `ContactNodes.tangent`.
 
-    Parameters
-    ----------
-    body, part, obstacle
-        Whose nodes, and the obstacle in front of them.
-    key
-        Name of the contact in messages.
-    press
-        Whether a shape may cut the body in the reference configuration.
-    conducts
-        Whether the foundation conducts: then nodes that cannot move carry charge too.
+    With `press` a shape may cut the body in the reference configuration, to which the geometry that
+    is returned belongs. Where the foundation `conducts`, nodes that cannot move carry charge too.
 
-    Returns
-    -------
-    The placement, and its geometry in the reference configuration.
-
-    Raises
-    ------
-    InputError
-        If no contact node is left on any rank, none sees the foundation, one has no contact
-        direction or a gap that is no number, or the foundation lies behind the contact part or
-        cuts the body in the reference configuration.
+    Refuses a part without a contact node on any rank, or without one that sees the foundation;
+    nodes without a contact direction, or with a gap that is no number; and foundations that lie
+    behind the contact part, or cut the body in the reference configuration.
     """
     comm, facets = body.comm, surface_of(body.domain, body.space, part)
     rest = np.zeros((body.layout.index_map.size_local, body.dim))

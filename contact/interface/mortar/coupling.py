@@ -52,29 +52,17 @@ class ModifiedDualBasis:
 
     These are nodes at crosspoints, or with Dirichlet conditions. With sum_j m_jk = 1 multipliers
     contain the constants.
-
-    Attributes
-    ----------
-    nodes
-        Global numbers of the nodes j of the functions on each facet, shape (f, k).
-    functions
-        The functions by the facet's own, shape (f, k, k).
     """
 
-    nodes: NDArray[np.int64]
-    functions: Array
+    nodes: NDArray[np.int64]  #: global numbers of the nodes j of each facet's functions, (f, k)
+    functions: Array  #: the functions by the facet's own, shape (f, k, k)
 
     @staticmethod
     def of(slave: Surface, no_multiplier: NDArray[np.int64]) -> ModifiedDualBasis:
-        """Return the basis without functions of some nodes. Collective.
+        """Return the basis without functions of some nodes, given by global numbers. Collective.
 
         m_jk is the same for the other nodes j of a facet; on one without any it is 1 for the
         nearest corner of another facet, of any rank.
-
-        Parameters
-        ----------
-        slave, no_multiplier
-            Facets of this rank, and the global numbers of their nodes without multiplier.
         """
         gone = np.isin(slave.nodes, no_multiplier)
         kept = ~gone
@@ -130,15 +118,7 @@ class Parts:
 
 
 def integrate(slave: Surface, opposite: Opposite, basis: ModifiedDualBasis) -> Parts:
-    """Integrate the dual functions of slave facets, alone and with the facets opposite.
-
-    Parameters
-    ----------
-    slave, opposite
-        Slave facets of this rank, and the master facets that they may face.
-    basis
-        The dual functions on the slave facets.
-    """
+    """Integrate the dual functions of slave facets, alone and with the facets opposite."""
     master = opposite.master
     direction, found = _facing(slave, opposite)
     change = dual_basis_transformation(slave.shape, slave.degree)
@@ -302,19 +282,10 @@ class Coupling(JumpRows):
     faces: Array
 
     def interference(self, owners: Owners, added: Array) -> tuple[float, bool]:
-        """Return the largest depth of the overlap less an added gap. Collective.
+        """Return the largest depth of the overlap less an added gap at nodes (length). Collective.
 
-        Parameters
-        ----------
-        owners
-            The owners of the nodes.
-        added
-            Gap that is added at the nodes, shape (n,) (length).
-
-        Returns
-        -------
-        The depth, and whether nodes have gaps below half of that, negative, wherever the overlap is
-        half as deep.
+        Also whether nodes have gaps below half of that, negative, wherever the overlap is half as
+        deep.
         """
         comm = owners.comm
         least = comm.allreduce(float(added.min(initial=np.inf)), op=MPI.MIN)
@@ -345,20 +316,12 @@ def couple(
     no_multiplier: NDArray[np.int64] = NOTHING,
     nodes: NDArray[np.int64] | None = None,
 ) -> Coupling:
-    """Integrate the dual mortar operator. Collective.
+    """Integrate the dual mortar operator on the facets that this rank owns. Collective.
 
-    Parameters
-    ----------
-    slave, master
-        The facets of both sides that this rank owns.
-    reach
-        Largest distance at which facets face each other (length).
-    no_multiplier
-        Global numbers of slave nodes without multiplier, at least those of this rank and of its
-        facets (`ModifiedDualBasis`).
-    nodes
-        Global numbers of the nodes of this rank with a multiplier, whether they face the master or
-        not; by default those that do.
+    Facets face each other up to the distance `reach` (length). `no_multiplier` has the global
+    numbers of slave nodes without multiplier, at least those of this rank and of its facets
+    (`ModifiedDualBasis`); `nodes` those of the nodes of this rank with one, whether they face the
+    master or not, by default those that do.
     """
     opposite = Opposite.of(slave, master, reach)
     parts = integrate(slave, opposite, ModifiedDualBasis.of(slave, no_multiplier))

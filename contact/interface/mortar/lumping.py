@@ -75,14 +75,9 @@ class JumpRows:
         return JumpRows(nodes, slaves, matrix, np.zeros(0, dtype=np.int64), none)
 
     def apply(self, owners: Owners, values: Array) -> Array:
-        """Return D times nodal values, shape (n, m). Collective.
+        """Return D times the values at `nodes`, all of their side, shape (n, m). Collective.
 
         Jumps made of infinite values are NaN.
-
-        Parameters
-        ----------
-        owners, values
-            The owners of the nodes, and the values at `nodes`, which are all of their side.
         """
         there = owners.values(self.slaves, lambda given: values[np.searchsorted(self.nodes, given)])
         with np.errstate(invalid="ignore"):

@@ -26,34 +26,16 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class CouplingOperator:
-    """The operator from nodal values to the jumps at contact nodes that are no nodal values.
+    """The operator from nodal values to the jumps at contact nodes that are no nodal values."""
 
-    Attributes
-    ----------
-    halo
-        The nodes of this rank and the ghosts in its rows.
-    jumps
-        Rows of this rank, shape (r, nodes).
-    change
-        Change of basis from nodal values to jumps.
-    numbers
-        Global numbers of their nodes, shape (r,).
-    between
-        Whether there are masters.
-    local
-        Local numbers of the nodes in jumps of any rank, shape (h,).
-    places, own
-        Positions of nodes of jumps among given nodes of this rank, and their rows, shape (k,).
-    """
-
-    halo: Halo
-    jumps: sparse.csr_array
-    change: BasisChange
-    numbers: NDArray[np.int64]
-    between: bool
-    local: NDArray[np.intp]
-    places: NDArray[np.intp]
-    own: NDArray[np.intp]
+    halo: Halo  #: the nodes of this rank and the ghosts in its rows
+    jumps: sparse.csr_array  #: rows of this rank, shape (r, nodes)
+    change: BasisChange  #: change of basis from nodal values to jumps
+    numbers: NDArray[np.int64]  #: global numbers of their nodes, shape (r,)
+    between: bool  #: whether there are masters
+    local: NDArray[np.intp]  #: local numbers of the nodes in jumps of any rank, shape (h,)
+    places: NDArray[np.intp]  #: positions of nodes of jumps among given nodes, shape (k,)
+    own: NDArray[np.intp]  #: and the rows of these, shape (k,)
 
     def at(self, numbers: NDArray[np.int64]) -> CouplingOperator:
         """Return the operator at other nodes of this rank, given their global numbers."""
@@ -83,24 +65,12 @@ def coupling_operator(
     nodes: tuple[NDArray[np.int32], Array],
     free: NDArray[np.bool_],
 ) -> CouplingOperator | None:
-    """Return the operator of all contacts; None where there are none. Collective.
+    """Return the operator of jumps that are no nodal values; None without any. Collective.
 
-    Parameters
-    ----------
-    comm, index_map
-        Communicator, and the nodes of the mesh.
-    given
-        The jumps that are no nodal values.
-    nodes
-        Local numbers of the contact nodes of this rank, shape (n,), and their unknowns by jumps,
-        shape (n, block size, block size): the free components of those of all others.
-    free
-        Which unknowns of the owned nodes are not fixed, shape (nodes, block size).
-
-    Raises
-    ------
-    InputError
-        If nodes of several contacts follow each other in a circle.
+    `nodes` are the local numbers of the contact nodes of this rank, shape (n,), and their unknowns
+    by jumps, shape (n, block size, block size): the free components of those of all others. `free`
+    is the mask of the unfixed unknowns of owned nodes, shape (nodes, block size). Refuses nodes of
+    several contacts that follow each other in a circle.
     """
     if not given:
         return None

@@ -29,24 +29,12 @@ DETOUR = 2.0
 
 @dataclass(frozen=True)
 class Opposite:
-    """The master facets opposite to slave facets of this rank.
+    """The master facets opposite to slave facets of this rank."""
 
-    Attributes
-    ----------
-    master
-        Master facets of all ranks.
-    near
-        Slave facets within the reach, shape (n,).
-    radius
-        Search radius around the centres of these, shape (n,) (length).
-    reach
-        Largest distance at which facets face each other (length).
-    """
-
-    master: Surface
-    near: NDArray[np.intp]
-    radius: Array
-    reach: float
+    master: Surface  #: master facets of all ranks
+    near: NDArray[np.intp]  #: slave facets within the reach, shape (n,)
+    radius: Array  #: search radius around the centres of these, shape (n,) (length)
+    reach: float  #: largest distance at which facets face each other (length)
 
     @staticmethod
     def of(slave: Surface, master: Surface, reach: float) -> Opposite:

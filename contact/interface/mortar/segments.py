@@ -33,17 +33,9 @@ from contact.typing import Array
 def clipped(polygons: Array, by: Array) -> tuple[Array, NDArray[np.intp]]:
     """Clip convex polygons by others (Sutherland and Hodgman, Comm. ACM 17, 1974).
 
-    Parameters
-    ----------
-    polygons, by
-        Corners of each in their order, either way round, shapes (n, k, 2) and (n, m, 2).
-
-    Returns
-    -------
-    polygons
-        Corners in their order, shape (n, k + m, 2); those beyond the number of corners are 0.
-    count
-        Number of corners, 0 where nothing is common, shape (n,).
+    Both are corners in their order, either way round, shapes (n, k, 2) and (n, m, 2). The result
+    has corners in their order, shape (n, k + m, 2), and their number, 0 where nothing is common,
+    (n,); corners beyond this number are 0.
     """
     n, k, _ = polygons.shape
     polygon = np.concatenate([polygons, np.zeros_like(by)], axis=1)
@@ -88,31 +80,18 @@ def _cut(polygon: Array, count: NDArray[np.intp], height: Array) -> tuple[Array,
 
 @dataclass(frozen=True)
 class Points:
-    """Quadrature points on common pieces.
+    """Quadrature points on common pieces."""
 
-    Attributes
-    ----------
-    slave, master
-        The facets that each point belongs to, shape (p,).
-    on_slave, on_master
-        Points of their reference facets, shape (p, dim).
-    weight
-        Quadrature weights, lengths or areas on the slave facet, or of its rings, shape (p,).
-    gap, curved_gap
-        Distance from the slave to the master facet along the slave's direction, and that of the
-        curved surfaces also where displacements do not follow these, shape (p,).
-    depth
-        Of the deepest overlap on each slave facet, of facets and of the surfaces that they
-        approximate; below 0 the least distance, shape (f,) (length).
-    """
-
-    slave: NDArray[np.intp]
-    master: NDArray[np.intp]
-    on_slave: Array
-    on_master: Array
-    weight: Array
-    gap: Array
+    slave: NDArray[np.intp]  #: the slave facet that each point belongs to, shape (p,)
+    master: NDArray[np.intp]  #: the master facet, likewise
+    on_slave: Array  #: points of the reference slave facets, shape (p, dim)
+    on_master: Array  #: points of the reference master facets, shape (p, dim)
+    weight: Array  #: quadrature weights, lengths or areas on the slave facet, or its rings, (p,)
+    gap: Array  #: distance from slave to master facet along the slave's direction, shape (p,)
+    #: That of the curved surfaces also where displacements do not follow these, shape (p,).
     curved_gap: Array
+    #: Of the deepest overlap on each slave facet, of facets and of the surfaces that they
+    #: approximate; below 0 the least distance, shape (f,) (length).
     depth: Array
 
 
@@ -124,14 +103,7 @@ def common_points(
 ) -> Points:
     """Return quadrature points on the intersections of pairs of facets.
 
-    Parameters
-    ----------
-    slave, master
-        The two sides.
-    pairs
-        The facets of each pair, shapes (n,).
-    direction
-        Along which a slave facet looks, unit vectors, shape (f, d).
+    A slave facet looks along its `direction`, a unit vector, shape (f, d).
     """
     i, j = pairs
     own, other = _on_planes(slave, i, direction[i], (slave.points[i], master.points[j]))

@@ -218,17 +218,13 @@ class Surface:
     def height(self, facets: NDArray[np.intp], at: Array) -> Array:
         """Return the height of the surface above points of straight facets, (p,).
 
-        Over an edge of the length L that is an arc of the sagitta f = c/4, whose height h over a
-        point is, with w = l_i l_j L^2 the product of the distances to the ends,
+        The points are those of the reference facet, shape (p, dim). Over an edge of the length L
+        that is an arc of the sagitta f = c/4, whose height h over a point is, with w = l_i l_j L^2
+        the product of the distances to the ends,
 
             h (h + 2 b) = w,     b = (L^2/4 - f^2)/(2 f),
 
         and on a facet the sum over its edges.
-
-        Parameters
-        ----------
-        facets, at
-            The facet of each point, shape (p,), and the points, shape (p, dim).
         """
         along, products = self._bubbles(at)
         sagitta, square = self.deviation[facets] / 4, self.edges[facets] ** 2
@@ -241,11 +237,6 @@ class Surface:
         """Return bounds of the height of a smooth surface above points of facets, (p,).
 
         Parts of an edge that has been refined are anywhere on its chord.
-
-        Parameters
-        ----------
-        facets, at
-            As of `height`.
         """
         if self.refined and self.order == 1:
             along, products = self._bubbles(self.shape.middle)
@@ -275,18 +266,10 @@ class Surface:
     def reconstructed(self, values: Array) -> tuple[NDArray[np.int64], Array]:
         """Return the third-order reconstruction of a function from its corner values. Collective.
 
-        The smoother of both, function and surface, has the larger weight (Jiang and Shu, as in
-        `deviations`).
-
-        Parameters
-        ----------
-        values
-            Values at the corners of facets, shape (f, c), infinite for none.
-
-        Returns
-        -------
-        The nodes of this rank, ascending, and at each the value, its weight against that on the
-        surface, from 0 to 1, and the unknown part; shape (n, 3).
+        These have the shape (f, c), infinite for none. The smoother of both, function and surface,
+        has the larger weight (Jiang and Shu, as in `deviations`). The result are the nodes of this
+        rank, ascending, and at each the value, its weight against that on the surface, from 0 to 1,
+        and the unknown part; shape (n, 3).
         """
         corners, places = self.nodes[:, : self.shape.corners], self.shape.nodes(self.degree)
         rise, other, _ = deviations(corners, self.points, self.normal, self.owners, values=values)
@@ -304,14 +287,8 @@ class Surface:
     def distance(self, facets: NDArray[np.intp], at: Array, direction: Array) -> Array:
         """Return the distance of the surface from points of straight facets along rays, (p,).
 
-        With the foot of each point of an arc beside the origin of its ray, to the fourth order.
-
-        Parameters
-        ----------
-        facets, at
-            As of `height`.
-        direction
-            Unit vectors, shape (p, d).
+        With the foot of each point of an arc beside the origin of its ray, to the fourth order. The
+        directions of the rays are unit vectors, shape (p, d), the points those of `height`.
         """
         found = np.zeros(len(at))
         if not self.deviation.any():
@@ -326,13 +303,7 @@ class Surface:
     def distance_bounds(
         self, facets: NDArray[np.intp], at: Array, direction: Array
     ) -> tuple[Array, Array]:
-        """Return the least and the largest distance of the surface from points, shapes (p,).
-
-        Parameters
-        ----------
-        facets, at, direction
-            As of `distance`.
-        """
+        """Return the least and the largest distance (`distance`) of the surface, shapes (p,)."""
         rise = np.einsum("pd,pd->p", self.normal[facets], direction)
         least, most = (height / rise for height in self.height_bounds(facets, at))
         if self.refined:
@@ -364,13 +335,7 @@ class Surface:
         return np.asarray(np.einsum("pkr,pkd->pdr", gradients, self.points[facets]))
 
     def normals(self, facets: NDArray[np.intp], slopes: Array) -> Array:
-        """Return unit normals at points of facets out of the body, shape (..., d).
-
-        Parameters
-        ----------
-        facets, slopes
-            The facets, shape (...), and dx/dxi there, shape (..., d, dim).
-        """
+        """Return unit normals out of the body, (..., d), of facets with dx/dxi, (..., d, dim)."""
         found = area_vectors(slopes)
         found /= np.linalg.norm(found, axis=-1, keepdims=True)
         sign = np.sign(np.einsum("...d,...d->...", found, self.normal[facets]))
@@ -378,13 +343,7 @@ class Surface:
 
 
 def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
-    """Return the facets of a part that this rank owns. Collective.
-
-    Raises
-    ------
-    InputError
-        If there is no such part.
-    """
+    """Return the facets of a part that this rank owns; refuse a missing part. Collective."""
     return straight_surface(domain, space, domain.facets(part)).with_deviations()
 
 
