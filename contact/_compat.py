@@ -109,11 +109,7 @@ def surface(grid: Any) -> Any:
 
 
 def keeps_inverted_blocks() -> bool:
-    """Whether PETSc takes a matrix's inverted nodal blocks for valid when its values change.
-
-    Since 3.25 MatInvertBlockDiagonal, and with it the preconditioner pbjacobi, forgets to renew
-    them.
-    """
+    """Whether PETSc (from 3.25 on) keeps inverted nodal blocks (pbjacobi) when values change."""
     return bool(PETSc.Sys.getVersion() >= (3, 25))
 
 

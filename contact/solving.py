@@ -418,7 +418,7 @@ def _checked(
 def _checked_times(
     problem: ContactProblem, times: Sequence[float] | Array, begin: float
 ) -> tuple[float, ...]:
-    """Return the ends of steps; refuse decreasing ones, contradictory supports. Collective."""
+    """Return ends of steps, which increase; refuse contradictory supports. Collective."""
     given = [*times] if isinstance(times, Iterable) and not isinstance(times, str) else []
     numbers = len(given) > 0 and all(isinstance(time, Real) for time in given)
     expect("times", times, "a list of times, the ends of the steps", numbers)

@@ -277,10 +277,7 @@ def gathered(comm: MPI.Intracomm, share: Grid) -> Grid | None:
 
 
 def write_vtu(path: Path, grid: Grid) -> None:
-    """Write a file; vectors of the plane get a third component 0. On one rank.
-
-    VTK's own writer may crash where the disk is full.
-    """
+    """Write a file, vectors in 3-D; VTK's own writer may crash on full disks. On one rank."""
     count = grid.cells.shape[1]
     kind, order = grid.shape.vtk(grid.shape.degree_of(count))
     cells = {

@@ -91,12 +91,7 @@ def solve_contact(
 ) -> End:
     """Solve one problem by Newton's steps, then by its fallbacks. Collective.
 
-    Parameters
-    ----------
-    semismooth, begin
-        The method on the problem, whole or condensed, and the initial guess.
-    condensed_steps
-        Steps on the condensed body, the last fallback of a whole problem that can be condensed.
+    Steps on the condensed body are the last fallback of a whole problem that can be condensed.
     """
     state, outcome = semismooth.iterate(begin, give_up=True)
     if outcome.converged and semismooth.modes.unconstrained_at(semismooth.problem, state):

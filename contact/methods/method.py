@@ -53,10 +53,7 @@ class Method(Protocol):
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate from a guess, zero by default, until convergence or a limit. Collective.
 
-        Raises
-        ------
-        InputError
-            If the linear system is singular.
+        InputError if the linear system is singular.
         """
 
 

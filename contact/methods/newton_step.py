@@ -53,27 +53,15 @@ SMALL = 0.1
 
 @dataclass(frozen=True)
 class LinearisedLaws:
-    """Contact, friction, layer and charge at the contact nodes, linearised for a step.
+    """Contact, friction, layer and charge at the contact nodes, linearised for a step."""
 
-    Attributes
-    ----------
-    active_set, unchanged
-        Active set of the step, and whether it is that of the last one, on all ranks.
-    multipliers, contact
-        lambda^0 and the blocks B of (19) in docs/algorithms.md.
-    layer, layer_shift
-        Blocks of the layer, and its linearised pressure at dx = 0 less its pressure, shape (n,).
-    charge
-        Blocks of the charge, or 0.
-    """
-
-    active_set: ActiveSet
-    unchanged: bool
-    multipliers: Multipliers
-    contact: Array
-    layer: Array
-    layer_shift: Array
-    charge: Array
+    active_set: ActiveSet  #: of the step
+    unchanged: bool  #: whether it is the active set of the last step, on all ranks
+    multipliers: Multipliers  #: lambda^0 of (19) in docs/algorithms.md
+    contact: Array  #: the blocks B of (19)
+    layer: Array  #: blocks of the layer
+    layer_shift: Array  #: its linearised pressure at dx = 0 less its pressure, (n,)
+    charge: Array  #: blocks of the charge, or 0
 
 
 class NewtonStep:

@@ -200,15 +200,9 @@ def at_retained_nodes(interface: Interface) -> Interface:
 class Condensation:
     """Linearisation of the whole problem and condensation onto the contact nodes.
 
-    Jumps are the unknowns of these nodes (`contact.linear.transformation`);
-    global unknowns q border the system, and are eliminated from the dense one.
-
-    Parameters
-    ----------
-    problem
-        The problem of the whole body.
-    counters
-        Counters of sparse factorisations and solves.
+    Jumps are the unknowns of these nodes (`contact.linear.transformation`); global unknowns q
+    border the system, and are eliminated from the dense one. The counters are those of sparse
+    factorisations and solves.
     """
 
     def __init__(self, problem: ContactProblem, counters: Counters) -> None:
@@ -359,10 +353,7 @@ class Condensation:
         return stiffness[own]
 
     def expand(self, condensed_problem: CondensedProblem, x: Array) -> Array:
-        """Return the increment of the whole body's owned unknowns. Collective.
-
-        Given the solution x of the condensed problem that `linearise` returned last.
-        """
+        """Return the whole body's owned increment by the last condensed problem's x. Collective."""
         self.counters.linear_solves += 1
         self.counters.linear_iterations += 1
         retained = np.concatenate(self.whole_problem.comm.allgather(x - condensed_problem.body.x_0))

@@ -92,10 +92,7 @@ class Group:
         return own.reshape(len(self.components), each, motions.shape[1])
 
     def translation(self, motion: Array) -> float | None:
-        """Return the amount of a motion, (m,), that is a translation along one axis; else None.
-
-        All parts that move do so by the same amount.
-        """
+        """Return the amount of a motion (m,) that moves parts alike along one axis; else None."""
         amounts = np.abs(motion)
         moving = amounts > 1e-6 * amounts.max()
         alike = np.ptp(motion[moving]) <= 1e-6 * amounts.max()

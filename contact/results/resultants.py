@@ -140,11 +140,7 @@ class DrivenPart:
 
     @staticmethod
     def of(problem: ContactProblem) -> DrivenPart | None:
-        """Return the driven part of a problem; None without any. Collective.
-
-        It is the first one whose displacement is prescribed as a function of time, or the first
-        one with a load.
-        """
+        """Return the part of the first displacement by a function of time, or load. Collective."""
         on = _driven(problem.description)
         if on is None:
             return None
