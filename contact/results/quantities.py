@@ -235,7 +235,7 @@ def values_of(file: str, given: Any, only: str = "") -> dict[str, Any]:
 
 
 def named_functionals(problem: ContactProblem) -> dict[str, Functional]:
-    """Return a problem's functionals by column; all have derivatives, see `Quantity`. Collective."""
+    """Return the functionals of a problem, which have derivatives, by column. Collective."""
     found: dict[str, Functional] = {}
     for quantity in QUANTITIES:
         if quantity.functional is not None:
