@@ -67,18 +67,9 @@ def tentative(matrix: PETSc.Mat, prefix: str) -> PETSc.Mat | None:
 class Aggregation:
     """The first coarse level of an operator K: the interpolation P, and P^T K P.
 
-    Smoothed aggregation (Vanek, Mandel and Brezina 1996). Each rank has its rows of P in a
-    sequential matrix. P^T K P is the sum of two products of each rank: with its own columns of K,
-    and with those of other ranks, which send their rows of P.
-
-    Parameters
-    ----------
-    matrix
-        The operator K.
-    tentative
-        P0, which is destroyed.
-    steps
-        Number of smoothing steps.
+    Smoothed aggregation (Vanek, Mandel and Brezina 1996); the tentative P0 is destroyed. Each rank
+    has its rows of P in a sequential matrix. P^T K P is the sum of two products of each rank: with
+    its own columns of K, and with those of other ranks, which send their rows of P.
     """
 
     def __init__(self, matrix: PETSc.Mat, tentative: PETSc.Mat, steps: int = 1) -> None:
@@ -427,17 +418,9 @@ class StiffNodes:
     gamma outweighs all couplings of a node in contact: GAMG would leave its sliding out of the
     coarse spaces, and coarse functions that move it against gamma are lost. The interpolation is
     therefore made once, for the body alone, and multiplied by (K + |B|)^-1 K at contact nodes, K
-    the nodal block of the body and B that of contact: equilibrium with the same neighbours.
-    |B| = (B^T B)^(1/2) keeps the factor bounded where friction falls with the slip.
-
-    Parameters
-    ----------
-    interpolation
-        This rank's rows of the interpolation of the body's operator; None without one.
-    block_size
-        Unknowns of a node.
-    nodes
-        Owned nodes with contact blocks, local numbers, shape (n,).
+    the nodal block of the body and B that of contact: equilibrium with the same neighbours. With
+    |B| = (B^T B)^(1/2) the factor is bounded where friction falls with the slip. `interpolation`
+    has this rank's rows for the body's operator; None without one.
     """
 
     def __init__(
@@ -517,18 +500,10 @@ PRICE = 8
 class Hierarchy:
     """The levels of GAMG for a sequence of operators.
 
-    The smoother of the finest level and the interpolation at contact nodes follow each operator.
-    The coarse operators, whose renewal costs `PRICE` iterations, are renewed once their age has
-    cost as many (ski rental), within a solve too. `ksp_max_it` holds for the whole solve.
-
-    Parameters
-    ----------
-    ksp
-        Solver with GAMG and the body's operator, not set up.
-    nodes
-        Owned nodes with contact blocks, local numbers, shape (n,).
-    subsystems
-        As of `refine`.
+    The smoother of the finest level and the interpolation at the owned nodes with contact blocks
+    follow each operator. The coarse operators, whose renewal costs `PRICE` iterations, are renewed
+    once their age has cost as many (ski rental), within a solve too. `ksp_max_it` holds for the
+    whole solve. `ksp` has GAMG and the body's operator, and is not set up.
     """
 
     def __init__(

@@ -67,21 +67,12 @@ ELECTRIC = {
 
 
 class BlockPreconditioner:
-    """The block-diagonal preconditioner of a piezoelectric operator, for MINRES or GMRES.
+    """The block-diagonal preconditioner of a piezoelectric operator.
 
-    K by GAMG with the rigid-body motions, L by hypre (or GAMG). It is assembled from a copy of the
-    operator whose electric rows are negated: its diagonal blocks are K and L, and PETSc's
-    fieldsplit looks at nothing else.
-
-    Parameters
-    ----------
-    ksp
-        The solver, which is set up for fieldsplit. Options under its prefix come first, for
-        instance ``-contact_fieldsplit_phi_pc_type gamg``.
-    layout
-        Unknowns with a potential.
-    symmetric
-        Whether the operator is symmetric: MINRES, else GMRES.
+    For MINRES, or GMRES if the operator is not symmetric: K by GAMG with the rigid-body motions, L
+    by hypre (or GAMG). It is assembled from a copy of the operator whose electric rows are negated:
+    its diagonal blocks are K and L, and PETSc's fieldsplit looks at nothing else. Options under the
+    solver's prefix come first, for instance ``-contact_fieldsplit_phi_pc_type gamg``.
     """
 
     def __init__(self, ksp: PETSc.KSP, layout: Layout, symmetric: bool) -> None:
@@ -207,21 +198,9 @@ class Operator(Protocol):
 class SparseOperator:
     """Bulk matrix plus nodal blocks, with one factorisation until either changes.
 
-    Parameters
-    ----------
-    bulk
-        Matrices of the body.
-    nodes
-        Owned nodes with blocks, local numbers, shape (n,).
-    symmetric
-        Whether the blocks are symmetric too: LDL^T instead of LU.
-    counters
-        Counters of factorisations and solves.
-    solver
-        "lu", "iterative", or "auto": iterative for large problems. "many", for hundreds of solves
-        with one matrix: iterative if LU has too little memory.
-    subsystems
-        Uncoupled subsystems; None for one.
+    `nodes` are the owned nodes with blocks, by local numbers; `symmetric` blocks mean LDL^T instead
+    of LU. `solver` is "lu", "iterative", or "auto": iterative for large problems; "many", for
+    hundreds of solves with one matrix: iterative if LU has too little memory.
     """
 
     def __init__(
@@ -276,23 +255,11 @@ class SparseOperator:
     def update(
         self, kind: str, state: LinearisationPoint, blocks: Array, *, reuse: bool = False
     ) -> bool:
-        """Assemble the operator at a state. Collective.
+        """Assemble the operator at a state; tell whether matrix or blocks have changed. Collective.
 
-        Parameters
-        ----------
-        kind
-            "secant" or "tangent".
-        state
-            Where the body is linearised.
-        blocks
-            Weighted blocks at the nodes, shape (n, block size, block size).
-        reuse
-            Whether to reuse the bulk matrix of the last call if its kind is the same; that of a
-            linear body always is.
-
-        Returns
-        -------
-        Whether matrix or blocks have changed.
+        `kind` is "secant" or "tangent", and the blocks are weighted, shape
+        (n, block size, block size). With `reuse` the bulk matrix is that of the last call if its
+        kind is the same; that of a linear body always is.
         """
         nodes, last = self._nodes, self._blocks
         same = kind == self._kind and (reuse or self.bulk.linear)
@@ -344,19 +311,8 @@ class SparseOperator:
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for an owned right-hand side; fixed unknowns stay 0. Collective.
 
-        Parameters
-        ----------
-        rhs
-            Owned right-hand side.
-        rtol
-            Relative tolerance of an iterative solver, its own by default.
-        guess
-            Initial guess of an iterative solver, owned unknowns; zero by default.
-
-        Raises
-        ------
-        InputError
-            If the operator is singular or its numbers overflow.
+        `rtol` is the relative tolerance of an iterative solver, its own by default, and `guess` its
+        initial guess, zero by default. Refuses singular operators, and numbers that overflow.
         """
         self._rhs.array[:] = self.layout.mask(rhs)
         self.ksp.setTolerances(rtol=self._tolerance if rtol is None else rtol)
@@ -399,13 +355,7 @@ class SparseOperator:
         return taken
 
     def solve_all(self, sides: Array) -> Array:
-        """Solve for several right-hand sides, shape (owned, k); counts as one solve. Collective.
-
-        Raises
-        ------
-        InputError
-            As `solve`.
-        """
+        """Solve for right-hand sides, (owned, k), as `solve`; counts as one solve. Collective."""
         given = np.column_stack([self.layout.mask(side) for side in sides.T])
         norm = float(np.sqrt(summed(self.layout.comm, np.sum(given**2))))
         if self.ksp.getPC().getFailedReason():

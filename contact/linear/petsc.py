@@ -163,18 +163,8 @@ def refine(
     """Correct a solution until |b - A x| <= sqrt(rtol) |b|, in each subsystem. Collective.
 
     The norms of the preconditioner and of the residual differ by about sqrt(rtol); beside a far
-    larger right-hand side a small subsystem is not seen.
-
-    Parameters
-    ----------
-    ksp
-        Solver with the matrix and the tolerance.
-    rhs, solution
-        b and x; x is corrected.
-    solve
-        Solver for another right-hand side, from zero.
-    subsystems
-        Uncoupled subsystems; None for one.
+    larger right-hand side a small subsystem is not seen. `solve` is a solver for other right-hand
+    sides, from zero.
     """
 
     def norms(vector: PETSc.Vec) -> Array:

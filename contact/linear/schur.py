@@ -57,19 +57,9 @@ def _mirror(matrix: Array) -> None:
 class SchurComplement:
     """Schur complement of a symmetric matrix at retained unknowns.
 
-    Parameters
-    ----------
-    matrix
-        The assembled matrix, for its pattern.
-    retained
-        Owned retained unknowns, local numbers; the result has them in rank order.
-    prefix
-        Prefix of PETSc options of the factorisation.
-
-    Attributes
-    ----------
-    size, offset
-        Number of retained unknowns, and offset of those of this rank.
+    A first matrix gives the pattern. The retained unknowns are owned, by local numbers; the result
+    has them in rank order: `size` on all ranks, those of this rank from `offset`. `prefix` is that
+    of PETSc options of the factorisation.
     """
 
     def __init__(self, matrix: PETSc.Mat, retained: NDArray[np.int32], prefix: str) -> None:
@@ -103,10 +93,7 @@ class SchurComplement:
     def complement(self, matrix: PETSc.Mat) -> Array:
         """Factorise, and return S on rank 0, by columns; NaN if singular. Collective.
 
-        Raises
-        ------
-        InputError
-            If there is too little memory.
+        Too little memory is an `InputError`.
         """
         first = self._rows is None
         self._rows = matrix.createSubMatrix(*self._places, self._rows)
@@ -280,18 +267,8 @@ def _forward(lower: Array, rhs: Array) -> Array:
 class DenseOperator:
     """A dense matrix plus nodal blocks; as `operator.SparseOperator`.
 
-    Parameters
-    ----------
-    comm
-        Communicator.
-    free
-        Which of the owned retained unknowns are free, shape (nodes, block size).
-    stiffness
-        The matrix, on the first rank.
-    counters
-        Counters of factorisations and solves.
-    inclined
-        Inclined directions of supports at retained nodes; None for none.
+    The matrix is on the first rank, and belongs to the retained unknowns of all ranks; `free` is
+    the mask of the free ones among those that this rank owns, shape (nodes, block size).
     """
 
     symmetric, iterative = False, False

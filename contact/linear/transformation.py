@@ -46,18 +46,10 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class BasisChange:
-    """A change of basis, x = Q y, that makes jumps unknowns.
+    """A change of basis, x = Q y, that makes jumps unknowns."""
 
-    Attributes
-    ----------
-    matrix
-        Q, the identity but for the nodes that jumps take the place of.
-    inverse
-        Its inverse.
-    """
-
-    matrix: PETSc.Mat
-    inverse: PETSc.Mat
+    matrix: PETSc.Mat  #: Q, the identity but for the nodes that jumps take the place of
+    inverse: PETSc.Mat  #: Q^-1
 
     @staticmethod
     def of(
@@ -72,19 +64,11 @@ class BasisChange:
         Jumps are T x, T = S + R with the diagonal S of the replaced nodes, and R without fixed
         unknowns: Q = T^-1 = (I + S^-1 R)^-1 S^-1, a finite sum, for S^-1 R is nilpotent.
 
-        Parameters
-        ----------
-        comm, halo
-            Communicator, and the nodes in the jumps.
-        rows
-            Replaced nodes of this rank, local numbers, shape (r,).
-        jumps
-            Jumps by nodal values of the halo, shape (r, nodes): of the node itself and of others,
-            replaced or not, without cycles.
-        unknowns
-            Unknowns by jumps, shape (r, block size, block size), the identity on the free
-            components of the node; and which unknowns of this rank's nodes are free, shape
-            (nodes, block size).
+        `rows` are local numbers of replaced nodes of this rank, (r,). `jumps` are given by nodal
+        values of the halo, (r, nodes): of the node itself and of others, replaced or not, without
+        cycles. `unknowns` are those by jumps, (r, block size, block size), the identity on the free
+        components of the node, and the mask of the free ones of this rank's nodes,
+        (nodes, block size).
         """
         made, free = unknowns
         (count, size), entries = free.shape, sparse.coo_array(jumps)
@@ -141,18 +125,10 @@ def _matrix(
 
 
 class Transformation:
-    """The matrix C of a body, x = C y.
+    """The matrix C of a body, x = C y, by the change of basis Q and the motions N_q.
 
-    Parameters
-    ----------
-    layout
-        The unknowns x.
-    change
-        Q; None for the identity.
-    motions
-        N_q, shape (owned, m); zero rows at fixed unknowns.
-    free
-        Which of q are free, shape (m,).
+    Q is None for the identity; N_q has the shape (owned, m), with zero rows at fixed unknowns, and
+    `free` is the mask of the free q, shape (m,).
     """
 
     def __init__(
@@ -194,22 +170,10 @@ class Transformation:
 
 
 class TransformedBulk:
-    """The matrices C^T K C of a body.
+    """The matrices C^T K C of a body; a first one at the state `rest` gives their pattern.
 
-    Parameters
-    ----------
-    bulk
-        K.
-    transformation
-        C.
-    rest
-        State of a first matrix, for its pattern.
-
-    Attributes
-    ----------
-    columns, corner
-        B = K^ N_q and E = N_q^T K^ N_q of the last matrix, with the terms of bolts; shapes
-        (owned, m) and (m, m).
+    `columns` and `corner` are B = K^ N_q, shape (owned, m), and E = N_q^T K^ N_q, (m, m), of the
+    last matrix, with the terms of bolts.
     """
 
     def __init__(
@@ -270,17 +234,9 @@ class TransformedBulk:
 class BorderedSolve:
     """Block elimination of q from K^ y^ + B q = f, B^T y^ + E q = g. Collective.
 
-    The Schur complement S = E - B^T inv(K^) B is inverted where anything resists q; the rest of q
-    is 0, and `regular` false.
-
-    Parameters
-    ----------
-    comm
-        Communicator.
-    columns, corner
-        B, shape (owned, m), and E, shape (m, m).
-    responses
-        inv(K^) B, shape (owned, m).
+    `columns` B and `responses` inv(K^) B have the shape (owned, m), the `corner` E has (m, m). The
+    Schur complement S = E - B^T inv(K^) B is inverted where anything resists q; the rest of q is 0,
+    and `regular` false.
     """
 
     def __init__(
@@ -299,15 +255,7 @@ class BorderedSolve:
 
 
 class TransformedOperator:
-    """C^T K C plus blocks at nodes of y; as `operator.SparseOperator`, in x.
-
-    Parameters
-    ----------
-    bulk
-        The body.
-    nodes, symmetric, counters, solver
-        As of `SparseOperator`.
-    """
+    """C^T K C plus blocks at nodes of y; as `operator.SparseOperator`, in x."""
 
     def __init__(
         self,
